@@ -1,6 +1,7 @@
 import lit from 'eslint-plugin-lit';
 import wc from 'eslint-plugin-wc';
 import tseslint from 'typescript-eslint';
+import { retiredNames } from './scripts/words/names.mjs';
 
 /** Who may know whom (docs/architecture.md). A package may import the packages listed, and no other of ours. */
 const MAY_IMPORT = {
@@ -63,6 +64,11 @@ export default tseslint.config(
       'no-implied-eval': 'error',
       'prefer-const': ['error', { destructuring: 'all' }],
     },
+  },
+  {
+    files: ['**/*.{ts,tsx,mjs,js}'],
+    plugins: { words: { rules: { 'retired-names': retiredNames } } },
+    rules: { 'words/retired-names': 'error' },
   },
   { files: ['packages/*/src/**/*.ts'], rules: { '@typescript-eslint/explicit-module-boundary-types': 'error' } },
   ...directions,

@@ -32,6 +32,8 @@ export default {
   ],
   files: named ?? ['tests/**/browser/**/*.test.ts', `!${DENSE}`],
   rootDir: '.',
+  // Runs beside each other have a port each; otherwise the first one that is free.
+  port: process.env.TEST_PORT ? Number(process.env.TEST_PORT) : undefined,
   // Without `development`, which is the default, Lit does not warn. With `production` a page would have the element twice: tests import its modules, too.
   nodeResolve: { exportConditions: ['browser'] },
   concurrency: CONCURRENCY[group],

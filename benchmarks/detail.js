@@ -17,7 +17,7 @@ const detail = number('detail', 1);
 /** Seconds at the first place of the flight before it begins, reported apart: what a visitor waits through. */
 const warm = number('warm', 3);
 /** `display`: a frame for each that the display shows, as on any page; `free`: the next as soon as the GPU is done. */
-const pace = query.get('pace') ?? 'display';
+const quality = query.get('pace') ?? 'display';
 
 /** How much of the curve is flown in these seconds: with 0.5 the first half, half as fast. */
 const speed = number('speed', 1);
@@ -36,7 +36,7 @@ const say = (text) => {
 const progress = new Progress(limit, say);
 /** Grows while there is something to measure; what stands in it is reported, whatever happens. */
 const report = {
-  ...{ width, height, detail, splatBudget: splats, megabytes, warm, seconds, speed, limit, pace },
+  ...{ width, height, detail, splatBudget: splats, megabytes, warm, seconds, speed, limit, pace: quality },
   ...{ warmUp: [], flight: [], atRest: [] },
 };
 
@@ -69,7 +69,8 @@ async function open(device) {
  * Lets the page's other tasks have a turn, as they do between the frames of a display: a loop that only ever waits for the GPU was seen to bring in two pages in two
  * seconds, with eight on their way all the time.
  */
-const turn = () => new Promise((resolve) => (pace === 'free' ? setTimeout(resolve) : requestAnimationFrame(resolve)));
+const turn = () =>
+  new Promise((resolve) => (quality === 'free' ? setTimeout(resolve) : requestAnimationFrame(resolve)));
 
 /**
  * Draws for so many seconds.

@@ -1,6 +1,7 @@
 /**
  * The frontier page: accuracy and time of every configuration of scripts/frontier/configurations.mjs on one scene, path and
- * size. All comparing is done here, so that only numbers leave the machine that it runs on.
+ * size. All comparing is done here, so that only numbers leave the machine that it runs on. With `images=1` the report
+ * has the compared images, too, for metrics that browsers do not compute.
  */
 import { configurations as table } from '../scripts/frontier/configurations.mjs';
 import { camerasAlong } from './scene/paths.js';
@@ -12,10 +13,11 @@ import { sendReport } from './run/report.js';
 import { BenchScene } from './run/scenes.js';
 import { Subjects } from './run/subjects.js';
 import { summarizeStandard, summarizeVisits } from './run/summary.js';
-import { compareImages, worstOf } from './quality/metrics.js';
+import { compareImages, pngOfCovered, withoutAlpha, worstOf } from './quality/metrics.js';
 import { makeReferences } from './quality/reference.js';
 
 const query = new URLSearchParams(location.search);
+const hasImages = query.has('images');
 
 /** The table's lines, or those that the address has (`lines`, as JSON), that `only` (a regular expression over names) leaves, on the scene that the address describes. */
 async function chosen() {
@@ -54,15 +56,17 @@ async function judge(subjects, entry, moments, references) {
   let subject;
   try {
     subject = await subjects.open(entry);
-    const views = [];
+    const [views, images] = [[], []];
     for (const [i, { camera, before }] of moments.entries()) {
-      views.push(compareImages(await subject.capture(camera, before), references.images[i], camera));
+      const pixels = await subject.capture(camera, before);
+      views.push(compareImages(pixels, references.images[i], camera));
+      if (hasImages) images.push(await pngOfCovered(withoutAlpha(pixels), references.images[i], camera));
       const { ignoredOptions = [] } = await subject.facts();
       // An option that nobody reads would show the default's figures under another name.
       if (ignoredOptions.length > 0)
         return { error: `the renderer has no option ${ignoredOptions.join(', ')}`, ignoredOptions };
     }
-    return { quality: worstOf(views), views };
+    return { quality: worstOf(views), views, ...(hasImages && { images }) };
   } catch (error) {
     return { error: String(error?.stack ?? error) };
   } finally {
@@ -114,6 +118,8 @@ async function collect(run) {
   subjects.dispose();
   await scene.destroy();
   const { images, ...reference } = references;
+  if (hasImages)
+    reference.images = await Promise.all(images.map((image, i) => pngOfCovered(image.color, image, views[i].camera)));
   return {
     kind: 'frontier',
     environment: describeEnvironment(gpu),

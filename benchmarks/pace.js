@@ -54,8 +54,8 @@ async function resizeFor(load, bench) {
   const known = [];
   for (const side of CALIBRATION_SIDES) known.push(await wholeTimeAt(bench, side));
   const target = stage.elements[0].stats.dynamicQuality.targetMs;
-  const most = (plan.most / Math.max(plan.width, plan.height)) ** 2 * plan.width * plan.height;
-  return { known, side: Math.sqrt(pixelsFor(load * target, known, most) / (plan.width * plan.height)) };
+  const max = (plan.most / Math.max(plan.width, plan.height)) ** 2 * plan.width * plan.height;
+  return { known, side: Math.sqrt(pixelsFor(load * target, known, max) / (plan.width * plan.height)) };
 }
 
 /** Visits to the first size, after which its time is known: GPUs that were idle run slower at first. */
@@ -101,8 +101,8 @@ async function measureStep({ what, value }, bench) {
 async function measure(plan, steps) {
   await customElements.whenDefined('gaussian-splat');
   showProgress('loading');
-  const most = Math.max(1, ...plan.steps.filter(({ what }) => what === 'elements').map(({ value }) => value));
-  const stage = new Stage(document.getElementById('stage'), await sceneOf(plan), plan, most);
+  const max = Math.max(1, ...plan.steps.filter(({ what }) => what === 'elements').map(({ value }) => value));
+  const stage = new Stage(document.getElementById('stage'), await sceneOf(plan), plan, max);
   stage.resize(plan.width, plan.height);
   await stage.load();
   const burns = plan.warm > 0 || plan.steps.some(({ what }) => what === 'burn');
@@ -117,7 +117,7 @@ async function measure(plan, steps) {
     showSteps(steps);
   }
   const left = plan.steps.length - steps.length;
-  return { left, splats: stage.elements[0].stats.modelled, burnerRoundsPerMs: burner?.perMs };
+  return { left, splats: stage.elements[0].stats.total, burnerRoundsPerMs: burner?.perMs };
 }
 
 const query = new URLSearchParams(location.search);

@@ -1,5 +1,5 @@
 /**
- * The page that draws rows of the stability catalogue with every subject. `?only=S7` runs one row, `?peers=0` ours alone, `?report=URL` is where
+ * The page that draws rows of the stability catalog with every subject. `?only=S7` runs one row, `?peers=0` ours alone, `?report=URL` is where
  * the figures are POSTed as JSON.
  */
 import { autotune, deviceDescriptor, GaussianBuffers, packGaussians } from '@gaussian-splat/renderer';
@@ -19,7 +19,7 @@ const SUBJECTS = [
   { name: `Spark ${BENCH_VERSIONS.spark}, parity`, peer: 'spark', parity: true },
 ];
 /** A peer that shows nothing must not hold up the others. */
-const PATIENCE_MS = 90_000;
+const TIMEOUT_MS = 90_000;
 
 const query = new URLSearchParams(location.search);
 const status = document.querySelector('#status');
@@ -54,7 +54,7 @@ async function run() {
 
 async function runCase(device, one, subjects) {
   const references = referencesOf(one);
-  const cells = addRow('td', [`${one.row}: ${one.title}`, picture(references.at(-1).color, 3, one.views[0])]);
+  const cells = addRow('td', [`${one.row}: ${one.title}`, photo(references.at(-1).color, 3, one.views[0])]);
   const results = [];
   for (const configuration of subjects) {
     status.textContent = `${one.row}, ${one.title}: ${configuration.name}`;
@@ -69,8 +69,8 @@ async function runCase(device, one, subjects) {
       error: result.error,
     });
   }
-  const { row, title, least, most } = one;
-  return { row, title, least, most, results };
+  const { row, title, least: min, most: max } = one;
+  return { row, title, least: min, most: max, results };
 }
 
 function referencesOf(one) {
@@ -114,7 +114,7 @@ async function openOther({ cloud, views: [{ width, height }] }, { peer, parity =
 
 function within(promise) {
   const late = new Promise((_, reject) => {
-    setTimeout(() => reject(new Error(`no frame within ${PATIENCE_MS / 1000} s`)), PATIENCE_MS);
+    setTimeout(() => reject(new Error(`no frame within ${TIMEOUT_MS / 1000} s`)), TIMEOUT_MS);
   });
   return Promise.race([promise, late]);
 }
@@ -132,7 +132,7 @@ function addRow(kind, contents) {
 
 function cellOf({ figure, unit, passes, image, error }, { views: [camera] }) {
   const cell = document.createElement('td');
-  if (image) cell.append(picture(image, 4, camera));
+  if (image) cell.append(photo(image, 4, camera));
   const line = document.createElement('p');
   line.textContent = error ?? `${passes ? 'passes' : 'fails'}: ${Number(figure.toFixed(1))} ${unit}`;
   cell.append(line);
@@ -140,7 +140,7 @@ function cellOf({ figure, unit, passes, image, error }, { views: [camera] }) {
 }
 
 /** Pixels over black, as a canvas. */
-function picture(values, channels, { width, height }) {
+function photo(values, channels, { width, height }) {
   const canvas = document.createElement('canvas');
   [canvas.width, canvas.height] = [width, height];
   const data = new ImageData(width, height);

@@ -115,7 +115,7 @@ async function visitCompared(plan) {
     const isCompared = i % 2 === 1;
     showProgress(`visit ${i + 1} of ${2 * plan.visits}, ${isCompared ? 'compared' : 'not compared'}`);
     forget(proofs());
-    const { frame, ...times } = await visit(plan, isCompared ? '' : 'compare="off"');
+    const { frame, ...times } = await visit(plan, isCompared ? '' : 'gpu-check="off"');
     const wait = isCompared
       ? untilKept(proofs, LONGEST_COMPARISON)
       : new Promise((resolve) => setTimeout(resolve, restMs));

@@ -1,4 +1,4 @@
-/** What the home page adds to the element: tabs, copying a view, and opening a file. */
+/** Additions of the home page to the element: tabs, copying a view, and opening a file. */
 import { copy } from './site/copy.js';
 import { addressOf, takeFiles } from './site/local-file.js';
 import { viewOf } from './site/view.js';

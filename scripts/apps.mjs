@@ -1,7 +1,6 @@
 /**
  * `npm run test:apps [-- NAME… [--newest]]`: the apps of tests/apps, each as a user would make it, with the versions that the list names or, with `--newest`, the latest ones. Installs our packages from a registry that has just the release, builds, opens the
- * app in Chromium, and the development server where the list has one. Each has to show its scene, with a worker and a clean console; what came over the wire until then is
- * printed. Apps stay in .cache/apps, so that a second run installs our packages alone.
+ * app in Chromium, and starts the development server if the list has one. Each has to show its scene, with a worker and a clean console; the bytes received until then are printed. Apps stay in .cache/apps, so that a second run installs our packages alone.
  */
 import { spawn, spawnSync } from 'node:child_process';
 import { cpSync, existsSync, mkdirSync, readdirSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
@@ -18,9 +17,9 @@ import { root } from './lib/run.mjs';
 const CACHE = join(root, '.cache/apps');
 const SCENE = join(root, 'demo/scenes/skull.spz');
 const BUILD_SECONDS = 400;
-/** What `--newest` leaves as it is: Node itself, and what other packages of the app bound. */
+/** `--newest` leaves Node, and versions that other packages of the app pin. */
 const NOT_NEWEST = new Set(['node', 'typescript', 'rxjs']);
-/** What Lit and the tools say of development. */
+/** Messages of Lit and the tools in development mode. */
 const DEVELOPMENT = /Lit is in dev mode|\[vite\]|Download the React DevTools/;
 
 const { values: options, positionals: asked } = parseArgs({
@@ -76,22 +75,22 @@ async function tryApp(name, app) {
   }
 }
 
-function print(name, { weight, files, workers, painted }, { most }) {
+function print(name, { weight, files, workers, painted }, { most: max }) {
   console.log(
     `${name}: ${(painted * 100).toFixed(0)} % painted, ${workers} worker(s), ${weight} bytes of gzip in ${files} scripts`,
   );
-  if (most !== undefined && weight > most) throw new Error(`${weight} bytes: expected at most ${most}`);
+  if (max !== undefined && weight > max) throw new Error(`${weight} bytes: expected at most ${max}`);
 }
 
-/** The app's files and its packages: those of others stay from one run to the next. */
+/** The app's files and its packages. Packages of others stay from one run to the next, except with `--newest`: npm would keep the versions that it finds. */
 async function install(folder, name, { folder: template = name, dependencies }) {
   mkdirSync(folder, { recursive: true });
   for (const file of readdirSync(folder)) {
-    if (!['node_modules', 'package-lock.json'].includes(file)) rmSync(join(folder, file), { recursive: true });
+    if (options.newest || file !== 'node_modules') rmSync(join(folder, file), { recursive: true });
   }
   const files = join(root, 'tests/apps', template);
   if (existsSync(files)) cpSync(files, folder, { recursive: true });
-  // Where static files lie differs.
+  // Apps have their static files in different folders.
   for (const place of ['.', 'public', 'static', 'dist']) {
     mkdirSync(join(folder, place), { recursive: true });
     cpSync(SCENE, join(folder, place, 'scene.spz'));
@@ -106,7 +105,6 @@ async function install(folder, name, { folder: template = name, dependencies }) 
   writeFileSync(join(folder, '.npmrc'), `@gaussian-splat:registry=${address}\n`);
   rmSync(join(folder, 'node_modules/@gaussian-splat'), { recursive: true, force: true });
   // It has the digests of our packages of the last time.
-  rmSync(join(folder, 'package-lock.json'), { force: true });
   rmSync(join(folder, 'node_modules/.package-lock.json'), { force: true });
   await soon(
     [

@@ -1,8 +1,6 @@
 /**
  * Turns shaders/*.wgsl into packages/renderer/src/generated/: code with its `#import`s resolved, and every
- * binding number, struct layout, workgroup size and numeric constant reflected from the WGSL itself, so that nobody
- * counts padding or repeats a number by hand. `shaders.ts` has what every scene needs, `live-shaders.ts` what only generators and
- * picture models do, `streamed-shaders.ts` what only streamed scenes do: pages without them never load these. The stages of economise are in its own
+ * binding number, struct layout, workgroup size and numeric constant reflected from the WGSL itself, so that the code neither counts padding nor repeats numbers by hand. `shaders.ts` has the shaders that every scene needs, `live-shaders.ts` those that only generators and image models need, `streamed-shaders.ts` those that only streamed scenes need: pages without them never load these. The stages of economise are in its own
  * package, with the structs and constants that only they have.
  */
 import { mkdirSync, readdirSync, writeFileSync } from 'node:fs';
@@ -23,6 +21,7 @@ const RARE = {
   'probe-shaders': ['probe_depth', 'probe_surface', 'probe_surface_quantized'],
   'depth-shaders': ['blend_layers', 'rasterize_quads_depth', 'rasterize_tiles_depth'],
   'linear-shaders': ['compose_linear'],
+  'rectangle-shaders': ['compose_rectangle'],
   'order-shaders': ['pixel_depths', 'pixel_depths_quantized', 'rasterize_tiles_order'],
 };
 /** Stages that are made a second time, `cull_quantized` of `cull` and so on, with another part in place of one. */
@@ -49,7 +48,7 @@ RARE['modified-shaders'] = [
   'cull_chunks_modified',
   ...QUANTIZED.stages.flatMap((stage) => [`${stage}_modified`, `${stage}_quantized_modified`]),
 ];
-/** Those of another package, which takes shared parts from the renderer. */
+/** Shaders of another package, which imports shared parts from the renderer. */
 const ECONOMISE = 'economise';
 RARE[ECONOMISE] = [
   'economise_cut',
@@ -64,7 +63,7 @@ RARE[ECONOMISE] = [
   'refine_step',
 ];
 const fileOf = (stage) => Object.keys(RARE).find((file) => RARE[file].includes(stage)) ?? 'shaders';
-/** What a binding holds, in the words of GPUBindGroupLayoutEntry. */
+/** The contents of a binding, as fields of GPUBindGroupLayoutEntry. */
 function resourceOf({ resourceType, type, access }) {
   if (resourceType === ResourceType.Texture) return { type: 'texture' };
   if (resourceType === ResourceType.StorageTexture) return { type: 'storage-texture', format: type.format.name };
@@ -117,7 +116,7 @@ const modifiedStages = [...plainStages, ...quantizedStages]
   .filter(({ path }) => path in MODIFIED.stages)
   .map((plain) => ({ ...plain, stage: `${plain.stage}_modified`, added: MODIFIED.stages[plain.path] }));
 const stages = [...plainStages, ...quantizedStages, ...modifiedStages];
-/** By name: the layout or the number, and the files whose stages say it. */
+/** The layout or the number by name, with the files whose stages declare it. */
 const structs = new Map();
 const constants = new Map();
 /** Each file once, however many stages import it: a page loads them all. */
@@ -162,10 +161,10 @@ const header = '/** Written by scripts/build-shaders.mjs from shaders/. Do not e
 const define = ([name, value]) => `export const ${name} = ${literal(value)} as const;`;
 /** As any string: declarations would hold all of the code once more. */
 const part = (path) => `export const ${partName(path)}: string = ${JSON.stringify(parts.get(path))};`;
-/** The file that has a part, from which others import it: `shaders.ts` only where its own stages need it. */
+/** The file that exports a part to the others: `shaders.ts` only if its own stages need it. */
 const homeOf = (path) => stageFiles.find((file) => partsIn[file].has(path));
 
-/** What stages of the given kind say, by name. */
+/** The declarations of stages of the given kind, by name. */
 function saidBy(named, isMeant) {
   return [...named].filter(([, { homes }]) => isMeant(homes)).map(([name, { value }]) => [name, value]);
 }
@@ -180,7 +179,7 @@ const layoutsOf = (homes) => (homes.size === 1 ? LAYOUTS[[...homes][0]] : undefi
 const isOfRenderer = (homes) => [...homes].some((file) => file !== ECONOMISE);
 const byName = ([a], [b]) => (a < b ? -1 : 1);
 
-/** @param from where parts of all other files are; else each is imported from its own */
+/** @param from the file that has the parts of all other files; by default each part comes from its own file */
 function rareFile(file, from) {
   const paths = [...partsIn[file]];
   const moduleOf = (path) => from ?? `./${homeOf(path)}.js`;
@@ -197,7 +196,7 @@ function rareFile(file, from) {
 }
 
 const files = {
-  // Modules and not objects, so that bundlers leave out what nobody uses.
+  // Modules and not objects, so that bundlers leave out the unused ones.
   layouts: [
     '/** Byte sizes and offsets of the WGSL structs. */',
     ...saidBy(structs, (homes) => isOfRenderer(homes) && !layoutsOf(homes))

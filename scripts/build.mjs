@@ -1,7 +1,6 @@
 /**
- * `npm run build`: shaders to typed constants, TypeScript to packages, the CDN bundle, what editors know of the element, and the demo as a static site.
- * `npm run build -- --element` ends with the CDN bundle: all that a page of one's own needs, in half of the time; `-- --packages` with the packages, which is what
- * most tests of Node need.
+ * `npm run build`: shaders to typed constants, TypeScript to packages, the CDN bundle, the element's data for editors, and the demo as a static site.
+ * `npm run build -- --element` ends with the CDN bundle: all that a separate page needs, in half of the time; `-- --packages` with the packages, which most tests of Node need. `-- --docs` adds the API reference of renderer, formats, generator and three to the site, in 20 seconds.
  */
 import { copyFileSync, cpSync, existsSync, readdirSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
@@ -25,7 +24,7 @@ const SCRIPTS = [
   'three-webgl/three-webgl.js',
 ];
 
-/** Texts of ONNX Runtime and of what is in it, as its releases bring them. */
+/** Licences of ONNX Runtime and its dependencies, as its releases include them. */
 const RUNTIME_LICENSES = 'packages/element/third-party/onnxruntime';
 
 const extent = ['element', 'packages'].find((name) => process.argv.includes(`--${name}`)) ?? 'whole';
@@ -34,6 +33,7 @@ const noteBuilt = beginBuild(extent);
 ensureDependencies();
 must(process.execPath, ['scripts/build-shaders.mjs']);
 must(process.execPath, [TSC, '--build', ...projects()]);
+for (const project of projects()) removeStaleOutputs(project);
 writeLicenses();
 await writeDecoders();
 if (extent !== 'element') await bundleThreads();
@@ -42,7 +42,10 @@ if (extent !== 'packages') {
   await bundleElement();
   await others;
   if (extent === 'whole') await buildApps();
-  if (extent === 'whole') await buildPages();
+  if (extent === 'whole') {
+    writeApiReference();
+    await buildPages();
+  }
 }
 noteBuilt();
 
@@ -85,6 +88,18 @@ function projects() {
   return names.map((name) => `packages/${name}`);
 }
 
+/** Removes modules whose source is no longer there. tsc keeps them; an import of one then fails on a fresh clone alone, and npm publishes them. */
+function removeStaleOutputs(project) {
+  const from = join(root, project, 'src');
+  const to = join(root, project, 'dist');
+  const declarations = readdirSync(to, { recursive: true }).filter((name) => name.endsWith('.d.ts'));
+  for (const name of declarations.map((file) => file.slice(0, -'.d.ts'.length))) {
+    if (['.ts', '.tsx', '.d.ts'].some((extension) => existsSync(join(from, name + extension)))) continue;
+    for (const extension of ['.js', '.js.map', '.d.ts', '.d.ts.map'])
+      rmSync(join(to, name + extension), { force: true });
+  }
+}
+
 /** npm takes a licence from the package's own folder only. */
 function writeLicenses() {
   for (const name of readdirSync(join(root, 'packages'))) {
@@ -93,7 +108,7 @@ function writeLicenses() {
   }
 }
 
-/** The bundle is without comments, and the licences of what is in it ask for their text. */
+/** The bundle has no comments, and the licences of its dependencies require their text. */
 function writeLicensesOfBundle() {
   const own = readFileSync(join(root, 'LICENSE'), 'utf8');
   const textOf = ([what, file]) => `${what}\n\n${readFileSync(join(root, file), 'utf8')}`;
@@ -119,7 +134,7 @@ function writeLicensesOfBundle() {
   writeFileSync(join(cdn, 'onnxruntime/LICENSES.txt'), runtime.join('\n\n'));
 }
 
-/** What editors and tools know of the element, from its sources. */
+/** Writes the element's data for editors and tools, from its sources. */
 async function describeElement() {
   const analyzer = join(root, 'node_modules/@custom-elements-manifest/analyzer/cem.js');
   const config = 'custom-elements-manifest.config.mjs';
@@ -151,7 +166,7 @@ async function buildDemo() {
     outdir: to,
     outbase: from,
     bundle: true,
-    // What a page loads later is a script of its own.
+    // Code that a page loads later is a separate script.
     external: ['./run.js'],
     format: 'esm',
     minify: true,
@@ -159,7 +174,7 @@ async function buildDemo() {
   });
 }
 
-/** The apps by Vite, which takes what the bundle has made for production. */
+/** Vite builds the apps from the bundle's production output. */
 async function buildApps() {
   const from = join(root, 'demo');
   for (const app of ['react', 'vue']) {
@@ -173,6 +188,12 @@ async function buildApps() {
       'warn',
     ]);
   }
+}
+
+/** The site links to the reference if the build made it. Other builds remove it, so that it is never outdated. */
+function writeApiReference() {
+  rmSync(join(root, 'demo/dist/api'), { recursive: true, force: true });
+  if (process.argv.includes('--docs')) must(process.execPath, ['node_modules/typedoc/bin/typedoc']);
 }
 
 /** demo/dist is the whole site: any static host can serve it. Eleventy copies the bundle, and names its digests. */

@@ -4,7 +4,7 @@ import { gpuEnvironment } from './lib/gpu-environment.mjs';
 import { ensureBuilt, ensureDependencies } from './lib/prepare.mjs';
 import { run } from './lib/run.mjs';
 
-/** Those in headless Chromium, and those of Dawn in Node. */
+/** Tests in headless Chromium, and tests of Dawn in Node. */
 const IN_CHROMIUM = {
   bench: ['scripts/bench/run-bench.mjs'],
   frontier: ['scripts/frontier/run-frontier.mjs'],

@@ -1,5 +1,5 @@
 /**
- * `npm run lab:screenshots [-- --only REGEX] [--out FOLDER] [--scheme light|dark] [--seconds 40] [--widths 390,1280] [--first] [--scenes]`: a picture of every page of
+ * `npm run lab:screenshots [-- --only REGEX] [--out FOLDER] [--scheme light|dark] [--seconds 40] [--widths 390,1280] [--first] [--scenes]`: a screenshot of every page of
  * the built site at 390 and 1280 CSS pixels, for people to look at. Scenes in the first screen get some seconds to appear; SwiftShader is slow. `--scenes` waits for
  * those below it, too; `--first` takes the first screen alone.
  */
@@ -11,7 +11,7 @@ import { findChromium, SWIFTSHADER_FLAGS } from './lib/chromium.mjs';
 import { root } from './lib/run.mjs';
 import { serve } from '../packages/cli/src/lib/server.mjs';
 
-/** A picture of a whole document would be too tall to look at. */
+/** A screenshot of a whole document would be too tall to look at. */
 const MAX_PIXELS_DOWN = 6000;
 
 const { values } = parseArgs({
@@ -33,14 +33,14 @@ const server = await serve({ '/': `${root}demo/dist` });
 const browser = await chromium.launch({ executablePath: findChromium(), args: SWIFTSHADER_FLAGS });
 for (const width of values.widths.split(',').map(Number)) {
   const context = await browser.newContext({ viewport: { width, height: 900 }, colorScheme: values.scheme });
-  for (const url of pages) await picture(await context.newPage(), url, width);
+  for (const url of pages) await image(await context.newPage(), url, width);
   await context.close();
 }
 await browser.close();
 server.closeAllConnections();
 server.close();
 
-async function picture(tab, url, width) {
+async function image(tab, url, width) {
   await tab.goto(`http://localhost:${server.address().port}${url}`);
   await settle(tab, `${url} at ${width}`);
   if (values.scenes) await visitScenes(tab, `${url} at ${width}`);
@@ -59,7 +59,7 @@ async function settle(tab, place) {
     .catch(() => console.log(`${place}: not everything in sight was loaded`));
 }
 
-/** Brings every scene into sight, one after the other: they load when they are seen, as all pictures of the page do. */
+/** Scrolls to every scene, one after the other: scenes load when they are visible, as all images of the page do. */
 async function visitScenes(tab, place) {
   for (const scene of await tab.locator('gaussian-splat:visible').all()) {
     await scene.scrollIntoViewIfNeeded();
@@ -68,7 +68,7 @@ async function visitScenes(tab, place) {
   await tab.evaluate(() => scrollTo(0, 0));
 }
 
-/** Every scene in the first screen is on show, or has failed. */
+/** Every scene in the first screen is visible, or has failed. */
 function isSettled() {
   const inSight = (element) => {
     const { top, bottom, width } = element.getBoundingClientRect();

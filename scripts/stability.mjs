@@ -1,7 +1,7 @@
 /**
- * `npm run lab:stability`: every row of the catalogue at full length, each in a process of its own, in Node and in Chromium. `-- PATTERN` runs the rows whose file name contains it;
- * `-- --peers` puts the peers through the rows that a page can; `-- --report` also writes docs/stability.md, its charts and figures.json, from which the demo takes its own;
- * `-- --merge FILE...` runs nothing and adds what was measured on another machine: its .cache/stability/runs.jsonl, or what the page POSTed.
+ * `npm run lab:stability`: every row of the catalog at full length, each in a process of its own, in Node and in Chromium. `-- PATTERN` runs the rows whose file name contains it;
+ * `-- --peers` puts the peers through the rows that a page can run; `-- --report` also writes docs/stability.md, its charts and figures.json, which the demo reads;
+ * `-- --merge FILE...` runs nothing and adds measurements of another machine: its .cache/stability/runs.jsonl, or reports that the page POSTed.
  */
 import { appendFileSync, existsSync, mkdirSync, statSync } from 'node:fs';
 import { basename, join, resolve } from 'node:path';
@@ -31,7 +31,7 @@ const { values, positionals } = parseArgs({
 /** Folder that a person's relative paths start from: npm itself runs scripts in the project's root. */
 const from = process.env.INIT_CWD ?? process.cwd();
 const cache = join(root, '.cache/stability');
-/** What was measured on this machine: lines are only ever added, the latest of a row counts. */
+/** Measurements on this machine: lines are only ever added, and the latest of a row counts. */
 const figures = join(cache, 'runs.jsonl');
 const peers = join(cache, 'peers.json');
 
@@ -64,7 +64,7 @@ function runRows() {
   const failed = chosen.filter(({ file, id }) => {
     const before = sizeOf(figures);
     const passed = runRow(basename(file)) === 0;
-    // Nothing was noted where not even an adapter was found.
+    // Nothing was recorded if no adapter was found.
     if (id !== undefined && sizeOf(figures) > before) {
       appendFileSync(figures, `${JSON.stringify({ row: id, passed })}\n`);
     }
@@ -86,7 +86,7 @@ function runRow(name) {
     STABILITY_FIGURES: figures,
     STABILITY_ROWS: name,
   };
-  const args = ['--import', 'tsx', '--test', '--test-reporter', 'spec', 'tests/stability/catalogue.alone.lab.test.ts'];
+  const args = ['--import', 'tsx', '--test', '--test-reporter', 'spec', 'tests/stability/catalog.alone.lab.test.ts'];
   return run(process.execPath, args, { env });
 }
 

@@ -1,4 +1,4 @@
-/** `npm start`: installs and builds what is missing, then serves the demo. PORT chooses the port (default 8080). */
+/** `npm start`: installs and builds missing parts, then serves the demo. PORT chooses the port (default 8080). */
 import { ensureBuilt, ensureDependencies } from './lib/prepare.mjs';
 import { root } from './lib/run.mjs';
 import { serve } from '../packages/cli/src/lib/server.mjs';

@@ -27,7 +27,7 @@ if (webgpu) {
   must(python, ['-m', 'pytest', '-rs', ...rest], { cwd: folder });
 }
 
-/** The Python of a virtual environment with these requirements; installs only what has changed since the last time. */
+/** The Python of a virtual environment with these requirements; installs only changes since the last time. */
 function environment(name, requirements) {
   const home = join(root, '.cache/exporter', name);
   const bin = join(home, process.platform === 'win32' ? 'Scripts/python.exe' : 'bin/python');

@@ -1,6 +1,5 @@
 /**
- * `npm run test:gpu`: builds, and runs every test of Node that draws on the GPU of this machine instead of SwiftShader: stages, images against the oracle, levels of
- * detail, economising, memory, and the rows of the stability catalogue as `npm test` runs them. `-- PATTERN` runs the files whose path contains it.
+ * `npm run test:gpu`: builds, and runs every test of Node that draws on the GPU of this machine instead of SwiftShader: stages, images against the oracle, levels of detail, pruning, memory, and the rows of the stability catalog as `npm test` runs them. `-- PATTERN` runs the files whose path contains it.
  */
 import { readdirSync } from 'node:fs';
 import { join } from 'node:path';
@@ -9,7 +8,7 @@ import { root, run } from './lib/run.mjs';
 
 /** Folders of tests that draw. */
 const FOLDERS = ['stages', 'golden', 'detail', 'economise', 'memory', 'stability'];
-/** Says which adapter the tests will have; fails where there is none. */
+/** Prints the adapter of the tests; fails if there is none. */
 const NAME_ADAPTER = `import { requestNodeAdapter } from './packages/cli/src/lib/node-gpu.mjs';
 const { vendor, architecture, device, description } = (await requestNodeAdapter()).info;
 console.log('Adapter: ' + [vendor, architecture, device, description].filter(Boolean).join(' '));

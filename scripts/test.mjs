@@ -1,8 +1,8 @@
 /**
- * `npm test`: installs what is missing (Node packages, a Chromium), builds, and tests the whole product: real Chromium with WebGPU and, beside it, what draws in Node
- * (stages on Dawn, images against the oracle), what needs no GPU, types and style. What may be asked for instead:
+ * `npm test`: installs missing parts (Node packages, a Chromium), builds, and tests the whole product: real Chromium with WebGPU and, beside it, the tests that draw in Node
+ * (stages on Dawn, images against the oracle), the tests that need no GPU, types and style. Other ways to call it:
  * `npm test -- PATTERN` the Node test files whose path contains it; `-- --package NAME` the tests of one package; `-- --changed [COMMIT]` those of the packages that changed since a commit (else
- * since this branch left `main`) and of all that depend on them; `-- --full` whole lists where otherwise a part stands for all.
+ * since this branch left `main`) and of all that depend on them; `-- --full` whole lists, of which otherwise a part is tested.
  * `npm run test:lab` is `--lab`: the laboratory's breadth, which the product does not depend on.
  */
 import { changedPackages, withDependants } from './lib/changed-packages.mjs';
@@ -37,7 +37,7 @@ const env = { ...gpuEnvironment(), ...extent, CHROMIUM: chromium };
 const { passed, failed, skipped, failures } = await runTests(files, {
   env,
   isStatic: files.isWhole,
-  failsUnsteady: isLab,
+  isLab,
 });
 for (const failure of failures) console.log(failure);
 console.log(`\n${passed} passed, ${failed} failed, ${skipped} skipped`);

@@ -17,7 +17,7 @@ const cloud = await readScene(readFileSync(path), { name: path });
 const columns = Math.ceil(Math.sqrt(copies));
 const count = copies * cloud.count;
 
-/** So many times the same numbers. */
+/** The same numbers, repeated. */
 function repeated(values) {
   const all = new Float32Array(copies * values.length);
   for (let copy = 0; copy < copies; copy++) all.set(values, copy * values.length);

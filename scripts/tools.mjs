@@ -1,5 +1,5 @@
 /**
- * `npm run lab:tools`: converts one scene with the newest versions of public tools, reads what they wrote, has them read what we write, and prints how far places, sizes
+ * `npm run lab:tools`: converts one scene with the newest versions of public tools, reads their output, has them read our output, and prints how far places, sizes
  * and opacities are from the source. It needs the npm registry.
  */
 import { execFileSync } from 'node:child_process';
@@ -21,7 +21,7 @@ const COUNT = 400;
 const folder = mkdtempSync(join(tmpdir(), 'gaussian-splat-tools-'));
 const at = (name) => join(folder, name);
 
-/** Splats of degree 1 whose opacities tell them apart, above one another in the order of their numbers: no turn or mirror leaves them in place. */
+/** Splats of degree 1 with different opacities, above one another in the order of their numbers: no turn or mirror leaves them in place. */
 function sourceCloud() {
   const places = Array.from({ length: COUNT }, (_, i) => [
     Math.sin(7 * i),
@@ -66,7 +66,7 @@ const sparkVersion = () => JSON.parse(readFileSync('node_modules/@sparkjsdev/spa
 async function transcodedBySpark(rad) {
   const { transcodeSpz } = await import('@sparkjsdev/spark');
   const inputs = [{ fileBytes: rad, fileType: 'rad' }];
-  // Its module says nothing of when its WebAssembly is there.
+  // Its module does not report when its WebAssembly is loaded.
   for (let tries = 0; ; tries++) {
     try {
       return (await transcodeSpz({ inputs, maxSh: 3 })).fileBytes;

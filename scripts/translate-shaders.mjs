@@ -1,4 +1,4 @@
-/** `npm run shaders:webgl`: translates the shaders of the WebGL renderer anew. Needed after a change of shaders/webgl or what it imports. */
+/** `npm run shaders:webgl`: translates the shaders of the WebGL renderer. Needed after a change of shaders/webgl or its imports. */
 import { writeFileSync } from 'node:fs';
 import { hasNaga, NAGA, WEBGL_SHADERS, webglShaders } from './lib/webgl-shaders.mjs';
 

@@ -53,7 +53,7 @@ function check(name, found, isRight) {
   console.log(`${isRight ? 'ok     ' : 'FAILED '} ${name}: ${found}`);
 }
 
-/** The true images of the reference views, each in one mode as `npm test` has it. */
+/** Reference images of the reference views, each in one mode as in `npm test`. */
 async function oraclesOf() {
   if (!hasSharedData) return [];
   const known = new Map();
@@ -68,7 +68,7 @@ async function oraclesOf() {
 
 async function checkAll(browser, evaluate) {
   console.log(browser);
-  // What the element blends in; of the first view, float16 besides.
+  // Formats in which the element blends; float16 for the first view, too.
   const drawn = [...oracles.slice(0, 1).map((first) => ({ ...first, wanted: 'rgba16float' })), ...oracles];
   for (const { view, mode, oracle, wanted = 'rgba32float' } of drawn) {
     const request = [`/shared/${view.file}`, view.camera, mode, wanted].map((part) => JSON.stringify(part));
@@ -78,11 +78,11 @@ async function checkAll(browser, evaluate) {
     const times = `frame ${frameMs.toFixed(0)} ms, sort ${sortMs.toFixed(1)} ms`;
     check(`${view.name} ${mode}`, `${decibels.toFixed(1)} dB, ${format}, ${times}`, decibels >= MIN_DB);
   }
-  const told = await evaluate(
+  const reported = await evaluate(
     `show({ src: '/scenes/skull.spz', 'camera-controls': '' }).then((element) => JSON.stringify([element.stats.renderer, element.loaded, !!navigator.gpu]))`,
   );
-  const [renderer, isLoaded, hasWebGpu] = JSON.parse(told);
-  check('the element chooses by itself', told, isLoaded && renderer === (hasWebGpu ? 'webgpu' : 'webgl'));
+  const [renderer, isLoaded, hasWebGpu] = JSON.parse(reported);
+  check('the element chooses by itself', reported, isLoaded && renderer === (hasWebGpu ? 'webgpu' : 'webgl'));
   const ages = JSON.parse(await evaluate(`orderAges({ src: '/scenes/skull.spz', renderer: 'webgl' }, 6000)`));
   const rates = `${ages.perSecond.toFixed(0)} frames a second with ${ages.moving}`;
   check(
@@ -119,7 +119,7 @@ async function inFirefox(body, env) {
   }
 }
 
-/** What pages fetch for WebGL and no other does: the chunks that its renderer and its sort are in. */
+/** Chunks that only pages with WebGL fetch: those of its renderer and its sort. */
 function bytesOfCode() {
   const cdn = join(root, 'packages/element/cdn');
   const files = readdirSync(cdn, { recursive: true }).filter((file) => file.endsWith('.js'));

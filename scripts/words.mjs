@@ -6,6 +6,7 @@ import { readdirSync, readFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { parseArgs } from 'node:util';
 import { root } from './lib/run.mjs';
+import { RETIRED_PARTS, retiredPartOf } from './words/names.mjs';
 import { blocksOfMarkdown, blocksOfPage, sentencesOf, wordsOf } from './words/prose.mjs';
 import { attributeComments, publicComments, sentencesInCode } from './words/sources.mjs';
 import { RATES, retiredIn } from './words/terms.mjs';
@@ -27,7 +28,9 @@ const FEW = 7;
 const RATE_LIMITS = { where: 1.5, 'what-clauses': 1.5, 'of which': 0.5 };
 /** Folders whose comments keep upper limits of rates per 1,000 words, and have no retired words or fragments. */
 const HELD_COMMENTS =
-  /^(shaders|packages\/(core|renderer|formats|generator|element|react|three|check|economise|cli)\/src)\//;
+  /^(shaders|tests|scripts|demo|packages\/(core|renderer|formats|generator|element|react|three|check|economise|cli|exporter)\/src)\//;
+const COMMENTED_FOLDERS = ['packages', 'tests', 'scripts', 'demo', 'shaders'];
+const COMMENTED_ENDINGS = ['.ts', '.tsx', '.mjs', '.js', '.wgsl', '.py'];
 const COMMENT_LIMITS = { where: 3, 'what-clauses': 3, 'of which': 0.7 };
 const FRAGMENT = /^(What|Of|Where|With|By|That|Those)\b/;
 /** Reasons and records, for those who work on the project. */
@@ -82,12 +85,13 @@ for (const { file, line, text, isDocument, isHeading } of texts) {
 for (const [name, limit] of Object.entries(LIMITS)) faults += measure(name, limit);
 faults += measureRates('documents', documentsAndPages, RATE_LIMITS);
 faults += holdComments();
+faults += holdShaderNames();
 if (values.inside) countInside();
 if (faults > 0) console.error(`\n${faults} to fix. The words: scripts/words/terms.mjs.`);
 process.exit(faults > 0 ? 1 : 0);
 
 /** Holds the sentences of some documents against their limits. @returns {number} of limits that are not kept */
-function measure(name, { files, least, average, longest = Infinity, many = 30, share = 1, short }) {
+function measure(name, { files, least: min, average, longest = Infinity, many = 30, share = 1, short }) {
   const sentences = [...prose]
     .filter(([path]) => files(path))
     .flatMap(([path, blocks]) =>
@@ -113,7 +117,7 @@ function measure(name, { files, least, average, longest = Infinity, many = 30, s
     mean > average && `expected ${average} words a sentence or fewer on average`,
     sentences[0].words > longest &&
       `expected no sentence above ${longest} words, found ${sentences[0].words} in line ${sentences[0].line}`,
-    mean < least && `expected ${least} words a sentence or more on average`,
+    mean < min && `expected ${min} words a sentence or more on average`,
     few > short && `expected ${100 * short} % of the sentences with ${FEW} words or fewer, at most`,
     above > share && `expected ${100 * share} % of the sentences above ${many} words or fewer`,
   ].filter(Boolean);
@@ -139,8 +143,7 @@ function measureRates(name, blocks, limits = {}) {
 
 /** Checks the comments of the held folders. @returns {number} of faults */
 function holdComments() {
-  const comments = ['packages', 'shaders']
-    .flatMap((folder) => ['.ts', '.tsx', '.mjs', '.wgsl'].flatMap((ending) => filesIn(folder, ending)))
+  const comments = COMMENTED_FOLDERS.flatMap((folder) => COMMENTED_ENDINGS.flatMap((ending) => filesIn(folder, ending)))
     .filter((path) => HELD_COMMENTS.test(path) && !/generated/.test(path))
     .flatMap((path) => commentsIn(read(path), path).map((text) => ({ path, text })));
   const wrong = comments.flatMap(({ path, text }) => [
@@ -157,11 +160,23 @@ function holdComments() {
   return wrong.length + measureRates('held comments', comments, COMMENT_LIMITS);
 }
 
+/** Checks declared names of shaders, as the ESLint rule does those of scripts. @returns {number} of faults */
+function holdShaderNames() {
+  const declaration =
+    /(?:\b(?:fn|struct|alias|let|const|override|var(?:<[^>]*>)?)\s+|[(,{;]\s*|^\s+)(\w+)(?=\s*[:=({])/gm;
+  const wrong = filesIn('shaders', '.wgsl').flatMap((path) =>
+    [...read(path).matchAll(declaration)].flatMap(([, name]) => {
+      const part = retiredPartOf(name, path);
+      return part ? [`${path}: "${part}" in "${name}" is retired. Write: ${RETIRED_PARTS.get(part)}.`] : [];
+    }),
+  );
+  for (const sentence of new Set(wrong)) console.error(sentence);
+  return wrong.length;
+}
+
 /** Comments and strings of code: retired words and rates, without limits. */
 function countInside() {
-  const sources = ['packages', 'tests', 'scripts', 'demo', 'shaders'].flatMap((folder) =>
-    ['.ts', '.tsx', '.mjs', '.js', '.wgsl', '.py'].flatMap((ending) => filesIn(folder, ending)),
-  );
+  const sources = COMMENTED_FOLDERS.flatMap((folder) => COMMENTED_ENDINGS.flatMap((ending) => filesIn(folder, ending)));
   for (const [name, chosen] of Object.entries({
     'comments of packages and shaders': (path) => /^(packages\/[^/]+\/src|shaders)\//.test(path),
     'comments of tests, scripts and pages': (path) => /^(tests|scripts|demo)\//.test(path),

@@ -38,7 +38,9 @@ struct Base {
 @group(0) @binding(0) var<uniform> animate: Animate;
 @group(0) @binding(1) var<storage, read> bases: array<Base>;
 @group(0) @binding(2) var<storage, read> base_sh: array<vec2u>;
-// Two 16-bit codes in each word, plane by plane.
+// Two 16-bit codes in each word, plane by plane. The last two planes are fades: of appearing, then of disappearing;
+// the lower byte is the fraction of the opacity in the first or last frame, the upper byte its change per frame, both in
+// 255ths.
 @group(0) @binding(3) var<storage, read> codes: array<u32>;
 // [frames, curve_count], multiplied by the quantization steps of the codes.
 @group(0) @binding(4) var<storage, read> curves: array<f32>;
@@ -46,10 +48,21 @@ struct Base {
 @group(0) @binding(6) var<storage, read_write> sh: array<vec2u>;
 @group(0) @binding(7) var<storage, read_write> chunks: array<Chunk>;
 
-fn code(plane: u32, row: u32) -> f32 {
+// The code in the upper half.
+fn code_bits(plane: u32, row: u32) -> u32 {
   let at = plane * animate.plane_codes + row;
-  // The shift to the highest bit extends the sign.
-  return f32(bitcast<i32>(codes[at / 2u] << (16u * (1u - (at & 1u)))) >> 16u);
+  return codes[at / 2u] << (16u * (1u - (at & 1u)));
+}
+
+fn code(plane: u32, row: u32) -> f32 {
+  // The shift extends the sign.
+  return f32(bitcast<i32>(code_bits(plane, row)) >> 16u);
+}
+
+// Fraction of the opacity; `age` counts frames from the first or from the last one.
+fn fade(plane: u32, row: u32, age: u32) -> f32 {
+  let bits = code_bits(plane, row);
+  return f32(((bits >> 16u) & 0xffu) + (bits >> 24u) * age) / 255.0;
 }
 
 // The change of one number: its codes lie in the planes from `plane` on, its curves start at `curve`.
@@ -100,10 +113,13 @@ fn animate_row(row: u32, to: u32, lane: u32) -> PackedGaussian {
   let scales = animate.grow * base.scales * exp(clamp(change_of_three(plane, curve, ranks.z, row), vec3f(-40.0), vec3f(40.0)));
   plane += planes.z;
   curve += ranks.z;
-  let opacity = clamp(base.opacity + change(plane, curve, ranks.w, row), 0.0, 1.0);
-  plane += planes.w;
-  curve += ranks.w;
-  write_color(row, to, change_of_three(plane, curve, animate.color_rank, row));
+  let color_plane = plane + planes.w;
+  let fade_plane = color_plane + 3u * animate.color_rank;
+  let first = base.life & 0xffffu;
+  let last = (base.life >> 16u) - 1u;
+  let shown = min(fade(fade_plane, row, animate.frame - first), fade(fade_plane + 1u, row, last - animate.frame));
+  let opacity = clamp(base.opacity * min(1.0, shown) + change(plane, curve, ranks.w, row), 0.0, 1.0);
+  write_color(row, to, change_of_three(color_plane, curve + ranks.w, animate.color_rank, row));
   let factor = factor_of(rotation, scales);
   let packed = pack_gaussian(bitcast<vec3u>(position), factor, opacity);
   if (!is_usable(packed)) { return unseen_gaussian(); }

@@ -43,12 +43,12 @@ fn degree_of(i: u32) -> u32 {
   var best = cut.sh_degree;
   if (cut.color_price <= 0.0) { return best; }
   let record = i * lowered_numbers(cut.sh_degree, cut.sh_degree);
-  var least = cut.color_price * f32(coefficients(best));
+  var lowest = cut.color_price * f32(coefficients(best));
   for (var degree = 0u; degree < cut.sh_degree; degree++) {
     let cost = lowered[record + degree] + cut.color_price * f32(coefficients(degree));
-    if (cost > least) { continue; }
+    if (cost > lowest) { continue; }
     best = degree;
-    least = cost;
+    lowest = cost;
   }
   return best;
 }

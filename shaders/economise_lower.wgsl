@@ -51,7 +51,7 @@ fn load_coefficients(i: u32, size: u32) {
 
 // Cholesky factorization of the moments, in place. One factor serves all degrees, because the factor of the first
 // coefficients is its leading block.
-fn factorise(size: u32) {
+fn factorize(size: u32) {
   for (var row = 0u; row < size; row++) {
     for (var column = 0u; column <= row; column++) {
       let place = at(row, column);
@@ -131,6 +131,6 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
   for (var k = 0u; k < at(size, 0u); k++) { matrix[k] = moments[k * lowering.row + i]; }
   let prior = lowering.prior_views * s.energy / f32(max(1u, s.looks)) / (4.0 * PI);
   for (var k = 0u; k < size; k++) { matrix[at(k, k)] += prior; }
-  factorise(size);
+  factorize(size);
   for (var degree = 0u; degree < lowering.sh_degree; degree++) { lower(i, degree, size, s.energy, is_judged); }
 }

@@ -11,7 +11,7 @@
 // For each streamed page the error in pixels of a missing page, as float32 bits, or 0. The first page is always
 // resident: its entry holds the largest error of the view.
 @group(0) @binding(4) var<storage, read_write> requests: array<atomic<u32>>;
-// The predicted camera: the columns of `local_to_camera`, and the eye.
+// The predicted camera, in the coordinates of the camera: the columns of the matrix to it, and its eye.
 @group(0) @binding(5) var<uniform> ahead: array<vec4f, 5>;
 
 const FEEDBACK_THREADS = 64u;
@@ -29,12 +29,25 @@ const SOON = 0.93;
 // octave is four of the steps that find the threshold.
 const KEPT = 0.7;
 
-// Screen error of a missing page in pixels, or 0 if it is at most `least`.
-fn page_error(seen: View, chunk: Chunk, d: ChunkDetail, allowed: f32, least: f32) -> f32 {
+// Screen error of a missing page in pixels, or 0 if it is at most `threshold`.
+fn page_error(seen: View, chunk: Chunk, d: ChunkDetail, allowed: f32, threshold: f32) -> f32 {
   let pixels = screen_error(seen, d.sphere, d.full_error);
-  if (pixels <= least && refined(pixels, allowed, seen.detail_fade) == 0u) { return 0.0; }
+  if (pixels <= threshold && refined(pixels, allowed, seen.detail_fade) == 0u) { return 0.0; }
   if (may_be_visible(seen, chunk)) { return pixels; }
   return select(UNSEEN, NEARBY, may_be_visible(nearby(seen), chunk)) * pixels;
+}
+
+// The view of the predicted camera.
+fn predicted(seen: View) -> View {
+  var later = seen;
+  // Cramer's rule, because a placement may scale and shear. The division keeps products in the range of float32.
+  let x = seen.local_to_camera[0].xyz / seen.stretch;
+  let y = seen.local_to_camera[1].xyz / seen.stretch;
+  let z = seen.local_to_camera[2].xyz / seen.stretch;
+  let eye = ahead[4].xyz / seen.stretch;
+  later.eye += vec3f(dot(eye, cross(y, z)), dot(eye, cross(z, x)), dot(eye, cross(x, y))) / dot(x, cross(y, z));
+  later.local_to_camera = mat4x4f(ahead[0], ahead[1], ahead[2], ahead[3]) * seen.local_to_camera;
+  return later;
 }
 
 // The view with a wider image around the same center.
@@ -52,9 +65,7 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
   let d = details[chunk];
   let page = d.children & CHILD_PAGE_MASK;
   if (page >= arrayLength(&requests)) { return; }
-  var later = view;
-  later.local_to_camera = mat4x4f(ahead[0], ahead[1], ahead[2], ahead[3]);
-  later.eye = ahead[4].xyz;
+  let later = predicted(view);
   let allowed = max(view.detail, chunk_shares[arrayLength(&chunk_shares) - 1u]);
   let is_kept = d.error > 0.0 && allowed > view.detail;
   let bound = select(allowed, max(view.detail, KEPT * allowed), is_kept);

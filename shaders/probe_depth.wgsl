@@ -3,6 +3,7 @@
 #import shared/probe
 #import shared/probe_answer
 #import shared/plan
+#import shared/group
 
 @group(0) @binding(0) var<storage, read> plan: Plan;
 @group(0) @binding(1) var<storage, read> splats: array<ProjectedSplat>;
@@ -18,7 +19,9 @@ var<workgroup> runs_in_front: array<f32, PROBE_LANES>;
 
 @compute @workgroup_size(PROBE_LANES)
 fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_index) lane: u32) {
-  let point = points[workgroup_id.x];
+  let at = group_index(workgroup_id);
+  if (at >= arrayLength(&answers)) { return; }
+  let point = points[at];
   let length = (plan.visible + PROBE_LANES - 1u) / PROBE_LANES;
   let first = min(lane * length, plan.visible);
   let end = min(first + length, plan.visible);
@@ -38,7 +41,7 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
   for (var run = 0u; run < PROBE_LANES; run++) { in_front *= runs_in_front[run]; }
   var answer = ProbeAnswer(vec3f(0.0), 0.0, vec3u(0u), in_front, vec3u(0u));
   for (var level = 0u; level < PROBE_LEVELS; level++) { find(&answer, point, level, length); }
-  answers[workgroup_id.x] = answer;
+  answers[at] = answer;
 }
 
 // The first splat, from near to far, behind which less than a fraction of the light is left.

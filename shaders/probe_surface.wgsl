@@ -17,7 +17,8 @@
 
 @compute @workgroup_size(PROBE_LEVELS)
 fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_index) level: u32) {
-  let at = workgroup_id.x;
+  let at = group_index(workgroup_id);
+  if (at >= arrayLength(&answers)) { return; }
   let page = plan.pages[view.page];
   let slot = answers[at].slots[level];
   let is_here = slot >= page.first_slot && slot < page.first_slot + page.survivors;

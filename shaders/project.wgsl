@@ -58,6 +58,6 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
   let toward = select(g.position - view.eye, view.axis, view.is_orthographic != 0u);
   let color = splat_sh_color(i, normalize(toward));
   splats[slot] = pack_splat(e, color);
-  let offset = (g.position - view.eye) - view.eye_rest;
-  keys[slot] = depth_key(select(e.depth, length(offset), view.key_bits > 32u));
+  // In units of the world, which all scenes share.
+  keys[slot] = depth_key(select(e.depth, length(in_camera(view, g.position)), view.key_bits > 32u));
 }

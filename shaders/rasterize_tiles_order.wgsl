@@ -32,7 +32,7 @@ struct Pixel {
   transmittance: f32,
   // No splat may reduce the transmittance to this value, or none is blended behind it; FINISHED once it is reached, or
   // if the pixel has nothing to draw.
-  least: f32,
+  min_transmittance: f32,
 }
 alias Pixels = Pixel;
 
@@ -89,9 +89,9 @@ fn whole(x: f32) -> u32 { return bitcast<u32>(x + WHOLE) & 0x7fffffu; }
 fn number(bits: u32) -> f32 { return bitcast<f32>(bits | WHOLE_BITS) - WHOLE; }
 
 fn shared_exponent(color: vec3f) -> u32 {
-  let most = bitcast<u32>(max(max(color.r, color.g), max(color.b, 0x1p-16)));
+  let brightest = bitcast<u32>(max(max(color.r, color.g), max(color.b, 0x1p-16)));
   // Rounded first, so that 2^(exponent - 15) exceeds the largest channel.
-  let exponent = ((most + 0x4000u) >> 23u) - 111u;
+  let exponent = ((brightest + 0x4000u) >> 23u) - 111u;
   let steps = color * bitcast<f32>((151u - exponent) << 23u);
   return whole(steps.r) | (whole(steps.g) << 9u) | (whole(steps.b) << 18u) | (exponent << 27u);
 }
@@ -126,7 +126,7 @@ fn start_pixels(pixel: vec2u) -> Pixel {
 }
 
 fn are_finished(pixel: Pixel) -> bool {
-  return pixel.least >= FINISHED;
+  return pixel.min_transmittance >= FINISHED;
 }
 
 fn depth_of(key: u32) -> f32 {
@@ -250,7 +250,7 @@ fn blend_layer(pixel: ptr<function, Pixel>) {
   if (are_finished(*pixel)) { return; }
   (*pixel).color += (*pixel).transmittance * layer.color.rgb;
   (*pixel).transmittance *= 1.0 - layer.color.a;
-  if ((*pixel).transmittance <= (*pixel).least) { (*pixel).least = FINISHED; }
+  if ((*pixel).transmittance <= (*pixel).min_transmittance) { (*pixel).min_transmittance = FINISHED; }
 }
 
 fn blend_one(pixel: ptr<function, Pixel>, key: u32, color: u32) {
@@ -260,10 +260,10 @@ fn blend_one(pixel: ptr<function, Pixel>, key: u32, color: u32) {
   let before = (*pixel).transmittance;
   let full_weight = before * (number(key & ALPHA_MASK) / f32(ALPHA_MASK));
   let remaining = before - full_weight;
-  let ends = remaining <= (*pixel).least;
+  let ends = remaining <= (*pixel).min_transmittance;
   var refuses = ends;
   if (!refuses_last) { refuses = remaining <= REFUSED || are_finished(*pixel); }
-  (*pixel).least = select((*pixel).least, FINISHED, ends);
+  (*pixel).min_transmittance = select((*pixel).min_transmittance, FINISHED, ends);
   let after = select(remaining, before, refuses);
   if (writes_depth && before > 0.5 && after <= 0.5) { half_depth = depth_of(key); }
   (*pixel).color += select(full_weight, 0.0, refuses) * shared_exponent_color(color);

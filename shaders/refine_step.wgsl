@@ -49,8 +49,8 @@ fn stride_along(i: u32, number: u32, rate: f32, bend: u32) -> f32 {
   let old = means[at];
   let mean = mix(vec2f(g, g * g), old, vec2f(step.keep_mean, step.keep_square));
   means[at] = mean;
-  let pace = min(rate / (sqrt(mean.y * step.square_scale) + step.epsilon), step.newton / max(MIN_BEND, bends[i][bend]));
-  return -mean.x * step.mean_scale * pace;
+  let step_rate = min(rate / (sqrt(mean.y * step.square_scale) + step.epsilon), step.newton / max(MIN_BEND, bends[i][bend]));
+  return -mean.x * step.mean_scale * step_rate;
 }
 
 fn vector_along(i: u32, number: u32, rate: f32, bend: u32) -> vec3f {

@@ -45,14 +45,14 @@ export async function compare(all, shares, views) {
     const camera = flightCamera(share, { bounds: manifest.bounds, width, height });
     progress.begin(`the view at ${share} of the flight`);
     const settled = await settle(all, camera, settings);
-    const picture = await readPixels(all.device, all.target);
-    const { visible, budgetError } = await all.viewpoint.statistics();
+    const image = await readPixels(all.device, all.target);
+    const { visible, budgetError } = await all.viewpoint.stats();
     const { resident, error } = all.scene.progress;
     const rest = { resident, poolError: rounded(error) };
     progress.begin(`the view at ${share} of the flight, four times finer`);
     const finerSettled = await settle(all, camera, { ...settings, detail: detail / 4, splatBudget: 4 * splatBudget });
     const finer = await readPixels(all.device, all.target);
-    const more = await all.viewpoint.statistics();
+    const more = await all.viewpoint.stats();
     views.push({
       ...{ share, settled, visible, budgetError: rounded(budgetError), ...rest },
       against: {
@@ -60,7 +60,7 @@ export async function compare(all, shares, views) {
         visible: more.visible,
         budgetError: rounded(more.budgetError),
         overflow: more.overflow,
-        decibels: psnr(picture, finer),
+        decibels: psnr(image, finer),
       },
     });
   }

@@ -24,7 +24,7 @@ const summary = (values) =>
         worst: rounded(Math.max(...values)),
       };
 
-const shareOver = (values, most) => rounded(values.filter((value) => value > most).length / Math.max(1, values.length));
+const shareOver = (values, max) => rounded(values.filter((value) => value > max).length / Math.max(1, values.length));
 
 /** Milliseconds from the begin of a frame's first pass to the end of its last. */
 const spanOf = (passes) => Math.max(...passes.map(({ end }) => end)) - passes[0].begin;
@@ -132,7 +132,7 @@ export class Second {
 
   /** Sends for what the GPU knows of the frames since the last look. */
   #look() {
-    this.#looks.push(this.#all.viewpoint.statistics());
+    this.#looks.push(this.#all.viewpoint.stats());
     if (this.#timer) this.#passes.push(this.#timer.read());
   }
 }

@@ -25,7 +25,7 @@ export class Burner {
   static async open() {
     const adapter = await navigator.gpu.requestAdapter({ powerPreference: 'high-performance' });
     const burner = new Burner(await adapter.requestDevice());
-    await burner.#findPace();
+    await burner.#findRate();
     return burner;
   }
 
@@ -76,11 +76,11 @@ export class Burner {
   }
 
   /** What a submission of nothing takes is the browser's answer. */
-  async #findPace() {
+  async #findRate() {
     await this.#time(1);
-    const least = await this.#time(1);
+    const min = await this.#time(1);
     for (let rounds = 16; ; rounds *= 4) {
-      const took = (await this.#time(rounds)) - least;
+      const took = (await this.#time(rounds)) - min;
       if (took < TELLING_MS) continue;
       this.#perMs = rounds / took;
       return;

@@ -28,7 +28,7 @@ export function levelsOf(frames) {
  * frame before, the level of pictures in motion, what a frame may take, and what one took that became known since
  * @param ladder names of all levels, the true image first
  */
-export function figuresOf(frames, ladder) {
+export function figuresOf(frames, levels) {
   const late = frames.filter(({ at }) => at >= IN_TIME_AFTER);
   const early = frames.filter(({ at }) => at < QUIET_UNTIL);
   const shares = late.filter(({ span }) => span !== null).map(({ span, target }) => span / target);
@@ -37,7 +37,7 @@ export function figuresOf(frames, ladder) {
     timed: shares.length,
     /** Of what a frame may take. */
     span: { p50: rounded(quantile(shares, 0.5)), p95: rounded(quantile(shares, 0.95)) },
-    reversals: reversals(early.map(({ moving }) => ladder.indexOf(moving))),
+    reversals: reversals(early.map(({ moving }) => levels.indexOf(moving))),
     levels: levelsOf(frames),
   };
 }
@@ -73,9 +73,9 @@ export function decibels(a, b) {
 const MIN_PIXELS = 128 ** 2;
 
 /** Pixels of a picture that takes a time, by what two sizes took (`fixed + perPixel * pixels`). */
-export function pixelsFor(milliseconds, [a, b], most) {
+export function pixelsFor(milliseconds, [a, b], max) {
   const perPixel = (b.milliseconds - a.milliseconds) / (b.pixels - a.pixels);
-  if (!(perPixel > 0)) return most;
+  if (!(perPixel > 0)) return max;
   const fixed = b.milliseconds - perPixel * b.pixels;
-  return Math.max(MIN_PIXELS, Math.min(most, (milliseconds - fixed) / perPixel));
+  return Math.max(MIN_PIXELS, Math.min(max, (milliseconds - fixed) / perPixel));
 }

@@ -18,14 +18,14 @@ export async function move(stage, seconds, { speed, onFrame = () => undefined })
     now = await nextFrame();
     stage.turn((speed / 1000) * Math.min(LONGEST, now - before));
     onFrame();
-    const elements = stage.elements.map((element) => readPace(element, lastOf));
+    const elements = stage.elements.map((element) => readQuality(element, lastOf));
     rows.push({ at: now - start, interval: now - before, elements });
   }
   return rows;
 }
 
 /** `span` is what a frame took, ms from when it could begin until the GPU was done, where one has become known since the last look; null where none has. */
-function readPace(element, lastOf) {
+function readQuality(element, lastOf) {
   const { moving, drawn, targetMs, lastMs } = element.stats?.dynamicQuality ?? {};
   const isNew = lastMs !== null && lastOf.has(element) && lastMs !== lastOf.get(element);
   lastOf.set(element, lastMs);

@@ -35,7 +35,7 @@ export function readPlan(query) {
     scene: query.get('scene') ?? '../scenes/skull.spz',
     /** The scene is repeated on the ground up to so many; 0: as it is. */
     splats: number(query.has('n') ? 'n' : 'splats', 0),
-    /** Bands of colour that repeated splats keep at most: millions of them make a smaller file. */
+    /** Bands of color that repeated splats keep at most: millions of them make a smaller file. */
     degree: number('degree', 3),
     /** Of the camera at first, as in the steps. */
     distance: number('distance', 1),

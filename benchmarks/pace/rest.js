@@ -36,8 +36,8 @@ export async function comeToRest(stage, { compares }) {
     elements.map(({ stats }) => stats.dynamicQuality.lastMs ?? NaN),
     0.5,
   );
-  const picture = compares && shown !== undefined ? await compareWithBlob(elements[0], shown) : undefined;
-  return { restMs: Math.round(done - since), wholeMs: Number(wholeMs.toFixed(3)), picture };
+  const image = compares && shown !== undefined ? await compareWithBlob(elements[0], shown) : undefined;
+  return { restMs: Math.round(done - since), wholeMs: Number(wholeMs.toFixed(3)), picture: image };
 }
 
 /**
@@ -73,17 +73,17 @@ async function submittedWorkDone(element) {
 }
 
 /** The middle of a picture over black, RGBA of 8 bits. */
-function pixelsOf(picture) {
-  const [width, height] = [picture.width, picture.height].map((side) => Math.min(CROP, side));
+function pixelsOf(image) {
+  const [width, height] = [image.width, image.height].map((side) => Math.min(CROP, side));
   const context = new OffscreenCanvas(width, height).getContext('2d', { willReadFrequently: true });
   context.fillStyle = 'black';
   context.fillRect(0, 0, width, height);
-  const [x, y] = [(picture.width - width) >> 1, (picture.height - height) >> 1];
-  context.drawImage(picture, x, y, width, height, 0, 0, width, height);
+  const [x, y] = [(image.width - width) >> 1, (image.height - height) >> 1];
+  context.drawImage(image, x, y, width, height, 0, 0, width, height);
   return context.getImageData(0, 0, width, height).data;
 }
 
-/** A PNG cannot hold colours that are brighter than their alpha, so what is compared is the canvas that the file is made of. */
+/** A PNG cannot hold colors that are brighter than their alpha, so what is compared is the canvas that the file is made of. */
 async function compareWithBlob(element, shown) {
   const file = element.toBlob();
   const found = decibels(shown, pixelsOf(element.shadowRoot.querySelector('canvas')));

@@ -12,7 +12,7 @@ const COLUMNS = [
   ['reversals', ({ reversals }) => reversals],
   ['levels', ({ levels }) => levels.map(({ at, level }) => `${level} (${at} ms)`).join(', ')],
   ['reference image after, ms', ({ restMs }) => restMs],
-  ['to toBlob(), dB', ({ picture }) => picture ?? ''],
+  ['to toBlob(), dB', ({ picture: image }) => image ?? ''],
 ];
 
 /** @param report the whole of it, once all is measured */

@@ -41,13 +41,13 @@ const COLUMNS = [
 const costOf = ({ burst, wall }) => burst?.p50 ?? wall?.p50;
 
 export function showResults(results, report) {
-  const most = Math.max(...results.map((result) => costOf(result) ?? 0));
+  const max = Math.max(...results.map((result) => costOf(result) ?? 0));
   const head = element(
     'tr',
     {},
     [...COLUMNS, ['stages', 0]].map(([title]) => element('th', { textContent: title })),
   );
-  const rows = results.map((result) => rowOf(result, most));
+  const rows = results.map((result) => rowOf(result, max));
   byId('results').replaceChildren(element('table', {}, [element('thead', {}, [head]), element('tbody', {}, rows)]));
   if (!report) return;
   byId('status').textContent = `Done on ${adapterName(report.environment.adapter)}. Times in milliseconds.`;
@@ -55,23 +55,23 @@ export function showResults(results, report) {
   byId('raw').hidden = false;
 }
 
-function rowOf(result, most) {
+function rowOf(result, max) {
   if (result.error) {
     const message = element('td', { colSpan: COLUMNS.length, textContent: result.error.split('\n')[0] });
     return element('tr', { className: 'failed' }, [element('td', { textContent: result.configuration.name }), message]);
   }
   const cells = COLUMNS.map(([, text]) => element('td', { textContent: text(result) }));
-  return element('tr', {}, [...cells, element('td', {}, [barOf(result, most)])]);
+  return element('tr', {}, [...cells, element('td', {}, [barOf(result, max)])]);
 }
 
 const HUES = [32, 200, 140, 280, 0, 60, 320];
 
 /** A bar as long as the cost, divided by stages where they are known. */
-function barOf(result, most) {
+function barOf(result, max) {
   const stages = Object.entries(result.stages ?? {}).map(([label, { p50 }]) => [label, p50]);
   const parts = stages.length > 0 ? stages : [['all', costOf(result) ?? 0]];
   const total = parts.reduce((sum, [, ms]) => sum + ms, 0) || 1;
-  const length = (100 * (costOf(result) ?? 0)) / (most || 1);
+  const length = (100 * (costOf(result) ?? 0)) / (max || 1);
   const bar = element('div', { className: 'bar' });
   bar.append(
     ...parts.map(([label, ms], i) => {

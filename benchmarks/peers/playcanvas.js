@@ -37,7 +37,7 @@ window.openSubject = async ({ ply, parity, antialiased, width, height }) => {
       timer.recording = false;
     },
     finish: () => state.device.queue.onSubmittedWorkDone(),
-    /** Colours are only evaluated anew when the camera has moved far enough: it gets every chance to do so. */
+    /** Colors are only evaluated anew when the camera has moved far enough: it gets every chance to do so. */
     async capture(view) {
       subject.draw(movedAside(view), false);
       await subject.finish();

@@ -7,7 +7,7 @@ import { cameraToWorldGl, FAR, holdAnimationFrames, NEAR, verticalFov } from './
 holdAnimationFrames();
 
 /** How long to wait for the worker, and how far Spark lets the camera move or turn (cosine) before it sorts anew. */
-const PATIENCE_MS = 60_000;
+const TIMEOUT_MS = 60_000;
 const SAME_PLACE = 2e-3;
 const SAME_DIRECTION = 0.999;
 
@@ -82,7 +82,7 @@ function place(camera, view) {
 async function settleOrder(spark, camera, draw) {
   const start = performance.now();
   const direction = new THREE.Vector3();
-  while (performance.now() - start < PATIENCE_MS) {
+  while (performance.now() - start < TIMEOUT_MS) {
     if (!spark.sorting && !spark.sortDirty) {
       camera.getWorldDirection(direction);
       const inPlace = spark.sortedCenter.distanceTo(camera.position) <= SAME_PLACE;
@@ -92,7 +92,7 @@ async function settleOrder(spark, camera, draw) {
     }
     await nextTask();
   }
-  throw new Error(`Spark: no order for the camera within ${PATIENCE_MS / 1000} s`);
+  throw new Error(`Spark: no order for the camera within ${TIMEOUT_MS / 1000} s`);
 }
 
 /** A pixel can only be read when all is drawn: WebGL has no other way to wait that is as exact. */

@@ -31,19 +31,35 @@ export function compareImages(pixels, reference, { width, height }) {
 
 /** The worst view in every respect. */
 export function worstOf(views) {
-  const least = (name) => Math.min(...views.map((view) => view[name]));
-  const most = (name) => Math.max(...views.map((view) => view[name]));
+  const min = (name) => Math.min(...views.map((view) => view[name]));
+  const max = (name) => Math.max(...views.map((view) => view[name]));
   return {
-    psnr: least('psnr'),
-    psnrAll: least('psnrAll'),
-    psnrShown: least('psnrShown'),
-    p999: most('p999'),
-    worst: most('worst'),
-    ssim: least('ssim'),
+    psnr: min('psnr'),
+    psnrAll: min('psnrAll'),
+    psnrShown: min('psnrShown'),
+    p999: max('p999'),
+    worst: max('worst'),
+    ssim: min('ssim'),
   };
 }
 
-function withoutAlpha(pixels) {
+/** PNG file as a data URL: pixels [height, width, 3], 8 bits each, in the box around what the reference covers. */
+export async function pngOfCovered(color, reference, { width, height }) {
+  const box = boxOf(reference.covered, width, height);
+  const canvas = new OffscreenCanvas(box.width, box.height);
+  const image = new ImageData(toBytes(color, width, box).data, box.width, box.height);
+  canvas.getContext('2d').putImageData(image, 0, 0);
+  const blob = await canvas.convertToBlob();
+  return new Promise((resolve, reject) => {
+    const reader = new FileReader();
+    reader.onload = () => resolve(reader.result);
+    reader.onerror = () => reject(reader.error);
+    reader.readAsDataURL(blob);
+  });
+}
+
+/** [height, width, 3] of [height, width, 4]. */
+export function withoutAlpha(pixels) {
   const color = new Float32Array((pixels.length / 4) * 3);
   for (let i = 0, j = 0; i < pixels.length; i += 4, j += 3) color.set(pixels.subarray(i, i + 3), j);
   return color;

@@ -1,5 +1,5 @@
 /**
- * The images that others are held against: [height, width, 3] colour over black and [height, width] 1 where any splat is
+ * The images that others are held against: [height, width, 3] color over black and [height, width] 1 where any splat is
  * seen. From the float64 oracle where the scene is small enough for it, else from our own compute rasterizer in float32,
  * which the tests hold against the oracle; then `proof` says how close it is on the start of the same scene.
  */

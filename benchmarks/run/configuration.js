@@ -36,7 +36,7 @@ export const DEFAULTS = Object.freeze({
   parity: false,
 });
 
-export const LADDER_MILLIONS = [0.25, 1, 3, 6.06, 12, 24];
+export const SIZES_MILLIONS = [0.25, 1, 3, 6.06, 12, 24];
 
 const NUMBERS = ['splats', 'visible', 'width', 'height', 'distance', 'resolutionScale'];
 const SHORT = { n: 'splats', w: 'width', h: 'height' };
@@ -87,7 +87,7 @@ function readNumber(name, text) {
 export async function readConfigurations(query, loadJson) {
   const base = { ...DEFAULTS, ...fieldsOf(query) };
   const list = query.has('list') ? await readList(query.get('list'), loadJson) : [{}];
-  const axes = [ladderAxis(query.get('ladder')), sizesAxis(query.get('sizes')), pathsAxis(query.get('paths'))];
+  const axes = [stepsAxis(query.get('ladder')), sizesAxis(query.get('sizes')), pathsAxis(query.get('paths'))];
   let all = list.map((fields) => merge(base, fields));
   for (const axis of axes)
     if (axis) all = all.flatMap((configuration) => axis.map((step) => ({ ...configuration, ...step })));
@@ -117,9 +117,9 @@ async function readList(text, loadJson) {
   return list;
 }
 
-const ladderAxis = (text) => {
+const stepsAxis = (text) => {
   if (text === null || text === '') return undefined;
-  const millions = text === 'all' ? LADDER_MILLIONS : text.split(',').map((word) => readNumber('ladder', word));
+  const millions = text === 'all' ? SIZES_MILLIONS : text.split(',').map((word) => readNumber('ladder', word));
   return millions.map((million) => ({ splats: Math.round(1e6 * million) }));
 };
 

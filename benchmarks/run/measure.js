@@ -183,15 +183,15 @@ async function timeBurst(subject, cameras) {
 
 /** Milliseconds until a submission of nothing is done: part of every `wall`. */
 async function timeNothing(subject) {
-  let least = Infinity;
+  let min = Infinity;
   for (let i = 0; i < EMPTY; i++) {
     const start = performance.now();
     subject.submitNothing();
     await subject.finish();
-    least = Math.min(least, performance.now() - start);
+    min = Math.min(min, performance.now() - start);
     await nextTask();
   }
-  return least;
+  return min;
 }
 
 /**

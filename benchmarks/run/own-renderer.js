@@ -70,7 +70,7 @@ export class OwnRenderer {
       splats,
       shDegree: this.#gaussians[0]?.shDegree,
       rasterizer: this.#viewpoint.rasterizer,
-      statistics: await this.#viewpoint.statistics(),
+      statistics: await this.#viewpoint.stats(),
       bytes: { scene, renderer, perSplat: Number(((scene + renderer) / splats).toFixed(1)) },
       ignoredOptions: this.#unread(),
     };
@@ -89,7 +89,7 @@ export class OwnRenderer {
   }
 
   async #hadRoom() {
-    const { overflow, pairOverflow } = await this.#viewpoint.statistics();
+    const { overflow, pairOverflow } = await this.#viewpoint.stats();
     if (overflow + pairOverflow === 0) return true;
     // Asking makes room.
     return this.#viewpoint.isComplete();

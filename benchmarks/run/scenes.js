@@ -48,9 +48,9 @@ export class BenchScene {
   }
 
   /** The scene's first `most` splats as one cloud: 240 bytes of memory for each with harmonics of degree 3. */
-  cloud(most = this.count) {
+  cloud(max = this.count) {
     const copies = [];
-    for (let left = most, i = 0; left > 0 && i < this.#copies.length; i++) {
+    for (let left = max, i = 0; left > 0 && i < this.#copies.length; i++) {
       const { offset, length } = this.#copies[i];
       copies.push({ offset, length: Math.min(length, left) });
       left -= length;

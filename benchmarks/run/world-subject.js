@@ -52,7 +52,7 @@ export class WorldSubject {
       splats: scenes.reduce((sum, { count }) => sum + count, 0),
       bytes: { scene: scenes.reduce((sum, { byteLength }) => sum + byteLength, 0), viewpoint: this.byteLength },
       rasterizer: this.#viewpoint.rasterizer,
-      statistics: await this.#viewpoint.statistics(),
+      statistics: await this.#viewpoint.stats(),
     };
   }
 

@@ -1,4 +1,4 @@
-/** Clouds with fewer bands of colour. */
+/** Clouds with fewer bands of color. */
 
 /** A cloud whose splats keep the coefficients up to a degree, 0 to 3. */
 export function withDegree(cloud, degree) {

@@ -6,7 +6,7 @@ const STEP = 2;
 export const LONE_RADIUS = 2.5;
 const RADIUS_PER_SIDE = 0.6;
 
-/** Offsets on a square grid in the ground plane, nearest to its centre first, so that copy 0 of odd sides stays in place. */
+/** Offsets on a square grid in the ground plane, nearest to its center first, so that copy 0 of odd sides stays in place. */
 function grid(copies, height) {
   const side = Math.ceil(Math.sqrt(copies));
   const cells = Array.from({ length: side * side }, (_, i) => [

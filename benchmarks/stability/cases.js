@@ -1,12 +1,12 @@
 /**
- * Rows of the stability catalogue that any viewer of a page can be put through: a scene, views, and what is asked of the pictures. The names are those of
- * tests/stability. Views are centred pinholes, since peers take no others.
+ * Rows of the stability catalog that any viewer of a page can be put through: a scene, views, and what is asked of the pictures. The names are those of
+ * tests/stability. Views are centerd pinholes, since peers take no others.
  */
 import { cloudOf, repeat } from '../../tests/support/clouds.ts';
 import { seededRandom } from '../../tests/support/random.ts';
 import { withHostileSplats } from '../../tests/support/hostile.ts';
 import { cameraAt, movedBy } from '../../tests/support/scenes.ts';
-import { brightColors, opacityLadder } from '../../tests/support/scenes/values.ts';
+import { brightColors, opacitySteps } from '../../tests/support/scenes/values.ts';
 import { needles } from '../../tests/support/scenes/shapes.ts';
 import { room } from '../../tests/support/scenes/room.ts';
 
@@ -76,13 +76,13 @@ function withOutliers() {
   return cloudOf([...near, ...far]);
 }
 
-const still = (row, title, cloud, views, least = ON_DISPLAY, more = {}) => ({
+const still = (row, title, cloud, views, min = ON_DISPLAY, more = {}) => ({
   row,
   title,
   kind: 'still',
   cloud,
   views,
-  least,
+  least: min,
   ...more,
 });
 
@@ -139,8 +139,8 @@ export const CASES = [
       { truth: clean },
     );
   },
-  () => still('S6', 'opacities from 0 to 1', opacityLadder().cloud, [view([0, 0, -4], [0, 0, 0], 70)]),
-  () => still('S6', 'colours below 0 and above 1', brightColors().cloud, [view([0.5, -0.8, -3.5], [0, 0, 0], 70)]),
+  () => still('S6', 'opacities from 0 to 1', opacitySteps().cloud, [view([0, 0, -4], [0, 0, 0], 70)]),
+  () => still('S6', 'colors below 0 and above 1', brightColors().cloud, [view([0.5, -0.8, -3.5], [0, 0, 0], 70)]),
   () => {
     const offset = [1_000_000, -2_000_000, 1_000_000];
     const cloud = ball(7, 1500);

@@ -19,14 +19,14 @@ export async function judge(subject, one, references) {
 }
 
 /** The first picture of a new direction: nobody waits for an order that is late. */
-async function judgeTurn(subject, { views: [before, after], least }, references) {
+async function judgeTurn(subject, { views: [before, after], least: min }, references) {
   await subject.capture(before);
   const image = await subject.snapshot(after);
   const { psnrShown: figure } = compareImages(image, references[1], after);
-  return { figure, image, unit: 'dB', passes: figure >= least };
+  return { figure, image, unit: 'dB', passes: figure >= min };
 }
 
-async function judgeFlicker(subject, { views: [view], most }) {
+async function judgeFlicker(subject, { views: [view], most: max }) {
   const bytes = async () =>
     Uint8Array.from(await subject.snapshot(view), (x) => Math.round(255 * Math.min(1, Math.max(0, x))));
   const image = await subject.capture(view);
@@ -36,5 +36,5 @@ async function judgeFlicker(subject, { views: [view], most }) {
     const next = await bytes();
     figure += next.reduce((count, value, i) => count + (value === first[i] ? 0 : 1), 0);
   }
-  return { figure, image, unit: 'bytes', passes: figure <= most };
+  return { figure, image, unit: 'bytes', passes: figure <= max };
 }

@@ -25,12 +25,12 @@ async function check(files) {
 async function examine(files) {
   const isJson = (file) => /\.json$/i.test(file.name);
   const others = files.filter((file) => !isJson(file));
-  // A file of another name is examined, too, so that the reader can say what it is.
+  // A file of another name is examined, too, so that the reader can name its type.
   const model = others.find((file) => /\.onnx$/i.test(file.name)) ?? others[0];
   if (model === undefined) return { name: files[0]?.name ?? 'No file', faults: ['Drop the ONNX file along with it.'] };
   const header = await readOnnxHeader(blobSource(model, model.name));
   const explicit = await files.find(isJson)?.text();
-  // Only what was dropped is known: without any other file nobody has looked for external data.
+  // Only the dropped files are known: without any other file, external data was not looked up.
   const beside = others.filter((file) => file !== model);
   const sizes = beside.length > 0 ? new Map(beside.map((file) => [file.name, file.size])) : undefined;
   try {
@@ -84,7 +84,7 @@ async function loadRuntime() {
   return ort;
 }
 
-/** What an error says, fault by fault. Errors that are not named are bugs, and are left to the console. */
+/** Sentences of an error, fault by fault. Errors without a name are bugs, and go to the console. */
 function asFaults(error, name = 'This file') {
   if (error instanceof ContractError) return { name, faults: error.faults.map(describeFault) };
   if (error instanceof GaussianSplatError) return { name, faults: [error.message] };

@@ -1,4 +1,4 @@
-/** Two elements, one camera, one line between their pictures. */
+/** Two elements, one camera, one line between their images. */
 import { addressOf, takeFiles } from '../site/local-file.js';
 import { adapterName, measureInTurns } from '../site/measure.js';
 import { differenceOf } from './difference.js';
@@ -9,7 +9,7 @@ const query = new URLSearchParams(location.search);
 const [left, right] = ['left', 'right'].map(byId);
 const sides = [left, right];
 
-/** What one side's selects say, on its element and in the words over its picture. */
+/** Applies the settings of one side to its element and to the caption. */
 function apply(element) {
   const quality = byId(`${element.id}-quality`).value;
   const degree = byId(`${element.id}-degree`).value;
@@ -30,7 +30,7 @@ function moveLine() {
   byId('pair').style.setProperty('--split', `${byId('split').value}%`);
 }
 
-/** The line goes where a finger or a mouse drags it; the keyboard has the slider below. */
+/** A finger or a mouse drags the line; the keyboard has the slider below. */
 function dragLine(divider) {
   const follow = ({ clientX }) => {
     const { left: start, width } = byId('pair').getBoundingClientRect();
@@ -44,7 +44,7 @@ function dragLine(divider) {
   divider.addEventListener('pointermove', (event) => divider.hasPointerCapture(event.pointerId) && follow(event));
 }
 
-/** Which of the prepared pairs is on show, if one is. */
+/** The prepared pair that is visible, if any. */
 function markPrepared() {
   const chosen = sides.map(({ id }) => `${byId(`${id}-quality`).value},${byId(`${id}-degree`).value}`);
   for (const button of document.querySelectorAll('[data-left]')) {

@@ -1,9 +1,9 @@
-/** How far two pictures are apart, as they are shown. */
+/** Difference between two images, as they are shown. */
 
 /**
  * @param a {HTMLElement} a `<gaussian-splat>` that shows a scene @param b {HTMLElement} another of the same size
- * @returns {Promise<{ decibels: number, worst: number }>} PSNR over the pixels that either covers, Infinity for equal pictures; largest
- *   difference of a colour, 0..255.
+ * @returns {Promise<{ decibels: number, worst: number }>} PSNR over the pixels that either covers, Infinity for equal images; largest
+ *   difference of a color, 0..255.
  */
 export async function differenceOf(a, b) {
   const [first, second] = await Promise.all([pixelsOf(a), pixelsOf(b)]);
@@ -12,7 +12,7 @@ export async function differenceOf(a, b) {
   for (let i = 0; i < first.length; i += 4) {
     if (first[i + 3] === 0 && second[i + 3] === 0) continue;
     for (let k = 0; k < 3; k++) {
-      // Over black, as a display would show the picture: colours read back are not premultiplied.
+      // Over black, as a display would show the image: colors read back are not premultiplied.
       const difference = (first[i + k] * first[i + 3] - second[i + k] * second[i + 3]) / 255;
       squares += difference ** 2;
       worst = Math.max(worst, Math.abs(difference));
@@ -26,8 +26,8 @@ export async function differenceOf(a, b) {
 }
 
 async function pixelsOf(element) {
-  const picture = await createImageBitmap(await element.toBlob());
-  const context = new OffscreenCanvas(picture.width, picture.height).getContext('2d');
-  context.drawImage(picture, 0, 0);
-  return context.getImageData(0, 0, picture.width, picture.height).data;
+  const image = await createImageBitmap(await element.toBlob());
+  const context = new OffscreenCanvas(image.width, image.height).getContext('2d');
+  context.drawImage(image, 0, 0);
+  return context.getImageData(0, 0, image.width, image.height).data;
 }

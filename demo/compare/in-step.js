@@ -1,4 +1,4 @@
-/** Synchronised cameras: whichever of two elements a person moves, the other is where it is in the next frame. */
+/** Synchronized cameras: when a person moves one of two elements, the other follows in the next frame. */
 
 /** @param a {HTMLElement} a `<gaussian-splat>` @param b {HTMLElement} another */
 export function keepInStep(a, b) {
@@ -6,7 +6,10 @@ export function keepInStep(a, b) {
   follow(b, a);
 }
 
-/** Puts both cameras where the first is, to the last bit: attributes are rounded, so that whoever only follows is a hair aside. */
+/**
+ * Sets both cameras to the first one's exact values. Attributes are rounded, so an element that only follows would
+ * differ slightly.
+ */
 export function align(a, b) {
   const view = viewOf(a);
   for (const element of [a, b]) show(element, view);
@@ -14,7 +17,7 @@ export function align(a, b) {
 
 function follow(leader, follower) {
   leader.addEventListener('camera-change', ({ detail }) => {
-    // What a page does to a camera is `none`: the follower's own move must not come back.
+    // A page's own camera changes have the source `none`, so that the follower's movement does not come back.
     if (detail.source !== 'none') show(follower, viewOf(leader));
   });
 }

@@ -1,7 +1,7 @@
-/** Search through the guide, in the browser: what is searched is fetched when somebody begins to type. */
+/** Search through the guide, in the browser: the index is fetched when a visitor starts to type. */
 import MiniSearch from 'minisearch';
 
-const MOST = 8;
+const MAX = 8;
 const query = document.getElementById('query');
 const found = document.getElementById('found');
 let index;
@@ -20,7 +20,7 @@ async function load() {
 async function search() {
   const { value } = query;
   index ??= load();
-  const results = value.trim() === '' ? [] : (await index).search(value).slice(0, MOST);
+  const results = value.trim() === '' ? [] : (await index).search(value).slice(0, MAX);
   if (value !== query.value) return;
   found.replaceChildren(...results.map(itemOf));
   if (value.trim() !== '' && results.length === 0) found.textContent = 'Nothing found.';

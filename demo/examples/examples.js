@@ -16,7 +16,7 @@ async function readFacts(name) {
   return { bytes: source.size, contract: resolveContract({ header }).contract, record: await response.json() };
 }
 
-/** What is known without running it: bytes, Gaussians, accuracy, training, licence. */
+/** Facts known without running it: bytes, Gaussians, accuracy, training, license. */
 function factsOf({ bytes, contract, record }) {
   const unseen = record.unseen ? `; ${record.unseen.psnr.toFixed(1)} dB on a scene that it never saw` : '';
   const inside = record.outline_psnr ? `; ${record.outline_psnr.toFixed(1)} dB inside the outline` : '';
@@ -25,7 +25,7 @@ function factsOf({ bytes, contract, record }) {
     ...(contract.nMax ? [['Gaussians', contract.nMax.toLocaleString('en')]] : []),
     ['Held-out PSNR', `${record.held_out_psnr.toFixed(1)} dB${inside}${unseen}`],
     ['Trained', `${Math.round(record.seconds)} s on one ${record.device}, ${record.steps.toLocaleString('en')} steps`],
-    ['Licence', `${contract.license}. ${contract.attribution}`],
+    ['License', `${contract.license}. ${contract.attribution}`],
   ];
 }
 
@@ -45,21 +45,21 @@ function conductTime(card) {
   }
   element.addEventListener('timeupdate', () => (slider.value = element.currentTime));
   slider.addEventListener('input', () => {
-    // The pause tells the time, which the slider follows.
+    // The pause reports the time, which the slider follows.
     const wanted = slider.valueAsNumber;
     element.pause();
     element.currentTime = wanted;
   });
 }
 
-/** Pairs of pictures, with what their cameras have to do with one another: `view.json` beside them. */
+/** Pairs of images, with what their cameras have to do with one another: `view.json` beside them. */
 async function conductImages(card) {
   const element = card.querySelector('gaussian-splat');
   const buttons = [...card.querySelectorAll('[data-pair]')];
   const choose = async (chosen) => {
     const folder = new URL(chosen.dataset.pair, folderOf(card.dataset.example));
     const view = await (await fetch(new URL('view.json', folder))).json();
-    const addresses = Object.entries(view.pictures).map(([name, file]) => [name, new URL(file, folder).href]);
+    const addresses = Object.entries(view.images).map(([name, file]) => [name, new URL(file, folder).href]);
     element.inputValues = { ...Object.fromEntries(addresses), ...view.controls };
     card.querySelectorAll('.given img').forEach((image, i) => (image.src = addresses[i][1]));
     for (const button of buttons) button.setAttribute('aria-pressed', String(button === chosen));
@@ -140,7 +140,7 @@ async function conductRound(card) {
   });
 }
 
-/** Post-processors run where somebody asks for them: they are the examples that a slow GPU has no patience for. */
+/** Post-processors run on request: they are too slow for weak GPUs. */
 function conductPainter(card, facts) {
   card.querySelector('[data-paint]').addEventListener('click', ({ target }) => {
     target.remove();
@@ -154,7 +154,7 @@ function conductPainter(card, facts) {
   });
 }
 
-/** A file's card needs no ONNX header: what is known of it stands in the page. */
+/** A file's card needs no ONNX header: the page contains its known facts. */
 function showFile(card) {
   const facts = Object.entries(JSON.parse(card.dataset.facts));
   fillCostCard(card.querySelector('.cost'), facts, card.querySelector('gaussian-splat'));

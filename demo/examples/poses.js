@@ -35,7 +35,7 @@ export function poseOf(joints, { arms, knees, head }) {
 /**
  * One moment of a walk.
  * @param {readonly string[]} joints
- * @param {number} phase 0 to 1, one pace of each leg
+ * @param {number} phase 0 to 1, one step of each leg
  */
 export function walkingPose(joints, phase) {
   const swing = Math.sin(2 * Math.PI * phase);

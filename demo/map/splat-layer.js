@@ -27,7 +27,11 @@ export class SplatLayer {
   }
 
   async load() {
-    this.splats = await this.host.load(packGaussians(await readScene(await fetchScene(this.src))));
+    const { host } = this;
+    const splats = await host.load(packGaussians(await readScene(await fetchScene(this.src))));
+    // The map may have removed the layer meanwhile.
+    if (host !== this.host) return splats.destroy();
+    this.splats = splats;
     this.map.triggerRepaint();
   }
 
@@ -44,5 +48,6 @@ export class SplatLayer {
   onRemove() {
     this.splats?.destroy();
     this.host.destroy();
+    this.splats = this.host = undefined;
   }
 }

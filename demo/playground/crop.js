@@ -44,7 +44,7 @@ export class Crop {
     this.#enable();
   }
 
-  /** A scene is shown. Of one that was cropped before only what is left is known: the sliders go half its size farther. */
+  /** A scene is shown. Only the remaining part of a cropped scene is known, so the sliders extend it by half its size. */
   measure() {
     const box = fileBoxOf(this.#scene);
     if (box !== null && this.#read() === undefined) this.#whole = box;
@@ -53,14 +53,14 @@ export class Crop {
     this.align();
   }
 
-  /** Brings the sliders to what the field says. */
+  /** Sets the sliders to the field's value. */
   align() {
     if (this.#whole === undefined) return;
     const box = this.#read() ?? this.#whole;
     for (const slider of this.#sliders) {
       const { axis, corner, isTurned } = this.#sideOf(slider);
-      const [least, most] = [this.#whole.min[axis], this.#whole.max[axis]];
-      const share = (box[corner][axis] - least) / (most - least || 1);
+      const [min, max] = [this.#whole.min[axis], this.#whole.max[axis]];
+      const share = (box[corner][axis] - min) / (max - min || 1);
       slider.value = 100 * (isTurned ? 1 - share : share);
     }
   }
@@ -79,8 +79,8 @@ export class Crop {
     const box = { min: [...min], max: [...max] };
     const { axis, corner, end, isTurned } = this.#sideOf(slider);
     const share = slider.valueAsNumber / 100;
-    const [least, most] = [this.#whole.min[axis], this.#whole.max[axis]];
-    box[corner][axis] = least + (isTurned ? 1 - share : share) * (most - least);
+    const [lowest, highest] = [this.#whole.min[axis], this.#whole.max[axis]];
+    box[corner][axis] = lowest + (isTurned ? 1 - share : share) * (highest - lowest);
     // A side that has gone past the one across takes it along.
     const isPast = box.min[axis] > box.max[axis];
     if (isPast) box[OTHER[corner]][axis] = box[corner][axis];
@@ -110,7 +110,7 @@ function axesOf(frame) {
   return axes;
 }
 
-/** The box around a scene, in the axes of its file; null where it is not known. */
+/** The box around a scene, in the axes of its file; null if it is unknown. */
 function fileBoxOf(scene) {
   const box = scene.getBoundingBox();
   if (box === null) return null;
@@ -123,16 +123,16 @@ function fileBoxOf(scene) {
   return { min: of(Math.min), max: of(Math.max) };
 }
 
-/** A hundred times the size of a box farther out: holds what lies far behind a capture. */
+/** A hundred times the size of a box farther out: contains the far background of a capture. */
 function farAround({ min, max }) {
-  const far = min.map((least, axis) => 100 * (max[axis] - least));
+  const far = min.map((lowest, axis) => 100 * (max[axis] - lowest));
   return {
-    min: min.map((least, axis) => Math.floor(least - far[axis])),
-    max: max.map((most, axis) => Math.ceil(most + far[axis])),
+    min: min.map((lowest, axis) => Math.floor(lowest - far[axis])),
+    max: max.map((highest, axis) => Math.ceil(highest + far[axis])),
   };
 }
 
 function around({ min, max }) {
-  const half = min.map((least, axis) => (max[axis] - least) / 2);
-  return { min: min.map((least, axis) => least - half[axis]), max: max.map((most, axis) => most + half[axis]) };
+  const half = min.map((lowest, axis) => (max[axis] - lowest) / 2);
+  return { min: min.map((lowest, axis) => lowest - half[axis]), max: max.map((highest, axis) => highest + half[axis]) };
 }

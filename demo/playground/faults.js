@@ -1,4 +1,4 @@
-/** What the element would say of a value, beside the field that has it. */
+/** The element's errors about a value, beside its field. */
 import { ATTRIBUTES } from '../../packages/element/dist/attributes.js';
 import { SCENE_ATTRIBUTES } from '../../packages/element/dist/composition/attributes.js';
 

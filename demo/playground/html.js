@@ -1,4 +1,4 @@
-/** What is on the page as HTML to paste or to download. */
+/** The page's scene as HTML to paste or to download. */
 
 /** The size of the tag: without one it is a box of 300 x 150 pixels. */
 const STYLE = 'width: 100%; height: auto; aspect-ratio: 4 / 3';
@@ -15,16 +15,18 @@ export function frameOf(cdn, attributes) {
   const query = new URLSearchParams(attributes.map(([name, value]) => [name, value === true ? '' : value]));
   const [, title = ''] = attributes.find(([name]) => name === 'alt') ?? [];
   const address = `${cdn}embed.html?${query}`;
-  return `<iframe src="${escape(address)}" title="${escape(title)}" style="width: 100%; aspect-ratio: 4 / 3; border: 0" allow="fullscreen"></iframe>`;
+  const isImmersive = attributes.some(([name, value]) => ['vr', 'ar'].includes(name) || value === 'walk');
+  const allow = isImmersive ? 'fullscreen; xr-spatial-tracking; gamepad' : 'fullscreen';
+  return `<iframe src="${escape(address)}" title="${escape(title)}" style="width: 100%; aspect-ratio: 4 / 3; border: 0" allow="${allow}"></iframe>`;
 }
 
-/** What a cropped scene has on a tag of its own: the box belongs to it, and not to the element. */
+/** Attributes of a cropped scene's own tag: the box belongs to it, and not to the element. */
 const OF_SCENE = ['src', 'up', 'crop', 'contract', 'chain', 'pose'];
 
 /**
- * Which tag has which attributes.
+ * Divides attributes between the tags.
  * @param attributes {readonly (readonly [name: string, value: string | true])[]} true for an attribute without a value.
- * @returns of the element, and of its `<splat-scene>`; null where it has none.
+ * @returns of the element, and of its `<splat-scene>`; null if it has none.
  */
 export function tagsOf(attributes) {
   if (!attributes.some(([name]) => name === 'crop')) return { element: attributes, scene: null };

@@ -1,9 +1,9 @@
-/** A capture that is tilted, set upright by three points of its floor: what the attribute `up` has to say. */
+/** A capture that is tilted, set upright by three points of its floor: the value of the attribute `up`. */
 import { parseUp } from '../../packages/element/dist/camera/grammar.js';
 import { eyeOfPose, toScene, viewerFrame } from '../../packages/element/dist/camera/orbit.js';
 import { pickPoint } from './pick.js';
 
-/** Up, where a scene says nothing. */
+/** The default up direction of a scene. */
 const AS_TRAINED = [0, -1, 0];
 
 const difference = (a, b) => [a.x - b.x, a.y - b.y, a.z - b.z];
@@ -12,7 +12,7 @@ const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a
 
 /**
  * Upright of the plane through three points of viewer space, on the side of the eye.
- * @returns {number[] | null} of length 1; null where the points are nearly in a line.
+ * @returns {number[] | null} of length 1; null if the points are nearly in a line.
  */
 export function uprightOf([a, b, c], eye) {
   const [first, second] = [difference(b, a), difference(c, a)];
@@ -23,7 +23,7 @@ export function uprightOf([a, b, c], eye) {
   return normal.map((value) => (side * value) / length);
 }
 
-/** What is up now: as the attribute says, which a cropped scene has on its own tag, or else the file. */
+/** The current up direction: from the attribute, which a cropped scene has on its own tag, or else from the file. */
 export const upNow = (scene) =>
   parseUp((scene.querySelector('splat-scene') ?? scene).getAttribute('up') ?? '') ?? scene.stats?.up ?? AS_TRAINED;
 
@@ -34,7 +34,7 @@ export function turnedOver(scene) {
   return axis < 0 ? numbers.join(' ') : `${numbers[axis] < 0 ? '-' : ''}${'xyz'[axis]}`;
 }
 
-/** What `up` has to say for a direction of viewer space to be up. */
+/** The value of `up` that makes a direction of viewer space point up. */
 function upOf(direction, scene) {
   const frame = viewerFrame(upNow(scene));
   return toScene(frame, direction)
@@ -47,7 +47,7 @@ function upOf(direction, scene) {
  * @param scene {HTMLElement} a `<gaussian-splat>` whose scene is shown
  * @param say {(sentence: string) => void}
  * @param signal {AbortSignal} ends it
- * @returns {Promise<string>} a value for `up`; rejects where `signal` is aborted.
+ * @returns {Promise<string>} a value for `up`; rejects if `signal` is aborted.
  */
 export async function askForLevel(scene, say, signal) {
   const points = [];

@@ -6,7 +6,7 @@ const MAX_MOTION = 5;
 /**
  * @param scene {HTMLElement} a `<gaussian-splat>` whose scene is shown
  * @param signal {AbortSignal} ends it
- * @returns {Promise<{ x: number, y: number, z: number } | null>} the surface at the next click, null beside the scene; rejects where `signal` is aborted.
+ * @returns {Promise<{ x: number, y: number, z: number } | null>} the surface at the next click, null beside the scene; rejects if `signal` is aborted.
  */
 export function pickPoint(scene, signal) {
   return new Promise((resolve, reject) => {

@@ -19,7 +19,7 @@ const ADDRESSES = ['src', 'poster', 'contract'];
 const LISTS = ['chain', 'postprocess'];
 /** The element's build, which this site has, too. */
 const CDN = new URL('../cdn/', document.baseURI).href;
-/** What is fetched as soon as it changes. */
+/** Fields whose changes load a file at once. */
 const LOADED = ['src', 'crop', 'views', ...ADDRESSES, ...LISTS];
 const VIEW = ['camera-orbit', 'camera-target', 'field-of-view'];
 
@@ -30,7 +30,7 @@ let savedPoster = '';
 const children = new Children(scene, byId('children'), show);
 const crop = new Crop(scene, form.elements.crop, form.querySelectorAll('[data-side]'), show);
 
-/** What the fields say: `[name, value]`, true for a bare attribute. Empty fields, and values that the element would not take, set nothing; `alt` and `src` come first. */
+/** The values of the fields: `[name, value]`, true for a bare attribute. Empty fields, and values that the element would not take, set nothing; `alt` and `src` come first. */
 function chosen() {
   return [...form.elements]
     .filter(({ name }) => name)
@@ -69,26 +69,26 @@ function setTags(tags) {
   if (isCropped && !cropped.isConnected) scene.append(cropped);
 }
 
-/** Whether a visitor has moved the camera since the fields last said where it is. */
+/** Whether a visitor has moved the camera since the fields last set it. */
 let isTurned = false;
 /** The view that comes back once the scene is loaded again. */
 let kept;
 
-/** Where a visitor has moved the camera, as `flyTo()` takes it. */
+/** The visitor's camera position as a target of `flyTo()`. */
 function turnedTo() {
   if (!isTurned) return undefined;
   const [orbit, target, fieldOfView] = [scene.getCameraOrbit(), scene.getCameraTarget(), scene.getFieldOfView()];
   return { orbit: String(orbit), target: String(target), fieldOfView: String(fieldOfView) };
 }
 
-/** Frames what is left of the scene, as a page with this HTML would; a visitor's view stays. */
+/** Frames the remaining part of the scene, as a page with this HTML would; a visitor's view stays. */
 async function frameAgain() {
   const view = turnedTo();
   await scene.updateFraming();
   if (view) await scene.flyTo(view, { duration: 0 });
 }
 
-/** Sets what is given, and removes every other attribute that the form has a field for. */
+/** Sets the given attributes, and removes all others that have a field in the form. */
 function setAttributes(element, attributes) {
   const values = new Map(attributes);
   for (const { name } of form.elements) {
@@ -122,7 +122,10 @@ function pasteable(name, value) {
 const absolute = (address) =>
   URL.canParse(address, document.baseURI) ? new URL(address, document.baseURI).href : address;
 
-/** The page's address says what the fields say, so that it can be sent. A file stays where it is: its name is kept. */
+/**
+ * The page's address contains the values of the fields, so that it can be sent. A file stays local: only its name is
+ * kept.
+ */
 function remember(attributes) {
   const query = new URLSearchParams();
   for (const [name, value] of attributes) query.set(value === local.name ? 'file' : name, value === true ? '' : value);
@@ -142,14 +145,14 @@ function recall() {
     byId('status').textContent = `${query.get('file')} was in your browser only. Drop it on this page again.`;
 }
 
-/** Where the camera is, as attributes: into the fields, the HTML and the clipboard. */
+/** Writes the camera's position as attributes into the fields, the HTML and the clipboard. */
 async function copyView() {
   for (const [name, value] of Object.entries(viewOf(scene))) form.elements[name].value = value;
   show();
   byId('copied').textContent = await copy(byId('html').textContent);
 }
 
-/** What can only be had here: a file that was dropped is on no server. */
+/** Local files are available only here: a dropped file is on no server. */
 async function copyUnlessLocal(textOf) {
   if (form.elements.src.value === local.name)
     byId('copied').textContent = 'Your file is in this browser only. Put it on a server, and name its address as src.';
@@ -167,7 +170,9 @@ function flip() {
 
 let asking = new AbortController();
 
-/** Asks for three points of the floor, and says in `up` what they come to; what was said of the view meant another one. */
+/**
+ * Asks for three points of the floor, and writes the result into `up`. Fields of the view refer to the old direction.
+ */
 async function level() {
   asking.abort();
   asking = new AbortController();
@@ -180,11 +185,11 @@ async function level() {
     show();
     say('Upright. If it stands on its head, look at the floor from above and try again.');
   } catch {
-    // Another button was pressed, or another scene is there.
+    // Another button was pressed, or another scene is shown.
   }
 }
 
-/** Puts a label where the visitor clicks next. */
+/** Puts a label at the visitor's next click. */
 async function label() {
   asking.abort();
   asking = new AbortController();
@@ -194,7 +199,7 @@ async function label() {
     if (point !== null) children.addLabel(point);
     else byId('copied').textContent = 'Nothing of the scene is there. Press the button again.';
   } catch {
-    // Another button was pressed, or another scene is there.
+    // Another button was pressed, or another scene is shown.
   }
 }
 

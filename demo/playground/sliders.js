@@ -15,7 +15,7 @@ export function connectSliders(form, onChange) {
   });
 }
 
-/** Brings the sliders to where the fields are. */
+/** Sets the sliders to the values of the fields. */
 export function alignSliders(form) {
   for (const slider of slidersOf(form)) {
     const part = partsOf(form, form.elements[slider.dataset.of])[Number(slider.dataset.part)];

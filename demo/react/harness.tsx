@@ -1,4 +1,4 @@
-/** What tests drive: mount, unmount, another source, a ref, events, a property by reference. */
+/** Actions for tests: mount, unmount, another source, a ref, events, a property by reference. */
 import { GaussianSplat, type GaussianSplatElement } from '@gaussian-splat/react';
 import type {} from '@gaussian-splat/react/jsx';
 import { useEffect, useRef, useState } from 'react';

@@ -1,6 +1,5 @@
 /**
- * The clip of the gallery, written when the site is built: dust rises from a plate, becomes a vase, which stands for a while, and blows away. No splat is there all the time. It is
- * there to show what a clip is, and costs the repository nothing.
+ * The clip of the gallery, written when the site is built: dust rises from a plate, becomes a vase, which stands for a while, and blows away. No splat lives all the time. It demonstrates clips without a file in the repository.
  */
 import { mkdirSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
@@ -17,7 +16,7 @@ const [RISE, DRIFT] = [1.4, 1.6];
 const GOLDEN = (Math.sqrt(5) - 1) / 2;
 /** Value of the constant spherical harmonic. */
 const SH_CONSTANT = 0.28209479177387814;
-/** What may be rounded: the eye sees none of it. */
+/** Step sizes of rounding that the eye cannot see. */
 const STEPS = { position: 0.004, rotation: 0.02, scale: 0.05, opacity: 0.02, color: 0.03 };
 
 /** Writes `vase.gsv` into a folder. */
@@ -25,7 +24,7 @@ export async function writeClip(folder) {
   const { codeClip, encodingsFor } = await import('../../packages/economise/dist/index.js');
   mkdirSync(folder, { recursive: true });
   const { bytes } = await codeClip({
-    ...{ frameCount: FRAMES, framesPerSecond: FRAMES_PER_SECOND, framesPerGroup: FRAMES_PER_GROUP, minDecibels: 45 },
+    ...{ frameCount: FRAMES, framesPerSecond: FRAMES_PER_SECOND, framesPerGroup: FRAMES_PER_GROUP, minPsnr: 45 },
     openFrame: async (frame) => vaseAt(frame / FRAMES_PER_SECOND),
     ...{ deflate, rounding: { encoding: encodingsFor('vase.spz').at(-1), steps: STEPS } },
   });

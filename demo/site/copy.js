@@ -1,8 +1,8 @@
-/** The clipboard, where the browser lets the page have it. */
+/** The clipboard, if the browser allows the page to use it. */
 
 /**
  * @param text {string}
- * @returns {Promise<string>} what to tell the person.
+ * @returns {Promise<string>} a message for the person.
  */
 export async function copy(text) {
   try {

@@ -1,4 +1,4 @@
-/** A cost card: what is known beforehand, and what this machine says about a scene while it shows it. */
+/** A cost card: known facts, and measurements of this machine while it shows a scene. */
 import { adapterName, measureFrames, timeLoading } from './measure.js';
 
 const LIVE = { warmUp: 'First frame', memory: 'GPU memory', frame: 'Frame time' };
@@ -9,7 +9,7 @@ const make = (name, text, properties = {}) =>
 /**
  * Fills a description list.
  * @param list {HTMLElement} a `<dl>`
- * @param facts {[string, string][]} what is known without showing the scene.
+ * @param facts {[string, string][]} facts known without showing the scene.
  * @param element {HTMLElement | null} the `<gaussian-splat>` that the card is about; null for none.
  */
 export function fillCostCard(list, facts, element) {

@@ -1,4 +1,4 @@
-/** The repository's own documents, which the site renders from where they lie: each has one source. */
+/** The repository's own documents, which the site renders in place: each has one source. */
 import { existsSync, readdirSync, readFileSync } from 'node:fs';
 import { join, posix } from 'node:path';
 import { root } from '../../scripts/lib/run.mjs';
@@ -51,7 +51,7 @@ const SECTIONS = [
 ];
 const TITLES = {
   'README.md': 'README',
-  LICENSE: 'Licence',
+  LICENSE: 'License',
   'docs/architecture.md': 'Architecture',
   'packages/element/README.md': 'The npm package',
   'packages/react/README.md': 'React',
@@ -93,7 +93,7 @@ function describe(source, section) {
   const text = readFileSync(posix.join(root, source), 'utf8');
   const [, heading] = /^# (.+)$/m.exec(text) ?? [];
   const title = TITLES[source] ?? plain(heading ?? source);
-  // A licence has no heading; a page needs one.
+  // A license has no heading; a page needs one.
   return { source, section, title, url: urlOf(source), text: heading ? text : `# ${title}\n\n${text}` };
 }
 

@@ -1,6 +1,6 @@
 /**
  * The site as Eleventy builds it: pages are the HTML files of demo/, each beside its scripts, and those of benchmarks/; the documents of the
- * repository are rendered beside them from where they lie. `npm run build` runs it after the packages.
+ * repository are rendered beside them in place. `npm run build` runs it after the packages.
  */
 import { readdirSync, readFileSync, statSync } from 'node:fs';
 import { join } from 'node:path';
@@ -11,7 +11,7 @@ import { pageFolders, relativeAddress } from './links.mjs';
 import { improveMarkdown } from './markdown.mjs';
 import { writePageList } from './page-list.mjs';
 
-/** Files that pages load as they are, and where they go. */
+/** Files that pages load unchanged, and their targets. */
 const COPIED = {
   'demo/style.css': 'style.css',
   'demo/home.css': 'home.css',
@@ -19,7 +19,7 @@ const COPIED = {
   'demo/scenes': 'scenes',
   'benchmarks/page/bench.css': 'bench/page/bench.css',
   'benchmarks/peers/*.html': 'bench/peers',
-  'docs/*.png': 'docs',
+  'docs/*.{png,webp}': 'docs',
   'docs/stability': 'stability/data',
   'docs/frontier': 'frontier/data',
   'packages/element/cdn': 'cdn',
@@ -30,7 +30,7 @@ const NOT_PAGES = ['demo/dist/**', 'demo/site/layouts/**'];
 export default function configure(eleventy) {
   eleventy.setUseGitIgnore(false);
   for (const pattern of NOT_PAGES) eleventy.ignores.add(pattern);
-  // Documents come in by name, below; Markdown beside scenes and models is not a page by itself.
+  // Documents come in by name, below; Markdown beside scenes and models is not a page.
   eleventy.ignores.add('demo/**/*.md');
   eleventy.setServerPassthroughCopyBehavior('copy');
   eleventy.addPassthroughCopy(COPIED);

@@ -9,7 +9,7 @@ export const pageFolders = readdirSync(join(root, 'demo'), { recursive: true })
   .filter((folder) => ['index.njk', 'index.html'].some((name) => existsSync(join(root, 'demo', folder, name))))
   .map((folder) => folder.replaceAll('\\', '/'));
 
-/** @param from {string} the page's address, with a slash in front and, for a folder, behind. @param to {string} likewise. */
+/** @param from {string} the page's address, with a slash in front and, for a folder, behind. @param to {string} in the same form. */
 export function relativeAddress(from, to) {
   const folder = from.endsWith('/') ? from : posix.dirname(from);
   const path = posix.relative(folder, to) || '.';

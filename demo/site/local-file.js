@@ -2,7 +2,7 @@
 
 let objectUrl;
 
-/** The address of a local file; the name goes along in its fragment, since some formats are known by nothing else. */
+/** The address of a local file; its fragment contains the name, since the name alone identifies some formats. */
 export function addressOf(file) {
   if (objectUrl) URL.revokeObjectURL(objectUrl);
   objectUrl = URL.createObjectURL(file);

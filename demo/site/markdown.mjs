@@ -1,4 +1,4 @@
-/** What documents of the repository need to be pages: headings that links can name, links to pages, tables that scroll on a phone. */
+/** Converts documents of the repository to pages: headings that links can name, links to pages, tables that scroll on a phone. */
 import { existsSync } from 'node:fs';
 import { join, posix } from 'node:path';
 import { root } from '../../scripts/lib/run.mjs';
@@ -11,7 +11,7 @@ const ADDRESSES = [
   [/^docs\/frontier\/?$/, '/frontier/'],
   [/^docs\/frontier\/(.+)$/, '/frontier/data/$1'],
   [/^docs\/stability\/(.+)$/, '/stability/data/$1'],
-  [/^docs\/([^/]+\.png)$/, '/docs/$1'],
+  [/^docs\/([^/]+\.(?:png|webp))$/, '/docs/$1'],
   [/^demo\/(scenes\/.+|generators\/.+\.(?:onnx|json|webp|png))$/, '/$1'],
   [/^benchmarks\/?$/, '/bench/'],
   [/^benchmarks\/([\w-]+\.html)$/, '/bench/$1'],
@@ -56,7 +56,7 @@ function nameHeadings(tokens) {
   });
 }
 
-/** A head cell without words is no heading for anybody who hears the table. */
+/** A head cell without words is no heading for screen readers. */
 function emptyHeads(tokens) {
   tokens.forEach((token, i) => {
     if (token.type !== 'th_open' || tokens[i + 1].content !== '') return;
@@ -79,7 +79,7 @@ function rewriteInline(children, { document, page }) {
   }
 }
 
-/** Files that are no pages are named, not linked: the site does not know where its visitors find the repository. */
+/** Files that are no pages are named, not linked: the site does not know the repository's address. */
 function becomeSpan(token, { path, isThere }) {
   token.tag = 'span';
   token.attrs = [
@@ -88,7 +88,7 @@ function becomeSpan(token, { path, isThere }) {
   ];
 }
 
-/** Where a link of a document leads on the site: `{ href }`, or `{ path, isThere }` of a file that is no page. */
+/** The target of a document's link on the site: `{ href }`, or `{ path, isThere }` of a file that is no page. */
 function targetOf(link, document, page) {
   if (document === undefined || /^([a-z]+:|#)/i.test(link)) return { href: link };
   const [file, fragment] = link.split('#');

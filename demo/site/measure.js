@@ -1,17 +1,17 @@
-/** What a scene costs here: measured on the visitor's machine, in the page, while it is drawn. */
+/** Measures the cost of a scene on the visitor's machine, in the page, while it is drawn. */
 
 const TURN_DEGREES = 6;
-/** Most frames that are measured; the page's address may say fewer. */
+/** Upper limit of measured frames; the page's address may set fewer. */
 const FRAMES = Number(new URLSearchParams(location.search).get('frames') ?? 30);
 
 /** Fewer frames say little: their median is one of them. */
 const ENOUGH = 9;
 
 /**
- * Frame times of scenes that take turns, frame by frame, so that whatever else the machine does falls on all of them. A frame's time goes from its submission until the GPU has finished it. The cameras
+ * Frame times of scenes that take turns, frame by frame, so that other work on the machine affects all of them. A frame's time goes from its submission until the GPU has finished it. The cameras
  * turn around their scenes and go back in the end. One frame of each is drawn before the first that counts. ONNX Runtime's work on the same device is in the figures.
- * @param elements {HTMLElement[]} `<gaussian-splat>` elements whose scenes are shown; they are brought into sight, since nothing is drawn elsewhere.
- * @param options.frames most frames of each. @param options.limitMs no further round is begun after this time.
+ * @param elements {HTMLElement[]} `<gaussian-splat>` elements whose scenes are shown; the page scrolls to them, since off-screen elements do not draw.
+ * @param options.frames upper limit of the frames of each. @param options.limitMs no further round starts after this time.
  * @returns {Promise<{ median: number, frames: number, isEnough: boolean, width: number, height: number }[]>} of each element; `isEnough` is false below 9 frames.
  */
 export async function measureInTurns(elements, { frames = FRAMES, limitMs = 6000 } = {}) {
@@ -81,20 +81,20 @@ function nextFrame(element) {
   });
 }
 
-/** Name of the graphics adapter, as far as the browser tells it. */
+/** Name of the graphics adapter, if the browser reports it. */
 export async function adapterName() {
   const { info = {} } = (await navigator.gpu?.requestAdapter()) ?? {};
   return [info.vendor, info.architecture, info.description].filter(Boolean).join(' ') || 'an adapter without a name';
 }
 
 /**
- * Tells how long a scene takes until its first picture, once it is there: from the begin of loading, so that the network, the shaders and,
+ * Reports the time until a scene's first frame, once it is drawn: from the start of loading, so that the network, the shaders and,
  * of a generator, the runtime and the first run are in it.
  * @param element {HTMLElement}
  * @param tell {(milliseconds: number) => void} called for every load.
  */
-export function timeLoading(element, tell) {
+export function timeLoading(element, report) {
   let started = performance.now();
   element.addEventListener('loadstart', () => (started = performance.now()));
-  element.addEventListener('load', () => tell(performance.now() - started));
+  element.addEventListener('load', () => report(performance.now() - started));
 }

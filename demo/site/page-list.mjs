@@ -1,4 +1,4 @@
-/** What the built site tells those who read it by program: all pages, documents as they were written, and what search looks through. */
+/** The built site for programs: all pages, documents as they were written, and the index of search. */
 import { mkdirSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { documents } from './documents.mjs';
@@ -25,7 +25,7 @@ function writeTwins() {
   }
 }
 
-/** https://llmstxt.org: what the site has, in Markdown. */
+/** https://llmstxt.org: the contents of the site in Markdown. */
 function overview() {
   const sections = [...new Set(documents.map(({ section }) => section))].filter((section) => section !== 'Decisions');
   const listed = sections.map((section) => {
@@ -35,7 +35,9 @@ function overview() {
   return `# gaussian-splat\n\n> A custom element that shows Gaussian splats on any web page, drawn with WebGPU.\n\n${listed.join('\n\n')}\n`;
 }
 
-/** What a document has under each of its headings. Decisions and figures are for contributors, and would drown the rest. */
+/**
+ * Text of a document under each of its headings. Decisions and figures are for contributors, and would drown the rest.
+ */
 function passagesOf({ section, title, url, text }) {
   if (section === 'Decisions' || section === 'Accuracy and speed') return [];
   return text.split(/^(?=#{1,3} )/m).map((part) => {

@@ -11,14 +11,14 @@ const FLOOR_RADIUS = 2.5;
 const COLUMN_CIRCLE = 2.05;
 const COLUMN_HEIGHT = 2.3;
 
-/** Linear base colours. */
+/** Linear base colors. */
 const MATERIALS = {
   floor: { baseColorFactor: [0.17, 0.14, 0.11, 1], roughnessFactor: 0.85, metallicFactor: 0 },
   stone: { baseColorFactor: [0.4, 0.33, 0.26, 1], roughnessFactor: 0.75, metallicFactor: 0 },
   brass: { baseColorFactor: [0.72, 0.46, 0.17, 1], roughnessFactor: 0.32, metallicFactor: 1 },
 };
 
-/** A profile of [radius, height] turned around the y axis; each stretch of it has normals of its own where `isFlat`. */
+/** A profile of [radius, height] turned around the y axis; each stretch of it has separate normals if `isFlat`. */
 function lathe(profile, { at: [x, z] = [0, 0], isFlat = true, segments = SEGMENTS } = {}) {
   const mesh = { positions: [], normals: [], indices: [] };
   const slope = ([r0, y0], [r1, y1]) => {

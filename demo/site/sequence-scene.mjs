@@ -1,6 +1,5 @@
 /**
- * The sequence of the examples, written when the site is built: a knot along which waves run, as its first frame and what moves after it. It is there to show what a sequence is,
- * and costs the repository nothing.
+ * The sequence of the examples, written when the site is built: a knot along which waves run, as its first frame and the later motion. It demonstrates sequences without a file in the repository.
  */
 import { mkdirSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
@@ -14,7 +13,7 @@ const GOLDEN = (Math.sqrt(5) - 1) / 2;
 /** Value of the constant spherical harmonic. */
 const SH_CONSTANT = 0.28209479177387814;
 
-/** What may be rounded: the eye sees none of it. */
+/** Step sizes of rounding that the eye cannot see. */
 const STEPS = { position: 0.004, rotation: 0.02, scale: 0.05, opacity: 0.02, color: 0.03 };
 
 /** Writes `knot.json`, its first frame and its motion into a folder. */
@@ -36,7 +35,7 @@ export async function writeSequence(folder) {
   writeFileSync(join(folder, 'knot.json'), `${JSON.stringify(manifest)}\n`);
 }
 
-/** The knot at a share of its period, as a `GaussianCloud`. */
+/** The knot at a fraction of its period, as a `GaussianCloud`. */
 function knotAt(share) {
   const cloud = {
     count: SPLATS,
@@ -63,7 +62,7 @@ function knotAt(share) {
   return cloud;
 }
 
-/** A point of the tube around a trefoil, and where the trefoil leads there. */
+/** A point of the tube around a trefoil, and the trefoil's direction there. */
 function tubeAt(along, around, radius) {
   const center = trefoil(along);
   const ahead = trefoil(along + 1e-3);
@@ -80,7 +79,7 @@ const cross = ([a, b, c], [d, e, f]) => [b * f - c * e, c * d - a * f, a * e - b
 /** The quaternion (w, x, y, z) that turns the first axis into a direction. */
 const turnTo = ([x, y, z]) => normalized([1 + x + 1e-6, 0, -z, y]);
 
-/** Constant coefficients of a warm colour that goes to blue along the knot, lighter on top and where the wave is. */
+/** Constant coefficients of a warm color that goes to blue along the knot, lighter on top and on the wave. */
 function colorAt(along, around, wave) {
   const share = 0.5 + 0.5 * Math.sin(along);
   const light = 0.62 + 0.28 * Math.sin(around) + 0.18 * wave;

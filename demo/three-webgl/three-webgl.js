@@ -18,7 +18,7 @@ const scene = new THREE.Scene();
 scene.background = new THREE.Color(0x20242b);
 const bar = new THREE.Mesh(new THREE.BoxGeometry(3, 0.12, 0.12), new THREE.MeshStandardMaterial({ color: 0xd9822b }));
 scene.add(bar, new THREE.HemisphereLight(0xffffff, 0x445566, 3));
-/** Where the splats are: captures have y down. */
+/** Position of the splats: captures have y down. */
 const place = new THREE.Object3D();
 place.rotation.x = Math.PI;
 scene.add(place);

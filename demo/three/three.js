@@ -29,7 +29,7 @@ async function show() {
   const renderer = new WebGPURenderer({ canvas });
   await renderer.init();
   const { device } = renderer.backend;
-  // Without WebGPU three.js draws by WebGL, and the next line says what is wrong.
+  // Without WebGPU three.js draws by WebGL, and the next line reports the reason.
   const splats = new SplatRenderer(renderer, { onIncomplete: () => draw() });
   await autotune(device);
 

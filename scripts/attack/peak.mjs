@@ -1,8 +1,8 @@
-/** The most memory that the processes of a page have had, if the system tells: on Linux. */
+/** Peak memory of the processes of a page, on Linux. */
 import { existsSync, readdirSync, readFileSync } from 'node:fs';
 
 /**
- * The most bytes that a process of Chromium has taken which this process, or a child of it, has started; NaN where the system does not tell.
+ * Peak bytes of a Chromium process that this process or a child has started; NaN if the system does not report them.
  * @param type `renderer` or `gpu-process`
  */
 export function peakBytes(type = 'renderer') {

@@ -60,7 +60,7 @@ const served = mkdtempSync(join(tmpdir(), 'attack-'));
 const files = readdirSync(folder).filter((file) => !/README|NOT-RUN/.test(file) && new RegExp(values.only).test(file));
 const faults = [];
 
-/** Where a file lies for the page: streamed scenes are known by the name of their manifest. */
+/** The address of a file for the page: the name of the manifest identifies streamed scenes. */
 function placed(file) {
   if (statSync(join(folder, file)).isDirectory()) {
     cpSync(join(folder, file), join(served, file), { recursive: true });

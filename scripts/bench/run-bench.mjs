@@ -21,7 +21,7 @@ const USAGE = `usage: npm run lab:bench -- [options]
 SwiftShader draws, on the CPU; GAUSSIAN_SPLAT_GPU=system takes the GPU of this machine.
 `;
 
-/** What is compared unless a list is given. */
+/** The comparison's default list. */
 const OURS = [{ name: 'ours' }];
 const PEERS = [
   { name: 'PlayCanvas', peer: 'playcanvas' },

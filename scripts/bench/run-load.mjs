@@ -1,4 +1,4 @@
-/** `npm run lab:load`: what the loading of ordinary files takes in Chromium, ours and others': time to the first preview and to the scene, the page's longest task, the most memory of its process. */
+/** `npm run lab:load`: the cost of loading ordinary files in Chromium with our element and with others: time to the first preview and to the scene, the page's longest task and the peak memory of its process. */
 import { statSync, writeFileSync } from 'node:fs';
 import { basename, dirname, join, resolve } from 'node:path';
 import { parseArgs } from 'node:util';
@@ -75,12 +75,12 @@ for (const file of positionals.map((each) => resolve(process.env.INIT_CWD ?? pro
       console.log(`  ${viewer.padEnd(12)} ${String(rounds[0].error.message).split('\n')[0].slice(0, 100)}`);
       continue;
     }
-    const least = (name) => fine.reduce((most, row) => (row[name] < (most ?? Infinity) ? row[name] : most), undefined);
-    const row = { file: basename(file), viewer, previewMs: least('previewMs'), loadMs: least('loadMs') };
+    const min = (name) => fine.reduce((max, row) => (row[name] < (max ?? Infinity) ? row[name] : max), undefined);
+    const row = { file: basename(file), viewer, previewMs: min('previewMs'), loadMs: min('loadMs') };
     Object.assign(row, {
-      longestMs: least('longestMs'),
-      peakBytes: least('peakBytes'),
-      emptyBytes: least('emptyBytes'),
+      longestMs: min('longestMs'),
+      peakBytes: min('peakBytes'),
+      emptyBytes: min('emptyBytes'),
     });
     rows.push(row);
     console.log(

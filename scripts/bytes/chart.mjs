@@ -1,4 +1,4 @@
-/** The chart of bytes against accuracy as SVG: bytes a splat of the source on a logarithmic axis, dB of the worst held-out view upwards. */
+/** The chart of bytes against accuracy as SVG: bytes a splat of the source on a logarithmic axis, PSNR of the worst held-out view upwards. */
 import { scaleLinear, scaleLog } from 'd3-scale';
 import { styleOf, tag, words, escape } from '../charts/svg.mjs';
 import { placeLabels } from '../frontier/labels.mjs';

@@ -10,8 +10,8 @@ import { root } from '../lib/run.mjs';
 export const TRANSFORM = '@playcanvas/splat-transform@3.7.0';
 
 /**
- * Runs a command that makes a file, unless that is there; false where it fails.
- * @param isKept only what is there is taken
+ * Runs a command that makes a file, unless the file exists. Returns false if the command fails.
+ * @param isKept whether only existing files are used
  */
 export function make(path, command, args, isKept = false) {
   if (existsSync(path) || isKept) return existsSync(path);
@@ -46,15 +46,15 @@ export async function read(path) {
   return readScene(new Uint8Array(readFileSync(path)), { name: basename(path), openFile });
 }
 
-/** The least of three times, ms, and what was read. */
+/** The shortest of three times in ms, and the result. */
 export async function timed(work) {
-  let [least, found] = [Infinity, undefined];
+  let [min, found] = [Infinity, undefined];
   for (let k = 0; k < 3; k++) {
     const start = performance.now();
     found = await work();
-    least = Math.min(least, performance.now() - start);
+    min = Math.min(min, performance.now() - start);
   }
-  return [least, found];
+  return [min, found];
 }
 
 /** Pages of a folder, decoded: the finest of them as a cloud, and how many bytes there are of all and of the first. */

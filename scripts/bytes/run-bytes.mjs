@@ -21,7 +21,7 @@ const USAGE = `usage: npm run lab:bytes -- [options]
   --out FOLDER     where bytes.json and bytes.svg go (default docs/frontier)
   --scenes A,B     of skull, playbot3, st-peter (default all); others keep their figures
   --views N        held-out views (default 8)
-  --scored N       views that score splats (default 24; 216 is the default of the commands, for a GPU)
+  --score-views N  views that score splats (default 24; 216 is the default of the commands, for a GPU)
   --kept           of what takes long to make only what is in --work
 `;
 
@@ -43,7 +43,7 @@ const SCENES = {
   },
   skull: { source: 'scenes/skull.ply', files: { 'PLY, float32': 'scenes/skull.ply' } },
 };
-/** What others' tool makes of a scene that has no such file. */
+/** The output of another tool for a scene that has no such file. */
 const TRANSFORMED = { SOG: 'sog', 'compressed PLY': 'compressed.ply', 'SPZ 4': 'spz' };
 const DECIBELS = [40, 50];
 
@@ -116,7 +116,7 @@ async function measure(scene, { source, files }, device) {
       make(
         folder,
         process.execPath,
-        own('detail', path(source), '--out', folder, '--min-db', String(dB), '--scored', values.scored),
+        own('detail', path(source), '--out', folder, '--min-psnr', String(dB), '--score-views', values['score-views']),
         values.kept,
       )
     ) {
@@ -124,7 +124,7 @@ async function measure(scene, { source, files }, device) {
       await note(`our pages, ${dB} dB`, true, found.bytes, found.first, ms, found.cloud);
     }
     const smaller = made(`own-${dB}.sog`);
-    const options = ['--min-db', String(dB), '--scored', values.scored, '--out', smaller];
+    const options = ['--min-psnr', String(dB), '--score-views', values['score-views'], '--out', smaller];
     if (make(smaller, process.execPath, own('economise', path(source), ...options), values.kept))
       await file(`SOG, ours, ${dB} dB`, true, smaller);
   }

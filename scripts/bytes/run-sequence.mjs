@@ -1,5 +1,5 @@
 /**
- * `npm run lab:sequence`: what a sequence costs whose splats correspond: ten seconds of the walker that ships, 240 frames of 40,000 splats, as its first frame and what moves after it,
+ * `npm run lab:sequence`: the cost of a sequence whose splats correspond: ten seconds of the walker that ships, 240 frames of 40,000 splats, as its first frame and the motion after it,
  * and the same frames as files of their own.
  */
 import { mkdirSync, readFileSync, writeFileSync } from 'node:fs';
@@ -21,7 +21,7 @@ const USAGE = `usage: npm run lab:sequence -- [options]
 
   --out FOLDER    where the sequence is written (default bench-results/sequence)
   --frames N      default 240
-  --min-db DB     default 45
+  --min-psnr DB   default 45
   --per-file N    default 48
 `;
 const text = (fallback) => ({ type: 'string', default: fallback });
@@ -30,7 +30,7 @@ const { values } = parseArgs({
     ...{
       out: text(join(root, 'bench-results/sequence')),
       frames: text('240'),
-      'min-db': text('45'),
+      'min-psnr': text('45'),
       'per-file': text('48'),
     },
     help: { type: 'boolean' },
@@ -42,8 +42,8 @@ if (values.help) {
 }
 
 const FRAMES_PER_SECOND = 24;
-/** Frames of a pace of each leg: no whole part of a second, so that no frame is like another. */
-const PACE = 26.5;
+/** Frames of each leg's gait cycle: not a whole fraction of a second, so that all frames differ. */
+const QUALITY = 26.5;
 /** Value of the constant spherical harmonic. */
 const SH_CONSTANT = 0.28209479177387814;
 
@@ -57,7 +57,7 @@ const session = await ort.InferenceSession.create(model, { executionProviders: [
 /** The walker in one frame, as a `GaussianCloud`. */
 async function openFrame(frame) {
   const { joints } = contract.inputs.pose;
-  const state = { timeSeconds: 0, pose: walkingPose(joints, (frame / PACE) % 1) };
+  const state = { timeSeconds: 0, pose: walkingPose(joints, (frame / QUALITY) % 1) };
   const inputs = Object.entries(bindInputs(header, contract, state));
   const feeds = Object.fromEntries(
     inputs.map(([name, { data, dims }]) => [name, new ort.Tensor('float32', data, dims)]),
@@ -92,9 +92,9 @@ const device = await adapter.requestDevice(deviceDescriptor(adapter));
 await pickInitialVariants(device, { format: 'rgba8unorm' });
 const frameCount = Number(values.frames);
 const framesPerFile = Number(values['per-file']);
-const options = { frameCount, openFrame, framesPerFile, minDecibels: Number(values['min-db']), device };
+const options = { frameCount, openFrame, framesPerFile, minPsnr: Number(values['min-psnr']), device };
 const begun = performance.now();
-const { first, files, decibels, worstDecibels } = await codeSequence({
+const { first, files, psnr, worstPsnr } = await codeSequence({
   ...options,
   ...{ encodeWebp, deflate, deflateQuickly },
   onStep: (step) => console.log(`  ${step}`),
@@ -116,6 +116,6 @@ splats         ${whole.count} in ${frameCount} frames
 first frame    ${first.length} bytes
 second frame   ${first.length + files[0].length} bytes
 all            ${(all / 1e6).toFixed(3)} MB; as SPZ of each frame ${((own * frameCount) / 1e6).toFixed(1)} MB
-accuracy       ${decibels.toFixed(2)} dB in held-out views of frames, ${worstDecibels.toFixed(2)} dB in the worst
+accuracy       ${psnr.toFixed(2)} dB in held-out views of frames, ${worstPsnr.toFixed(2)} dB in the worst
 seconds        ${((performance.now() - begun) / 1000).toFixed(0)}`);
 process.exit(0);

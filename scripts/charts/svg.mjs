@@ -1,4 +1,4 @@
-/** What charts as SVG have in common: colours for light and dark pages, and elements. */
+/** Shared parts of SVG charts: colors for light and dark pages, and elements. */
 
 export const styleOf = ({ font }) => `
   svg { --ink: #1d1b18; --quiet: #6b645b; --ground: #fffdf9; --line: #e2dcd2; --own: #b3541e; --peer: #1f6fb2; }

@@ -1,15 +1,15 @@
-/** What the charts of splats drawn against splats that show have in common: views of a scene at growing distances, their pictures, and what shows in them. */
+/** Shared parts of the charts of drawn against visible splats: views of a scene at growing distances, their images, and the visible splats. */
 import { lookAt } from '@gaussian-splat/core';
 import { Viewpoint, World } from '@gaussian-splat/renderer';
 import { AuxiliaryOutputs } from '@gaussian-splat/renderer/tools';
 
-/** Weight, alpha times transmittance, from which on a splat can be told on a display of 8 bits. */
+/** Lowest weight, alpha times transmittance, that is visible on a display of 8 bits. */
 const MIN_WEIGHT = 0.5 / 255;
 
 export const numbers = (list) => list.split(',').map(Number);
 
 /**
- * A view of a scene's middle. At distance 1 the scene fills the picture.
+ * A view of a scene's middle. At distance 1 the scene fills the image.
  * @param azimuth, elevation of the camera, radians
  */
 export function cameraAt({ center, radius }, { width, height }, distance, azimuth = 0.4, elevation = Math.atan(0.5)) {
@@ -44,14 +44,14 @@ export async function draw(device, gaussians, camera, detail = 0) {
   const { width, height } = camera;
   const usage = GPUTextureUsage.RENDER_ATTACHMENT | GPUTextureUsage.STORAGE_BINDING | GPUTextureUsage.COPY_SRC;
   const target = device.createTexture({ size: [width, height], format: 'rgba32float', usage });
-  const splats = gaussians.pages.reduce((sum, page) => sum + 256 * Math.ceil(page.count / 256), 0);
+  const splats = gaussians.blocks.reduce((sum, page) => sum + 256 * Math.ceil(page.count / 256), 0);
   const contributions = device.createBuffer({ size: 4 * splats, usage: 0x80 | 0x4 });
   const world = new World();
   world.add({ scene: gaussians });
   const viewpoint = new Viewpoint(device, world, { settings: { rasterizer: 'tiles', threads: 'serial', detail } });
   do viewpoint.draw(camera, { target, auxiliary: new AuxiliaryOutputs({ contributions }) });
   while (!(await viewpoint.isComplete()));
-  const { visible } = await viewpoint.statistics();
+  const { visible } = await viewpoint.stats();
   const weights = await read(device, 4 * splats, (encoder, staging) =>
     encoder.copyBufferToBuffer(contributions, 0, staging, 0, 4 * splats),
   );
@@ -68,7 +68,7 @@ export async function draw(device, gaussians, camera, detail = 0) {
   return { pixels, visible, contributing: weights.reduce((sum, weight) => sum + (weight >= MIN_WEIGHT ? 1 : 0), 0) };
 }
 
-/** Mean squared difference over the pixels that the first picture covers. */
+/** Mean squared difference over the pixels that the first image covers. */
 export function meanSquare(a, b) {
   let [sum, count] = [0, 0];
   for (let i = 0; i < a.length; i += 4) {

@@ -1,4 +1,4 @@
-/** What the checks of `npm run lab:firefox` and `npm run lab:webkit` do within a page. Everything answers with text or bytes, which any protocol carries. */
+/** The checks of `npm run lab:firefox` and `npm run lab:webkit` within a page. Every function returns text or bytes, which any protocol carries. */
 const SIZE = 'display: block; width: 300px; height: 240px';
 
 const delay = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
@@ -25,7 +25,7 @@ async function show(attributes) {
   return element;
 }
 
-/** Where the camera is: theta and phi in degrees, radius and target in metres. */
+/** Camera position: theta and phi in degrees, radius and target in meters. */
 async function place() {
   element.jumpCameraToGoal();
   await frames();
@@ -44,7 +44,7 @@ async function until(condition, what, limitMs = 20_000) {
   }
 }
 
-/** What the scenes of a page of the site come to: each is scrolled to, its poster dismissed. */
+/** Final states of the scenes of a page: each is scrolled to, its poster dismissed. */
 async function scenesOfPage() {
   const scenes = [...document.querySelectorAll('gaussian-splat')];
   const faults = [];
@@ -55,7 +55,7 @@ async function scenesOfPage() {
     if (scene.error) faults.push(`${scene.src}: ${scene.error.reason}`);
     else if (!(await paints(scene))) faults.push(`${scene.src}: blank`);
   }
-  // What needs WebGPU says so.
+  // Scenes that need WebGPU report it.
   const refused = faults.filter((fault) => /unsupported\/webgl$/.test(fault)).length;
   scrollTo(0, 0);
   await delay(500);
@@ -73,7 +73,7 @@ async function paints(scene) {
   return context.getImageData(0, 0, 64, 64).data.some((value, i) => i % 4 === 3 && value > 128);
 }
 
-/** WebGL contexts that the page was given, and what it threw. */
+/** WebGL contexts that the page created, and errors that it threw. */
 window.contexts = [];
 const { getContext } = HTMLCanvasElement.prototype;
 HTMLCanvasElement.prototype.getContext = function watching(...args) {

@@ -55,7 +55,7 @@ export async function checkPolicies(tab) {
         assert(loaded, error);
         assert(own === 0, `${own} scripts of its own server`);
       });
-      // Policies are meant to be violated here; what else is thrown counts.
+      // Policies are meant to be violated here; other errors count.
       await check('strict pages throw nothing', async () => {
         const thrown = (await tab.takeExceptions()).filter((text) => !/Content-Security-Policy/.test(text));
         assert(thrown.length === 0, thrown.join('; '));
@@ -65,7 +65,27 @@ export async function checkPolicies(tab) {
   );
 }
 
-/** Frames without an origin let nobody look into them but on the screen. */
+/** Meshes under the guide's policy, which need WebGPU: a texture within a GLB, a buffer in the JSON, and meshopt with the directive that the guide names. */
+export async function checkMeshPolicies(tab) {
+  const policy = recommended();
+  const withWasm = policy.replace("script-src 'self'", "script-src 'self' 'wasm-unsafe-eval'");
+  const cases = {
+    '/fixtures/textured.glb': policy,
+    '/policies/triangle.gltf': policy,
+    '/fixtures/meshopt.glb': withWasm,
+  };
+  for (const [file, header] of Object.entries(cases))
+    await withServer({ 'content-security-policy': header }, (origin) =>
+      check(`the policy of the guide with the mesh ${file}`, async () => {
+        const { mesh, violations, warnings } = await reportOf(tab, `${origin}/policies/secure.html?mesh=${file}`);
+        assert(mesh === 'shown', mesh);
+        assert(violations.length + warnings.length === 0, [...violations, ...warnings].join('; '));
+        return 'no violation';
+      }),
+    );
+}
+
+/** Scripts cannot read frames without an origin, so the test reads the screen. */
 async function checkFrames(tab, origin, host) {
   const blank = [];
   for (const attributes of FRAMES) {

@@ -1,4 +1,4 @@
-/** What `npm run lab:webgl` does within a page: frames of the renderer alone, and how old the order of a moving element is. */
+/** The page side of `npm run lab:webgl`: frames of the renderer alone, and how old the order of a moving element is. */
 import { readScene } from '@gaussian-splat/formats';
 import { packGaussians } from '@gaussian-splat/renderer';
 import {
@@ -65,7 +65,9 @@ async function drawView(url, camera, mode, accumulation) {
   return JSON.stringify({ pixels: btoa(text), format, frameMs, sortMs });
 }
 
-/** How old the order is, ms, that each frame of a motion is drawn in: since it was asked for, 0 where the page's thread has just made it. */
+/**
+ * Age in ms of the sort order in each frame of a motion: time since its request, 0 if the main thread has just made it.
+ */
 async function orderAges(attributes, milliseconds) {
   const ages = [];
   let asked;
@@ -104,7 +106,7 @@ async function orderAges(attributes, milliseconds) {
     const start = performance.now();
     let frames = 0;
     for (let theta = 0; performance.now() < start + milliseconds; theta += 2, frames++) {
-      // The first frames find their pace.
+      // The first frames find their quality level.
       if (performance.now() < start + milliseconds / 2) ages.length = 0;
       element.setAttribute('camera-orbit', `${theta}deg 75deg auto`);
       await new Promise(requestAnimationFrame);
@@ -112,11 +114,11 @@ async function orderAges(attributes, milliseconds) {
     const { splats } = element.stats;
     const perSecond = (1000 * frames) / (performance.now() - start);
     const sorted = ages.sort((a, b) => a - b);
-    const [median, most] = [sorted[Math.floor(sorted.length / 2)], sorted.at(-1)];
+    const [median, max] = [sorted[Math.floor(sorted.length / 2)], sorted.at(-1)];
     return JSON.stringify({
       splats,
       median,
-      most,
+      most: max,
       frames: sorted.length,
       perSecond,
       moving: element.stats.dynamicQuality.moving,

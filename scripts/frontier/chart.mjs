@@ -1,19 +1,19 @@
 /** The chart of speed against accuracy as SVG: milliseconds on a logarithmic axis, dB upwards, the front as a line. */
 import { scaleLinear, scaleLog } from 'd3-scale';
 import { adapterName } from '../../benchmarks/run/environment.js';
-import { nonDominated, pointsOf } from './front.mjs';
+import { nonDominated, pointsOf, perceptual } from './front.mjs';
 import { placeLabels } from './labels.mjs';
 import { escape, styleOf, tag, words } from '../charts/svg.mjs';
 
-/** The whole chart, and one that can be read on a phone: there most levers are dots without a name. */
+/** The whole chart, and one that can be read on a phone: there most settings are dots without a name. */
 const LAYOUTS = {
   whole: { width: 920, height: 620, margin: { left: 64, right: 24, top: 64, bottom: 96 }, font: 12, isSmall: false },
   small: { width: 460, height: 470, margin: { left: 52, right: 10, top: 74, bottom: 92 }, font: 15, isSmall: true },
 };
-/** What the small chart names, besides the front. */
+/** Configurations that the small chart names, besides the front. */
 const NAMED_TIERS = ['tier', 'variant', 'peer'];
 
-/** Tiers of accuracy and where they begin, in dB of the worst view. */
+/** Tiers of accuracy and their lower limits, in dB PSNR of the worst view. */
 const TIERS = [
   ['reference', 75],
   ['exact on a display', 59],
@@ -121,7 +121,7 @@ function drawPoints(points, front, { x, y }, { width, height, margin, font, isSm
   );
   const marks = points.map((point) => {
     const kind = [point.peer ? 'peer' : 'own', !isNamed(point) && 'unnamed'];
-    const note = `${point.name}: ${point.ms.toFixed(2)} ms, ${point.psnr.toFixed(1)} dB, worst pixel ${point.worst.toFixed(1)}/255, SSIM ${point.ssim.toFixed(4)}`;
+    const note = `${point.name}: ${point.ms.toFixed(2)} ms, ${point.psnr.toFixed(1)} dB, worst pixel ${point.worst.toFixed(1)}/255, ${perceptual(point)}`;
     const circle = { class: kind.filter(Boolean).join(' '), cx: x(point.ms), cy: y(point.psnr), r: 5 };
     return tag('circle', circle, tag('title', {}, escape(note)));
   });

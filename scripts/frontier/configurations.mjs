@@ -1,5 +1,5 @@
 /**
- * What the chart of speed against accuracy compares, a line for each configuration: its name, what it aims at (`tier`), and
+ * Configurations in the chart of speed against accuracy, a line for each: its name, its aim (`tier`), and
  * how it differs from the default in options of the Renderer, of packGaussians (`pack`; `detail: true` packs levels of detail)
  * or in resolution scale. A line whose options the renderer does not have yet is left out of the chart and listed as such.
  */

@@ -10,11 +10,11 @@ export function nonDominated(points) {
   return points.filter((point) => !points.some((other) => dominates(other, point))).sort((a, b) => a.ms - b.ms);
 }
 
-/** Shares of a time, and dB, that a run does not tell apart: `default` beside itself comes out so far off. */
+/** Resolution of a run, as a fraction of the time and in dB: two measurements of `default` differ by as much. */
 const [SAME_TIME, SAME_DECIBELS] = [0.01, 0.05];
 
 /**
- * Points that leave nothing to be said for one: they are as fast, as true and as small, and clearly better in one of the three. What others hold is not known, and counts as nothing.
+ * Points that dominate one: they are as fast, as accurate and as small, and clearly better in one of the three. Sizes of other renderers are unknown and count as 0.
  * @param points {{ms: number, psnr: number, bytes?: number}[]} milliseconds, dB and bytes for each splat.
  */
 export function passing(point, points) {
@@ -27,7 +27,7 @@ export function passing(point, points) {
 
 /**
  * Area that the points dominate below `reference.ms` and above `reference.psnr`, in decades of time times dB: one number
- * that grows when anything gets faster or truer.
+ * that grows when anything gets faster or more accurate.
  */
 export function hypervolume(points, reference = { ms: 16.6, psnr: 36 }) {
   const front = nonDominated(points.filter(({ ms, psnr }) => ms < reference.ms && psnr > reference.psnr));
@@ -38,8 +38,7 @@ export function hypervolume(points, reference = { ms: 16.6, psnr: 36 }) {
 }
 
 /**
- * Milliseconds a frame: of many in a row, the queue drained once, the same clock for all. Where a configuration was measured beside the default in turns, its time is the ratio of the two times
- * what the default took over the whole run: the clock of a GPU that changes within a run then changes nothing.
+ * Milliseconds a frame: of many in a row, the queue drained once, the same clock for all. If a configuration was measured in turns with the default, its time is the ratio of the two times the default's time over the whole run: the clock of a GPU that changes within a run then changes nothing.
  */
 export function timeOf(result, standard) {
   const { burst, ratio } = result;
@@ -51,6 +50,10 @@ export function timeOf(result, standard) {
 export function bytesASplat({ bytes }, { splats }) {
   return bytes && (bytes.scene + bytes.renderer) / splats;
 }
+
+/** SSIM, and LPIPS if it was measured, of the worst views. */
+export const perceptual = ({ ssim, lpips }) =>
+  `SSIM ${ssim.toFixed(4)}${lpips === undefined ? '' : `, LPIPS ${lpips.toFixed(4)}`}`;
 
 /** The points of a report. */
 export function pointsOf({ results, standard, scene }) {
@@ -66,6 +69,7 @@ export function pointsOf({ results, standard, scene }) {
       psnr: Math.min(120, quality.psnr),
       worst: quality.worst,
       ssim: quality.ssim,
+      lpips: quality.lpips,
       bytes,
     }));
 }

@@ -9,7 +9,7 @@ const SAME = 4;
 /** Names that a label has room for. */
 const MAX_NAMES = 3;
 
-/** Where a label may stand, as directions from its point; the nearer ones first. */
+/** Directions of a label from its point, the nearest ones first. */
 const DIRECTIONS = [
   [1, 0],
   [-1, 0],
@@ -26,7 +26,10 @@ const DISTANCES = [1, 2.2, 3.6, 5.2, 7, 9, 11.5, 14, 17];
 
 const ROUNDS = 6;
 
-/** What a label costs that covers a pixel of another, whose line crosses another or another's line, whose line runs over a point, and each step away. */
+/**
+ * Cost of a label: covering a pixel of another, crossing another label or its line, a line over a point, and each step
+ * away.
+ */
 const COVERED = 100;
 const CROSSED = 400;
 const TANGLED = 150;
@@ -47,7 +50,8 @@ export function placeLabels(points, { left, right, top, bottom, font }) {
     ),
   );
   const labels = order.map(() => undefined);
-  // Each in turn where it costs least beside all others; a few rounds, since the first did not know of the last.
+  // Places each label at its lowest cost beside all others. A few rounds follow, since the first labels ignore the
+  // later ones.
   for (let round = 0; round < ROUNDS; round++) {
     choices.forEach((candidates, i) => {
       const others = labels.filter((label, k) => label !== undefined && k !== i);

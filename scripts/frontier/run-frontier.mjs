@@ -1,12 +1,14 @@
-/** The work behind `npm run lab:frontier`: collects in the browser, or takes what was collected elsewhere, and draws. */
-import { mkdirSync, readFileSync, writeFileSync } from 'node:fs';
+/** The work behind `npm run lab:frontier`: collects in the browser, or reads results of another machine, and draws. */
+import { mkdirSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
+import { tmpdir } from 'node:os';
 import { join, resolve } from 'node:path';
 import { parseArgs } from 'node:util';
 import { adapterName } from '../../benchmarks/run/environment.js';
+import { runMetrics } from '../../packages/cli/src/lib/gate/gate.mjs';
 import { runPage } from '../lib/browser-page.mjs';
 import { root } from '../lib/run.mjs';
 import { drawChart } from './chart.mjs';
-import { bytesASplat, hypervolume, nonDominated, passing, pointsOf, timeOf } from './front.mjs';
+import { bytesASplat, hypervolume, nonDominated, passing, perceptual, pointsOf, timeOf } from './front.mjs';
 
 const USAGE = `usage: npm run lab:frontier -- [options]
 
@@ -20,6 +22,7 @@ const USAGE = `usage: npm run lab:frontier -- [options]
   --only REGEX      only configurations whose name matches
   --scene FILE      a scene of yours instead of the one that ships
   --query TEXT      anything else for the page's address, for example "reference=renderer"
+  --python FILE     measures LPIPS, too, with a Python that has packages/cli/src/lib/gate/requirements.txt
   --from FILE       draws a report that the page posted on another machine; measures nothing
   --adapter NAME    the GPU's name, where the browser tells no more than its vendor
   --out FOLDER      where frontier-ADAPTER.json and .svg go (default docs/frontier)
@@ -43,6 +46,7 @@ function readOptions() {
       only: text(''),
       scene: { type: 'string' },
       query: text(''),
+      python: { type: 'string' },
       from: { type: 'string' },
       adapter: { type: 'string' },
       out: text(join(root, 'docs/frontier')),
@@ -52,7 +56,7 @@ function readOptions() {
   return values;
 }
 
-async function collect({ size, splats, path, distance, views, frames, rounds, only, scene, query }) {
+async function collect({ size, splats, path, distance, views, frames, rounds, only, scene, python, query }) {
   const asked = {
     sizes: size,
     splats,
@@ -64,6 +68,7 @@ async function collect({ size, splats, path, distance, views, frames, rounds, on
     only,
     warmup: '2',
     phases: 'burst,wall,gpu',
+    images: python && '1',
   };
   const more = Object.fromEntries(new URLSearchParams(query));
   return runPage(
@@ -77,7 +82,33 @@ async function collect({ size, splats, path, distance, views, frames, rounds, on
   );
 }
 
-/** Part of a file's name that tells adapters apart. */
+/** Moves the images out of a report, and adds the LPIPS of each configuration's worst view to its metrics. */
+function measureLpips({ reference, results }, python) {
+  const folder = mkdtempSync(join(tmpdir(), 'frontier-'));
+  const write = (name, images) =>
+    images.map((url, k) => {
+      const path = join(folder, `${name}-${k}.png`);
+      writeFileSync(path, Buffer.from(url.slice(url.indexOf(',') + 1), 'base64'));
+      return path;
+    });
+  try {
+    const compared = results.filter(({ images }) => images);
+    const expected = write('reference', reference.images);
+    const pairs = compared.flatMap(({ images }, n) => write(n, images).map((path, k) => [path, expected[k]]));
+    const { rows, withoutLpips } = runMetrics(python, pairs);
+    if (withoutLpips) throw new Error(`LPIPS cannot be measured: ${withoutLpips}`);
+    for (const [n, { quality }] of compared.entries()) {
+      const own = rows.slice(expected.length * n, expected.length * (n + 1));
+      quality.lpips = Number(Math.max(...own.map(({ lpips }) => lpips)).toFixed(5));
+    }
+  } finally {
+    rmSync(folder, { recursive: true });
+  }
+  delete reference.images;
+  for (const result of results) delete result.images;
+}
+
+/** Part of a file's name that distinguishes adapters. */
 function slugOf(adapter) {
   const name = /swiftshader/i.test(adapterName(adapter)) ? 'swiftshader' : adapterName(adapter);
   return name
@@ -96,7 +127,7 @@ function describe(report) {
     const { name } = configuration;
     if (error) return `  ${name.padEnd(28)} left out: ${error.split('\n')[0]}`;
     const time = timeOf(result, report.standard).toFixed(2);
-    const numbers = `${time.padStart(9)} ms ${quality.psnr.toFixed(2).padStart(7)} dB  p99.9 ${quality.p999.toFixed(2)}  worst ${quality.worst.toFixed(1)}  SSIM ${quality.ssim.toFixed(4)}${bytes ? `  ${bytes} B` : ''}`;
+    const numbers = `${time.padStart(9)} ms ${quality.psnr.toFixed(2).padStart(7)} dB  p99.9 ${quality.p999.toFixed(2)}  worst ${quality.worst.toFixed(1)}  ${perceptual(quality)}${bytes ? `  ${bytes} B` : ''}`;
     return `${front.has(name) ? '*' : ' '} ${name.padEnd(28)}${numbers}`;
   });
   const area = hypervolume(points);
@@ -119,6 +150,7 @@ async function main() {
   if (report.kind !== 'frontier')
     throw new Error(`expected the report of bench/frontier.html, found kind "${report.kind}"`);
   if (report.error) throw new Error(report.error);
+  if (report.reference.images) measureLpips(report, options.python);
   if (options.adapter) report.environment.adapter.description = options.adapter;
   const folder = resolve(from, options.out);
   mkdirSync(folder, { recursive: true });

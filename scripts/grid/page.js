@@ -32,7 +32,7 @@ const isInView = (element) => {
   return bottom > 0 && top < innerHeight;
 };
 
-/** By element: the most bytes that its splats, its frames and its canvas have taken. */
+/** Peak bytes of each element's splats, frames and canvas. */
 const needs = new Map();
 
 /** Bytes of the GPU that the page holds, those of canvases with an image included. */

@@ -1,6 +1,5 @@
 /**
- * `npm run lab:grid`: twelve scenes on a page of a phone's size, scrolled up and down by a finger for a minute. The most memory of the GPU is compared with
- * the most that the scenes in view take; tasks of the page's thread are taken from the browser's trace: what they worked, and what they waited for the GPU.
+ * `npm run lab:grid`: twelve scenes on a page of a phone's size, scrolled up and down by a finger for a minute. Peak GPU memory is compared with the peak of the scenes in view. Tasks of the main thread are read from the browser's trace: their work, and their wait for the GPU.
  */
 import { writeFileSync } from 'node:fs';
 import { join } from 'node:path';
@@ -110,9 +109,9 @@ async function swipe(devtools, direction) {
 }
 
 function judge({ samples, longTasks, tasks, errors, loaded, resident }) {
-  const most = (of) => Math.max(...samples.map(of));
-  const peak = most(({ own, canvasBytes }) => own + canvasBytes);
-  const share = peak / most(({ needed }) => needed);
+  const max = (of) => Math.max(...samples.map(of));
+  const peak = max(({ own, canvasBytes }) => own + canvasBytes);
+  const share = peak / max(({ needed }) => needed);
   if (!(share <= MAX_SHARE)) failures.push(`${share.toFixed(2)} times the memory of the scenes in view`);
   const own = tasks.filter(({ cpuMs, gpuMs }) => cpuMs + gpuMs > MAX_TASK_MS);
   if (own.length > 0) failures.push(`${own.length} tasks of more than ${MAX_TASK_MS} ms`);
@@ -120,11 +119,11 @@ function judge({ samples, longTasks, tasks, errors, loaded, resident }) {
   if (loaded < COUNT) failures.push(`${loaded} of ${COUNT} scenes came`);
   const megabytes = (bytes) => Math.round(bytes / 1e5) / 10;
   return {
-    scenes: { inView: most(({ inView }) => inView), held: most(({ held }) => held), loaded },
+    scenes: { inView: max(({ inView }) => inView), held: max(({ held }) => held), loaded },
     megabytes: {
       peak: megabytes(peak),
-      inView: megabytes(most(({ needed }) => needed)),
-      canvases: megabytes(most(({ canvasBytes }) => canvasBytes)),
+      inView: megabytes(max(({ needed }) => needed)),
+      canvases: megabytes(max(({ canvasBytes }) => canvasBytes)),
       gpuProcess: megabytes(resident),
     },
     share: Math.round(100 * share) / 100,

@@ -1,6 +1,6 @@
-/** Tasks of a page's thread, from a trace of Chromium with the categories `toplevel` and `gpu`. */
+/** Tasks of a page's main thread, from a trace of Chromium with the categories `toplevel` and `gpu`. */
 
-/** What the thread does while it waits for the GPU process. */
+/** Events of the thread while it waits for the GPU process. */
 const WAITS = new Set([
   'CommandBufferProxyImpl::WaitForGetOffset',
   'CommandBufferProxyImpl::WaitForTokenInRange',
@@ -8,7 +8,7 @@ const WAITS = new Set([
 ]);
 
 /**
- * Those that took longer than a limit, ms: with the time that the thread was running meanwhile, and that it waited for the GPU. The rest it waited for its turn on the processor.
+ * Tasks that took longer than a limit in ms, with the time that the thread was running and that it waited for the GPU. The rest of the time it waited for a CPU.
  * @param {Buffer} trace
  * @returns {{ ms: number, cpuMs: number, gpuMs: number, from: string }[]}
  */

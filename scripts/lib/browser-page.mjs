@@ -5,13 +5,13 @@ import { findChromium, gpuFlags } from './chromium.mjs';
 import { root } from './run.mjs';
 import { serve } from '../../packages/cli/src/lib/server.mjs';
 
-/** Exact timestamps: browsers round them to 100 µs unless told otherwise. */
+/** Exact timestamps: browsers round them to 100 µs by default. */
 const MEASURING_FLAGS = ['--disable-dawn-features=timestamp_quantization'];
 /**
  * @param page path in demo/dist, for example `bench/index.html`.
  * @param query {Record<string, string>} of its address.
  * @param scene {string | undefined} a scene file on disk that takes the place of the one that ships.
- * @returns the report; throws what the page says went wrong, or after `minutes`.
+ * @returns the report; throws the error that the page reports, or after `minutes`.
  */
 export async function runPage(page, query, { scene, minutes = 30, onProgress = () => {} } = {}) {
   const mounts = { '/': `${root}demo/dist` };

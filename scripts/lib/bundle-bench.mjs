@@ -20,7 +20,7 @@ const ENTRIES = [
   'peers/spark',
 ];
 
-/** @param folder where the pages are, for example demo/dist/bench. */
+/** @param folder of the pages, for example demo/dist/bench. */
 export async function bundleBench(folder) {
   const from = join(root, 'benchmarks');
   await build({

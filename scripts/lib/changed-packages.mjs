@@ -1,11 +1,11 @@
-/** What a change concerns: from the files that git finds different to packages, and from these to all that are made of them. */
+/** Packages that a change affects: the packages of the files that git finds different, and all that depend on them. */
 import { execFileSync } from 'node:child_process';
 import { existsSync, readdirSync, readFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { root } from './run.mjs';
 import { TESTS_OF } from './test-files.mjs';
 
-/** Packages that changed since a commit, by default the one where this branch left `main`; what is not committed counts. */
+/** Packages that changed since a commit, by default the one at which this branch left `main`; uncommitted changes count. */
 export function changedPackages(since = branchPoint()) {
   const files = [git('diff', '--name-only', since), git('ls-files', '--others', '--exclude-standard')]
     .join('\n')

@@ -1,4 +1,4 @@
-/** Finds a Chromium, or installs Debian's. Its SwiftShader also serves Dawn in Node where there is no GPU. */
+/** Finds a Chromium, or installs Debian's. Its SwiftShader also serves Dawn in Node if there is no GPU. */
 import { execFileSync, spawnSync } from 'node:child_process';
 import { accessSync, constants, existsSync } from 'node:fs';
 import { delimiter, join } from 'node:path';

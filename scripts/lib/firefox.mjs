@@ -72,7 +72,7 @@ export async function withDisplay(body) {
   }
 }
 
-/** Where it listens, which it says when it is ready. */
+/** The address on which it listens, from its output when it is ready. */
 function addressOf(child) {
   return new Promise((resolve, reject) => {
     const timer = setTimeout(() => reject(new Error('Firefox does not answer')), START_MS);
@@ -113,7 +113,7 @@ async function connect(address) {
   return { send, onEvent: (listener) => listeners.push(listener) };
 }
 
-/** A tab of Firefox, and what it has thrown. */
+/** A tab of Firefox, and the errors that it has thrown. */
 export class FirefoxTab {
   #firefox;
   #origin;
@@ -124,8 +124,10 @@ export class FirefoxTab {
   constructor(firefox, origin) {
     this.#firefox = firefox;
     this.#origin = origin;
-    firefox.onEvent((method, { type, level, text }) => {
-      if (method === 'log.entryAdded' && type === 'javascript' && level === 'error') this.#exceptions.push(text);
+    firefox.onEvent((method, { type, level, text, stackTrace }) => {
+      if (method !== 'log.entryAdded' || type !== 'javascript' || level !== 'error') return;
+      const { url, lineNumber, columnNumber } = stackTrace?.callFrames[0] ?? {};
+      this.#exceptions.push(url ? `${text} (${url}:${lineNumber}:${columnNumber})` : text);
     });
     this.#isSubscribed = firefox.send('session.subscribe', { events: ['log.entryAdded'] });
   }
@@ -140,7 +142,7 @@ export class FirefoxTab {
     });
   }
 
-  /** The value of an expression, or of what it promises. */
+  /** The value of an expression, or of its promise. */
   async evaluate(expression) {
     const answer = await this.#firefox.send('script.evaluate', {
       expression,

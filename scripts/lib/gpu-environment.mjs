@@ -1,4 +1,4 @@
-/** The environment in which Node's `webgpu` package (Dawn) finds a GPU, or SwiftShader where there is none. */
+/** Environment variables with which Node's `webgpu` package (Dawn) finds a GPU, or SwiftShader if there is none. */
 import { copyFileSync, existsSync, mkdirSync } from 'node:fs';
 import { join } from 'node:path';
 import { fileURLToPath } from 'node:url';
@@ -7,7 +7,7 @@ import { findSwiftShader } from './chromium.mjs';
 const cache = fileURLToPath(new URL('../../.cache/vulkan/', import.meta.url));
 
 /**
- * Variables for a child process that uses Dawn. On Linux that is SwiftShader, which gives the same picture on every
+ * Variables for a child process that uses Dawn. On Linux that is SwiftShader, which gives the same image on every
  * machine; GAUSSIAN_SPLAT_GPU=system leaves the choice to the system's Vulkan. Elsewhere Dawn has Metal or Direct3D.
  */
 export function gpuEnvironment() {

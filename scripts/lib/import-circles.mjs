@@ -2,7 +2,7 @@
 import { readdirSync, readFileSync } from 'node:fs';
 import { dirname, join, relative } from 'node:path';
 
-/** Tables of what is loaded late: they import files that may ask them for others. */
+/** Tables of late-loaded parts: they import files that may import them back. */
 const REGISTRIES = ['formats.ts', 'late-formats.ts'];
 /** `from '…'` and `import('…')`, as formatted by Prettier. */
 const STATIC = /\bfrom\s*'(\.{1,2}\/[^']+)'/g;
@@ -23,7 +23,7 @@ export function importsIn(folder) {
   );
 }
 
-/** Sets of more than one file of which each imports all others, by way of further ones: Tarjan's strongly connected components. */
+/** Sets of several files that all import one another, directly or by way of others: Tarjan's strongly connected components. */
 export function circlesOf(graph) {
   const index = new Map();
   const low = new Map();

@@ -1,4 +1,4 @@
-/** What a fresh clone lacks: Node packages and built files. */
+/** Installs and builds the parts that a fresh clone lacks: Node packages and built files. */
 import { existsSync, readdirSync, readFileSync, statSync, writeFileSync, mkdirSync } from 'node:fs';
 import { createHash } from 'node:crypto';
 import { join } from 'node:path';
@@ -16,7 +16,7 @@ export function ensureDependencies() {
   writeFileSync(stamp, lock);
 }
 
-/** What the two builds are made from, and where they note that they are done. */
+/** Inputs of the two builds, and the files that record a finished build. */
 const WHOLE = {
   stamp: '.cache/built',
   sources: [
@@ -58,7 +58,7 @@ export function build() {
 
 const STAMPS = { whole: [PACKAGES, WHOLE, ELEMENT], element: [ELEMENT], packages: [PACKAGES] };
 
-/** Begins a build. The result notes that it is done (`whole` holds the other two), from the sources as they were: what is edited meanwhile asks for another. */
+/** Starts a build. The function returned records that it is done (`whole` includes the other two) with the sources at its start, so that later edits cause another build. */
 export function beginBuild(extent) {
   const before = STAMPS[extent].map(({ stamp, sources }) => [join(root, stamp), fingerprint(sources)]);
   return () => {
@@ -73,13 +73,13 @@ function isBuilt({ stamp, sources }) {
   return existsSync(path) && existsSync(join(root, made)) && readFileSync(path, 'utf8') === fingerprint(sources);
 }
 
-/** What builds write among the sources. */
+/** Outputs of builds among the sources. */
 const IGNORED = new Set([
   ...['node_modules', 'dist', 'cdn', 'generated', 'LICENSE'],
   ...['custom-elements.json', 'vscode.html-custom-data.json', 'web-types.json'],
 ]);
 
-/** Of all files under some paths, with the times when they were changed. */
+/** Digest of all files under some paths, with the times of their last changes. */
 function fingerprint(paths) {
   return createHash('sha256').update(paths.flatMap(changesUnder).join('\n')).digest('hex');
 }

@@ -4,8 +4,7 @@ import { constants, setPriority } from 'node:os';
 import { root } from './run.mjs';
 
 /**
- * Runs a command and returns what it printed, without colours, and its exit status. What runs `beside` something else takes what that leaves of the
- * processors, and its output is shown when it has ended, in one piece.
+ * Runs a command and returns what it printed, without colors, and its exit status. A command that runs `beside` another takes the CPU time that is left, and prints its output in one piece when it ends.
  */
 export function runAsync(command, args, { env = {}, isBeside = false } = {}) {
   const child = spawn(command, args, {
@@ -31,7 +30,7 @@ export function runAsync(command, args, { env = {}, isBeside = false } = {}) {
   });
 }
 
-/** As little of the processors as a process can ask for. */
+/** The lowest CPU priority that a process can request. */
 function giveWay(pid) {
   try {
     setPriority(pid, constants.priority.PRIORITY_LOW);

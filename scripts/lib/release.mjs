@@ -1,4 +1,4 @@
-/** What `npm run release` makes; the tests and the apps of tests/apps use it as a user does. */
+/** The output of `npm run release`. The tests and the apps of tests/apps use it as a user does. */
 import { spawnSync } from 'node:child_process';
 import { createHash } from 'node:crypto';
 import { existsSync, mkdirSync, readdirSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
@@ -21,7 +21,7 @@ export function manifests() {
   );
 }
 
-/** What keeps the packages from being published together; empty if nothing does. */
+/** Reasons against publishing the packages together; empty if there are none. */
 export function faultsOf(packages) {
   const { version } = read(join(root, 'package.json'));
   return [...packages.values()].flatMap((each) => {
@@ -91,7 +91,7 @@ export function writeRelease(folder) {
 }
 
 /**
- * A registry of npm with our packages alone, for `@gaussian-splat:registry=` in an .npmrc: what is installed from it is what users will install.
+ * A registry of npm with our packages alone, for `@gaussian-splat:registry=` in an .npmrc: users will install the same files.
  * @param tarballs {Map<string, string>} paths by name
  */
 export async function serveRegistry(tarballs, port = 0) {

@@ -1,4 +1,5 @@
 /** Runs test files of Node and of Chromium beside each other, and counts. */
+import { availableParallelism } from 'node:os';
 import { relative } from 'node:path';
 import { runAsync } from './processes.mjs';
 import { root, TSC } from './run.mjs';
@@ -6,34 +7,66 @@ import { byGroup, byProcess } from './test-files.mjs';
 
 /** Files that are given a second chance alone, at most: more than that is no matter of a busy machine. */
 const MAX_UNSTEADY = 3;
+/** On machines with this many CPU cores or more, each file of a laboratory run has its own process. */
+const MIN_PROCESSORS_OF_EACH = 8;
+/** Ports between two test servers, in case one is taken. */
+const PORT_STEP = 10;
 const IN_ONE_PROCESS = 'tests/support/in-one-process.ts';
 const TYPES = [TSC, '--noEmit', '--project', 'tests'];
 const ESLINT = ['node_modules/eslint/bin/eslint.js', '.'];
 const WORDS = ['scripts/words.mjs'];
 
 /**
- * Chromium has the processors first, since some of its tests look at what happens in time; what draws in Node, what needs no GPU, types and the linter run beside it at
- * the lowest priority, and take what pages leave while they wait.
+ * Chromium has CPU priority, since some of its tests measure time. Tests that draw in Node, tests without a GPU, types and the linter run beside it at the lowest priority, while pages wait. Those of the laboratory run after it: they take minutes of all CPU cores.
  * @param files paths of test files, of Node and of Chromium.
  * @param env variables of all that runs.
- * @param isStatic whether types and style are looked at, too.
- * @param failsUnsteady whether a file that passes only when it runs again, alone, has failed.
+ * @param isStatic whether types and style are checked, too.
+ * @param isLab whether Node follows Chromium, or each file has a process of its own on machines with many CPU cores.
  * @returns how many tests passed, failed and were skipped, and a line for each that failed.
  */
-export async function runTests({ node, browser }, { env, isStatic = false, failsUnsteady = false }) {
-  const isBeside = browser.length > 0;
+export async function runTests({ node, browser }, { env, isStatic = false, isLab = false }) {
+  if (isLab && availableParallelism() >= MIN_PROCESSORS_OF_EACH) return runEach({ node, browser }, env);
+  const isBeside = browser.length > 0 && !isLab;
   const { sharing, together, alone } = byProcess(node);
   const options = { env: { ...env, NODE_ENV: 'test' }, isBeside };
+  const pages = runBrowser(byGroup(browser), { ...options, isBeside: false });
+  if (isLab) await pages;
   const results = await Promise.all([
-    runBrowser(byGroup(browser), { ...options, isBeside: false }, failsUnsteady),
-    runSharing(sharing, options),
-    runAlone(alone, isBeside ? 1 : 2, options).then(async (counts) => [
-      counts,
-      await runSharing(together, options),
-      ...(isStatic ? await runStatic(options) : []),
-    ]),
+    pages,
+    inTurn(
+      () => runSharing(sharing, options),
+      () => runSharing(together, options),
+    ),
+    inTurn(() => runAlone(alone, isBeside ? 1 : 2, options), ...(isStatic ? [() => runStatic(options)] : [])),
   ]);
   return results.flat().reduce(sum, NONE);
+}
+
+/** Counts of some runs, one after the other. */
+async function inTurn(...runs) {
+  const counts = [];
+  for (const run of runs) counts.push(await run());
+  return counts.flat();
+}
+
+/** Every file in its own process, on half of the CPU cores. */
+async function runEach({ node, browser }, env) {
+  const optionsAt = (slot) => ({
+    env: { ...env, NODE_ENV: 'test', TEST_PORT: String(8000 + PORT_STEP * slot) },
+    isBeside: true,
+  });
+  const groups = Object.entries(byGroup(browser));
+  const jobs = [
+    ...node.map((file) => (options) => runAlone([file], 1, options)),
+    ...groups.flatMap(([group, files]) => files.map((file) => (options) => inChromium(group, [file], options))),
+  ];
+  let counts = NONE;
+  const work = async (slot) => {
+    for (let job = jobs.shift(); job !== undefined; job = jobs.shift())
+      counts = sum(counts, await job(optionsAt(slot)));
+  };
+  await Promise.all(Array.from({ length: availableParallelism() >> 1 }, (_, slot) => work(slot)));
+  return counts;
 }
 
 const NONE = { passed: 0, failed: 0, skipped: 0, failures: [] };
@@ -83,10 +116,9 @@ async function runStatic(options) {
 }
 
 /**
- * The pages draw on the processor, and some tests look at what a page does in time: a few files that fail while the machine is busy with something else
- * run once more, by themselves. One that passes then is named as unsteady; one that fails again has failed.
+ * The pages draw on the CPU, and some tests measure times: a few files that fail while the machine is busy run once more, alone. One that passes then is named as unsteady; one that fails again has failed.
  */
-async function runBrowser(groups, options, failsUnsteady) {
+async function runBrowser(groups, options) {
   const results = [];
   for (const [group, files] of Object.entries(groups))
     if (files.length > 0) results.push({ group, ...(await inChromium(group, files, options)) });
@@ -98,7 +130,6 @@ async function runBrowser(groups, options, failsUnsteady) {
     const again = await inChromium(group === 'dense' ? group : 'timing', [file], options);
     if (again.failed > 0) continue;
     console.log(`unsteady: ${file} failed beside the others and passed alone`);
-    if (failsUnsteady) continue;
     const result = results.find(({ failedIn }) => failedIn.has(file));
     result.passed += count;
     result.failed -= count;
@@ -121,7 +152,7 @@ async function inChromium(group, files, options) {
   return { ...countsOf('Chromium', result), failedIn };
 }
 
-/** What a closing line says; a run that ended badly without naming a failure is one. */
+/** The sentence of a closing line. A run that failed without naming a test counts as a failure. */
 function countsOf(name, { text, status }) {
   const line = new RegExp(`^${name}: (\\d+) passed, (\\d+) failed, (\\d+) skipped$`, 'm').exec(text);
   const [, passed = 0, failed = 0, skipped = 0] = line?.map(Number) ?? [];

@@ -4,10 +4,10 @@ import { fileURLToPath } from 'node:url';
 
 export const root = fileURLToPath(new URL('../../', import.meta.url));
 
-/** TypeScript's native compiler. ESLint, and tests that look into programs, need the interface of the one before. */
+/** TypeScript's native compiler. ESLint, and tests that parse programs, need the API of the older compiler. */
 export const TSC = 'node_modules/typescript-7/bin/tsc';
 
-/** Runs a command, in the project's root unless told otherwise, and returns its exit status. */
+/** Runs a command, in the project's root by default, and returns its exit status. */
 export function run(command, args, { env = {}, stdio = 'inherit', cwd = root } = {}) {
   const result = spawnSync(command, args, { cwd, stdio, env: { ...process.env, ...env } });
   if (result.error) throw result.error;
@@ -23,7 +23,7 @@ export function must(command, args, options) {
   }
 }
 
-/** The same, while something else goes on: resolves when the command has ended. */
+/** The same in the background: resolves when the command has ended. */
 export async function mustSoon(command, args, { cwd = root } = {}) {
   const child = spawn(command, args, { cwd, stdio: 'inherit' });
   const status = await new Promise((resolve, reject) => child.on('error', reject).on('close', resolve));

@@ -1,4 +1,4 @@
-/** The WGSL in shaders/: files, the parts that they import, and what they declare. */
+/** The WGSL in shaders/: files, the parts that they import, and their declarations. */
 import { readFileSync } from 'node:fs';
 import { fileURLToPath } from 'node:url';
 import { WgslReflect } from 'wgsl_reflect/wgsl_reflect.module.js';
@@ -25,7 +25,7 @@ export function ownCode(path) {
   return code.replace(IMPORT, '').trim();
 }
 
-/** The same, with other functions called than those that it names; none where it declares them. */
+/** The same, with other functions called than those that it names. Empty if it declares them. */
 export function modifiedCode(path, called) {
   const names = Object.keys(called).join('|');
   const code = ownCode(path);

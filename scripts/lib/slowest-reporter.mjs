@@ -4,7 +4,7 @@ import { fileURLToPath } from 'node:url';
 import { root } from './run.mjs';
 
 /** Files that are printed, at most. */
-const MOST = 12;
+const MAX = 12;
 /** Below this nothing is worth a look, in milliseconds. */
 const SHORT_MS = 1_000;
 
@@ -29,7 +29,7 @@ export default async function* slowest(source) {
     files.set(path, (files.get(path) ?? 0) + (data.details?.duration_ms ?? 0));
   }
   const rows = [...files].filter(([, ms]) => ms >= SHORT_MS).sort(([, a], [, b]) => b - a);
-  for (const [path, ms] of rows.slice(0, MOST)) yield `${(ms / 1000).toFixed(0).padStart(4)} s ${path}\n`;
+  for (const [path, ms] of rows.slice(0, MAX)) yield `${(ms / 1000).toFixed(0).padStart(4)} s ${path}\n`;
   for (const { name, file, details } of failures)
     yield failureLine(pathOf(file), name, details?.error?.cause?.message ?? details?.error?.message);
   yield `Node: ${counts.passed} passed, ${counts.failed} failed, ${counts.skipped} skipped\n`;

@@ -1,28 +1,28 @@
-/** Which test files there are, and which run where: this is the one place that knows. Paths are relative to the root, with slashes. */
+/** The list of test files, and the environment of each: this is the only place that defines it. Paths are relative to the root, with slashes. */
 import { readdirSync, readFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { root } from './run.mjs';
 
 /**
- * `*.lab.test.ts`: the laboratory's, by `npm run test:lab`: tools that look for fewer splats or measure others, in all their breadth; what is judged by a clock; the same again in
+ * `*.lab.test.ts`: the laboratory's, by `npm run test:lab`: tools that reduce scenes or measure others, in all their breadth; tests that measure time; the same again in
  * another framework, another family of models, on another screen, or a hundred times. `npm test` keeps the behavior of the product, each in one way, and a smoke test of most tools.
  */
 export const isLaboratory = (file) => file.endsWith('.lab.test.ts');
 
 /**
- * `*.alone.test.ts`, or `*.alone.lab.test.ts`. In Node: has a process of its own, because it changes what others of the process see (globals, shaders, the clock, the device). In Chromium: no other page
- * runs beside it, because it looks at what happens in time, has the server lose files, or ends the GPU process.
+ * `*.alone.test.ts`, or `*.alone.lab.test.ts`. In Node: has a process of its own, because it changes state that the process shares (globals, shaders, the clock, the device). In Chromium: no other page
+ * runs beside it, because it measures time, has the server lose files, or ends the GPU process.
  */
 const isAlone = (file) => /\.alone\.(lab\.)?test\.ts$/.test(file);
 
 /** Has a browser of its own, whose screen is dense. */
 export const DENSE = 'tests/element/browser/high-density.lab.test.ts';
-/** Files of Node that share a process with the device of tests/support, and so what it has compiled. */
+/** Files of Node that run in one process with the device of tests/support, and thus reuse its compiled pipelines. */
 const SHARES_DEVICE = /^tests\/(detail|golden|stages)\//;
 /** Files of these folders have a process each: they take the machine's memory or threads. Others share one: to start it takes longer than most of them. */
 const ONE_EACH = /^tests\/(economise|packages)\//;
 
-/** Where the tests of each package are; those of demo and documents are the site's. */
+/** Folders of each package's tests. Tests of demo and documents belong to the site. */
 export const TESTS_OF = {
   core: ['contract', 'onnx'],
   formats: ['formats'],
@@ -37,7 +37,7 @@ export const TESTS_OF = {
   site: ['site'],
 };
 
-/** All test files, by where they run. */
+/** All test files, by environment. */
 export function testFiles() {
   const all = filesIn('tests').filter((file) => file.endsWith('.test.ts'));
   const [browser, node] = [all.filter(inBrowser), all.filter((file) => !inBrowser(file))];
@@ -48,7 +48,7 @@ export function testFiles() {
 export const hasBreadth = (file) =>
   /\bonlyInLab\b|\b(is|itIn)Lab\b|\bsomeOf\b|SITE === 'full'/.test(readFileSync(join(root, file), 'utf8'));
 
-/** Files of Node: those that share a device, those that share a process, and those that have one each. */
+/** Files of Node: those that use one device, those that use one process, and those that have one each. */
 export function byProcess(files) {
   const kindOf = (file) => {
     if (isAlone(file) || ONE_EACH.test(file)) return 'alone';
@@ -58,7 +58,7 @@ export function byProcess(files) {
   return { sharing: ofKind('sharing'), together: ofKind('together'), alone: ofKind('alone') };
 }
 
-/** Files of Chromium by group, in the order in which the groups run. */
+/** Files of Chromium by group, in the order of the groups. */
 export function byGroup(files) {
   return {
     timing: files.filter((file) => isAlone(file) && file !== DENSE),

@@ -1,7 +1,5 @@
 /**
- * The shaders of the WebGL renderer, in GLSL ES 3.00, made of the same WGSL as WebGPU's: naga (naga-cli, a tool of Rust) translates
- * shaders/webgl and what that imports from shaders/shared. What it makes is committed, since few machines have naga, with a digest of the WGSL
- * that it was made of: a test holds both against one another everywhere.
+ * The shaders of the WebGL renderer, in GLSL ES 3.00, made from the same WGSL as WebGPU's: naga (naga-cli, a tool of Rust) translates shaders/webgl and its imports from shaders/shared. Its output is committed, since few machines have naga, with a digest of the WGSL source. A test compares both everywhere.
  */
 import { execFileSync } from 'node:child_process';
 import { createHash } from 'node:crypto';
@@ -16,10 +14,10 @@ import { ownCode, partsOf, reflect, reflectStruct } from './shader-source.mjs';
 export const NAGA = '30.0.1';
 export const WEBGL_SHADERS = fileURLToPath(new URL('../../packages/renderer/src/webgl/shaders.ts', import.meta.url));
 
-/** What stands in the place of WebGPU's buffers. */
+/** GLSL that replaces WebGPU's buffers. */
 const REPLACED = { 'shared/stored_gaussian': 'webgl/textured_gaussian' };
 const STAGES = ['project', 'quads', 'hosted_quads', 'compose', 'probe', 'probe_surface'];
-/** What a stage takes as it is from WebGPU's. */
+/** Functions that a stage takes unchanged from WebGPU's. */
 const SHARED = ['full_screen'];
 const ENTRIES = [
   ['full_screen', 'vertex'],
@@ -34,7 +32,7 @@ const codeOf = (stage) =>
     .map(ownCode)
     .join('\n');
 
-/** Of all the WGSL, without its comments. */
+/** Digest of all the WGSL, without its comments. */
 export function digestOfSource() {
   const hash = createHash('sha256');
   for (const stage of STAGES) hash.update(codeOf(stage));
@@ -95,7 +93,9 @@ function named(text, code) {
   );
 }
 
-/** Without what a page need not load: spaces, constants that nothing uses, and a first instance that is always 0. */
+/**
+ * Removes text that a page need not load: spaces, constants that nothing uses, and a first instance that is always 0.
+ */
 function shortened(text) {
   const lines = text
     .replace('uniform uint naga_vs_first_instance;', '')

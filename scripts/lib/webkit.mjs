@@ -5,7 +5,7 @@ import { createServer } from 'node:net';
 import { join } from 'node:path';
 
 const START_MS = 60_000;
-/** Of one script in a page: software draws slowly. */
+/** Timeout of one script in a page: software rendering is slow. */
 const SCRIPT_MS = 180_000;
 
 /** @param env has DISPLAY */
@@ -85,7 +85,7 @@ export class WebKitTab {
     await this.#webkit.send('POST', '/url', { url: new URL(path, this.#origin).href });
   }
 
-  /** The value of an expression, or of what it promises. */
+  /** The value of an expression, or of its promise. */
   async evaluate(expression) {
     const script = `const done = arguments[arguments.length - 1];
       (async () => (${expression}))().then((value) => done({ value }), (error) => done({ error: String(error) }));`;
@@ -105,7 +105,7 @@ export class WebKitTab {
     if (source.type !== 'wheel') await this.#webkit.send('DELETE', '/actions');
   }
 
-  /** What the pages themselves have recorded (`window.thrown`): WebDriver tells of nothing. */
+  /** Errors that the pages themselves have recorded (`window.thrown`), since WebDriver reports none. */
   async takeExceptions() {
     await this.#keepThrown();
     return this.#thrown.splice(0);

@@ -1,4 +1,4 @@
-"""Where Gaussians may be: inside the visual hull, above the cut."""
+"""Bounds of the Gaussians: inside the visual hull, above the cut."""
 
 import numpy as np
 import torch
@@ -45,10 +45,10 @@ class Bounds:
         return ~(within & self.grid[x, y, z]) | (means[:, 1] > self.cut_height)
 
     def overhang(self, parameters: Parameters) -> torch.Tensor:
-        """How far each Gaussian reaches below the cut, world units, 0 where it does not. Differentiable."""
+        """How far each Gaussian reaches below the cut, world units, 0 if it does not. Differentiable."""
         down = matrices(parameters["quats"])[:, 1] * torch.exp(parameters["scales"])
         return torch.relu(parameters["means"][:, 1] + CUT_SIGMAS * down.norm(dim=1) - self.cut_height)
 
     def excess_width(self, parameters: Parameters) -> torch.Tensor:
-        """By how much each axis is wider than surface detail needs."""
+        """The excess of each axis over the width that surface detail needs."""
         return torch.relu(torch.exp(parameters["scales"]) - WIDEST)

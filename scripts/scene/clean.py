@@ -1,4 +1,4 @@
-"""What is left out of the finished scene, and how bright it is."""
+"""Removes Gaussians from the finished scene, and sets its brightness."""
 
 import numpy as np
 import torch
@@ -11,7 +11,7 @@ from model import Parameters, weights
 
 # A Gaussian that makes up less than this many pixels of every single photograph is never missed.
 LEAST_PIXELS = 0.1
-# Share of a Gaussian's visible weight, over all photographs, that must fall on the object.
+# Fraction of a Gaussian's visible weight, over all photographs, that must fall on the object.
 LEAST_ON_OBJECT = 0.6
 # Neighbours and distance, in units of the typical distance, beyond which a Gaussian counts as floating alone.
 NEIGHBOURS = 8
@@ -21,8 +21,7 @@ EXPOSURE_PERCENTILE = 85
 
 
 def visible_and_proper(parameters: Parameters, pictures: list[Picture]) -> tuple[torch.Tensor, torch.Tensor]:
-    """Which Gaussians make up LEAST_PIXELS of some photograph, and which of them show mostly where the photographs
-    show the object rather than background or darkness; (N,) booleans each."""
+    """Which Gaussians make up LEAST_PIXELS of some photograph, and which of them are visible mostly on the object rather than on background or darkness; (N,) booleans each."""
     count = len(parameters["means"])
     most, on, off = (torch.zeros(count, device="cuda") for _ in range(3))
     for picture in pictures:
@@ -40,7 +39,7 @@ def lonely(means: np.ndarray) -> np.ndarray:
 
 
 def cleaned(parameters: Parameters, bounds: Bounds, pictures: list[Picture]) -> Parameters:
-    """The Gaussians that are inside the bounds, seen on the object by somebody and not alone."""
+    """The Gaussians that are inside the bounds, visible on the object in a view, and not isolated."""
     kept, proper = visible_and_proper(parameters, pictures)
     unseen, spilled = int((~kept).sum()), int((kept & ~proper).sum())
     kept &= proper

@@ -1,4 +1,4 @@
-"""The masked photographs as torch tensors: what the trainer compares its pictures with."""
+"""The masked photographs as torch tensors: the references of the trainer's images."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,7 +18,7 @@ EDGE = 2
 @dataclass(frozen=True)
 class Picture:
     """One crop on the GPU: rgb (3,H,W) in 0..1, alpha, valid and doubtful (1,H,W), world to camera
-    (4,4), intrinsics (3,3). See masks.py for what is valid and doubtful."""
+    (4,4), intrinsics (3,3). masks.py defines valid and doubtful."""
 
     name: str
     rgb: torch.Tensor
@@ -73,7 +73,7 @@ def load_picture(folder: Path, view: View, capture: Capture, device: str) -> Pic
 
 
 def load_pictures(folder: Path, capture: Capture, device: str = "cuda") -> list[Picture]:
-    """All views for which masks.py left a mask, in the order of their names."""
+    """All views with a mask of masks.py, in the order of their names."""
     return [
         load_picture(folder, view, capture, device) for view in capture.views if (folder / f"{view.name}.png").exists()
     ]

@@ -24,7 +24,7 @@ FIELD_OF_VIEW = 35.0
 
 
 def shot(parameters: Parameters, degree: int, matrix: np.ndarray, size: int, background: float) -> np.ndarray:
-    """A square picture, uint8 RGB, over a grey background."""
+    """A square image, uint8 RGB, over a grey background."""
     focal = size / 2 / np.tan(np.radians(FIELD_OF_VIEW) / 2)
     intrinsics = torch.tensor(
         [[focal, 0, size / 2], [0, focal, size / 2], [0, 0, 1]], dtype=torch.float32, device="cuda"
@@ -37,7 +37,7 @@ def shot(parameters: Parameters, degree: int, matrix: np.ndarray, size: int, bac
 
 
 def masked_psnr(parameters: Parameters, degree: int, picture: Picture) -> tuple[float, float]:
-    """PSNR of the colour where the photograph shows the object, and the coverage's mean error where that is known."""
+    """PSNR of the colour on the object's pixels, and the coverage's mean error on the pixels with known coverage."""
     with torch.no_grad():
         colour, alpha, _ = render(parameters, picture.view_matrix, picture.intrinsics, picture.size, degree)
     inside = ((picture.alpha > 0.99) & (picture.valid > 0) & (picture.doubtful == 0))[0]

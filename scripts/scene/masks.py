@@ -1,10 +1,10 @@
 """Cuts the object out of its photographs: python masks.py PHOTOS OUT
 
 PHOTOS holds images/*.jpg and sparse/0 (COLMAP text). OUT receives, per view, NAME.jpg (unchanged) and NAME.png: red
-is the object's coverage in 0..255; green is 255 where the pixel may teach the trainer anything, 0 where the post hides
-or touches the object; blue is 255 where the photograph is dark and nobody can tell shaded object from dark room.
+is the object's coverage in 0..255; green is 255 if the trainer uses the pixel, 0 if the post hides
+or touches the object; blue is 255 if the photograph is too dark to distinguish shaded object from dark room.
 
-Brightness alone cannot tell the pale object from the pale plate below it or a lamp behind it, nor a dark eye socket
+Brightness alone cannot separate the pale object from the pale plate below it or a lamp behind it, nor a dark eye socket
 from the dark room; all photographs together can. So: a threshold per photograph, a visual hull from all of them, and
 the threshold again, trusted only near the hull's outline.
 """
@@ -27,7 +27,7 @@ CONTRAST = 0.2
 HULL_MARGIN = 4
 # A pixel this deep inside the hull is object, however dark.
 CORE_MARGIN = 10
-# Share of the views that must see a voxel as object. Below 1, because one faulty silhouette must not cut a hole.
+# Fraction of the views that must see a voxel as object. Below 1, because one faulty silhouette must not cut a hole.
 HULL_AGREEMENT = 0.96
 # From this height down (upright frame) the object shades itself; see visual_hull. What fewer views agree on may still
 # be object there.
@@ -40,7 +40,7 @@ HIGH_VIEW_DEGREES = 25
 HULL_MARGIN = 4
 # A pixel this deep inside the hull is object, however dark.
 CORE_MARGIN = 10
-# Share of the views that must see a voxel as object. Below 1, because one faulty silhouette must not cut a hole.
+# Fraction of the views that must see a voxel as object. Below 1, because one faulty silhouette must not cut a hole.
 HULL_AGREEMENT = 0.96
 # From this height down (upright frame) the object shades itself; see visual_hull.
 UNDERSIDE = 0.08
@@ -68,7 +68,7 @@ def stamp(points: np.ndarray, view: View, capture: Capture, radius: float) -> np
 
 
 def nearest_depth(points: np.ndarray, view: View, capture: Capture) -> np.ndarray:
-    """Depth of the nearest voxel in each pixel; infinite where there is none."""
+    """Depth of the nearest voxel in each pixel; infinite if there is none."""
     k = capture.intrinsics
     pixels, depth = project(points, view, capture)
     half = int(np.ceil(VOXEL * k.fx / np.median(depth) / 2))
@@ -80,7 +80,7 @@ def nearest_depth(points: np.ndarray, view: View, capture: Capture) -> np.ndarra
         for right in range(-half, half + 1):
             x, y = column + right, row + down
             seen = (x >= 0) & (x < k.width) & (y >= 0) & (y < k.height)
-            # Of several writes to one pixel the last stays: the nearest. Between shifts the nearer of both.
+            # The last of several writes to one pixel stays: the nearest. Between shifts the nearer of both.
             shifted = np.full_like(image, np.inf)
             shifted[y[seen], x[seen]] = depth[seen]
             image = np.minimum(image, shifted)
@@ -88,7 +88,7 @@ def nearest_depth(points: np.ndarray, view: View, capture: Capture) -> np.ndarra
 
 
 def bright_part(photograph: np.ndarray, near: np.ndarray) -> np.ndarray:
-    """What the flash lit, inside the region `near`: brighter than that region's dark surroundings by CONTRAST."""
+    """The pixels that the flash lit, inside the region `near`: brighter than that region's dark surroundings by CONTRAST."""
     value = photograph.max(axis=2)
     ring = (cv2.dilate(near.astype(np.uint8), np.ones((61, 61))) > 0) & ~near
     dark, lit = np.median(value[ring]), np.median(value[near])
@@ -125,7 +125,7 @@ def from_high(view: View) -> bool:
 
 def visual_hull(capture: Capture, masks: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
     """Voxels that the views that see them call object, each with whether enough of them agree to be sure of it.
-    Outside a picture nothing is said, and views from high above say nothing about the underside: it lies in the
+    Outside an image nothing is said, and views from high above say nothing about the underside: it lies in the
     flash's shadow there and looks like background."""
     grid = voxels(capture)
     said_yes, said = np.zeros(len(grid)), np.zeros(len(grid))
@@ -148,7 +148,7 @@ def visual_hull(capture: Capture, masks: dict[str, np.ndarray]) -> tuple[np.ndar
 
 
 def first_masks(capture: Capture, photographs: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """From the sparse points alone: what lies far from all of them is not the object."""
+    """Uses the sparse points alone: places far from all of them are not the object."""
     on_object = capture.points[np.linalg.norm(capture.points, axis=1) < 0.85]
     return {
         view.name: bright_part(photographs[view.name], stamp(on_object, view, capture, 0.07))
@@ -168,7 +168,7 @@ def final_mask(view: View, capture: Capture, first: np.ndarray, hull: np.ndarray
     core, reach = cv2.erode(certain, disc(CORE_MARGIN)) > 0, cv2.dilate(certain, margin) > 0
     silhouette = largest_part((first & (reach if from_high(view) else possible)) | core)
     doubtful = projected & ~silhouette & ~first
-    # The post hides the object where it is nearer. Its silhouette is not trusted to the pixel, hence the margin.
+    # The post hides the object when it is nearer. Its silhouette is not trusted to the pixel, hence the margin.
     post = cv2.dilate((below < above).astype(np.uint8), margin) > 0
     inside = silhouette & np.isfinite(cv2.erode(above, margin))
     coverage = cv2.GaussianBlur(inside.astype(np.float32), (0, 0), 0.8)

@@ -1,4 +1,4 @@
-"""The parameters that are trained, and the picture they give."""
+"""The parameters that are trained, and the image they give."""
 
 import numpy as np
 import torch
@@ -38,7 +38,7 @@ def initial_parameters(points: np.ndarray, colours: np.ndarray, sh_degree: int, 
 def render(
     parameters: Parameters, view_matrix: torch.Tensor, intrinsics: torch.Tensor, size: tuple[int, int], sh_degree: int
 ) -> tuple[torch.Tensor, torch.Tensor, dict]:
-    """Premultiplied colour (3,H,W), alpha (1,H,W) and what the strategy wants to know. size is (width, height)."""
+    """Premultiplied colour (3,H,W), alpha (1,H,W) and the inputs of the strategy. size is (width, height)."""
     colour, alpha, info = rasterization(
         means=parameters["means"],
         quats=parameters["quats"],
@@ -65,7 +65,7 @@ def weights(
     regions: list[torch.Tensor],
 ) -> list[torch.Tensor]:
     """How many pixels of each region (1,H,W) each Gaussian makes up: its blending weights summed, (N,) each."""
-    # The derivative of the summed picture by a Gaussian's grey value is that sum; no second rasterizer needed.
+    # The derivative of the summed image by a Gaussian's grey value is that sum; no second rasterizer needed.
     grey = torch.ones(len(parameters["means"]), 1, device=view_matrix.device, requires_grad=True)
     picture, _, _ = rasterization(
         means=parameters["means"].detach(),

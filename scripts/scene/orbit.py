@@ -1,4 +1,4 @@
-"""Where a camera on an orbit stands, in the words of the element's camera-orbit attribute."""
+"""The position of a camera on an orbit, in the syntax of the element's camera-orbit attribute."""
 
 import numpy as np
 

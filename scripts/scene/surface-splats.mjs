@@ -1,16 +1,16 @@
 /**
  * Splats of a textured mesh: `node --import tsx scripts/scene/surface-splats.mjs ROOM.glb ROOM.spz`.
  *
- * Each triangle is divided until its texture is nearly one colour or it is as small as a splat may be, and becomes one flat Gaussian. A mesh with baked light (`KHR_materials_unlit`)
- * then looks as it does in a mesh renderer, with few splats on plain walls and many where there is something to see.
+ * Each triangle is divided until its texture is nearly one color or it is as small as a splat may be, and becomes one flat Gaussian. A mesh with baked light (`KHR_materials_unlit`)
+ * then looks as it does in a mesh renderer, with few splats on plain walls and many on details.
  */
 import { readFileSync, writeFileSync } from 'node:fs';
 import { PNG } from 'pngjs';
 import { writeSpz } from '../../packages/economise/src/write/spz.ts';
 
-const [source, out, least = '0.015', contrast = '7'] = process.argv.slice(2);
-/** Longest edge of a triangle that is divided no further, world units; and the spread of colours, of 255, within one that is. */
-const [MIN_EDGE, CONTRAST] = [Number(least), Number(contrast)];
+const [source, out, min = '0.015', contrast = '7'] = process.argv.slice(2);
+/** Longest edge of a triangle that is divided no further, world units; and the spread of colors, of 255, within one that is. */
+const [MIN_EDGE, CONTRAST] = [Number(min), Number(contrast)];
 /** No splat is longer: it would show as a blob. */
 const MAX_EDGE = 0.3;
 /** Standard deviations of a uniform triangle are too small for their Gaussians to close the surface. */
@@ -100,7 +100,7 @@ function textureOf(texture, attributes) {
   return { image, places: rowsOf(attributes[`TEXCOORD_${texture.texCoord ?? 0}`]) };
 }
 
-/** The colour of a triangle's point, of 255. Without a texture it is white. */
+/** The color of a triangle's point, of 255. Without a texture it is white. */
 function colorAt({ base }, weights) {
   if (base === undefined) return [255, 255, 255];
   const { image, at } = base;
@@ -112,7 +112,7 @@ function colorAt({ base }, weights) {
   return [...image.data.subarray(pixel, pixel + 3)];
 }
 
-/** Colours within a triangle: its corners, a little inside, the middles of its edges, and its own middle. */
+/** Colors within a triangle: its corners, a little inside, the middles of its edges, and its own middle. */
 function sampled(triangle) {
   const { weights } = triangle;
   const mix = (shares) => [0, 1, 2].map((axis) => shares.reduce((sum, share, k) => sum + share * weights[k][axis], 0));
@@ -128,13 +128,13 @@ function divided(triangle) {
     Math.hypot(...[0, 1, 2].map((axis) => points[k][axis] - points[(k + 1) % 3][axis])),
   );
   const longest = Math.max(...edges);
-  const colours = sampled(triangle);
+  const colors = sampled(triangle);
   const spread = Math.max(
     ...[0, 1, 2].map(
-      (c) => Math.max(...colours.map((colour) => colour[c])) - Math.min(...colours.map((colour) => colour[c])),
+      (c) => Math.max(...colors.map((color) => color[c])) - Math.min(...colors.map((color) => color[c])),
     ),
   );
-  if (longest <= MIN_EDGE || (spread <= CONTRAST && longest <= MAX_EDGE)) return [{ points, colour: mean(colours) }];
+  if (longest <= MIN_EDGE || (spread <= CONTRAST && longest <= MAX_EDGE)) return [{ points, color: mean(colors) }];
   // In two, at the middle of the longest edge: no part becomes a sliver.
   const k = edges.indexOf(longest);
   const [a, b, c] = [k, (k + 1) % 3, (k + 2) % 3];
@@ -147,14 +147,17 @@ function divided(triangle) {
   return [...divided(part([a, -1, c])), ...divided(part([-1, b, c]))];
 }
 
-/** Of a triangle the Gaussian with its centre and, but for SPREAD, its covariance (that of a uniform triangle is a twelfth of the corners' scatter). */
+/**
+ * The Gaussian with the triangle's center and, except for SPREAD, its covariance (that of a uniform triangle is a
+ * twelfth of the corners' scatter).
+ */
 function cloudOf(all) {
   const [positions, scales, rotations, opacities, sh] = [3, 3, 4, 1, 3].map(
     (width) => new Float32Array(width * all.length),
   );
-  all.forEach(({ points, colour }, i) => {
-    const centre = mean(points);
-    const arms = points.map((point) => minus(point, centre));
+  all.forEach(({ points, color: color }, i) => {
+    const center = mean(points);
+    const arms = points.map((point) => minus(point, center));
     const along = unit(minus(points[1], points[0]));
     const normal = unit(cross(along, minus(points[2], points[0])));
     const across = cross(normal, along);
@@ -166,14 +169,14 @@ function cloudOf(all) {
     const x = [0, 1, 2].map((k) => Math.cos(angle) * along[k] + Math.sin(angle) * across[k]);
     // glTF has y up; the frame of splats has y down and z forward.
     const flip = ([a, b, c]) => [a, -b, -c];
-    positions.set(flip(centre), 3 * i);
+    positions.set(flip(center), 3 * i);
     scales.set(
       [SPREAD * Math.sqrt(middle + reach), SPREAD * Math.sqrt(Math.max(1e-9, middle - reach)), THICKNESS],
       3 * i,
     );
     rotations.set(quaternionOf(flip(x), flip(cross(normal, x)), flip(normal)), 4 * i);
     opacities[i] = 0.98;
-    sh.set(colour.map((v) => (v / 255 - 0.5) / SH_C0), 3 * i); // prettier-ignore
+    sh.set(color.map((v) => (v / 255 - 0.5) / SH_C0), 3 * i); // prettier-ignore
   });
   return {
     count: all.length,

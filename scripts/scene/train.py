@@ -23,7 +23,7 @@ from spz import write_spz
 
 RATES = {"means": 1.6e-4, "scales": 5e-3, "quats": 1e-3, "opacities": 5e-2, "sh0": 2.5e-3, "shN": 2.5e-3 / 20}
 HELD_OUT_EVERY = 8
-# Flash and camera moved together: what looks like gloss is as much the lamp. Harmonics pay for what they add.
+# Flash and camera moved together: apparent gloss may be the lamp. Harmonics pay for what they add.
 SH_WEIGHT = 2e-3
 OPACITY_WEIGHT = 0.01
 SCALE_WEIGHT = 0.01
@@ -31,7 +31,7 @@ SCALE_WEIGHT = 0.01
 CUT_WEIGHT = 2e-3
 WIDTH_WEIGHT = 1e-2
 SSIM_WEIGHT = 0.2
-# Coverage where nobody knows what is there: little enough to give way wherever another view knows.
+# Weight of coverage on doubtful pixels: small enough that other views override it.
 DOUBT_WEIGHT = 0.1
 # Steps after which the scene is good enough to correct the cameras by.
 POSES_FROM = 1000
@@ -45,7 +45,7 @@ def gaussian_window(width: int = 11, sigma: float = 1.5) -> torch.Tensor:
 
 
 def ssim(a: torch.Tensor, b: torch.Tensor, window: torch.Tensor) -> torch.Tensor:
-    """Structural similarity of two pictures (3,H,W) in 0..1 (Wang et al. 2004, an 11x11 window of sigma 1.5)."""
+    """Structural similarity of two images (3,H,W) in 0..1 (Wang et al. 2004, an 11x11 window of sigma 1.5)."""
     stack = torch.stack([a, b, a * a, b * b, a * b])
     mean_a, mean_b, aa, bb, ab = F.conv2d(stack, window, padding=window.shape[-1] // 2, groups=3)
     both, c1, c2 = mean_a * mean_b, 0.01**2, 0.03**2
@@ -55,7 +55,7 @@ def ssim(a: torch.Tensor, b: torch.Tensor, window: torch.Tensor) -> torch.Tensor
 
 
 class Exposures:
-    """A gain for each picture and channel: the flash was nearer to the object in some photographs than in others."""
+    """A gain for each image and channel: the flash was nearer to the object in some photographs than in others."""
 
     def __init__(self, count: int):
         self.log_gain = torch.nn.Parameter(torch.zeros(count, 3, device="cuda"))
@@ -86,8 +86,7 @@ class Poses:
 
 
 def photometric_loss(picture: Picture, colour: torch.Tensor, alpha: torch.Tensor, window: torch.Tensor) -> torch.Tensor:
-    """Over a random background, new each time: only coverage that is right looks right over all of them. Where the
-    photograph is dark and the mask in doubt the background is black, and anything that is no brighter is right."""
+    """Over a random background, new each time: only coverage that is right looks right over all of them. If the photograph is dark and the mask in doubt, the background is black, and anything that is no brighter is right."""
     background = torch.rand(3, 1, 1, device="cuda") * (1 - picture.doubtful)
     got = colour + background * (1 - alpha)
     wanted = picture.rgb * picture.alpha + background * (1 - picture.alpha)
@@ -143,7 +142,7 @@ def train(pictures: list[Picture], parameters: Parameters, bounds: Bounds, optio
         if refining:
             poses.decay.step()
         if step % 100 == 0:
-            # Whatever left the hull counts as dead; the strategy puts it to better use on this very step.
+            # A Gaussian outside the hull counts as dead; the strategy puts it to better use on this very step.
             with torch.no_grad():
                 parameters["opacities"][bounds.outside(parameters["means"])] = -8.0
         if step < strategy.refine_stop_iter:

@@ -1,8 +1,7 @@
 """Trims a trained scene: python trim.py TRAINED.ply HULL.npy SPARSE OUT.spz (and OUT.ply beside it)
 
 Shade that hangs in the air by the object costs training little, because the photographs are as dark there; over a
-white page it shows. It gives itself away without any photograph: looked at from all round, haze lies mostly where the
-picture stays translucent, while whatever lies on a surface has, from most sides, more surface behind it. So haze goes,
+white page it shows. It can be detected without photographs: seen from all around, haze lies mostly on translucent pixels, while Gaussians on a surface have, from most sides, more surface behind them. So haze goes,
 and the post is cut off level. Needs no GPU; takes some minutes.
 """
 
@@ -25,7 +24,8 @@ AZIMUTHS = range(0, 360, 18)
 PICTURE = (420, 380)
 FIELD_OF_VIEW = 24.0
 ORBIT_RADIUS = 2.9
-# A pixel covered less than this is translucent, and a Gaussian with more than this share of its weight there is haze.
+# A pixel covered less than this is translucent, and a Gaussian with more than this fraction of its weight there is
+# haze.
 MOST_THIN = 0.9
 MOST_HAZE = 0.4
 # The end of the post is open, its rim thin from everywhere: nothing is haze from here down, this near to its axis.
@@ -40,12 +40,12 @@ LEAST_SHRINK = 0.15
 
 
 def haze(gaussians: Gaussians) -> np.ndarray:
-    """Share of each Gaussian's visible weight, from all round, that falls on translucent pixels, (N,)."""
+    """Fraction of each Gaussian's visible weight, from all round, that falls on translucent pixels, (N,)."""
     focal = PICTURE[0] / 2 / np.tan(np.radians(FIELD_OF_VIEW) / 2)
     thin, solid = np.zeros(len(gaussians)), np.full(len(gaussians), 1e-9)
     for ring, phi in enumerate(POLAR_ANGLES):
         for theta in AZIMUTHS:
-            # Rings are turned against each other, so that no side is looked at from one column of cameras only.
+            # Rings are turned against each other, so that no side is seen from one column of cameras only.
             matrix = orbit_matrix(theta + 3 * ring, phi, ORBIT_RADIUS)
             seen = thin_and_solid(project_ellipses(gaussians, matrix, focal, PICTURE), PICTURE, MOST_THIN)
             thin, solid = thin + seen[0], solid + seen[1]
@@ -62,7 +62,7 @@ def near_post(gaussians: Gaussians, hull: np.ndarray, cut_height: float) -> np.n
 
 
 def cut_level(gaussians: Gaussians, height: float) -> Gaussians:
-    """Leaves out what lies below the height (y grows downwards) and shrinks what reaches over it."""
+    """Removes Gaussians below the height (y grows downwards) and shrinks those that reach over it."""
     down = np.linalg.norm(axes(gaussians)[:, 1], axis=1)
     room = (height - gaussians.positions[:, 1]) / (CUT_SIGMAS * down)
     shrunk = np.log(np.clip(room, LEAST_SHRINK, 1)).astype(np.float32)

@@ -1,4 +1,4 @@
-/** Watches every device of the page: what lives on it, what it complains of. Must run before anybody asks for a device. */
+/** Watches every device of the page: its resources and its errors. Must run before the page requests a device. */
 
 const BYTES_PER_PIXEL = { rgba8unorm: 4, bgra8unorm: 4, rgba16float: 8, rgba32float: 16 };
 
@@ -60,7 +60,7 @@ HTMLCanvasElement.prototype.getContext = function watched(kind, ...rest) {
   return context;
 };
 
-/** Counts what is bound to the target of a call that allocates. */
+/** Counts the objects bound to the target of a call that allocates. */
 function watchGl(name, bindingOf, bytesOf) {
   const { prototype } = WebGL2RenderingContext;
   const allocate = prototype[name];
@@ -97,10 +97,10 @@ for (const level of ['warn', 'error']) {
   console[level] = (...words) => faults.push(`console.${level}: ${words.join(' ')}`);
 }
 
-/** Made once for a device and kept as long as it lives: which of them there are depends on what was tried on it. */
-const OF_DEVICE = /^gs\.(sort\.pass_\d|rasterize\.indices)$/;
+/** Created once for a device and kept as long as it lives. The set depends on the variants that were tried. */
+const OF_DEVICE = /^gs\.(sort\.pass_\d|rasterize\.indices|no_\w+)$/;
 
-/** Bytes of our own objects, of those that belong to the device, and of others' (ONNX Runtime); and where ours are. */
+/** Bytes of our objects, of the device's objects, and of others' (ONNX Runtime); and the classes of our objects. */
 export function ledger() {
   const sum = { own: 0, device: 0, others: 0, byLabel: {} };
   for (const { objects } of devices) {

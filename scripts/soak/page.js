@@ -5,7 +5,7 @@ const { GaussianSplatElement } = await import('/cdn/gaussian-splat.min.js');
 GaussianSplatElement.releaseDelay = 0;
 
 const walk = document.querySelector('#walk');
-const MOST = 4;
+const MAX = 4;
 const delay = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
 const pick = (list, share) => list[Math.min(list.length - 1, Math.floor(share * list.length))];
 const SOURCES = [
@@ -25,7 +25,7 @@ const events = {};
 let [lost, restored] = [0, 0];
 
 function addElement(share) {
-  if (walk.children.length >= MOST) return;
+  if (walk.children.length >= MAX) return;
   const element = document.createElement('gaussian-splat');
   element.style.cssText = 'display: inline-block; width: 120px; height: 90px';
   element.setAttribute('loading', 'eager');
@@ -91,18 +91,18 @@ async function act(name, which, a, b) {
   await ACTIONS[name](element, a, b);
 }
 
-/** Everything but the anchor is gone, and what was on its way has come to an end. */
+/** Everything but the anchor is gone, and pending work has ended. */
 async function settle() {
   walk.replaceChildren();
   let last = '';
   // Until the books stand still: releases, restorations and late loads take a while.
   for (let still = 0, tries = 0; still < 6 && tries < 600; tries++) {
     await delay(100);
-    // What has been handed to the GPU process must have come back, too.
+    // Resources handed to the GPU process must have been returned, too.
     await Promise.all(devices.map(({ device }) => device.queue.onSubmittedWorkDone().catch(() => undefined)));
     const anchor = document.querySelector('#anchor');
     const now = JSON.stringify([ledger(), anchor?.loaded, devices.length]);
-    // Between the two events a lost anchor still counts as loaded, and shows its last picture.
+    // Between the two events a lost anchor still counts as loaded, and shows its last frame.
     const isThere = anchor.loaded && lost === restored;
     still = now === last && isThere ? still + 1 : 0;
     last = now;

@@ -4,7 +4,7 @@ import { readFileSync } from 'node:fs';
 const PAGE_BYTES = 4096;
 
 /**
- * Resident bytes of all processes of a browser by their kind (`browser`, `GPU`, `renderer`, ...), as Linux tells them; undefined elsewhere.
+ * Resident bytes of all processes of a browser by their kind (`browser`, `GPU`, `renderer`, ...), as Linux reports them; undefined elsewhere.
  * @param session a devtools session of the browser, not of a page
  */
 export async function residentBytes(session) {

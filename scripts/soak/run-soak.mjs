@@ -15,13 +15,13 @@ const USAGE = `usage: npm run lab:soak -- [--minutes N (default 120)] [--seed S]
 Every five minutes a line that begins with "summary:" tells how far it has come, and FILE holds the report so far. Ends with an error once the
 browser's processes hold more memory than --max-mib together (on Linux, which tells).`;
 const ANCHOR = { x: 0, y: 0, width: 160, height: 120 };
-/** Actions between two looks at the books. */
+/** Actions between two checks of the ledger. */
 const EPOCH = 30;
 /** Looks at the books, two seconds apart, before a byte too many counts as lost. */
-const PATIENCE = 8;
+const TIMEOUT = 8;
 /** Minutes between two summaries. */
 const SUMMARY_EVERY = 5;
-/** What a page says of files that are damaged or missing on purpose. */
+/** Messages of a page about files that are damaged or missing on purpose. */
 const EXPECTED = [/truncated\.ply|none\.ply|faulty-run|faulty/i, /404/, /pose expects|camera-orbit/];
 
 const { values } = parseArgs({
@@ -57,7 +57,7 @@ const server = await serve({
 });
 const browser = await chromium.launch({ executablePath: findChromium(), args: gpuFlags() });
 const failures = [];
-/** What the page complained of since the last epoch, and did not have to expect. */
+/** Errors of the page since the last epoch that were not expected. */
 const faults = [];
 try {
   const report = await soak(await browser.newPage({ viewport: { width: 800, height: 600 } }));
@@ -81,7 +81,7 @@ async function soak(page) {
   const processes = await browser.newBrowserCDPSession();
   const actions = await page.evaluate(() => window.soak.actions);
   const random = randomSource(Number(values.seed));
-  // The very first frames allocate what is kept for good: the baseline is what lives after one epoch of each action.
+  // The very first frames allocate permanent resources: the baseline is taken after one epoch of each action.
   await page.evaluate(() => window.soak.start());
   await walk(page, actions, random);
   const base = await look(page, devtools);
@@ -95,7 +95,7 @@ async function soak(page) {
     performed += EPOCH;
     let now = await look(page, devtools);
     // A load that was given up ends when the GPU process has answered; a leak stays.
-    for (let tries = 0; tries < PATIENCE && now.state.ledger.own !== base.state.ledger.own; tries++) {
+    for (let tries = 0; tries < TIMEOUT && now.state.ledger.own !== base.state.ledger.own; tries++) {
       await page.waitForTimeout(2_000);
       now = await look(page, devtools);
     }
@@ -111,7 +111,7 @@ async function soak(page) {
     const held = Object.values(resident ?? {}).reduce((sum, bytes) => sum + bytes, 0) / 2 ** 20;
     if (held > Number(values['max-mib'])) failures.push(`the browser holds ${held.toFixed(0)} MiB`);
     if (!now.state.loaded) failures.push(`the anchor is not loaded: ${now.state.error}`);
-    if (differing > 0) failures.push(`${differing} colour values of the anchor differ`);
+    if (differing > 0) failures.push(`${differing} color values of the anchor differ`);
     const grown = now.state.ledger.own - base.state.ledger.own;
     if (grown !== 0) {
       const detail = changes(base.state.ledger.byLabel, now.state.ledger.byLabel);
@@ -174,8 +174,8 @@ async function look(page, devtools) {
   const { usedSize } = await devtools.send('Runtime.getHeapUsage');
   const seen = await page.evaluate(() => window.soak.faults());
   faults.push(...seen.filter((text) => !EXPECTED.some((pattern) => pattern.test(text))));
-  const picture = PNG.sync.read(await page.screenshot({ clip: ANCHOR }));
-  return { state, heap: usedSize, picture };
+  const image = PNG.sync.read(await page.screenshot({ clip: ANCHOR }));
+  return { state, heap: usedSize, picture: image };
 }
 
 function changes(before, after) {

@@ -3,7 +3,7 @@ import { heapSlope } from './slope.mjs';
 
 const mebibytes = (bytes) => (bytes / 2 ** 20).toFixed(2);
 
-/** @param epochs looks at the books so far, the last of them now; `resident` is what {@link residentBytes} of processes.mjs found */
+/** @param epochs checks of the ledger until now; `resident` is the result of {@link residentBytes} of processes.mjs */
 export function summaryLine({ epochs, actions, base, events, failures }) {
   const { minutes, heap, own, resident } = epochs.at(-1);
   const kinds = Object.entries(resident ?? {}).filter(([, bytes]) => bytes > 0);

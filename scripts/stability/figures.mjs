@@ -1,16 +1,16 @@
 /**
- * Figures of the catalogue by the adapter that they were measured on. A figures file (tests/stability/support/row.ts writes it) is JSON lines: one of the adapter and
+ * Figures of the catalog by the adapter that they were measured on. A figures file (tests/stability/support/row.ts writes it) is JSON lines: one of the adapter and
  * the time, then figures and curves of rows that it drew, then whether a row passed; the next line of an adapter begins another run.
  */
 import { readFileSync } from 'node:fs';
 
 /**
  * @typedef {{vendor: string, architecture: string, device: string, description: string}} Adapter as `GPUAdapterInfo` says it
- * @typedef {{date: string, passed?: boolean, figures: object[], curves: object[]}} Row what the last run of a row found; `passed` is missing where nobody noted it
+ * @typedef {{date: string, passed?: boolean, figures: object[], curves: object[]}} Row the result of a row's last run; `passed` is missing if it was not recorded
  * @typedef {{adapter: Adapter, rows: Record<string, Row>}} Run the rows of one adapter, by id
  */
 
-/** @returns {Run[]} what the lines of a figures file say. Throws for lines before the first adapter's. */
+/** @returns {Run[]} the runs of a figures file. Throws for lines before the first adapter's. */
 export function parseFigures(text, name) {
   const runs = [];
   let date;
@@ -36,7 +36,10 @@ function addEntry(row, entry) {
   else row.passed = entry.passed;
 }
 
-/** Runs of the same adapters joined: of each row the latest, whole or not. SwiftShader, which everybody has, comes first. */
+/**
+ * Merges runs of the same adapter: of each row the latest, whole or not. SwiftShader, which runs everywhere, comes
+ * first.
+ */
 export function mergeRuns(runs) {
   const byAdapter = new Map();
   for (const { adapter, rows } of [...runs].sort((a, b) => latestOf(a).localeCompare(latestOf(b)))) {
@@ -79,7 +82,7 @@ export function mergePages(pages) {
   return [...byAdapter.values()].sort((a, b) => isFirst(a) - isFirst(b));
 }
 
-/** What files of another machine hold: figures files, and reports that the page POSTed. */
+/** Contents of another machine's files: figures files, and reports that the page POSTed. */
 export function readFiles(paths) {
   const found = { runs: [], pages: [] };
   for (const path of paths) {

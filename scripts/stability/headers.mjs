@@ -1,4 +1,7 @@
-/** What the files of the catalogue say about themselves: number, title, who fails and how that was seen, what was asked for and what is run, what passes. */
+/**
+ * Headers of the catalog's files: number, title, who fails and its evidence, the request and the actual run, and the
+ * passing condition.
+ */
 import { readdirSync, readFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { root } from '../lib/run.mjs';
@@ -17,7 +20,7 @@ export const rowFiles = () => sourcesIn(FOLDERS[0]).map((file) => ({ file, id: r
 
 const sourcesIn = (folder) =>
   readdirSync(join(root, folder))
-    .filter((name) => name.endsWith('.ts') && !['catalogue.alone.lab.test.ts', 'support.ts'].includes(name))
+    .filter((name) => name.endsWith('.ts') && !['catalog.alone.lab.test.ts', 'support.ts'].includes(name))
     .map((name) => `${folder}/${name}`);
 
 function readHeader(file) {

@@ -4,11 +4,11 @@ import { scaleLinear, scaleLog } from 'd3-scale';
 const WIDTH = 560;
 const HEIGHT = 300;
 const SIDES = { top: 30, right: 16, bottom: 44, left: 54 };
-/** Names of curves stand above the plot, a line each, where no curve is. */
+/** Names of curves stand above the plot, a line each, away from the curves. */
 const LINE = 13;
 const COLORS = ['#2166ac', '#b2182b', '#1b7837', '#762a83'];
 /** dB that stand for equal images. */
-const MOST = 130;
+const MAX = 130;
 
 const escape = (text) =>
   String(text).replace(/[&<>"]/g, (c) => ({ '&': '&amp;', '<': '&lt;', '>': '&gt;', '"': '&quot;' })[c]);
@@ -22,7 +22,7 @@ export function lineChart(curves, { title, x: xTitle, y: yTitle, log = false, ma
   const margin = { ...SIDES, top: SIDES.top + LINE * curves.length };
   const points = curves.flatMap((curve) => curve.points);
   const xs = points.map(([x]) => x);
-  const ys = [...points.map(([, y]) => Math.min(MOST, y)), ...(line ? [line.y] : [])];
+  const ys = [...points.map(([, y]) => Math.min(MAX, y)), ...(line ? [line.y] : [])];
   const x = (log ? scaleLog() : scaleLinear())
     .domain([Math.min(...xs), Math.max(...xs)])
     .range([margin.left, WIDTH - margin.right]);
@@ -31,7 +31,7 @@ export function lineChart(curves, { title, x: xTitle, y: yTitle, log = false, ma
     .range([HEIGHT - margin.bottom, margin.top]);
   const text = (at, down, words, more = '') =>
     `<text x="${at.toFixed(1)}" y="${down.toFixed(1)}" ${more}>${escape(words)}</text>`;
-  // A name that would leave the picture on the right stands to the left of its line.
+  // A name that would exceed the chart on the right stands to the left of its line.
   const nameOf = (mark, i) => {
     const isLate = x(mark.x) > WIDTH / 2;
     const [at, anchor] = isLate ? [x(mark.x) - 4, 'end'] : [x(mark.x) + 4, 'start'];
@@ -63,7 +63,7 @@ export function lineChart(curves, { title, x: xTitle, y: yTitle, log = false, ma
       : []),
     ...curves.flatMap((curve, i) => {
       const color = COLORS[i % COLORS.length];
-      const places = curve.points.map(([a, b]) => [x(a), y(Math.min(MOST, b))]);
+      const places = curve.points.map(([a, b]) => [x(a), y(Math.min(MAX, b))]);
       return [
         `<path d="M${places.map((p) => p.map((v) => v.toFixed(1)).join(' ')).join('L')}" fill="none" stroke="${color}" stroke-width="2"/>`,
         ...places.map(([a, b]) => `<circle cx="${a.toFixed(1)}" cy="${b.toFixed(1)}" r="3" fill="${color}"/>`),

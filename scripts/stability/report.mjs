@@ -1,11 +1,11 @@
-/** docs/stability.md, its charts and figures.json, from which the demo takes its own: what was published, and what was measured since. */
+/** docs/stability.md, its charts and figures.json, which the demo reads: published results, and later measurements. */
 import { readFileSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { root } from '../lib/run.mjs';
 import { mergePages, mergeRuns, titleOf } from './figures.mjs';
 import { readHeaders } from './headers.mjs';
 import { lineChart } from './line-chart.mjs';
-import { catalogueTable, describeRuns, pagesTable } from './tables.mjs';
+import { catalogTable, describeRuns, pagesTable } from './tables.mjs';
 
 const CHARTS = [
   {
@@ -44,7 +44,7 @@ const CHARTS = [
   },
 ];
 
-/** Adds runs and reports of pages (see figures.mjs) to the published ones, and writes everything anew. */
+/** Adds runs and reports of pages (see figures.mjs) to the published ones, and writes everything again. */
 export function writeReport({ runs, pages }) {
   const folder = join(root, 'docs/stability');
   const file = join(folder, 'figures.json');
@@ -76,7 +76,7 @@ function drawCurves({ file, row: id, ...options }, runs, folder) {
 
 function markdown({ rows, runs, pages }) {
   const measured = `Limits kept of limits tested; an asterisk marks the short recipe. ${describeRuns(runs, rows)}\n`;
-  const parts = ['## Rows\n', measured, catalogueTable(rows, runs)];
+  const parts = ['## Rows\n', measured, catalogTable(rows, runs)];
   if (pages.length > 0) parts.push('## Peers\n', PEERS, pagesTable(pages));
   return parts.join('\n');
 }

@@ -1,4 +1,4 @@
-/** The rows of the catalogue that any viewer can be put through, with ours and the peers in one run: a JSON report. */
+/** The rows of the catalog that any viewer can be put through, with ours and the peers in one run: a JSON report. */
 import { writeFileSync } from 'node:fs';
 import { runPage } from '../lib/browser-page.mjs';
 

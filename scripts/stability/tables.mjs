@@ -12,8 +12,8 @@ export function describeRuns(runs, rows) {
     .join(' ');
 }
 
-/** One line for each row of the catalogue: its failure, the limits kept on each adapter, and its test. */
-export function catalogueTable(rows, runs) {
+/** One line for each row of the catalog: its failure, the limits kept on each adapter, and its test. */
+export function catalogTable(rows, runs) {
   const lines = rows.map((row) => {
     const results = runs.map((run) => resultOf(run.rows[row.id]));
     return `| [${row.id}](../${row.file}) | ${cell(row.title)} | ${results.join(' | ')} |`;
@@ -36,7 +36,7 @@ function resultOf(row) {
 export const isWhole = ({ figures }) => figures.every(({ isFull }) => isFull);
 
 /**
- * What several adapters found of the same things, a line each. A whole recipe has lines of its own where it says another size or count.
+ * Results of several adapters for the same measures, a line each. A whole recipe has separate lines if its size or count differs.
  * @param columns {object[][]} figures of each adapter
  */
 export function linesOf(columns) {
@@ -72,7 +72,10 @@ export function pagesTable(pages) {
   return `${lines.join('\n')}\n`;
 }
 
-/** Who was put through the page's rows, ours first, with the results by row and title. Browsers tell little of an adapter, mostly its vendor. */
+/**
+ * Renderers that ran the page's rows, ours first, with the results by row and title. Browsers report little of an
+ * adapter, mostly its vendor.
+ */
 export function subjectsOf(pages) {
   const subjects = pages.flatMap(({ adapter, rows }, page) =>
     rows[0].results.map(({ subject }, k) => ({

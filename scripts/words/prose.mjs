@@ -1,6 +1,6 @@
 /** The sentences of documents and pages, without their code: blocks of text with the lines on which they begin. */
 
-const CODE = '`'; // What stands for a piece of code: one word, and none that a list of words could have.
+const CODE = '`'; // Stands for a piece of code: a single word that no list contains.
 
 /** @returns {{ line: number, text: string, isHeading: boolean, isCell: boolean }[]} paragraphs, items, cells and headings of Markdown. */
 export function blocksOfMarkdown(source) {
@@ -50,7 +50,7 @@ function plain(text) {
 const BLOCKS =
   /<\/?(p|h\d|li|ul|ol|dl|dt|dd|td|th|tr|table|caption|div|section|figure|figcaption|button|label|option|summary|details|a class)\b/i;
 
-/** @returns blocks of an HTML page or a Nunjucks template: what is shown, and what attributes say to readers. */
+/** @returns blocks of an HTML page or a Nunjucks template: visible text, and texts of attributes. */
 export function blocksOfPage(source) {
   const front = /^---\n([\s\S]*?)\n---\n/.exec(source)?.[1] ?? '';
   const described = front

@@ -1,4 +1,4 @@
-/** What sources say to those who use them: comments of the public API, sentences of errors and of pages. */
+/** Texts for users in sources: comments of the public API, sentences of errors and of pages. */
 import { existsSync, readdirSync, readFileSync } from 'node:fs';
 import { join, relative } from 'node:path';
 import ts from 'typescript';
@@ -30,7 +30,7 @@ export function publicComments() {
     ts.sys,
     root,
   );
-  // Packages know one another by their names, which lead to what is built; sources are enough here.
+  // Packages import one another by name, which resolves to built files; sources are enough here.
   const program = ts.createProgram(entries, {
     ...options,
     noEmit: true,
@@ -71,7 +71,7 @@ export function publicComments() {
 
   function take(node) {
     const file = node.getSourceFile();
-    // Of a variable the comment belongs to its statement.
+    // The comment of a variable belongs to its statement.
     const owner = ts.isVariableDeclaration(node) ? node.parent.parent : node;
     for (const doc of ts.getJSDocCommentsAndTags(owner).filter(ts.isJSDoc)) {
       const key = `${file.fileName}:${doc.pos}`;

@@ -1,4 +1,4 @@
-/** Words that the project's texts do without, and what stands in their place: one term for one thing. Code between backticks is never looked at. */
+/** Words that the project's texts do without, and what stands in their place: one term for one thing. Code between backticks is ignored. */
 
 /** `[what is found, what to write]`. A pattern is as wide as the sense that is retired, and no wider. */
 export const RETIRED = [

@@ -4,7 +4,7 @@
 
 const PREFIX_THREADS = 256u;
 
-var<workgroup> ladder: array<u32, 2u * PREFIX_THREADS>;
+var<workgroup> scan: array<u32, 2u * PREFIX_THREADS>;
 
 // Sum of `own` over all threads of the same row up to and including this one; rows are `width` threads wide (a power of
 // two). Must be called by all threads. Ends with a barrier, so another call may follow.
@@ -13,9 +13,9 @@ fn inclusive_sum(own: u32, lane: u32, width: u32) -> u32 {
   var sum = own;
   var side = 0u;
   for (var reach = 1u; reach < width; reach *= 2u) {
-    ladder[side + lane] = sum;
+    scan[side + lane] = sum;
     workgroupBarrier();
-    if (column >= reach) { sum = add_saturating(sum, ladder[side + lane - reach]); }
+    if (column >= reach) { sum = add_saturating(sum, scan[side + lane - reach]); }
     side = PREFIX_THREADS - side;
   }
   workgroupBarrier();

@@ -37,9 +37,9 @@ fn gaussian_at(i: u32) -> FoundGaussian {
 fn is_usable(g: FoundGaussian) -> bool {
   let magnitudes = vec4u(0x7fffffffu);
   if (any((g.origin & magnitudes) > vec4u(QUANTIZED_FARTHEST)) || any((g.step & magnitudes) > vec4u(QUANTIZED_FARTHEST))) { return false; }
-  let least = bitcast<f32>(g.origin.w);
-  let largest = least + QUANTIZED_SIZES * bitcast<f32>(g.step.w);
-  return max(abs(least), abs(largest)) <= QUANTIZED_LARGEST_SIZE;
+  let smallest = bitcast<f32>(g.origin.w);
+  let largest = smallest + QUANTIZED_SIZES * bitcast<f32>(g.step.w);
+  return max(abs(smallest), abs(largest)) <= QUANTIZED_LARGEST_SIZE;
 }
 
 fn position_of(g: FoundGaussian) -> vec3f {

@@ -1,4 +1,4 @@
-// The hook of a page, called for each splat: packages/renderer/src/modifiers/hook.ts replaces the text of this file.
+// The hook of a page, called for each splat: packages/renderer/src/modifiers/splat-shader.ts replaces the text of this file.
 #import shared/modifiers
 
 // Returns the columns position, color, and (opacity, factor of the size, 0).

@@ -74,11 +74,11 @@ fn found_pair(nth: u32) -> u32 {
   return 32u * word + bit;
 }
 
-// Loads the next `most` splats of the tile, or fewer at the end of the list, from as many windows as necessary. A
+// Loads the next `limit` splats of the tile, or fewer at the end of the list, from as many windows as necessary. A
 // barrier must follow. Returns their number.
-fn load_batch(place: ptr<function, ListPlace>, most: u32, tile_in_bin: u32, tile_corner: vec2f, lane: u32) -> u32 {
+fn load_batch(place: ptr<function, ListPlace>, limit: u32, tile_in_bin: u32, tile_corner: vec2f, lane: u32) -> u32 {
   var count = 0u;
-  while (count < most) {
+  while (count < limit) {
     if ((*place).loaded == (*place).in_window) {
       if (32u * (*place).next_word >= (*place).range.y) { break; }
       (*place).first_word = (*place).next_word;
@@ -87,7 +87,7 @@ fn load_batch(place: ptr<function, ListPlace>, most: u32, tile_in_bin: u32, tile
       (*place).in_window = workgroupUniformLoad(&found);
       (*place).loaded = 0u;
     }
-    let taken = min((*place).in_window - (*place).loaded, most - count);
+    let taken = min((*place).in_window - (*place).loaded, limit - count);
     if (lane < taken) {
       load_splat(count + lane, pairs[32u * (*place).first_word + found_pair((*place).loaded + lane)], tile_corner);
     }

@@ -1,4 +1,4 @@
-/** Opens an app in Chromium as a visitor: is its scene visible, with a worker and a clean console, and what came over the wire until then? */
+/** Opens an app in Chromium as a visitor: is its scene visible, with a worker and a clean console, and how many bytes were received until then? */
 import { existsSync, readFileSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { gzipSync } from 'node:zlib';
@@ -12,9 +12,8 @@ const MAX_MS = 120_000;
 
 /**
  * @param {{ folder?: string, elsewhere?: string, address?: string, faults?: RegExp }} app a folder to serve, with another one at another origin, whose address takes the
- *   place of `ELSEWHERE` in the page; or the address of a page; and what its console may say
- * @returns {Promise<{ weight: number, files: number, workers: number, painted: number }>} bytes of gzip of scripts and styles, their number, the workers, and the share of
- *   the element's pixels that the scene paints
+ *   place of `ELSEWHERE` in the page; or the address of a page; and its allowed console messages
+ * @returns {Promise<{ weight: number, files: number, workers: number, painted: number }>} bytes of gzip of scripts and styles, their number, the workers, and the fraction of the element's pixels that the scene paints
  */
 export async function visitApp({ folder, elsewhere, address, faults }) {
   const other = elsewhere && existsSync(elsewhere) ? await serve({ '/': elsewhere }, { headers: CORS }) : undefined;
@@ -49,8 +48,8 @@ async function visit(page, faults, address) {
     if (/javascript|css/.test(response.headers()['content-type'] ?? '') && !response.url().startsWith('blob:'))
       bodies.push(response.body().catch(() => Buffer.alloc(0)));
   });
-  let most = 0;
-  page.on('worker', () => (most = Math.max(most, page.workers().length)));
+  let max = 0;
+  page.on('worker', () => (max = Math.max(max, page.workers().length)));
   await open(page, address);
   const found = await page
     .waitForFunction(
@@ -69,10 +68,10 @@ async function visit(page, faults, address) {
   const scripts = await Promise.all(bodies);
   const painted = await page.evaluate(shareOfPaint);
   if (!(painted > 0.05)) throw new Error(`${painted} of the element is painted`);
-  if (most === 0) complaints.push('there is no worker');
+  if (max === 0) complaints.push('there is no worker');
   if (complaints.length > 0) throw new Error(complaints.join('\n'));
   const weight = scripts.reduce((sum, body) => sum + gzipSync(body, { level: 6 }).length, 0);
-  return { weight, files: scripts.length, workers: most, painted };
+  return { weight, files: scripts.length, workers: max, painted };
 }
 
 /** A development server takes a while to listen. */
@@ -88,7 +87,7 @@ async function open(page, address) {
   }
 }
 
-/** In the page: the share of pixels of the element's image that are not transparent. */
+/** In the page: the fraction of pixels of the element's image that are not transparent. */
 async function shareOfPaint() {
   const image = await createImageBitmap(await document.querySelector('gaussian-splat').toBlob());
   const context = new OffscreenCanvas(image.width, image.height).getContext('2d');

@@ -91,7 +91,7 @@ test('subjects are visited forwards, then backwards; one that fails does not sto
   assert.equal(results[0].visits[0].wall.length, 2);
 });
 
-/** A subject whose frames take the page's thread so many milliseconds each, on a clock of the test's own. */
+/** A subject whose frames each occupy the main thread for a number of milliseconds, on the test's clock. */
 function subjectOf(millisecondsOf: (frame: number) => number, clock: { now: number }) {
   let frame = 0;
   return { draw: () => void (clock.now += millisecondsOf(frame++)), finish: async () => {} };
@@ -126,7 +126,7 @@ test('beside a standard a clock that changes within the run changes nothing', as
   assert.ok(slower.burst.p50 > 2 * same.burst.p50, 'what the times alone say');
   assert.ok(Math.abs(same.ratio.burst.p50 - 1) < 0.01 && Math.abs(slower.ratio.burst.p50 - 1.5) < 0.01);
   const quality = { psnr: 60, worst: 1, ssim: 0.99 };
-  // What leaves splats out counts for the scene as it was.
+  // Subjects that omit splats count with the original scene.
   const bytes = { scene: 4000, renderer: 1000, perSplat: 1 };
   const results = [same, slower].map((one, i) => ({ ...one, quality, bytes, configuration: { name: `${i}` } }));
   const common = summarizeStandard(visits.map((one) => ({ visits: [one] })));

@@ -1,4 +1,4 @@
-/** Pictures in motion: from an address to steps, from frames to figures. */
+/** Frames in motion: from an address to steps, from frames to figures. */
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { benchModule } from './load.js';
@@ -55,10 +55,10 @@ test('spans count from a second after the step on, levels until five', () => {
 });
 
 test('pictures: identical, empty, or so many dB where either shows something', () => {
-  const [black, grey] = [Uint8Array.of(0, 0, 0, 255, 0, 0, 0, 255), Uint8Array.of(10, 10, 10, 255, 0, 0, 0, 255)];
-  assert.equal(decibels(grey, grey), 'identical');
+  const [black, gray] = [Uint8Array.of(0, 0, 0, 255, 0, 0, 0, 255), Uint8Array.of(10, 10, 10, 255, 0, 0, 0, 255)];
+  assert.equal(decibels(gray, gray), 'identical');
   assert.equal(decibels(black, black), 'empty');
-  assert.equal(decibels(black, grey), Number((20 * Math.log10(25.5)).toFixed(3)));
+  assert.equal(decibels(black, gray), Number((20 * Math.log10(25.5)).toFixed(3)));
 });
 
 test('a size for a time: along the line through two that are known, and no further than may be', () => {

@@ -1,4 +1,4 @@
-/** The built pages in Chromium: small runs of ours beside another renderer. Needs `npm run build`, which `npm test` does. */
+/** The built pages in Chromium: small runs of our renderer beside another. Needs `npm run build`, which `npm test` does. */
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { onlyInFull } from '../support/extent.js';
@@ -42,7 +42,7 @@ test('the benchmark page measures a list in one report', { timeout: 180_000 }, a
 test('what hangs overhead is not visible', { timeout: 180_000, skip: onlyInFull }, async () => {
   const common = { ...SMALL, rounds: '1', w: '96', h: '64', phases: 'wall' };
   const overhead = { ...common, layout: 'overhead', visible: '5000' };
-  // Both of several copies: a scene by itself is not cut to whole chunks.
+  // Both have several copies: a single scene is not cut to whole chunks.
   const few = await runPage('bench/index.html', { ...overhead, n: '90000' });
   const many = await runPage('bench/index.html', { ...overhead, n: '200000' });
   assert.equal(many.results[0].configuration.splats, 200_000);
@@ -92,13 +92,13 @@ test(
     assert.equal(report.error, undefined);
     const [{ elements, target, span, interval, timed, restMs, wholeMs, levels }] = report.steps;
     assert.equal(elements, 2);
-    // Two share what the display leaves to one: 0.8 of an interval of 60 Hz or less.
+    // Two subjects divide the display's time for one: 0.8 of an interval of 60 Hz or less.
     assert.ok(target > 0 && target <= (0.8 * 1000) / 60 / 2 + 0.01, `${target} ms`);
     assert.ok(timed > 0 && span.p95 >= span.p50 && span.p50 > 0, JSON.stringify(span));
     assert.ok(interval.p50 > 0 && wholeMs > 0 && restMs >= 0);
     assert.ok(levels.length > 0 && levels[0].at < 200);
 
-    // A budget is one of what the whole picture takes, whatever else is on show.
+    // A budget limits the time of the whole image, with any other work on the display.
     const budgeted = await runPage('bench/pace.html', { ...query, budget: '40', compare: '0', steps: 'elements:2' });
     assert.equal(budgeted.error, undefined);
     const [step] = budgeted.steps;
@@ -134,7 +134,7 @@ test('the page of several scenes: as one, as two, as ten, moved, added, reordere
   for (const { name, grown, allocated, allocatedAfter } of report.changes.rows) {
     assert.equal(allocatedAfter.buffers, 0, `${name}: the frames after it allocate nothing`);
     if (name.startsWith('one is added')) assert.ok(grown <= report.changes.alone, `${name}: ${grown} bytes`);
-    // The list of pages is written anew: some bytes for each scene.
+    // The list of pages is written again: some bytes for each scene.
     if (name.startsWith('all')) assert.ok(grown === 0 && allocated.bytes < 1024, `${name}: ${allocated.bytes} bytes`);
   }
 });

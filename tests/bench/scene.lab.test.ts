@@ -43,7 +43,7 @@ test('what stands overhead is seen from no frame of any path but zoom', () => {
   }
 });
 
-/** Whether a ball of radius 1 around a point may touch the picture. */
+/** Whether a ball of radius 1 around a point may touch the image. */
 function isNearView({ worldToCamera: m, height, fy }: Camera, point: readonly number[]): boolean {
   const [, y, z] = [0, 1, 2].map(
     (r) => m[4 * r] * point[0] + m[4 * r + 1] * point[1] + m[4 * r + 2] * point[2] + m[4 * r + 3],
@@ -110,7 +110,7 @@ function repeated(cloud: GaussianCloud, count: number): GaussianCloud {
   return firstSplats(tileCloud(cloud, copies), count) as GaussianCloud;
 }
 
-test('a cloud with fewer bands of colour has the first ones', async () => {
+test('a cloud with fewer bands of color has the first ones', async () => {
   assert.equal(small.shDegree, 3);
   assert.equal(withDegree(small, 3), small);
   for (const degree of [0, 2]) {

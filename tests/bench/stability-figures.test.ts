@@ -1,4 +1,4 @@
-/** Figures of the stability catalogue from several machines: what a file says, which of two runs counts, how they stand side by side. */
+/** Figures of the stability catalog from several machines: the contents of a file, the choice between two runs, and their comparison. */
 import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
 import { test } from 'node:test';
@@ -15,7 +15,7 @@ interface Run {
 }
 
 const { parseFigures, mergeRuns, mergePages, titleOf } = await scriptModule('stability/figures.mjs');
-const { catalogueTable, describeRuns, subjectsOf } = await scriptModule('stability/tables.mjs');
+const { catalogTable, describeRuns, subjectsOf } = await scriptModule('stability/tables.mjs');
 
 const swiftShader = { vendor: 'google', architecture: 'swiftshader', device: 'x', description: 'driver 5' };
 const card = { vendor: 'nvidia', architecture: '', device: 'nvidia-h200', description: 'NVIDIA: 580' };
@@ -81,7 +81,7 @@ test('the table of rows has a column for each adapter, and shows short recipes a
       ...[figure('S1', '200 frames', 61), { row: 'S1', passed: false }],
     ),
   ]);
-  const text = catalogueTable([{ id: 'S1', title: 'Popping', file: 'tests/a.ts' }], runs);
+  const text = catalogTable([{ id: 'S1', title: 'Popping', file: 'tests/a.ts' }], runs);
   assert.match(text, /\| test \| failure \| SwiftShader \| NVIDIA H200 \|/);
   assert.match(text, /\| \[S1\]\(\.\.\/tests\/a\.ts\) \| Popping \| 1\/1\* \| \*\*failed\*\*, 1\/1 \|/);
   assert.match(describeRuns(runs, [{ id: 'S1' }]), /NVIDIA H200 \(NVIDIA: 580, 2026-01-01\): failed: S1\./);

@@ -26,7 +26,7 @@ function command(...args: string[]): { status: number | null; text: string } {
   return { status, text: stdout + stderr };
 }
 
-/** What is wrong with each fixture, values included. */
+/** Faults of each fixture, values included. */
 const FAULTS: Readonly<Record<string, readonly string[]>> = {
   'faulty-values.onnx': [
     'contract/count',
@@ -66,7 +66,7 @@ for (const name of fixtureNames().filter((name) => !ENDLESS.includes(name))) {
     const runs = report.sections.find(({ title }) => title === 'Runs');
     const isRun = !codes(report).some((code) => /run|inference|operator/.test(code));
     const hasControls = /^(packed-sh-half|post(?!-temporal|-seen).*|link-.*|state)\.onnx$/.test(name);
-    // Of models that know the time, six shares of it besides.
+    // Models that know the time also get six fractions of it.
     const rows = runs?.rows.filter(([label]) => !label.endsWith(' of the time'));
     assert.equal(rows?.length, isRun ? (hasControls ? 5 : 3) : undefined);
   });
@@ -117,7 +117,7 @@ test('bounds are held against runs at defaults; controls may leave them', async 
     writeFileSync(path, JSON.stringify({ ...contract, bounds: { min: [-1, -1, minZ], max: [1, 1, 1] } }));
     return codes(await checkModel(fixturePath('packed-sh-half.onnx'), { contract: path, run: true }));
   };
-  // By default the upper half of the ball lives, with the control at its most all of it.
+  // The upper half of the ball is live by default, and all of it with the control at its maximum.
   assert.deepEqual([await checkWith(0), await checkWith(0.5)], [[], ['contract/conflict']]);
 });
 
@@ -203,15 +203,18 @@ test('--draft writes the contract that a file lacks, asks what no header tells, 
   };
   assert.deepEqual(contract.outputs.layout, 'split');
   for (const name of ['positions', 'scales', 'rotations', 'sh', 'opacities']) assert.ok(contract.outputs[name], name);
-  // What was asked is all that is wrong: this file writes logarithms and logits.
+  // The question is the only fault: this file writes logarithms and logits.
   const { text } = command(path, '--run');
   assert.match(text, /: 2 faults\n.*declare scaleActivation "log".*\n.*declare opacityActivation "logit"/);
   const again = command(path, '--draft');
   assert.equal(again.status, 1);
-  assert.match(again.text, /there already/);
+  assert.match(again.text, /exists already/);
 });
 
-/** What a run writes, as tables say it, of some fixtures: the page must say the same (tests/check/browser/check-page.lab.test.ts). */
+/**
+ * Outputs of some fixtures' runs in words of the tables: the page must report the same
+ * (tests/check/browser/check-page.lab.test.ts).
+ */
 const RUNS = JSON.parse(readFileSync(join(root, 'tests/fixtures/check-runs.json'), 'utf8')) as Record<
   string,
   string[][]

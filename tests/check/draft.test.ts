@@ -1,4 +1,4 @@
-/** Drafts of contracts: what a file's names and shapes allow is a contract that the file keeps. */
+/** Drafts of contracts: the contract that a file's names and shapes allow is one that the file keeps. */
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { checkContract, parseContract } from '@gaussian-splat/core/contract';
@@ -26,4 +26,14 @@ test('a row of LGM is known by its 14 numbers, and asked about', () => {
   const { contract, questions } = draftContract(header);
   assert.deepEqual(checkContract(header, parseContract(JSON.stringify(contract))), []);
   assert.ok(questions.some((question) => question.includes('LGM')));
+});
+
+test('a role that fits several inputs is drafted once, and a whole number only for a tensor of whole numbers', () => {
+  const inputs = [tensor('body_pose', [21, 3]), tensor('hand_pose', [30, 3]), tensor('time', [1]), tensor('t', [1])];
+  inputs.push(tensor('frame', [1]), tensor('seed', [1], 'int64'));
+  const header = headerWith(inputs, [tensor('out', [100, 13])]);
+  const { contract } = draftContract(header);
+  assert.deepEqual(checkContract(header, parseContract(JSON.stringify(contract))), []);
+  const roles = Object.values(contract.inputs).map(({ role }) => role);
+  assert.deepEqual(roles, ['pose', 'control', 'time', 'control', 'control', 'seed']);
 });

@@ -26,7 +26,7 @@ function run(command: string, args: readonly string[], cwd = folder): { status: 
   return { status, output: stdout + stderr };
 }
 
-/** What npm would install: the files of the tarball, and the commands that the package names. */
+/** The package as npm would install it: the files of the tarball, and the commands that the package names. */
 function install(name: string): void {
   const packed = run('npm', ['pack', '--silent', '--pack-destination', folder], join(root, 'packages', name));
   const tarball = packed.output.trim().split('\n').at(-1) ?? '';

@@ -160,7 +160,7 @@ test('split: scales, rotations, logits', () => {
   assert.deepEqual(found({ p: { dims: [1, 2, 3] }, c: { dtype: 'int64', data: [2n] as never } }), [], 'the same bytes');
 });
 
-test('declared bounds hold the centres', () => {
+test('declared bounds hold the centers', () => {
   const bounded = (max: number): Contract => ({ ...PACKED, bounds: { min: [0, 0, 0], max: [max, max, max] } });
   const report = checkOutputs(PACKED, { gaussians: packed(2) });
   assert.deepEqual(checkBounds(PACKED, report), []);
@@ -171,7 +171,7 @@ test('declared bounds hold the centres', () => {
   assert.equal(faults[0].tensor, 'gaussians');
 });
 
-test('declared bounds of one Gaussian are its centre, rounded', () => {
+test('declared bounds of one Gaussian are its center, rounded', () => {
   const bounds = { min: [0.1, 200.2, -0.3], max: [0.1, 200.2, -0.3] } as const;
   const one = packed(1, [
     [0, 0, 0.1],

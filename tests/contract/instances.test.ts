@@ -1,4 +1,4 @@
-/** The axis of instances: where it must stand, what it leaves of shapes, and how values of several become those of one. */
+/** The axis of instances: its required position, the remaining shapes, and how values of several become those of one. */
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import {

@@ -58,3 +58,13 @@ test('files: what onnx says of them, and an output that is folded counts', async
   // Its output has a symbolic axis, and depends only on constants, too.
   assert.ok(modelMemory(await fixtureHeader('packed-sh-half.onnx')).unknownTensors > 0);
 });
+
+test('each node is evaluated once, also if tensors are used twice', () => {
+  const sums = Array.from({ length: 17 }, (_, k) => node('Add', [`t${k}`, `t${k}`], [`t${k + 1}`]));
+  const shapes = Array.from({ length: 2_000 }, (_, k) => node('Shape', ['t16'], [`s${k}`]));
+  const header = headerWith([tensor('t0', ['n', 3])], [tensor('t17', ['n', 3])], { nodes: [...sums, ...shapes] });
+  const start = process.cpuUsage();
+  assert.equal(modelMemory(header).largestKnownTensorBytes, null);
+  const { user } = process.cpuUsage(start);
+  assert.ok(user < 1e6, `${user / 1e3} ms`);
+});

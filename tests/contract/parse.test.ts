@@ -104,7 +104,7 @@ for (const [what, json, code, where, message] of REFUSALS) {
   });
 }
 
-test('split: either covariances or scales with rotations, either colours or harmonics', () => {
+test('split: either covariances or scales with rotations, either colors or harmonics', () => {
   const rest: Record<string, unknown> = { ...SPLIT.outputs };
   delete rest.scales;
   assert.match(String(faultsOf(() => parseContract({ ...SPLIT, outputs: rest }))[0].found), /nothing/);
@@ -158,4 +158,10 @@ test('all faults are reported, and survive postMessage', () => {
   assert.match(error.message, /^7 faults:\n- /);
   const copy = ContractError.fromData(structuredClone(error.toData()));
   assert.deepEqual([copy.faults, copy.message, copy.code], [error.faults, error.message, error.code]);
+});
+
+test('a contract of very many faults reports the first ones', () => {
+  const extra = Object.fromEntries(Array.from({ length: 200_000 }, (_, k) => [`x${k}`, 0]));
+  const faults = faultsOf(() => parseContract({ ...PACKED, outputs: { ...PACKED.outputs, ...extra } }));
+  assert.equal(faults.length, 60_000);
 });

@@ -78,6 +78,25 @@ test('what is inferred from shapes', () => {
     { role: 'pose', format: 'quaternion', quaternionOrder: 'wxyz' },
     { role: 'pose', format: 'parameters' },
   ]);
+  // A leading 1 changes nothing.
+  const batched = infer([tensor('pose', [1, 24, 4])], [tensor('gaussians', [1, 5, 13])]);
+  assert.deepEqual(batched.inputs.pose, { role: 'pose', format: 'quaternion', quaternionOrder: 'wxyz' });
+  assert.match(JSON.stringify(batched.outputs), /"rgb"/);
+  const orders = [
+    [1, 5, 48],
+    [1, 5, 16, 3],
+    [5, 3, 16],
+    [1, 5, 3, 4],
+    [5, 27],
+  ].map((dims) => {
+    const parts = [tensor('positions', [5, 3]), tensor('covariances', [5, 6]), tensor('opacities', [5])];
+    const { outputs } = infer([], [...parts, tensor('sh', dims)]);
+    return 'shOrder' in outputs ? outputs.shOrder : undefined;
+  });
+  const [coefficients, channels] = ['coefficient-major', 'channel-major'];
+  assert.deepEqual(orders, [coefficients, coefficients, channels, channels, coefficients]);
+  const profile = infer([], [tensor('gaussians', [1, 5, 10]), tensor('color_rgb', [1, 5, 4])]).outputs;
+  assert.deepEqual(profile, { layout: 'visionary', gaussians: 'gaussians', colors: 'color_rgb' });
   const names = ['positions', 'scales', 'rotations', 'sh', 'opacities', 'count'];
   const shapes = [[5, 3], [5, 3], [5, 4], [5, 3, 4], [5], [1]];
   const split = infer(

@@ -87,7 +87,7 @@ export function assertHelpful(faults: readonly ContractFault[]): void {
   for (const { code, where, expected, found, remedy } of faults) {
     assert.match(code, /^contract\//);
     for (const part of [where, expected, found, remedy]) {
-      // Where a value is NaN, a message must say so.
+      // A message must report NaN values.
       const broken = code === 'contract/not-finite' ? /undefined|\[object/ : /undefined|NaN|\[object/;
       assert.ok(part.length > 0 && !broken.test(part), `${code} at ${where}: ${part}`);
     }

@@ -1,4 +1,4 @@
-/** One rule set, one corpus: what this checker finds in what a run wrote is what the Python exporter's finds (test_written.py). */
+/** One rule set, one corpus: this checker finds the same faults in a run's output as the Python exporter's (test_written.py). */
 import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
 import { test } from 'node:test';

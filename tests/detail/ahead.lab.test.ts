@@ -1,4 +1,4 @@
-/** Which pages a view wishes for, on the GPU: those that the plain rule names, a little before they are drawn, and while the camera moves those that it will need. */
+/** A view's page requests on the GPU: the pages that the plain rule names, a little before they are drawn, and while the camera moves those that it will need. */
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import type { Camera } from '@gaussian-splat/core';
@@ -18,9 +18,9 @@ const options = { threads: 'serial', sort: 'serial', detailFade: 0 } as const;
 const viewFrom = (distance: number): Camera =>
   cameraAt([distance, -2, 0], [0, 0, 0], { width: 96, height: 64, fovXDegrees: 60, near: 0.01 });
 
-/** As in shaders/page_feedback.wgsl: pages are wished for a little before anything of them is drawn. */
+/** As in shaders/page_feedback.wgsl: pages are requested a little before any of their splats is drawn. */
 const SOON = 0.93;
-/** Pages that a view wishes for, by so many times more than it allows. */
+/** Pages that a view requests, by the factor of their error to the allowed one. */
 function requested(camera: Camera, times = 1): Set<number> {
   const pages = new Set([0]);
   rule.request(camera, times * DETAIL, (page) => pages.add(page));
@@ -38,10 +38,10 @@ test('at rest the pages are there that the plain rule names', async () => {
     const camera = viewFrom(distance);
     await drawUntilCalm(scene, renderer, camera, DETAIL);
     const found = residents(scene);
-    // float32 may see it differently where a page is just at the limit.
-    const [least, most] = [1.001 * SOON, 0.999 * SOON].map((times) => requested(camera, times));
-    for (const page of least) assert.ok(found.has(page), `${distance}: page ${page} is missing`);
-    for (const page of found) assert.ok(most.has(page), `${distance}: page ${page} is not asked for`);
+    // float32 may decide differently for a page just at the limit.
+    const [min, max] = [1.001 * SOON, 0.999 * SOON].map((times) => requested(camera, times));
+    for (const page of min) assert.ok(found.has(page), `${distance}: page ${page} is missing`);
+    for (const page of found) assert.ok(max.has(page), `${distance}: page ${page} is not asked for`);
     assert.equal(scene.progress.error, 0);
     [renderer, scene].forEach((owner) => owner.destroy());
   }
@@ -53,7 +53,7 @@ test('while a camera comes nearer, pages come before it needs them', async (t) =
   const scene = await StreamedGaussians.open(device, folder.manifest, { fetchPage: folder.fetchPage });
   const renderer = new Renderer(device, options);
   const target = device.createTexture({ size: [96, 64], format: 'rgba8unorm', usage: 0x10 });
-  // Pipelines are there, and what the first view needs.
+  // Pipelines and the first view's pages are loaded.
   await drawUntilCalm(scene, renderer, viewFrom(60), DETAIL);
   const ahead = new Set<number>();
   const needed = new Set<number>();

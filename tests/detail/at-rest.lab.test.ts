@@ -1,4 +1,4 @@
-/** Pages that draw a frame only when one is asked for: views at rest come to what they need, and to rest. */
+/** Pages that draw a frame only when one is asked for: views at rest load all that they need, and stop. */
 import assert from 'node:assert/strict';
 import { after, test } from 'node:test';
 import { setTimeout as pause } from 'node:timers/promises';
@@ -21,15 +21,15 @@ const besides = (target: Vector3, distance: number, angle: number): Camera =>
     lens,
   );
 
-/** A turn is at least so long, in milliseconds; a second of them without a wish is rest; more than these are none. */
+/** Minimum time of a turn in milliseconds; a second of turns without a request is rest; the maximum number of turns. */
 const TURN_MS = 4;
 const CALM_TURNS = 1000 / TURN_MS;
 const MAX_TURNS = 20_000 / TURN_MS;
 
-/** A scene, and whoever draws it when asked to. */
+/** A scene, and its drawing callback. */
 interface Page {
   readonly scene: StreamedGaussians;
-  /** Draws when asked to, until nobody has asked for a second or the turns are over: those, and no clock, so that a busy machine has as many. @returns turns from the first frame to the last */
+  /** Draws when asked to, until no request came for a second or the turns are over: those, and no clock, so that a busy machine has as many. @returns turns from the first frame to the last */
   readonly live: (turns: number, draw: () => void) => Promise<number>;
 }
 
@@ -70,7 +70,7 @@ const renderer = async (): Promise<Renderer> => new Renderer(await anyDevice(), 
 test('within a budget of splats and a pool that is full, a view at rest comes to rest', async () => {
   const places = [0, 1, 2, 3, 4, 5].map((k): Vector3 => [14 * (k % 3), 0, 14 * Math.floor(k / 3)]);
   const folder = detailFolder(pebbles(40_000), places);
-  const [drawing, picture] = [await renderer(), await target()];
+  const [drawing, image] = [await renderer(), await target()];
   const tight = [
     [48, 16_500, 1.4],
     [72, 24_000, 4.4],
@@ -78,16 +78,18 @@ test('within a budget of splats and a pool that is full, a view at rest comes to
   for (const [slots, splatBudget, angle] of someOf(tight, 1)) {
     const { scene, live } = await open(folder, { slots });
     const camera = besides([14, 0, 7], 2, angle);
-    const draw = (): void => drawing.render({ gaussians: scene, camera, target: picture, detail: 0.3, splatBudget });
+    const draw = (): void => drawing.render({ gaussians: scene, camera, target: image, detail: 0.3, splatBudget });
     const took = await live(MAX_TURNS, draw);
-    const { budgetError } = await drawing.statistics();
-    const { pages } = scene.traffic;
-    console.log(`${slots} slots: ${pages} pages in ${took} turns; within ${budgetError.toFixed(2)} pixels`);
-    assert.ok(took < 0.9 * MAX_TURNS && pages < 4 * slots, `${pages} pages in ${took} turns`);
-    assert.ok(budgetError > 0.3 && scene.progress.resident === slots, 'both are tight');
+    const { budgetError } = await drawing.stats();
+    const { blocks } = scene.traffic;
+    console.log(`${slots} slots: ${blocks} pages in ${took} turns; within ${budgetError.toFixed(2)} pixels`);
+    assert.ok(took < 0.9 * MAX_TURNS && blocks < 4 * slots, `${blocks} pages in ${took} turns`);
+    // Which limit binds depends on the order in which pages come: the budget (2.5 pixels missing) or the pool (3.3).
+    const missing = Math.max(budgetError, scene.progress.error);
+    assert.ok(missing > 0.3 && scene.progress.resident === slots, `${missing.toFixed(2)} pixels are missing`);
     scene.destroy();
   }
-  [drawing, picture].forEach((owner) => owner.destroy());
+  [drawing, image].forEach((owner) => owner.destroy());
 });
 
 /** Pages of a copy that are finer than its coarsest, nearly all of them. */
@@ -105,7 +107,7 @@ for (const isOne of [false, true]) {
       [0, 60].map(
         (x) => pagesInSlots.filter((page) => page !== undefined && page > 1 && list.translate(page)[0] === x).length,
       );
-    const picture = await target();
+    const image = await target();
     const first = await renderer();
     const drawing = [first, isOne ? first : await renderer()];
     for (const isMoving of [false, true]) {
@@ -113,11 +115,12 @@ for (const isOne of [false, true]) {
       const [still, start] = [besides([60, 0, 0], 3, 0), performance.now()];
       const draw = (): void => {
         const other = besides([0, 0, 0], 3, isMoving ? (performance.now() - start) / 2000 : 0);
-        drawing[0].render({ gaussians: scene, camera: other, target: picture, detail: 0.3 });
-        drawing[1].render({ gaussians: scene, camera: still, target: picture, detail: 0.3 });
+        drawing[0].render({ gaussians: scene, camera: other, target: image, detail: 0.3 });
+        drawing[1].render({ gaussians: scene, camera: still, target: image, detail: 0.3 });
       };
       if (isMoving) {
-        // As many as pages take to be asked for, fetched and placed, more where other tests share the processor; and some in which they might leave again.
+        // As many as pages take to be requested, fetched and placed, more if other tests use the same CPU; and some
+        // more, in which they might be evicted again.
         const isThere = (): boolean => copiesOf(scene).every((pages) => pages >= MAX_COPY_SHARE);
         for (let [frame, after] = [0, 0]; after < 40 && frame < 2400; after += isThere() ? 1 : 0, frame++) {
           draw();
@@ -134,7 +137,7 @@ for (const isOne of [false, true]) {
       assert.ok(Math.min(...copies) >= MAX_COPY_SHARE, `pages of the copies: ${copies.join()}`);
       scene.destroy();
     }
-    [picture, ...new Set(drawing)].forEach((owner) => owner.destroy());
+    [image, ...new Set(drawing)].forEach((owner) => owner.destroy());
   });
 }
 
@@ -149,20 +152,20 @@ test('pages that do not come are asked for again, though the view is at rest', a
         : folder.fetchPage(file),
     onError: (error) => errors.push(error),
   });
-  const [drawing, picture] = [await renderer(), await target()];
+  const [drawing, image] = [await renderer(), await target()];
   const draw = (): void =>
-    drawing.render({ gaussians: scene, camera: besides([0, 0, 0], 4, 1), target: picture, detail: 0.2 });
+    drawing.render({ gaussians: scene, camera: besides([0, 0, 0], 4, 1), target: image, detail: 0.2 });
   for (let round = 0; round < 40 && errors.length === 0; round++) await live(25, draw);
   const { resident } = scene.progress;
   assert.ok(errors.length > 0 && scene.progress.error > 0.2);
   isDown = false;
-  // Asked for again after four seconds; later, where a busy machine has seen a second failure.
+  // Requested again after four seconds; later, if a busy machine has had a second failure.
   for (let round = 0; round < 60 && scene.progress.error > 0; round++) {
     await pause(500);
     await live(50, draw);
   }
   assert.ok(scene.progress.resident > resident && scene.progress.error === 0, JSON.stringify(scene.progress));
-  [drawing, picture, scene].forEach((owner) => owner.destroy());
+  [drawing, image, scene].forEach((owner) => owner.destroy());
 });
 
 after(endNodeDevice);

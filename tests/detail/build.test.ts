@@ -1,4 +1,4 @@
-/** Levels of detail as they are built: how many, how they nest, and that merging keeps what it must. */
+/** Levels of detail as they are built: how many, how they nest, and that merging keeps its invariants. */
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { packGaussians, type PackedGaussians } from '@gaussian-splat/renderer';
@@ -58,11 +58,12 @@ test('errors and spheres of a chunk exceed those of what it stands for, and each
   }
 });
 
-test('merging keeps mean colour and middle, by what splats weigh, and covariances stay covariances', () => {
+test('merging keeps mean color and middle, by what splats weigh, and covariances stay covariances', () => {
   const levels = buildLevels(cloud, order);
   const means = levels.slice(0, 3).map((level) => weightedMeans(level));
   for (const mean of means.slice(1)) {
-    // A merged splat weighs what it covers, a little less than its parts do where they overlap: not the very same mean. The scene is 12 wide.
+    // The weight of a merged splat is its covered area, a little less than its overlapping parts have: not exactly the
+    // same mean. The scene is 12 wide.
     mean.forEach((value, k) =>
       assert.ok(Math.abs(value - means[0][k]) < (k < 3 ? 0.3 : 0.05), `${k}: ${value}, ${means[0][k]}`),
     );

@@ -10,23 +10,23 @@ import {
   type SampledFrame,
 } from '@gaussian-splat/renderer/stages';
 
-const MOST = { visible: 4e6, pairs: 50e6 };
+const MAX = { visible: 4e6, pairs: 50e6 };
 
 /** A monitor and the room that it has asked for last. */
-function watch(room: Capacity, least: () => Capacity): { monitor: CapacityMonitor; room: () => Capacity } {
+function watch(room: Capacity, min: () => Capacity): { monitor: CapacityMonitor; room: () => Capacity } {
   const device = { createBuffer: () => ({ destroy: () => undefined }) } as unknown as GPUDevice;
   let current = room;
   const monitor = new CapacityMonitor(
     new CountBuffers(device),
     room,
-    { min: least, max: MOST },
+    { min: min, max: MAX },
     new CapacityHistory(),
     (requested) => (current = requested),
   );
   return { monitor, room: () => current };
 }
 
-const picture = (pixels: number, wholePixels: number): SampledFrame => ({
+const image = (pixels: number, wholePixels: number): SampledFrame => ({
   pixels,
   wholePixels,
   isWhole: pixels === wholePixels,
@@ -44,7 +44,7 @@ test('buffers that are nearly empty shrink, and grow before they are full', () =
   monitor.judge({ visible: 1200, pairs: 5000 }, false);
   assert.deepEqual(room(), { visible: 1500, pairs: MIN_CAPACITY.pairs });
   monitor.judge({ visible: 3.9e6, pairs: 60e6 }, true);
-  assert.deepEqual(room(), MOST);
+  assert.deepEqual(room(), MAX);
 });
 
 test('room that must stay does, and comes back as soon as more of it may', () => {
@@ -78,18 +78,18 @@ test('pictures of fewer pixels do not take the room that the whole one at rest n
   const { monitor, room } = watch({ visible: 4e6, pairs: 6e6 }, () => MIN_CAPACITY);
   const whole = { visible: 3.5e6, pairs: 5e6 };
   const smaller = { visible: 3e6, pairs: 1e6 };
-  monitor.isDue(true, picture(4_000_000, 4_000_000));
+  monitor.isDue(true, image(4_000_000, 4_000_000));
   sample(monitor, whole);
-  monitor.isDue(true, picture(250_000, 4_000_000));
+  monitor.isDue(true, image(250_000, 4_000_000));
   for (let k = 0; k < 10; k++) sample(monitor, smaller);
   assert.ok(room().pairs >= whole.pairs, `${room().pairs}`);
-  // The element has become smaller: what its picture at rest needed says nothing, but that it was five times as much as in motion.
-  monitor.isDue(true, picture(62_500, 1_000_000));
+  // The element has become smaller: the need of its frame at rest is out of date, but it was five times as much as in motion.
+  monitor.isDue(true, image(62_500, 1_000_000));
   for (let k = 0; k < 2; k++) sample(monitor, { ...smaller, pairs: 2e5 });
   assert.equal(room().pairs, 1.25 * 5 * 2e5);
 });
 
-/** What a view needs with so many times as many splats as at first; in motion with levels of detail of half as many. */
+/** The need of a view with a multiple of the initial splats; half as many in motion with levels of detail. */
 function needAt(view: number, { pixels, isWhole }: SampledFrame): Capacity {
   const visible = view * 1e6 * (isWhole ? 1 : 0.5);
   return { visible, pairs: visible * 2 * (pixels / 4e6) ** 0.3 };
@@ -98,9 +98,9 @@ function needAt(view: number, { pixels, isWhole }: SampledFrame): Capacity {
 for (const pixels of [4_000_000, 1_960_000, 250_000]) {
   test(`a camera that comes nearer in pictures of ${pixels} pixels has room for the whole one at any time`, () => {
     const { monitor, room } = watch({ visible: 2e6, pairs: 2.5e6 }, () => MIN_CAPACITY);
-    const see = (view: number, picture: SampledFrame): void => {
-      monitor.isDue(true, picture);
-      monitor.judge(needAt(view, picture), false);
+    const see = (view: number, photo: SampledFrame): void => {
+      monitor.isDue(true, photo);
+      monitor.judge(needAt(view, photo), false);
     };
     const whole = { pixels: 4_000_000, wholePixels: 4_000_000, isWhole: true };
     see(1, whole);

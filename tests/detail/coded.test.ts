@@ -1,4 +1,4 @@
-/** Coded pages: what they decode to is what pages that are not coded say, to the steps that were asked for; and what is no such file is refused. */
+/** Coded pages: decoded pages equal pages that are not coded, to the requested steps; and other files are refused. */
 import assert from 'node:assert/strict';
 import { after, test } from 'node:test';
 import { deflateRawSync } from 'node:zlib';
@@ -43,7 +43,7 @@ const FINE: PageSteps = {
   harmonics: 1 / 1000,
 };
 
-/** Colours that depend on the view, those of three channels mostly alike. */
+/** Colors that depend on the view, those of three channels mostly alike. */
 function withHarmonics(cloud: GaussianCloud, shDegree: ShDegree): GaussianCloud {
   const [from, to] = [cloud.shDegree, shDegree].map((degree) => 3 * shCoefficientCount(degree));
   const random = randomSource(9);
@@ -80,8 +80,8 @@ for (const degree of [0, 1, 2, 3] as const) {
       found.forEach((number, k) => {
         const [level] = holds[Math.floor((k * chunks) / layout.chunks)];
         const size = Math.max(1e-3, Math.abs(asked[k]));
-        const most = (level === 0 ? 0.03 : 0.05) * size;
-        assert.ok(Math.abs(number - asked[k]) <= most, `bound ${k}: ${number}, not ${asked[k]}`);
+        const max = (level === 0 ? 0.03 : 0.05) * size;
+        assert.ok(Math.abs(number - asked[k]) <= max, `bound ${k}: ${number}, not ${asked[k]}`);
       });
       const leaves = holds.flatMap(([level], chunk) => (level === 0 ? [chunk] : []));
       parts.push({ words, of: chunks, chunks: leaves });
@@ -95,8 +95,8 @@ for (const degree of [0, 1, 2, 3] as const) {
       [decoded.scales, cloud.scales],
       [decoded.sh, cloud.sh],
     ]) {
-      const most = Math.max(1, sums(asked.map(Math.abs)));
-      assert.ok(Math.abs(sums(found) - sums(asked)) < 0.02 * most, `${sums(found)}, not ${sums(asked)}`);
+      const max = Math.max(1, sums(asked.map(Math.abs)));
+      assert.ok(Math.abs(sums(found) - sums(asked)) < 0.02 * max, `${sums(found)}, not ${sums(asked)}`);
     }
   });
 }
@@ -109,8 +109,8 @@ test('harmonics of a splat that is seen from one side are rounded to what that s
   const roots = Float32Array.from({ length: 45 * splats }, (_, k) => root[k % 45]);
   const seen = { energies: new Float32Array(splats).fill(1), roots };
   const others = cone(64, random).map(basisOf);
-  const [plain, fitting] = [undefined, seen].map((told) => {
-    const rounder = new HarmonicRounder(9, told);
+  const [plain, fitting] = [undefined, seen].map((reported) => {
+    const rounder = new HarmonicRounder(9, reported);
     const step = 0.05;
     const counts = new Map<number, number>();
     let error = 0;
@@ -176,7 +176,7 @@ test('coarser levels keep the harmonics that show', async () => {
   assert.ok(usual / fine > 0.6 && usual / fine < 1.1, `${usual / fine}`);
 });
 
-/** dB of a streamed scene, all of whose pages are there, from the scene that was loaded whole. */
+/** PSNR in dB between a streamed scene with all pages resident and the scene that was loaded whole. */
 async function closenessOf(cloud: GaussianCloud, steps: PageSteps): Promise<{ decibels: number; bytes: number }> {
   const device = await anyDevice();
   const { manifest, files, fetchPage } = detailFolder(cloud, undefined, {

@@ -1,4 +1,4 @@
-/** Copies of a tree: pages that share a file, and are moved to their places on the GPU. */
+/** Copies of a tree: pages from one file, and are moved to their places on the GPU. */
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import type { Vector3 } from '@gaussian-splat/core';
@@ -14,12 +14,12 @@ import { Renderer } from '../support/renderer.js';
 
 /** Words of a chunk's box, of its details, and of the geometry and harmonics (degree 1) of its splats: docs/lod-format.md. */
 const [BOX, DETAILS, GEOMETRY, SH] = [8, 12, 8 * constants.CULL_GROUP, 4 * constants.CULL_GROUP];
-/** Of which no coordinate is a float32. */
+/** An offset without a float32 coordinate. */
 const places = [0, 1, 2].map((k): Vector3 => [14.1 * k, 0.3 * k, -3.7 * k]);
 const folder = detailFolder(pebbles(4_000), places);
 const options = { threads: 'serial', sort: 'serial' } as const;
 
-/** Adds to the points that begin at every so many numbers, in float32. */
+/** Adds to the points that begin at every multiple of a stride, in float32. */
 function moved(words: Uint32Array, firsts: readonly number[], stride: number, by: Vector3): Uint32Array {
   const floats = Float32Array.from(new Float32Array(words.slice().buffer));
   for (const first of firsts) {
@@ -51,7 +51,7 @@ test('whatever came and went, each slot has the words of its page in its file, a
   assert.ok(seen.size > slots, 'some left for others');
   const [geometry, sh, boxes] = await Promise.all(
     (['geometry', 'sh', 'chunks'] as const).map(
-      async (part) => new Uint32Array(await readBuffer(scene.pages[0][part])),
+      async (part) => new Uint32Array(await readBuffer(scene.blocks[0][part])),
     ),
   );
   const rows = await readRows(scene);

@@ -1,4 +1,4 @@
-/** Where a camera will be, the pace of uploads, and what they give to a flight over a streamed scene: simulated, without a GPU. */
+/** Prediction of cameras, the rate of uploads, and their benefit for a flight over a streamed scene: simulated, without a GPU. */
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { eyeOf, lookAt, type Camera, type Vector3 } from '@gaussian-splat/core';
@@ -119,19 +119,19 @@ test('a file that comes short is refused and fetched again, and a view of bytes 
   assert.equal(fetched, 2, 'kept');
 });
 
-/** Frames of a page that uploads all it may. @returns bytes of each, and the share after it */
+/** Frames of a page that uploads all it may. @returns bytes of each, and the fraction after it */
 function paced(
   frames: number,
   intervalOf: (frame: number, bytes: number) => number,
   msPerMegabyte: number,
 ): { bytes: number; share: number }[] {
-  const pace = new UploadBudget();
+  const quality = new UploadBudget();
   let [now, last] = [0, 0];
   return Array.from({ length: frames }, (_, frame) => {
     now += intervalOf(frame, last);
-    last = pace.startFrame(now);
-    pace.note(last, (last / 1e6) * msPerMegabyte);
-    return { bytes: last, share: pace.share };
+    last = quality.startFrame(now);
+    quality.note(last, (last / 1e6) * msPerMegabyte);
+    return { bytes: last, share: quality.share };
   });
 }
 
@@ -177,16 +177,16 @@ test('where uploads above 4 MB make a display leave a frame out, few are, and mo
 
 test('a clock that ticks once a millisecond gives the same share on average', () => {
   const interval = 1000 / 60;
-  const pace = new UploadBudget();
+  const quality = new UploadBudget();
   let [now, uploaded, allowed] = [0, 0, 0];
   for (let frame = 0; frame < 600; frame++) {
-    const bytes = pace.startFrame(interval * frame);
+    const bytes = quality.startFrame(interval * frame);
     if (frame >= 100) {
       uploaded += bytes;
-      allowed += (pace.share * interval * 1e6) / 1.3;
+      allowed += (quality.share * interval * 1e6) / 1.3;
     }
     const took = (bytes / 1e6) * 1.3;
-    pace.note(bytes, Math.floor(now + took) - Math.floor(now));
+    quality.note(bytes, Math.floor(now + took) - Math.floor(now));
     now += took + 7.77;
   }
   close(uploaded, Math.min(allowed, (500 * 5e6) / 1.3), 0.2);

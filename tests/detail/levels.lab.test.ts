@@ -1,4 +1,4 @@
-/** Scenes whose files have levels of their own (streamed SOG), box by box: whatever comes, fails or leaves, every box is covered exactly once. */
+/** Scenes whose files have levels of their own (streamed SOG), box by box: with any arrivals, failures and evictions, every box is covered exactly once. */
 import assert from 'node:assert/strict';
 import { after, test } from 'node:test';
 import { setTimeout as pause } from 'node:timers/promises';
@@ -29,7 +29,7 @@ const viewFrom = (distance: number, angle = 0.4, x = 0): Camera =>
     ...{ width: 96, height: 64, fovXDegrees: 60, near: 0.01 },
   });
 
-/** Bytes of a slot, by what a page of docs/lod-format.md has. */
+/** Bytes of a slot, from a page's contents in docs/lod-format.md. */
 function slotBytes({ scene }: PageSource): number {
   const words = { int8: [2, 4, 8, 14], float16: [2, 6, 14, 24] }[scene.shPrecision][scene.shDegree];
   return 4 * SLOT_CHUNKS * (8 + 12 + 8 + CULL_GROUP * (4 + words));
@@ -160,8 +160,8 @@ test('a file that is missing, and a run beyond its file, are told by name, and w
   assert.equal(scene.progress.resident, 2);
   assert.deepEqual(new Set(errors.map(({ code }) => code)), new Set(['network/status', 'decode/corrupt']));
   assert.ok(errors.some(({ where }) => where.includes('lod-meta.json, 1_0/meta.json')));
-  const picture = await readFrame(device, renderer, { gaussians: scene, camera: viewFrom(8) });
-  assert.ok(picture.some((value) => value > 0.1));
+  const image = await readFrame(device, renderer, { gaussians: scene, camera: viewFrom(8) });
+  assert.ok(image.some((value) => value > 0.1));
   [renderer, scene].forEach((owner) => owner.destroy());
 });
 
@@ -206,16 +206,16 @@ test(
     );
     assert.deepEqual([...small.source.list.slots], [2, 2, 5, 16, 2, 5, 16]);
     const target = device.createTexture({ size: [96, 64], format: 'rgba8unorm', usage: 0x10 });
-    let most = 0;
+    let max = 0;
     for (let frame = 0; frame < 40; frame++) {
       const camera = viewFrom(0.8 + 3 * Math.abs(Math.sin(frame / 12)), frame / 9);
       renderer.render({ gaussians: small.scene, camera, target, detail: DETAIL });
       await device.queue.onSubmittedWorkDone();
       await pause(2);
       const { whole } = await checkBoxes(small.levels, small.source, small.scene, { camera, allowed: DETAIL });
-      most = Math.max(most, whole.size);
+      max = Math.max(max, whole.size);
     }
-    assert.ok(most >= 2, `${most} pages`);
+    assert.ok(max >= 2, `${max} pages`);
     assert.ok(small.scene.progress.resident <= 6);
     const large = await openLod(device, index, fetch, {}, files);
     const camera = viewFrom(2);

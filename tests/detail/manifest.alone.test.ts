@@ -103,6 +103,15 @@ test('lists within lists, where a manifest has something else, are refused with 
   assert.throws(() => checkManifest({ format: deep }, 'detail.json'), { code: 'decode/unsupported' });
 });
 
+test('an address that no server accepts is refused, because each request of a page parses it', () => {
+  const [first] = manifests[1].trees[0].pages;
+  const named = (length: number): unknown => ({
+    ...manifests[1],
+    trees: [{ pages: [{ ...first, file: 'a'.repeat(length) }] }],
+  });
+  assert.throws(() => checkManifest(named(2049), 'detail.json'), { code: 'decode/header' });
+});
+
 test('a manifest is checked in a time that grows as its files do', () => {
   const [first] = manifests[1].trees[0].pages;
   // Each file below the last chunk of the one before.

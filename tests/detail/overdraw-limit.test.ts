@@ -15,10 +15,13 @@ test('a view that stays is drawn again at most twice, however its sum trembles',
 
 test('pixels come back with a view that covers less', () => {
   const limit = new OverdrawLimit();
+  assert.equal(limit.mayExceed(10), false);
   limit.note(20_000, 0);
   assert.ok(Math.abs(limit.share - 0.04) < 1e-9);
+  assert.equal(limit.mayExceed(10), true, 'a scene of few splats may follow');
   assert.equal(limit.note(10_000, 0), true);
   assert.equal(limit.note(0, 0), true);
   assert.equal(limit.share, 1);
+  assert.equal(limit.mayExceed(10), false);
   assert.equal(limit.note(0, 0), false);
 });

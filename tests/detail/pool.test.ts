@@ -1,4 +1,4 @@
-/** What is written into the slots of a pool, through mapped memory or past it. */
+/** Writes to the slots of a pool, through mapped memory or without it. */
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { setTimeout as pause } from 'node:timers/promises';
@@ -25,7 +25,7 @@ const format = { shDegree: 1, shPrecision: 'int8' } as const;
 const SLOTS = 24;
 const [chunk, slot] = [pageLayout(format, 1), pageLayout(format, SLOT_CHUNKS)];
 const GEOMETRY = chunk.geometry / constants.CULL_GROUP;
-/** Of which a chunk's first row alone moves. */
+/** Pages in which only a chunk's first row moves. */
 const quantized = { ...format, geometry: 'quantized' } as const;
 const PARTS = ['chunks', 'details', 'geometry', 'sh'] as const;
 

@@ -1,4 +1,4 @@
-/** Streamed scenes with quantized geometry: how near they are to what was quantized, and that shaders read what was written. */
+/** Streamed scenes with quantized geometry: their error against the original values, and that shaders read the written values. */
 import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
 import { after, test } from 'node:test';
@@ -30,7 +30,7 @@ import { Renderer } from '../support/renderer.js';
 after(endNodeDevice);
 
 const { CULL_GROUP } = constants;
-/** Exact painting, so that what differs is what was quantized. */
+/** Exact painting, so that only quantized values differ. */
 const serial = { threads: 'serial', sort: 'serial', rasterizer: 'tiles' } as const;
 /** Pages come with any rasterizer: quads are several times as fast here. */
 const fast = { threads: 'serial', rasterizer: 'quads' } as const;
@@ -78,9 +78,9 @@ for (const count of [1, 2, 255, 256]) {
         return [Math.min(...own), Math.max(...own)];
       })
       .reduce(
-        ([lows, highs], [least, most]) => [
-          [...lows, least],
-          [...highs, most],
+        ([lows, highs], [min, max]) => [
+          [...lows, min],
+          [...highs, max],
         ],
         [[], []] as number[][],
       );
@@ -89,7 +89,7 @@ for (const count of [1, 2, 255, 256]) {
       if (k >= count) return assert.equal(opacity, 0, 'what fills up the chunk shows');
       position.forEach((x, axis) => {
         const error = Math.abs(x - level.positions[3 * i + axis]);
-        assert.ok(error <= (high[axis] - low[axis]) / 131_000 + 1e-7, `centre of ${k}: ${error}`);
+        assert.ok(error <= (high[axis] - low[axis]) / 131_000 + 1e-7, `center of ${k}: ${error}`);
       });
       assert.ok(Math.abs(opacity - level.opacities[i]) <= 1 / 2900);
       assert.equal(opacity >= 1 / 255, level.opacities[i] >= 1 / 255);
@@ -129,7 +129,7 @@ test('splats without any size along an axis, and chunks of one size, stay what t
   }
 });
 
-/** dB of a streamed scene, all of whose pages are there, from the scene that was loaded whole. */
+/** PSNR in dB between a streamed scene with all pages resident and the scene that was loaded whole. */
 async function closenessOf(cloud: GaussianCloud, distances: readonly number[], options: object): Promise<number[]> {
   const device = await anyDevice();
   const folder = detailFolder(cloud, undefined, quantized);
@@ -169,7 +169,7 @@ test('captured scenes are 66 dB and more from what was quantized', { skip: needs
   }
 });
 
-/** Stones of which every so many splats lie far off, as sky and floaters of captures do. */
+/** Stones with splats far off at a regular stride, as sky and floaters of captures are. */
 function scattered(count: number, every: number, distance: number): GaussianCloud {
   const cloud = pebbles(count);
   const random = randomSource(every);
@@ -194,7 +194,7 @@ for (const [count, every, distance] of someOf(SCATTERED, 2)) {
   });
 }
 
-test('what fills up chunks is no splat of the scene, and errors of coarser levels count what their centres are rounded by', () => {
+test('what fills up chunks is no splat of the scene, and errors of coarser levels count what their centers are rounded by', () => {
   for (const [count, every, distance] of SCATTERED) {
     const tree = buildDetailTree(scattered(count, every, distance), quantized);
     assert.equal(tree.splats, count);
@@ -209,8 +209,8 @@ test('what fills up chunks is no splat of the scene, and errors of coarser level
           Math.hypot(...position.map((x, axis) => x - level.positions[3 * (first + n) + axis])),
         );
         const said = tree.errors[k + 1].errors[first / CULL_GROUP];
-        const most = Math.max(...off);
-        assert.ok(2 * most <= 1.001 * said, `level ${k + 1}, chunk ${first / CULL_GROUP}: ${2 * most}, ${said} said`);
+        const max = Math.max(...off);
+        assert.ok(2 * max <= 1.001 * said, `level ${k + 1}, chunk ${first / CULL_GROUP}: ${2 * max}, ${said} said`);
       }
     });
   }
@@ -233,7 +233,7 @@ test('copies that are moved on the GPU, and coarser levels, are what exact pages
         const scene = await StreamedGaussians.open(device, manifest, { fetchPage, arrivalMs: 0 });
         await drawUntilCalm(scene, fetching, camera, detail);
         const image = await readFrame(device, renderer, { gaussians: scene, camera, detail });
-        const { visible } = await renderer.statistics();
+        const { visible } = await renderer.stats();
         scene.destroy();
         return { image, visible };
       }),
@@ -274,7 +274,7 @@ test('chunks whose first rows make no sense are not drawn, and spoil nothing els
     await drawUntilCalm(scene, fetching, camera, 0);
     const image = await readFrame(device, renderer, { gaussians: scene, camera, detail: 0 });
     assert.ok(image.every(Number.isFinite), `word ${word}`);
-    const { unusable, visible } = await renderer.statistics();
+    const { unusable, visible } = await renderer.stats();
     assert.ok(unusable > 500 && visible > 300, `word ${word}: ${unusable} refused, ${visible} visible`);
     scene.destroy();
   }

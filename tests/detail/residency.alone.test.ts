@@ -103,11 +103,11 @@ test('a pool that is too small comes to rest, and nothing that is worth much mor
     );
     const isLeaf = (page: number): boolean =>
       !Array.from(residency.pageIn).some((resident) => list.parent[resident] === page);
-    const spare = Math.min(
+    const extra = Math.min(
       ...[...residency.pageIn].filter((page) => page !== 0 && isLeaf(page)).map((page) => requests[page]),
     );
     const lacking = Math.max(...requests.filter((_, page) => !residency.isResident(page)));
-    assert.ok(lacking <= 1.5 * spare, `view ${view}: ${lacking} is missing, ${spare} is there`);
+    assert.ok(lacking <= 1.5 * extra, `view ${view}: ${lacking} is missing, ${extra} is there`);
   }
 });
 
@@ -142,7 +142,7 @@ function cpuOf(work: () => void): number {
   return (user + system) / 1000;
 }
 
-/** CPU milliseconds of a look, the quickest of many, and of a page that takes the place of another, on average, in a full pool whose view changes with every look. */
+/** CPU milliseconds of a feedback pass, the quickest of many, and of a page that replaces another, on average, in a full pool whose view changes with every pass. */
 function costs(pages: number, slots: number): { sample: number; page: number } {
   const list = pageTree(pages);
   const residency = opened(list, slots);

@@ -1,4 +1,4 @@
-/** Levels of detail that a file brings (streamed SOG): packed so that of every node one level is drawn, the finest where no error is allowed. */
+/** Levels of detail in a file (streamed SOG): packed so that one level of every node is drawn, the finest if no error is allowed. */
 import assert from 'node:assert/strict';
 import { after, test } from 'node:test';
 import { keepUsable, type Camera, type GaussianCloud, type LevelRun } from '@gaussian-splat/core';
@@ -17,7 +17,7 @@ import { Renderer } from '../support/renderer.js';
 
 const { CULL_GROUP } = constants;
 
-/** Three nodes with three levels, of which the middle one of the second is missing; some splats cannot be drawn. */
+/** Three nodes with three levels, without the middle one of the second; some splats cannot be drawn. */
 function nodes(): GaussianCloud {
   const cloud = pebbles(3_000);
   const counts = [
@@ -105,15 +105,15 @@ test(
     for (const distance of [2, 6, 18]) {
       const camera = cameraAt([distance, -distance / 2, 0], [0, -0.5, 0], { width: 96, height: 64, near: 0.01 });
       const truth = await readFrame(device, renderer, { gaussians: finest, camera });
-      const { visible: most } = await renderer.statistics();
+      const { visible: max } = await renderer.stats();
       const exact = await readFrame(device, renderer, { gaussians: levels, camera });
       assert.ok(psnr(truth, exact, { channels: 4 }) > 90);
-      const picture = await readFrame(device, renderer, { gaussians: levels, camera, detail: 1 });
-      const { visible } = await renderer.statistics();
-      const decibels = psnr(truth, picture, { channels: 4, mask: truth.filter((_, i) => i % 4 === 3) });
-      console.log(`from ${distance}: ${visible} of ${most} splats, ${decibels.toFixed(1)} dB at 1 px`);
-      assert.ok(visible / most <= last);
-      last = visible / most;
+      const image = await readFrame(device, renderer, { gaussians: levels, camera, detail: 1 });
+      const { visible } = await renderer.stats();
+      const decibels = psnr(truth, image, { channels: 4, mask: truth.filter((_, i) => i % 4 === 3) });
+      console.log(`from ${distance}: ${visible} of ${max} splats, ${decibels.toFixed(1)} dB at 1 px`);
+      assert.ok(visible / max <= last);
+      last = visible / max;
     }
     assert.ok(last < 0.5, `${last} of the splats from afar`);
     [renderer, levels, finest].forEach((owner) => owner.destroy());

@@ -32,7 +32,7 @@ function opened(list: PageList, slots: number): Residency {
   return residency;
 }
 
-/** Each page is in as many slots as it takes, each slot holds one page, and what is above a page is there. @returns slots in use */
+/** Asserts that each page is in as many slots as it needs, each slot holds one page, and a page's parents are resident. @returns slots in use */
 function check(list: PageList, residency: Residency): number {
   const residents = [...new Set(residency.pageIn)].filter((page) => page !== NONE);
   assert.equal(residency.residents, residents.length);
@@ -56,7 +56,7 @@ test('whatever is wished for, comes or fails, pages are there whole or not at al
   const slots = list.slots[0] + 30;
   const residency = opened(list, slots);
   const coming: number[] = [];
-  let [placed, refused, several, most] = [0, 0, 0, 0];
+  let [placed, refused, several, max] = [0, 0, 0, 0];
   for (let step = 0; step < 4000; step++) {
     residency.note(Float32Array.from({ length: list.count }, () => (random() < 0.5 ? 0 : 10 * random())));
     for (let page = residency.nextMissing(); page !== NONE && coming.length < 5; page = residency.nextMissing()) {
@@ -78,14 +78,14 @@ test('whatever is wished for, comes or fails, pages are there whole or not at al
     placed++;
     if (settled.left.length > 1) several++;
     for (const { page: evictee } of settled.left) assert.ok(before.has(evictee) && !residency.isResident(evictee));
-    most = Math.max(most, check(list, residency));
+    max = Math.max(max, check(list, residency));
   }
-  console.log(`${placed} placed, ${several} of them for several others, ${refused} refused; ${most} of ${slots} slots`);
-  assert.ok(placed > 500 && several > 50 && most > slots - 3);
+  console.log(`${placed} placed, ${several} of them for several others, ${refused} refused; ${max} of ${slots} slots`);
+  assert.ok(placed > 500 && several > 50 && max > slots - 3);
 });
 
 test('a page that does not fit beside what is above it is never sent for, and keeps nothing else away', () => {
-  // The finest run of the first box takes 10 slots; there are 12, of which the runs above it take 3.
+  // The finest run of the first box takes 10 slots; there are 12, and the runs above it take 3.
   const list = boxList([
     [4, 8, 40],
     [4, 12],
@@ -121,13 +121,13 @@ test('a large page for which too little can leave keeps no small one from coming
   const look = (...requests: number[]): void => residency.note(Float32Array.of(0, ...requests));
   look(0, 50, 0);
   assert.ok(residency.nextMissing() === 2 && residency.begin(2) && residency.settle(2));
-  // Ten slots: six are empty, and what is in the others is needed nearly as much.
+  // Ten slots: six are empty, and the pages in the others are needed nearly as much.
   look(60, 50, 1);
   assert.equal(residency.nextMissing(), 1);
   assert.equal(residency.begin(1), false);
   assert.equal(residency.nextMissing(), 3);
   assert.ok(residency.begin(3) && residency.settle(3));
-  // Where it is needed far more, both leave for it.
+  // Both pages are evicted for one that is needed far more.
   look(90, 50, 1);
   assert.equal(residency.nextMissing(), 1);
   assert.ok(residency.begin(1));

@@ -1,4 +1,4 @@
-/** Scenes that are streamed: pages come and go, and whatever is there covers the scene. */
+/** Scenes that are streamed: pages are loaded and evicted, and the resident ones always cover the scene. */
 import assert from 'node:assert/strict';
 import { after, test } from 'node:test';
 import { setTimeout as pause } from 'node:timers/promises';
@@ -78,7 +78,7 @@ async function rowsOfPages(scene: StreamedGaussians): Promise<Map<number, Float3
   return new Map(scene.pagesInSlots.flatMap((page, slot) => (page === undefined ? [] : [[page, rows[slot]] as const])));
 }
 
-/** Adds shares up along every path from the coarsest chunk down to the finest that is there: each must come to 1. */
+/** Sums weights along every path from the coarsest chunk to the finest resident one: each sum must be 1. */
 function checkCovered(source: DetailFolder, rows: ReadonlyMap<number, Float32Array>, view: DetailView): number {
   const list = listPages(source.manifest);
   let paths = 0;
@@ -95,7 +95,7 @@ function checkCovered(source: DetailFolder, rows: ReadonlyMap<number, Float32Arr
   return paths;
 }
 
-/** Chunks that one stands for, as far as they are there. */
+/** Resident chunks that one chunk represents. */
 function below(
   list: ReturnType<typeof listPages>,
   page: number,
@@ -120,23 +120,23 @@ for (const [name, make] of [
     assert.equal(scene.pagesInSlots.length, slots);
     const renderer = new Renderer(await anyDevice(), options);
     const seen = new Set<number>();
-    let most = 0;
+    let max = 0;
     for (const [k, distance] of [30, 3, 2, 60, 1.5, 2.5].entries()) {
       const camera = viewFrom(distance, k, [2 * k - 5, 0, 3 - k]);
       await drawUntilCalm(scene, renderer, camera, 0.2);
-      most = Math.max(most, scene.progress.error);
+      max = Math.max(max, scene.progress.error);
       const rows = await rowsOfPages(scene);
       for (const page of rows.keys()) seen.add(page);
       for (const fade of [0, 0.5]) assert.ok(checkCovered(source, rows, { camera, allowed: 0.2, fade }) > 3);
     }
-    assert.ok(most > 0.2, `${most} pixels: the pool is too small for some of these views`);
+    assert.ok(max > 0.2, `${max} pixels: the pool is too small for some of these views`);
     assert.ok(seen.size > slots, `only ${seen.size} of ${list.count} pages were ever there: none left for another`);
     renderer.destroy();
     scene.destroy();
   });
 }
 
-/** A camera that comes nearer and goes on to the next copy. */
+/** A camera that comes nearer and moves to the next copy. */
 const flightOver = (frame: number): Camera =>
   viewFrom(2 + 10 * Math.abs(Math.sin(frame / 9)), frame / 20, [14 * ((frame >> 4) % 3), 0, 14 * ((frame >> 5) % 3)]);
 
@@ -193,11 +193,11 @@ test('a view that turns to the scene lacks nothing, though hardly anything was v
     renderer.render({ gaussians: scene, camera, target, detail: 4, splatBudget: 150_000 });
     await device.queue.onSubmittedWorkDone();
   };
-  // Room is looked at every 16 frames.
+  // Capacity is checked every 16 frames.
   for (let frame = 0; frame < 18; frame++) await look([-300, -5, 50]);
-  const away = await renderer.statistics();
+  const away = await renderer.stats();
   await look([50, 0, 50]);
-  const towards = await renderer.statistics();
+  const towards = await renderer.stats();
   console.log(`${away.visible} splats visible, then ${towards.visible}; ${towards.overflow} left out`);
   assert.ok(scene.count > 1.5e5 && away.visible === 0 && towards.visible > 100);
   assert.equal(towards.overflow + towards.pairOverflow, 0);
@@ -239,9 +239,9 @@ test('a page that does not come is told of, and what stands for it stays on show
   });
   const renderer = new Renderer(device, options);
   await drawUntilCalm(scene, renderer, viewFrom(14), 0.2);
-  const picture = await readFrame(device, renderer, { gaussians: scene, camera: viewFrom(14), detail: 0.2 });
+  const image = await readFrame(device, renderer, { gaussians: scene, camera: viewFrom(14), detail: 0.2 });
   assert.ok(errors.length > 0 && scene.progress.resident === 1);
-  assert.ok(picture.some((value) => value > 0.1));
+  assert.ok(image.some((value) => value > 0.1));
   renderer.destroy();
   scene.destroy();
 });
@@ -348,27 +348,27 @@ test('a manifest in which two pages are below one chunk, a file has two lengths,
   assert.throws(() => checkManifest(folder.manifest, 'detail.json', 3), refusal);
 });
 
-/** Most that the picture of a camera at rest changes from one frame to the next, in dB, while pages come. */
+/** Largest change of a resting camera's image from one frame to the next, in dB, while pages load. */
 async function largestChange(arrivalMs: number): Promise<{ decibels: number; frames: number; pages: number }> {
   const device = await anyDevice();
   const fetchPage = folder.fetchPage;
   const scene = await StreamedGaussians.open(device, folder.manifest, { fetchPage, arrivalMs });
   const renderer = new Renderer(device, options);
   const request = { gaussians: scene, camera: viewFrom(9), detail: 0.5 };
-  let [least, frames, calm]: number[] = [Infinity, 1, 0];
+  let [min, frames, calm]: number[] = [Infinity, 1, 0];
   let last = await readFrame(device, renderer, request);
   for (; calm < 8 && frames < 400; frames++) {
     await pause(1);
     const { resident } = scene.progress;
-    const picture = await readFrame(device, renderer, request);
-    least = Math.min(least, psnr(last, picture, { channels: 4 }));
-    last = picture;
+    const image = await readFrame(device, renderer, request);
+    min = Math.min(min, psnr(last, image, { channels: 4 }));
+    last = image;
     calm = scene.progress.resident === resident && scene.progress.coming === 0 ? calm + 1 : 0;
   }
   const pages = scene.progress.resident;
   renderer.destroy();
   scene.destroy();
-  return { decibels: least, frames, pages };
+  return { decibels: min, frames, pages };
 }
 
 test('pages that come fade in: no picture differs by 40 dB from the one before; without the fade they pop', async () => {

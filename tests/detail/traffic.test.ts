@@ -1,4 +1,4 @@
-/** Pages on their way: how many, in which order, and what becomes of those that nobody wishes for any more. No GPU. */
+/** Pages in flight: how many, their order, and the end of those that are no longer requested. No GPU. */
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { setImmediate as turn, setTimeout as pause } from 'node:timers/promises';
@@ -24,19 +24,19 @@ interface Fetch {
   readonly fail: () => void;
 }
 
-/** A server that answers when told to. */
+/** A server that answers on command. */
 class Server {
   readonly open: Fetch[] = [];
-  /** Pages in the order in which they were sent for. */
+  /** Pages in the order of their requests. */
   readonly log: number[] = [];
-  most = 0;
+  max = 0;
 
   readonly fetch = (page: number, signal: AbortSignal): Promise<Uint32Array<ArrayBuffer>> => {
     this.log.push(page);
     return new Promise((resolve, reject) => {
       const arrive = (): void => resolve(Uint32Array.of(page));
       this.open.push({ page, signal, arrive, fail: () => reject(new Error(`page ${page}: 404`)) });
-      this.most = Math.max(this.most, this.open.filter((fetch) => !fetch.signal.aborted).length);
+      this.max = Math.max(this.max, this.open.filter((fetch) => !fetch.signal.aborted).length);
     });
   };
 
@@ -55,7 +55,7 @@ interface Pool {
   readonly errors: unknown[];
   /** Pages that were said to wait for their upload. */
   readonly arrivals: () => number;
-  /** Looks with the given shares of the parents' needs; returns the wishes. */
+  /** Feedback with the given fractions of the parents' needs; returns the page requests. */
   readonly look: (share: (page: number) => number) => Float32Array;
 }
 
@@ -83,10 +83,10 @@ function pool(pages: number, slots: number, below = 16, now?: () => number): Poo
   return { list, residency, traffic, server, errors, arrivals: () => arrivals, look };
 }
 
-/** Places up to so many pages of those that wait. @returns them, in order */
-function place({ residency, traffic }: Pool, most: number): number[] {
+/** Places up to a number of the waiting pages. @returns them, in order */
+function place({ residency, traffic }: Pool, max: number): number[] {
   const placed: number[] = [];
-  for (let next = traffic.next(); next !== undefined; next = placed.length < most ? traffic.next() : undefined) {
+  for (let next = traffic.next(); next !== undefined; next = placed.length < max ? traffic.next() : undefined) {
     assert.equal(next.words[0], next.page);
     if (residency.settle(next.page)) placed.push(next.page);
     else traffic.refused();
@@ -102,7 +102,7 @@ test('a thousand pages that arrive as fast as they are sent for: few are under w
     assert.ok(frame < 1000, `${all.residency.residents} of 1200 pages after 1000 frames`);
     if (frame % 6 === 0) all.look((page) => shares[page]);
     for (let answers = 0; answers < 3; answers++) await all.server.answer();
-    assert.ok(all.traffic.underWay <= MAX_IN_FLIGHT && all.server.most <= MAX_FETCHES);
+    assert.ok(all.traffic.underWay <= MAX_IN_FLIGHT && all.server.max <= MAX_FETCHES);
     const needs = place(all, 5).map((page) => all.residency.need(page));
     assert.deepEqual(
       needs,
@@ -140,7 +140,7 @@ test('pages that two looks do not wish for are given up where they are, and may 
   assert.ok(stale.every(({ signal }) => signal.aborted));
   all.look(() => 0.5);
   assert.equal(all.server.open.length, MAX_FETCHES);
-  // What was given up comes late, or fails as aborted fetches do: neither counts.
+  // Cancelled pages arrive late, or fail as aborted fetches do: neither counts.
   stale.forEach(({ arrive, fail }, k) => (k % 2 ? arrive() : fail()));
   await turn();
   assert.equal(all.traffic.waiting, 0);
@@ -235,7 +235,7 @@ test('in a small pool, whatever comes in whatever order, what is above a page is
     const shares = Float32Array.from({ length: 2000 }, () => (random() < 0.3 ? 0 : random()));
     let last = -1;
     for (let frame = 0; frame < 600 && last !== all.server.log.length; frame++) {
-      // One view in three is left before it has what it wishes for.
+      // One view in three ends before its requested pages are resident.
       if (view % 3 === 0 && frame > 20) break;
       if (frame % 30 === 29) last = all.server.log.length;
       if (frame % 3 === 0) all.look((page) => shares[page]);

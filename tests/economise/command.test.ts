@@ -1,4 +1,4 @@
-/** `gaussian-splat economise` as people meet it: what it refuses before any work, what it writes, and that what it reads stays as it is. */
+/** `gaussian-splat economise` as users call it: refusals before any work, its output, and unchanged inputs. */
 import assert from 'node:assert/strict';
 import { spawnSync } from 'node:child_process';
 import { linkSync, mkdtempSync, readdirSync, readFileSync, rmSync, symlinkSync, writeFileSync } from 'node:fs';
@@ -36,10 +36,9 @@ const cameras = join(folder, 'views.json');
 writeFileSync(cameras, JSON.stringify({ views }));
 
 function command(...args: string[]): { status: number | null; said: string } {
-  const env = { ...process.env, INIT_CWD: folder };
   const { status, stdout, stderr } = spawnSync(process.execPath, [script, 'economise', ...args], {
     encoding: 'utf8',
-    env,
+    cwd: folder,
   });
   return { status, said: stdout + stderr };
 }
@@ -56,10 +55,13 @@ test('files that it reads are none that it writes, by whatever name', () => {
     [['--out', 'a.glb', '--report', 'a.glb'], /--report: expected another file than that of --out/],
   ] as const;
   for (const [args, reason] of someOf<(typeof cases)[number]>(cases, 3)) {
-    const { status, said } = command('scene.ply', '--min-db', '40', ...args);
+    const { status, said } = command('scene.ply', '--min-psnr', '40', ...args);
     assert.equal(status, 2, said);
     assert.match(said, reason);
   }
+  const gated = command('scene.ply', '--gate', 'views.json', '--out', 'a.glb', '--report', 'views.json');
+  assert.equal(gated.status, 2, gated.said);
+  assert.match(gated.said, /--report: .* that of --gate/);
   assert.deepEqual(readFileSync(scene), source);
 });
 
@@ -76,14 +78,14 @@ test('what cannot be written or read is said before the work, for people', () =>
     [['scene.ply', '--out', 'a.glb', '--views', '.'], 1, /^EISDIR/m],
   ] as const;
   for (const [args, status, reason] of someOf<(typeof cases)[number]>(cases, 3)) {
-    const found = command('--min-db', '40', ...args);
+    const found = command('--min-psnr', '40', ...args);
     assert.equal(found.status, status, found.said);
     assert.match(found.said, reason);
     assert.doesNotMatch(found.said, /\n {4}at /, 'no stack');
   }
 });
 
-/** One run, for it takes half a minute of a processor: a broken file, and cameras that begin with a byte-order mark, the first as large as a photograph. */
+/** One run, for it takes half a minute of CPU time: a broken file, and cameras that begin with a byte-order mark, the first as large as a photograph. */
 test(
   'what it says of the written file is what a reader finds in it; splats that cannot be drawn are counted apart, and large views are drawn smaller',
   { skip: onlyInLab },
@@ -101,7 +103,7 @@ test(
     const K = [[across * fx, 0, across * cx], [0, across * fy, down * cy], last];
     const large = { ...first, width: 9000, height: 90, K };
     writeFileSync(join(folder, 'marked.json'), `\ufeff${JSON.stringify({ views: [large, ...others] })}`);
-    const { status, said } = command('broken.ply', '--min-db', '30', '--out', 'less.glb', '--views', 'marked.json');
+    const { status, said } = command('broken.ply', '--min-psnr', '30', '--out', 'less.glb', '--views', 'marked.json');
     assert.equal(status, 0, said);
     const bytes = readFileSync(join(folder, 'less.glb'));
     const { count } = await readScene(bytes, { name: 'less.glb' });
@@ -114,21 +116,26 @@ test(
   },
 );
 
+/** Few splats and the fewest views, because the search measures each step in excerpts at the size of screens. */
 test('SOG is tuned to the figure, or to the bytes, that are asked for', { skip: onlyInLab }, async () => {
-  const asked = command('scene.ply', '--min-db', '40', '--out', 'less.sog', '--views', 'views.json');
+  const few = smallCloud(40, 1);
+  const file = await encodingsFor('a.ply')[0].write({ cloud: few, degrees: new Uint8Array(40).fill(1) });
+  writeFileSync(join(folder, 'few.ply'), file);
+  writeFileSync(join(folder, 'few.json'), JSON.stringify({ views: views.slice(0, 8) }));
+  const asked = command('few.ply', '--min-psnr', '40', '--out', 'less.sog', '--views', 'few.json');
   assert.equal(asked.status, 0, asked.said);
   assert.match(asked.said, /SOG version 2, steps place/);
   assert.ok(Number(/found +([\d.]+) dB/.exec(asked.said)?.[1]) >= 40, asked.said);
   const { length } = readFileSync(join(folder, 'less.sog'));
-  const most = Math.ceil(1.1 * length);
-  const sized = command('scene.ply', '--max-mb', String(most / 1e6), '--out', 'sized.sog', '--views', 'views.json');
+  const max = Math.ceil(1.1 * length);
+  const sized = command('few.ply', '--max-mb', String(max / 1e6), '--out', 'sized.sog', '--views', 'few.json');
   assert.equal(sized.status, 0, sized.said);
-  assert.ok(readFileSync(join(folder, 'sized.sog')).length <= most, sized.said);
+  assert.ok(readFileSync(join(folder, 'sized.sog')).length <= max, sized.said);
   const found = await readScene(readFileSync(join(folder, 'sized.sog')), { name: 'sized.sog' });
   assert.ok(found.count > 0);
-  const both = command('scene.ply', '--min-db', '40', '--max-mb', '1', '--out', 'less.sog');
+  const both = command('few.ply', '--min-psnr', '40', '--max-mb', '1', '--out', 'less.sog');
   assert.equal(both.status, 2);
-  assert.match(both.said, /one of --min-db and --max-mb/);
+  assert.match(both.said, /one of --min-psnr, --max-mb and --gate/);
 });
 
 test('where writing fails, what was there stays', () => {

@@ -1,4 +1,4 @@
-/** What the economiser measures, chooses and writes. Images are drawn on the CPU, but for one that the renderer is held against. */
+/** Measurements, choices and outputs of the economiser. Images are drawn on the CPU, except for one of the renderer. */
 import assert from 'node:assert/strict';
 import { after, test } from 'node:test';
 import {
@@ -31,7 +31,7 @@ import { cpuPainter, cpuScorer, PaintedEvaluator, scoreSplats, Studio } from './
 
 const SIZE = { width: 120, height: 80 };
 
-/** A closed ball of opaque splats with others inside that nobody can see, and colours that depend on the view for some. */
+/** A closed ball of opaque splats with hidden ones inside, and colors that depend on the view for some. */
 function ball(): GaussianCloud {
   const count = 900;
   const cloud = smallCloud(count, 2, 4);
@@ -77,8 +77,8 @@ test('what a splat is said to cost is what the image lacks without it', async ()
     const opacities = scene.opacities.slice();
     opacities[missing] = 0;
     const [without] = await cpuPainter.draw({ ...scene, opacities }, [view]);
-    const colours = whole.map((value, k) => (k % 4 === 3 ? 0 : (value - without[k]) ** 2));
-    const found = colours.reduce((sum, square) => sum + square, 0) / (3 * view.width * view.height);
+    const colors = whole.map((value, k) => (k % 4 === 3 ? 0 : (value - without[k]) ** 2));
+    const found = colors.reduce((sum, square) => sum + square, 0) / (3 * view.width * view.height);
     assert.ok(
       Math.abs(found - said[missing]) < 0.02 * found,
       `splat ${missing}: ${said[missing]} said, ${found} found`,
@@ -86,11 +86,11 @@ test('what a splat is said to cost is what the image lacks without it', async ()
   }
 });
 
-test('fewer bands, set anew, come nearer to the colours than those that stay would', async () => {
+test('fewer bands, set anew, come nearer to the colors than those that stay would', async () => {
   const count = 400;
   const numbers = 27;
   const sh = scene.sh.slice(0, numbers * count);
-  // Dim enough that no colour is black.
+  // Dim enough that no color is black.
   for (let k = 0; k < sh.length; k++) sh[k] *= k % numbers < 3 ? 0.3 : 0.2;
   const cloud = { ...scene, count, sh };
   const { scored: all, heldOut } = viewSplitAround(boundsOf(scene), { width: 60, height: 40 });
@@ -103,9 +103,9 @@ test('fewer bands, set anew, come nearer to the colours than those that stay wou
     return decibels(images.reduce((sum, image, k) => sum + meanSquare(image, whole[k]), 0) / images.length);
   };
   const set = Float32Array.from({ length: 12 * count }, (_, k) => lowered[1].of(Math.floor(k / 12))[k % 12]);
-  const [plain, anew] = [await figure(cut), await figure(set)];
-  console.log(`degree 1 instead of 2: ${plain.toFixed(1)} dB, set anew ${anew.toFixed(1)} dB`);
-  assert.ok(anew > plain + 2, `${anew} dB, without ${plain} dB`);
+  const [plain, again] = [await figure(cut), await figure(set)];
+  console.log(`degree 1 instead of 2: ${plain.toFixed(1)} dB, set anew ${again.toFixed(1)} dB`);
+  assert.ok(again > plain + 2, `${again} dB, without ${plain} dB`);
 });
 
 test('splats that nobody sees contribute nothing, and go without a trace', async () => {
@@ -124,14 +124,14 @@ test('splats that nobody sees contribute nothing, and go without a trace', async
   assert.ok(found > 50, `${found} dB`);
 });
 
-test('degrees go where colour does not depend on the view, at any price', async () => {
+test('degrees go where color does not depend on the view, at any price', async () => {
   const { degrees, cloud } = reduce(scene, await scored, { minContribution: 0.2, colorPrice: 1e-14 });
-  assert.ok(degrees.filter((degree) => degree === 0).length >= 0.4 * cloud.count, 'half of them have no such colour');
+  assert.ok(degrees.filter((degree) => degree === 0).length >= 0.4 * cloud.count, 'half of them have no such color');
   assert.ok(degrees.filter((degree) => degree === 2).length >= 0.3 * cloud.count, 'the others keep it');
 });
 
 // Far above: no camera looks there.
-test('splats that no view looked at keep their colours, as they keep their place', async () => {
+test('splats that no view looked at keep their colors, as they keep their place', async () => {
   const positions = scene.positions.map((value, k) => (k < 30 && k % 3 === 1 ? value - 1000 : value));
   const cloud = { ...scene, positions };
   const { degrees, kept } = reduce(cloud, await scoreSplats(cloud, fewer.scored, cpuScorer(cloud)), {
@@ -152,7 +152,7 @@ test('the most seen come first', async () => {
   assert.equal(shell, 450);
 });
 
-/** A picture on a wall: all at one depth for whoever looks at it straight on, so that the file's order decides what lies in front. */
+/** A painting on a wall: all at one depth seen straight on, so that the file's order decides which splats are in front. */
 function wall(): GaussianCloud {
   const cloud = smallCloud(600, 1);
   cloud.positions.forEach((_, k) => k % 3 === 2 && (cloud.positions[k] = 0));
@@ -169,7 +169,7 @@ for (const name of ['a.glb', 'a.ply', 'a.spz']) {
     const own = { ...viewSplitAround(boundsOf(cloud), { ...SIZE, scored: 24 }) };
     const few = { ...own, searched: own.searched.slice(0, 3), heldOut: own.heldOut.slice(0, 3) };
     const evaluator = new PaintedEvaluator(cloud, { views: few });
-    const { bytes, splats, degrees } = await economise(cloud, { minDecibels: 36, name, evaluator });
+    const { bytes, splats, degrees } = await economise(cloud, { minPsnr: 36, name, evaluator });
     assert.ok(splats.after < splats.before, 'nothing has gone');
     const written = await readScene(bytes, { name });
     assert.equal(degrees[written.shDegree] > 0, true);
@@ -206,14 +206,14 @@ for (const name of ['a.glb', 'a.ply', 'a.spz']) {
 
 test('the asked figure is met in held-out views, with less than there was', async () => {
   const evaluator = new PaintedEvaluator(scene, { views: fewer });
-  const result = await economise(scene, { minDecibels: 50, name: 'a.glb', evaluator });
-  assert.ok(result.decibels >= 50, `${result.decibels} dB`);
+  const result = await economise(scene, { minPsnr: 50, name: 'a.glb', evaluator });
+  assert.ok(result.psnr >= 50, `${result.psnr} dB`);
   assert.ok(result.splats.after <= 0.75 * result.splats.before, `${result.splats.after} splats`);
   assert.ok(result.coefficients.after <= 0.5 * result.coefficients.before, `${result.coefficients.after} coefficients`);
   assert.equal((await readScene(result.bytes, { name: 'a.glb' })).count, result.splats.after);
 });
 
-/** A camera that turns its back on what it looked at: what comes of axes that are not OpenCV's. */
+/** A camera that faces away from its subject: the result of axes that are not OpenCV's. */
 const away = (camera: Camera): Camera => ({
   ...camera,
   worldToCamera: camera.worldToCamera.map((value, k) => (k >= 4 && k < 12 ? -value : value)),
@@ -224,7 +224,7 @@ test('what nothing shows of goes at any figure, however much of the rest would c
   for (let i = 0; i < 400; i++) if (i % 5 < 2) cloud.opacities[i] = 0;
   const own = viewSplitAround(boundsOf(cloud), { ...SIZE, scored: 24 });
   const evaluator = new PaintedEvaluator(cloud, { views: own });
-  const { splats } = await economise(cloud, { minDecibels: 75, name: 'a.ply', evaluator });
+  const { splats } = await economise(cloud, { minPsnr: 75, name: 'a.ply', evaluator });
   assert.ok(splats.after <= 240, `${splats.after} splats, of which 240 paint something`);
 });
 
@@ -234,7 +234,7 @@ test('where few splats make the error grow in steps, what fits is found below th
     const dealt = viewSplitAround(boundsOf(cloud), { width: 60, height: 40, scored: 24 });
     const own = { ...dealt, searched: dealt.searched.slice(0, 2), heldOut: dealt.heldOut.slice(0, 1) };
     const evaluator = new PaintedEvaluator(cloud, { views: own });
-    const { splats, decibels: found } = await economise(cloud, { minDecibels: 40, name: 'a.ply', evaluator });
+    const { splats, psnr: found } = await economise(cloud, { minPsnr: 40, name: 'a.ply', evaluator });
     assert.ok(splats.after < 120 && found >= 40 && found < 60, `seed ${seed}: ${splats.after} splats, ${found} dB`);
   }
 });
@@ -246,7 +246,7 @@ test('where all splats of a file take as many coefficients none loses some for n
   const dealt = viewSplitAround(boundsOf(cloud), { ...SIZE, scored: 24 });
   const own = { ...dealt, searched: dealt.searched.slice(0, 3), heldOut: dealt.heldOut.slice(0, 3) };
   const smaller = (name: string) =>
-    economise(cloud, { minDecibels: 40, name, evaluator: new PaintedEvaluator(cloud, { views: own }) });
+    economise(cloud, { minPsnr: 40, name, evaluator: new PaintedEvaluator(cloud, { views: own }) });
   const [ply, glb] = [await smaller('a.ply'), await smaller('a.glb')];
   assert.ok(glb.degrees[2] < glb.splats.after, 'there is something to gain where bands are saved');
   assert.ok(
@@ -260,13 +260,13 @@ test('views that show nothing have no say in the figure, and the scene is refuse
   const [first, second, third] = fewer.heldOut;
   const sampledAt = (heldOut: Camera[]) => new PaintedEvaluator(scene, { views: { ...fewer, heldOut } });
   const blind = sampledAt([first, away(second), away(third)]);
-  const result = await economise(scene, { minDecibels: 45, name: 'a.glb', evaluator: blind });
+  const result = await economise(scene, { minPsnr: 45, name: 'a.glb', evaluator: blind });
   const written = await readScene(result.bytes, { name: 'a.glb' });
   const [before, now] = [await cpuPainter.draw(scene, [first]), await cpuPainter.draw(written, [first])];
   const found = decibels(meanSquare(now[0], before[0]));
-  assert.ok(Math.abs(result.decibels - found) < 1e-6, `${result.decibels} dB said, ${found} dB`);
+  assert.ok(Math.abs(result.psnr - found) < 1e-6, `${result.psnr} dB said, ${found} dB`);
   assert.ok(found >= 45 && result.heldOutViews === 1, `${found} dB in ${result.heldOutViews} view`);
-  const options = { minDecibels: 45, name: 'a.glb', evaluator: sampledAt([away(first), away(second)]) };
+  const options = { minPsnr: 45, name: 'a.glb', evaluator: sampledAt([away(first), away(second)]) };
   await assert.rejects(economise(scene, options), /held-out views: expected views that show some of the scene/);
 });
 
@@ -278,17 +278,17 @@ test('a figure that is reached with every splat kept is reached, and where it is
   const written = await readScene(await encodingsFor('a.glb')[0].write(whole), { name: 'a.glb' });
   const [before, now] = [await cpuPainter.draw(cloud, fewer.heldOut), await cpuPainter.draw(written, fewer.heldOut)];
   const rounding = decibels(now.reduce((sum, image, k) => sum + meanSquare(image, before[k]), 0) / now.length);
-  const smaller = (minDecibels: number) =>
-    economise(cloud, { minDecibels, name: 'a.glb', evaluator: new PaintedEvaluator(cloud, { views: fewer }) });
-  const { decibels: found } = await smaller(rounding - 0.3);
+  const smaller = (minPsnr: number) =>
+    economise(cloud, { minPsnr: minPsnr, name: 'a.glb', evaluator: new PaintedEvaluator(cloud, { views: fewer }) });
+  const { psnr: found } = await smaller(rounding - 0.3);
   assert.ok(rounding < 120 && found >= rounding - 0.3, `${found} dB where rounding alone leaves ${rounding}`);
-  const most = `at most ${rounding.toFixed(1)} dB, with every splat kept`;
-  await assert.rejects(smaller(rounding + 3), (error: Error) => error.message.includes(most));
+  const max = `at most ${rounding.toFixed(1)} dB, with every splat kept`;
+  await assert.rejects(smaller(rounding + 3), (error: Error) => error.message.includes(max));
 });
 
 test('a format that cannot reach the figure is refused with what it can', async () => {
   const evaluator = new PaintedEvaluator(scene, { views: fewer });
-  const options = { minDecibels: 70, name: 'a.spz', evaluator };
+  const options = { minPsnr: 70, name: 'a.spz', evaluator };
   await assert.rejects(economise(scene, options), /70 dB or more.*at most \d+\.\d dB, with every splat kept/);
   assert.throws(() => encodingsFor('a.obj'), /\.spz, \.glb, \.ply/);
   assert.throws(() => encodingsFor('a.glb', { antialiased: true }), /filter of the scene: .*\.spz, \.ply/);
@@ -302,7 +302,7 @@ test('views are dealt out without sharing one', () => {
   assert.equal(new Set([...a, ...b, ...c]).size, 40);
 });
 
-test('between cameras there are views that are no camera, each halfway to its nearest neighbour', () => {
+test('between cameras there are views that are no camera, each halfway to its nearest neighbor', () => {
   const cameras = viewsAround(boundsOf(scene), 12);
   const between = viewsBetween(cameras);
   assert.ok(between.length >= 6 && between.length <= 12, `${between.length} views`);
@@ -358,12 +358,12 @@ test('between cameras of one place that look in opposite directions there is no 
     [1, 0, 0],
     [-1, 0, 0],
   ];
-  // Pictures of panoramas come like this: four sides of each place.
+  // Images of panoramas have this form: four sides of each position.
   const cameras = [0, 3, 6].flatMap((x) =>
     directions.map((to) => ({ ...views.scored[0], worldToCamera: lookAt([x, 0, 0], add([x, 0, 0], to), [0, -1, 0]) })),
   );
   const between = viewsBetween(cameras);
-  assert.equal(between.length, 6, 'between neighbouring sides');
+  assert.equal(between.length, 6, 'between neighboring sides');
   for (const view of between) validateCamera(view);
 });
 

@@ -1,4 +1,4 @@
-/** What a reader learns beside the numbers, up, order and filter, is in what every writer makes of it, or the splats are turned, or it is refused. */
+/** Every writer stores a file's metadata, up, order and filter, or the splats are turned, or the conversion is refused. */
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { encodingsFor, writeSog, writeStreamedSog, type SogOptions } from '@gaussian-splat/economise';
@@ -31,7 +31,7 @@ const WRITERS: Readonly<Record<string, (cloud: GaussianCloud) => Promise<Gaussia
   },
 };
 
-/** Splats whose first two coefficients and place tell which they are: opacities differ. */
+/** Splats whose first two coefficients and position identify them: opacities differ. */
 function sourceWith(hints: CloudHints, more: Partial<GaussianCloud> = {}): GaussianCloud {
   const cloud = smallCloud(COUNT, 1);
   // Linear harmonics of one direction that turns along: brighter as seen from the first axis of the world.
@@ -64,7 +64,8 @@ for (const [name, written] of Object.entries(WRITERS)) {
       if (name === 'ply') up.forEach((x, k) => assert.ok(Math.abs(x - foundUp[k]) < 1e-6));
       const height = ({ positions, origin }: GaussianCloud, axis: readonly number[], i: number): number =>
         axis.reduce((sum, x, k) => sum + x * (positions[3 * i + k] + origin[k]), 0);
-      // Of harmonics of degree 1, -y, z and -x in that order, the direction in which a splat is brightest.
+      // Coefficients of degree 1 are -y, z and -x in that order, so they give the direction in which a splat is
+      // brightest.
       const brightest = ({ sh }: GaussianCloud, i: number): number[] => [
         -sh[12 * i + 9],
         -sh[12 * i + 3],
@@ -74,7 +75,7 @@ for (const [name, written] of Object.entries(WRITERS)) {
       let worst = 0;
       let color = 0;
       mine.forEach((i, n) => {
-        // Neighbours in opacity may be one byte apart.
+        // Neighbors in opacity may be one byte apart.
         const near = theirs.slice(Math.max(0, n - 2), n + 3);
         const errors = near.map((j) => Math.abs(height(source, up, i) - height(found, foundUp, j)));
         worst = Math.max(worst, Math.min(...errors));

@@ -24,7 +24,7 @@ import { type ContributionScorer, cpuScorer, PaintedEvaluator, scoreSplats, Stud
 const SIZE = { width: 64, height: 48 };
 const COUNT = 900;
 
-/** A ball of splats of degree 3, some dim, some inside, and colours that depend on the view. */
+/** A ball of splats of degree 3, some dim, some inside, and colors that depend on the view. */
 function ball(): GaussianCloud {
   const cloud = smallCloud(COUNT, 3, 7);
   for (let i = 0; i < COUNT; i++) {
@@ -61,12 +61,12 @@ before(async () => {
 
 /** Largest difference of two lists of numbers, in parts of the largest of the second. */
 function apart(found: ArrayLike<number>, expected: ArrayLike<number>): number {
-  let [most, largest] = [0, 0];
+  let [max, largest] = [0, 0];
   for (let i = 0; i < expected.length; i++) {
-    if (found[i] !== expected[i]) most = Math.max(most, Math.abs(found[i] - expected[i]));
+    if (found[i] !== expected[i]) max = Math.max(max, Math.abs(found[i] - expected[i]));
     if (Number.isFinite(expected[i])) largest = Math.max(largest, Math.abs(expected[i]));
   }
-  return most / largest;
+  return max / largest;
 }
 
 test('how splats are seen: energies are means over the views, and roots those of the moments of what each view saw', async () => {
@@ -92,7 +92,7 @@ test('how splats are seen: energies are means over the views, and roots those of
   }
 });
 
-test('sums, colours and errors are those of plain code from the same contributions', async () => {
+test('sums, colors and errors are those of plain code from the same contributions', async () => {
   const given: ContributionScorer = async (camera) => {
     const energy = await evaluator.energiesIn(views.scored.indexOf(camera));
     return { energy, peak: new Float32Array(COUNT), removal: energy.map((value) => 0.02 * value) };
@@ -188,7 +188,7 @@ const median = (values: Float32Array, share: number): number =>
 for (const [name, cutOf] of [
   ['by contribution', () => ({ minContribution: median(ranking.contribution, 0.2) })],
   ['by what the pictures would lack', () => ({ removalPrice: median(ranking.removalError, 0.15) })],
-  ['of bands of colour', () => ({ colorPrice: Math.fround(1e-9) })],
+  ['of bands of color', () => ({ colorPrice: Math.fround(1e-9) })],
   ['of both', () => ({ minContribution: median(ranking.contribution, 0.1), colorPrice: Math.fround(1e-10) })],
 ] as const satisfies readonly (readonly [string, () => Cut])[]) {
   test(`a cut on the GPU shows what the reduced cloud shows: ${name}`, async () => {
@@ -208,7 +208,7 @@ for (const [name, cutOf] of [
 }
 
 // Far above: no camera looks there.
-test('splats that no view looked at keep their colours, as they keep their place', async () => {
+test('splats that no view looked at keep their colors, as they keep their place', async () => {
   const cloud = {
     ...scene,
     positions: scene.positions.map((value, k) => (k < 30 && k % 3 === 1 ? value - 1000 : value)),
@@ -241,11 +241,11 @@ test('splats of planes stay in the order of the file, in which those at one dept
 });
 
 test('the asked figure is met by the written file', async () => {
-  const result = await economise(scene, { minDecibels: 45, name: 'a.glb', evaluator });
+  const result = await economise(scene, { minPsnr: 45, name: 'a.glb', evaluator });
   const written = await readScene(result.bytes, { name: 'a.glb' });
   const errors = await evaluator.compare(written, 'heldOut');
   const found = decibels(errors.reduce((sum, error) => sum + error, 0) / errors.length);
-  assert.ok(found >= 45 && Math.abs(found - result.decibels) < 1e-6, `${found} dB, ${result.decibels} dB said`);
+  assert.ok(found >= 45 && Math.abs(found - result.psnr) < 1e-6, `${found} dB, ${result.psnr} dB said`);
   assert.equal(written.count, result.splats.after);
   assert.ok(result.splats.after < COUNT && result.coefficients.after < result.coefficients.before);
   assert.ok(result.seconds.score > 0 && result.seconds.search > 0);

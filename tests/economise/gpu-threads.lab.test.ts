@@ -1,4 +1,4 @@
-/** Threads beside a GPU: what the GPU leaves of it is the same with them and without. */
+/** Threads beside a GPU: the reduced scene is the same with them and without. */
 import assert from 'node:assert/strict';
 import { after, test } from 'node:test';
 import { boundsOf, type GaussianCloud } from '@gaussian-splat/core';
@@ -17,7 +17,7 @@ after(async () => {
   await endNodeDevice();
 });
 
-/** Small splats, some of which differ from their copies by their place alone. */
+/** Small splats, some of them differ from their copies by their place alone. */
 function scene(): GaussianCloud {
   const few = smallCloud(1000, 1, 11);
   const repeated = (values: Float32Array): Float32Array => {

@@ -1,4 +1,4 @@
-/** What merging makes of pairs, what it leaves alone, and what it saves. Images are drawn on the CPU. */
+/** Merging of pairs: the result, the unchanged splats, and the savings. Images are drawn on the CPU. */
 import assert from 'node:assert/strict';
 import { before, test } from 'node:test';
 import { boundsOf, type GaussianCloud } from '@gaussian-splat/core';
@@ -22,7 +22,7 @@ import { cpuPainter, PaintedEvaluator } from './twin/index.js';
 const SIZE = { width: 120, height: 80 };
 const SPLATS = 600;
 
-/** A ball of splats; each but the last hundred has a twin close by, a tenth smaller and of nearly its colour, that comes right after it. */
+/** A ball of splats; each but the last hundred has a twin close by, a tenth smaller and of nearly its color, that comes right after it. */
 function twins(): GaussianCloud {
   const cloud = smallCloud(SPLATS, 1, 11);
   const numbers = 12;
@@ -53,21 +53,21 @@ const mergingTo = (decibels: number): MergingEvaluator =>
   });
 
 let merging: MergingEvaluator;
-let pictures: readonly Float32Array[];
+let photos: readonly Float32Array[];
 
 before(async () => {
   merging = mergingTo(40);
   await merging.rank();
-  pictures = await cpuPainter.draw(scene, views.heldOut);
+  photos = await cpuPainter.draw(scene, views.heldOut);
 });
 
-/** dB of a cloud in the held-out views. */
+/** PSNR in dB for a cloud in the held-out views. */
 async function figureOf(cloud: GaussianCloud): Promise<number> {
   const images = await cpuPainter.draw(cloud, views.heldOut);
-  return decibels(images.reduce((sum, image, k) => sum + meanSquare(image, pictures[k]), 0) / images.length);
+  return decibels(images.reduce((sum, image, k) => sum + meanSquare(image, photos[k]), 0) / images.length);
 }
 
-/** The price at which so many merges are made. */
+/** The price at which the given number of merges is made. */
 async function atMerges(count: number): Promise<{ cut: Cut; reduced: ReducedCloud }> {
   let [low, high] = [1e-20, 1];
   for (let tries = 0; tries < 60; tries++) {
@@ -110,7 +110,7 @@ test('twins are merged first: means and covariances are those of both', async ()
     const numbers = 12;
     for (let n = 0; n < numbers; n++) {
       const expected = (1 - q) * scene.sh[numbers * a + n] + q * scene.sh[numbers * b + n];
-      assert.ok(Math.abs(reduced.cloud.sh[numbers * k + n] - expected) < 1e-4, 'the mean colour');
+      assert.ok(Math.abs(reduced.cloud.sh[numbers * k + n] - expected) < 1e-4, 'the mean color');
     }
     checked++;
   }
@@ -122,7 +122,7 @@ test('the cover is kept: alpha of the pictures stays what it was', async () => {
   const images = await cpuPainter.draw(reduced.cloud, views.heldOut);
   const sum = (image: Float32Array): number => image.reduce((all, value, k) => all + (k % 4 === 3 ? value : 0), 0);
   images.forEach((image, k) => {
-    const ratio = sum(image) / sum(pictures[k]);
+    const ratio = sum(image) / sum(photos[k]);
     assert.ok(Math.abs(ratio - 1) < 0.005, `view ${k}: ${ratio}`);
   });
 });
@@ -158,7 +158,7 @@ test('a merge whose other half is dropped is not made, and saves nothing twice',
   assert.ok(whole.length > 20 && same.length > 0.8 * whole.length, `${same.length} of ${whole.length}`);
 });
 
-test('colours keep the bands of the one that keeps more, and the most seen come first', async () => {
+test('colors keep the bands of the one that keeps more, and the most seen come first', async () => {
   const { cut } = await atMerges(200);
   const plain = await merging.reduce({ colorPrice: 1e-9 });
   const merged = await merging.reduce({ ...cut, colorPrice: 1e-9 });
@@ -187,17 +187,15 @@ test('without a price nothing is merged', async () => {
   assert.deepEqual(await merging.reduce({ minContribution: 0.05 }), reduce(scene, scores, { minContribution: 0.05 }));
 });
 
-for (const minDecibels of [57, 44]) {
-  test(`at ${minDecibels} dB fewer splats stay, and the figure is kept in views that had no say`, async () => {
-    const options = { minDecibels, name: 'a.glb' };
+for (const minPsnr of [57, 44]) {
+  test(`at ${minPsnr} dB fewer splats stay, and the figure is kept in views that had no say`, async () => {
+    const options = { minPsnr, name: 'a.glb' };
     const without = await economise(scene, { ...options, evaluator: new PaintedEvaluator(scene, { views }) });
-    const result = await economise(scene, { ...options, evaluator: mergingTo(minDecibels) });
+    const result = await economise(scene, { ...options, evaluator: mergingTo(minPsnr) });
     const written = await readScene(result.bytes, { name: 'a.glb' });
     const found = await figureOf(written);
-    console.log(
-      `${minDecibels} dB: ${result.splats.after} of ${SPLATS} splats, without merging ${without.splats.after}`,
-    );
-    assert.ok(found >= minDecibels && Math.abs(found - result.decibels) < 1e-6, `${found} dB`);
+    console.log(`${minPsnr} dB: ${result.splats.after} of ${SPLATS} splats, without merging ${without.splats.after}`);
+    assert.ok(found >= minPsnr && Math.abs(found - result.psnr) < 1e-6, `${found} dB`);
     assert.equal(written.count, result.splats.after);
     assert.ok(result.splats.after < 0.95 * without.splats.after, `${result.splats.after} of ${without.splats.after}`);
     assert.ok((result.cut.mergePrice ?? 0) > 0);

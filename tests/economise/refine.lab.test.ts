@@ -1,4 +1,4 @@
-/** What refining makes of what cuts leave: derivatives against those of plain code, and what it gains in views that it was not fitted to. */
+/** Refining of reduced scenes: derivatives against those of plain code, and the gain in views that it was not fitted to. */
 import assert from 'node:assert/strict';
 import { after, before, test } from 'node:test';
 import { boundsOf, eyeOf, GaussianSplatError, type Camera, type GaussianCloud } from '@gaussian-splat/core';
@@ -19,7 +19,7 @@ const SIZE = 32;
 const DEGREE = 1;
 const NUMBERS = 12;
 
-/** A ball of large splats, some of them inside, whose colours depend on the view. */
+/** A ball of large splats, some of them inside, whose colors depend on the view. */
 function ball(count: number): GaussianCloud {
   const cloud = smallCloud(count, DEGREE, 7);
   for (let i = 0; i < count; i++) {
@@ -81,22 +81,22 @@ before(async () => {
 
 async function imagesOf(cloud: GaussianCloud, views: readonly Camera[]): Promise<ImageErrors> {
   const gaussians = await CloudBuffers.upload(device, cloud);
-  const pictures = await ImageErrors.of(device, renderer, gaussians, views);
+  const images = await ImageErrors.of(device, renderer, gaussians, views);
   gaussians.destroy();
-  return pictures;
+  return images;
 }
 
-/** Squared error of the colours over the covered pixels, as the fitter weighs it. */
+/** Squared error of the colors over the covered pixels, as the fitter weighs it. */
 function lossOf(images: readonly Float32Array[], references: readonly Float32Array[]): number {
   return images.reduce((sum, image, k) => sum + 3 * SIZE * SIZE * meanSquare(image, references[k]), 0);
 }
 
-/** Gauss and Newton's curvature of that error of a view along a number: by the pictures with it a step less and a step more. */
+/** Gauss and Newton's curvature of that error of a view along a number: by the images with it a step less and a step more. */
 function curvatureOf(less: Float32Array, more: Float32Array): number {
   return (2 * lossOf([less], [more])) / (2 * STEP) ** 2;
 }
 
-/** One number of a splat moved along what the fitter seeks. */
+/** One number of a splat moved along a direction of the fitter. */
 function moved(cloud: GaussianCloud, i: number, number: number, by: number): GaussianCloud {
   const [positions, scales, rotations] = [cloud.positions.slice(), cloud.scales.slice(), cloud.rotations.slice()];
   const [opacities, sh] = [cloud.opacities.slice(), cloud.sh.slice()];
@@ -132,17 +132,17 @@ function moved(cloud: GaussianCloud, i: number, number: number, by: number): Gau
   return { ...cloud, positions, scales, rotations, opacities, sh };
 }
 
-/** What the fitter seeks: the kinds of numbers, the first of each and the one behind the last; which of four curvatures is theirs, and what that may be in parts of the true one: scales, turns and steps have bounds, and harmonics share one. */
+/** The fitter's parameters: their kinds, the first of each and the one behind the last; which of four curvatures they use, and its allowed ratio to the exact curvature: scales, turns and steps have bounds, and harmonics have one together. */
 const KINDS = {
   positions: { span: [0, 3], bend: 3, kept: [1, Infinity] },
   scales: { span: [3, 6], bend: 2, kept: [1, Infinity] },
   rotations: { span: [6, 9], bend: 2, kept: [1, Infinity] },
   opacity: { span: [9, 10], bend: 1, kept: [0.8, 1.2] },
-  colour: { span: [10, 13], bend: 0, kept: [3.9, 4.1] },
+  color: { span: [10, 13], bend: 0, kept: [3.9, 4.1] },
   bands: { span: [13, 22], bend: 0, kept: [1, Infinity] },
 };
 const MIN_CURVATURE = 1e-4;
-/** Of `Descent.newton`: no step is shortened. */
+/** Steps of `Descent.newton`: none is shortened. */
 const UNLIMITED = 1e38;
 const STEP = 1e-2;
 
@@ -152,12 +152,12 @@ for (const antialiased of [false, true]) {
     const whole = { ...ball(count), antialiased };
     const cloud = disturbed(whole);
     const views = viewSplitAround(boundsOf(whole), { width: SIZE, height: SIZE, scored: 24 }).scored.slice(0, 2);
-    const pictures = await imagesOf(whole, views);
+    const images = await imagesOf(whole, views);
     // A splat that keeps fewer bands.
     const degrees = new Uint8Array(count).fill(DEGREE);
     degrees[3] = 0;
     const scene = await RefinedScene.of(device, { cloud, degrees });
-    const fitter = new SceneFitter(device, renderer, scene, pictures);
+    const fitter = new SceneFitter(device, renderer, scene, images);
     views.forEach((_, k) => fitter.look(k));
     const [{ gradients, bends, row }] = scene.parts;
     const read = await readBack(device, [{ buffer: gradients }, { buffer: bends }]);
@@ -168,7 +168,7 @@ for (const antialiased of [false, true]) {
       {
         span,
         bend,
-        kept: [least, most],
+        kept: [min, max],
       },
     ] of Object.entries(KINDS)) {
       const [first, end] = span;
@@ -183,7 +183,7 @@ for (const antialiased of [false, true]) {
           if (number >= 13 && degrees[i] === 0) continue;
           const curvature = Math.max(...views.map((_, k) => curvatureOf(less[k], more[k])));
           const kept = curvatures[4 * i + bend] / curvature;
-          if (curvature > MIN_CURVATURE) assert.ok(kept > least && kept < most, `${kind} of splat ${i}: ${kept}`);
+          if (curvature > MIN_CURVATURE) assert.ok(kept > min && kept < max, `${kind} of splat ${i}: ${kept}`);
         }
       }
       // Splats that begin to paint a pixel, or cease to, do so at once: differences have that, derivatives do not.
@@ -193,7 +193,7 @@ for (const antialiased of [false, true]) {
     for (let number = 13; number < 22; number++) assert.equal(found[number * row + 3], 0, 'a band that went');
     fitter.destroy();
     scene.destroy();
-    pictures.destroy();
+    images.destroy();
   });
 }
 
@@ -226,14 +226,14 @@ test('a few steps come nearer in views that were not fitted, and leave the sourc
 function veiled(ball: GaussianCloud, eye: readonly number[]): GaussianCloud {
   const behind = (values: Float32Array, grain: readonly number[], veil: readonly number[]): Float32Array =>
     Float32Array.from([...values, ...grain, ...veil]);
-  const colour = Array.from({ length: NUMBERS }, (_, k) => (k < 3 ? 0.8 : 0.1));
+  const color = Array.from({ length: NUMBERS }, (_, k) => (k < 3 ? 0.8 : 0.1));
   return {
     ...{ ...ball, count: ball.count + 2 },
     positions: behind(ball.positions, [0, -0.6, -1], eye),
     scales: behind(ball.scales, [0.006, 0.006, 0.006], [0.8, 0.5, 0.6]),
     rotations: behind(ball.rotations, [1, 0, 0, 0], [1, 0, 0, 0]),
     opacities: behind(ball.opacities, [0.9], [0.15]),
-    sh: behind(ball.sh, colour, colour),
+    sh: behind(ball.sh, color, color),
   };
 }
 
@@ -243,11 +243,11 @@ test('a splat that the near plane cuts off in a view is not moved into it', asyn
   const [seen] = dealt.heldOut;
   const whole = veiled(bare, eyeOf(seen.worldToCamera));
   const cloud = without(whole, 6);
-  const pictures = await imagesOf(whole, dealt.scored.slice(0, 12));
+  const images = await imagesOf(whole, dealt.scored.slice(0, 12));
   const others = await imagesOf(whole, dealt.heldOut);
   const fitted = async (newton: number): Promise<{ before: number; after: number; read: GaussianCloud }> => {
     const scene = await RefinedScene.of(device, { cloud, degrees: new Uint8Array(cloud.count).fill(DEGREE) });
-    const fitter = new SceneFitter(device, renderer, scene, pictures);
+    const fitter = new SceneFitter(device, renderer, scene, images);
     const [before] = await others.measure(scene);
     const rates = { ...USUAL_DESCENT.rates, position: 0.01 };
     await fitter.fit({ ...USUAL_DESCENT, steps: 60, newton, rates });
@@ -262,16 +262,16 @@ test('a splat that the near plane cuts off in a view is not moved into it', asyn
   assert.deepEqual(placeOf(limited.read, veil), placeOf(cloud, veil));
   assert.notDeepEqual(placeOf(limited.read, grain), placeOf(cloud, grain));
   assert.ok(limited.after < limited.before, `${limited.after} after ${limited.before}`);
-  // That this scene tells one from the other.
+  // Checks that this scene distinguishes the two.
   assert.ok(free.after > 10 * free.before, `${free.after} after ${free.before} without a limit`);
-  pictures.destroy();
+  images.destroy();
   others.destroy();
 });
 
 test('the figure is kept with fewer splats, and the source is left as it is', async () => {
   const whole = twins(200);
   const dealt = viewSplitAround(boundsOf(whole), { width: SIZE, height: SIZE, scored: 24 });
-  const options = { minDecibels: 43, name: 'a.glb' };
+  const options = { minPsnr: 43, name: 'a.glb' };
   const painted = (): PaintedEvaluator => new PaintedEvaluator(whole, { views: dealt });
   const unrefined = await economise(whole, { ...options, evaluator: painted() });
   const rates = { position: 0, growth: 0, turn: 0, logit: 0.08, constant: 0.004, harmonic: 0.001 };
@@ -282,7 +282,7 @@ test('the figure is kept with fewer splats, and the source is left as it is', as
   const errors = await evaluator.compare(written, 'heldOut');
   const found = decibels(errors.reduce((sum, error) => sum + error, 0) / errors.length);
   console.log(`43 dB: ${result.splats.after} of 200 splats, ${unrefined.splats.after} without; ${found.toFixed(1)} dB`);
-  assert.ok(found >= 43 && Math.abs(found - result.decibels) < 1e-6, `${found} dB`);
+  assert.ok(found >= 43 && Math.abs(found - result.psnr) < 1e-6, `${found} dB`);
   assert.ok(result.splats.after < 0.97 * unrefined.splats.after);
   assert.equal(written.count, result.splats.after);
   assert.deepEqual(whole, twins(200));

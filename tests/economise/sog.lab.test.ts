@@ -1,4 +1,4 @@
-/** SOG as economise writes it: what is read again is what was rounded, and steps and palettes are as coarse as errors allow. */
+/** SOG as economise writes it: the file holds the rounded values, and steps and palettes are as coarse as errors allow. */
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { shCoefficientCount, type GaussianCloud, type ShDegree } from '@gaussian-splat/core';
@@ -13,7 +13,7 @@ import { pebbles } from '../support/scenes/pebbles.js';
 
 const FINEST: SogSteps = { place: 1, size: 1e-3, turn: 1, opacity: 1, color: 1e-3, harmonics: 1e-3 };
 
-/** Stones whose colours are of a few kinds, so that a palette of as many holds them. */
+/** Stones whose colors are of a few kinds, so that a palette of as many holds them. */
 function ofKinds(count: number, shDegree: ShDegree, kinds: number): GaussianCloud {
   const cloud = pebbles(count);
   const random = randomSource(3);
@@ -145,7 +145,7 @@ test('a scene is tuned until its rounding is what it may be, and without an enco
   await assert.rejects(encodingsFor('a.sog')[0].tune!(whole, measure, 1e-3), { code: 'argument/value' });
 });
 
-/** Where a cloud's matter lies, and how far from there: each splat counts by its opacity and its volume's face. */
+/** Center and spread of a cloud's matter: each splat counts by its opacity and its volume's face. */
 function matterOf({ count, positions, scales, opacities }: GaussianCloud): { area: number; center: number[] } {
   let area = 0;
   const center = [0, 0, 0];

@@ -1,4 +1,4 @@
-/** What comes in parts is done by threads: the same bytes, the same clouds and the same errors as without. */
+/** Threads do the work that has parts: the same bytes, the same clouds and the same errors as without. */
 import assert from 'node:assert/strict';
 import { mkdtempSync, rmSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
@@ -113,7 +113,7 @@ test('errors of threads are those that a single one would meet', async () => {
   const message = await readScene(file, { name: 'a.glb' }).catch((error: Error) => error.message);
   assert.match(String(message), /componentType.*decode\/header/);
   await assert.rejects(readInParts(file, { name: 'a.glb' }, pool), { code: 'decode/header', message });
-  // The threads go on.
+  // The threads continue.
   assert.equal((await readInThreads(inFolder('scene.ply', bytes), pool)).count, reduced.cloud.count);
 });
 

@@ -47,7 +47,7 @@ test('from rest it never passes its goal, comes closer at every step, and arrive
     fc.property(value, value, decay, fc.double({ min: 0.01, max: 3, noNaN: true }), (from, goal, decayMs, ratio) => {
       const damper = new Damper();
       const scale = Math.max(Math.abs(from - goal), 1e-9);
-      // Where the goal is large and the way short, the last steps drown in the goal's own rounding.
+      // The goal is large and the way short, so the goal's rounding error exceeds the last steps.
       const rounding = 1e-10 * Math.max(Math.abs(from), Math.abs(goal));
       let x = from;
       for (let i = 0; i < 5_000 && x !== goal; i++) {

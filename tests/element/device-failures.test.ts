@@ -1,4 +1,4 @@
-/** What people read of a device that cannot be brought back. */
+/** Error texts for a device that cannot be restored. */
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { GaussianSplatError } from '@gaussian-splat/core';

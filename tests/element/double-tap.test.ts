@@ -2,7 +2,7 @@ import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { DoubleTap } from '../../packages/element/src/camera/double-tap.js';
 
-/** Down and up of each tap: when, how long, where, how far the finger slides, whether another is down, whether the browser takes it. */
+/** Down and up of each tap: time, duration, position, how far the finger slides, whether another is down, whether the browser takes it. */
 type Tap = [ms: number, x: number, more?: { rest?: number; slide?: number; alone?: boolean; taken?: boolean }];
 
 function doubles(taps: readonly Tap[]): boolean[] {

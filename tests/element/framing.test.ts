@@ -1,4 +1,4 @@
-/** What the camera shows that nobody has set: all of a subject that stands alone, the middle of what has surroundings. */
+/** The default camera: it frames all of an isolated subject, and the middle of a scene with surroundings. */
 import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
 import { test } from 'node:test';
@@ -20,7 +20,10 @@ const SIZES = [
 
 type Places = Pick<GaussianCloud, 'count' | 'positions' | 'opacities' | 'origin'>;
 
-/** Shares of opaque centres outside of the pictures that nobody has set a camera for, the most of three sizes; and the largest share of a side that they reach across. */
+/**
+ * Fractions of opaque centers outside of the default camera's images, the largest of three sizes; and the largest
+ * fraction of a side that they cross.
+ */
 function shown(bounds: Bounds, places: readonly Vector3[]): { outside: number; across: number } {
   const found = SIZES.map(([width, height]) => {
     const controller = new CameraController(settings(), () => undefined);
@@ -53,7 +56,7 @@ function opaque({ count, positions, opacities, origin }: Places): Vector3[] {
     .map((i) => [0, 1, 2].map((axis) => positions[3 * i + axis] + origin[axis]) as unknown as Vector3);
 }
 
-/** Somebody who stands: most of what there is of her is her trunk. */
+/** A standing person: most of her splats are on her trunk. */
 function standing(count: number): number[][] {
   const random = randomSource(3);
   return Array.from({ length: count }, (_, i) => {

@@ -55,7 +55,7 @@ test('orbits', () => {
   assert.deepEqual(orbit.parse('  -10.5deg\t0   150cm '), { theta: -10.5 * DEGREE, phi: 0, radius: { meters: 1.5 } });
   assert.deepEqual(orbit.parse('auto auto 105%'), { theta: 'auto', phi: 'auto', radius: { framings: 1.05 } });
   assert.deepEqual(orbit.parse('auto'), { theta: 'auto', phi: 'auto', radius: 'auto' });
-  // As in <model-viewer>, what is left out at the end is automatic.
+  // As in <model-viewer>, omitted values at the end are automatic.
   assert.deepEqual(orbit.parse('45deg'), { theta: 45 * DEGREE, phi: 'auto', radius: 'auto' });
   assert.deepEqual(orbit.parse('45deg 1rad'), { theta: 45 * DEGREE, phi: 1, radius: 'auto' });
   assert.deepEqual(orbit.parse('1E1DEG .5rad 20MM'), { theta: 10 * DEGREE, phi: 0.5, radius: { meters: 0.02 } });
@@ -152,7 +152,7 @@ test('an absent attribute takes its default in silence', () => {
   assert.equal(read.maxShDegree, 3);
   assert.equal(read.detail, 'auto');
   assert.equal(read.camera.up, undefined, 'what the scene says');
-  assert.deepEqual(read.camera.orbit, { theta: 0, phi: 75 * DEGREE, radius: 'auto' });
+  assert.deepEqual(read.camera.orbit, { theta: 'auto', phi: 'auto', radius: 'auto' });
 });
 
 test('a malformed attribute takes its default with one warning that says what was expected and found', () => {

@@ -1,4 +1,6 @@
-/** What of a clip is kept in the page's memory: bounded however long it plays, the next group before a finer image of this one. */
+/**
+ * Parts of a clip in the page's memory: bounded for any playing time, the next group before a finer image of this one.
+ */
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import type { ClipIndex } from '@gaussian-splat/formats';
@@ -135,4 +137,16 @@ test('what cannot be had is reported once, and passed over', async () => {
   await settle();
   assert.equal(asked.filter((each) => each === '1.0').length, 1);
   assert.equal(errors.length, 1);
+});
+
+test('of groups of a single frame, at 1,000 frames a second, some hundreds are fetched ahead', async () => {
+  const part = { splats: 1, planes: 1, sceneBytes: 1, motionBytes: 1, start: 0 };
+  const groups = Array.from({ length: 7_000 }, (_, first) => ({ first, frames: 1, parts: [part] }));
+  const { cache, asked, settle } = bench({ framesPerSecond: 1_000, groups } as unknown as ClipIndex);
+  cache.want(0, true);
+  for (let before = -1; asked.length > before;) {
+    before = asked.length;
+    await settle();
+  }
+  assert.ok(asked.length > 100 && asked.length < 500, `${asked.length} groups`);
 });

@@ -1,4 +1,4 @@
-/** The latest request wins: what was asked for before does nothing more, and its failure is nobody's. */
+/** The latest request wins: earlier requests have no more effect, and their failures are ignored. */
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { LatestTask } from '../../packages/element/src/latest-task.js';

@@ -1,4 +1,4 @@
-/** Whatever people do to a camera, the scene is in sight, or one action away. */
+/** After any input to a camera, the scene is visible, or one action away. */
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import type { Bounds, Camera, Vector3 } from '@gaussian-splat/core';
@@ -25,7 +25,7 @@ const SCREENS = [
 const place = (width: number, height: number): fc.Arbitrary<{ x: number; y: number }> =>
   fc.record({ x: fc.integer({ min: 0, max: width }), y: fc.integer({ min: 0, max: height }) });
 
-/** One gesture of a hand on a picture of this size. */
+/** One gesture of a hand on a view of this size. */
 function gesture(width: number, height: number): fc.Arbitrary<CameraAction[]> {
   const point = place(width, height);
   const key = fc.constantFrom('ArrowLeft', 'ArrowRight', 'ArrowUp', 'ArrowDown', 'PageUp', 'PageDown');
@@ -54,7 +54,7 @@ function fromMiddle(controller: CameraController): number {
   return Math.hypot(x - a, y - b, z - c);
 }
 
-/** Whether all of the ball that is framed lies in the picture. */
+/** Whether the whole framed ball is in view. */
 function showsAll({ worldToCamera: m, width, height, fx, fy }: Camera): boolean {
   const [x, y, z] = [0, 4, 8].map(
     (row) => m[row] * BOUNDS.center[0] + m[row + 1] * BOUNDS.center[1] + m[row + 2] * BOUNDS.center[2] + m[row + 3],

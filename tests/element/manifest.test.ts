@@ -108,18 +108,26 @@ check('names the events of the typed map, with their types, and every one that t
 });
 
 check('names the slots, parts, custom properties and states that there are', () => {
-  // What few pages need is in chunks of their own.
+  // Features of few pages are in separate chunks.
   const late = [
     'views/tour',
     'hands-view',
     'dynamic/sound',
     'controllers/motion-controller',
     'controllers/hotspot-controller',
-  ]
-    .map((name) => source(`${name}.ts`))
-    .join('\n');
-  const [template, styles] = [source('template.ts') + late, source('styles.ts') + late];
-  const slots = matches(template, /<slot name="([a-z-]+)"/g);
+    'xr/ar-overlay',
+    'xr/simplified-model',
+    'xr/measure',
+    'walk/joystick',
+    'composition/interaction',
+  ].map((name) => source(`${name}.ts`));
+  // The code of VR and of AR forms its names from the kind of session.
+  for (const kind of ['vr', 'ar'])
+    late.push(source('xr/xr-offer.ts').replaceAll('`${kind.name}-button`', `'${kind}-button'`));
+  const [template, styles] = ['template.ts', 'styles.ts'].map((name) => [source(name), ...late].join('\n'));
+  const slots = [/<slot name="([a-z-]+)"/g, /createElement\('slot'\), \{ name: '([a-z-]+)'/g].flatMap((pattern) =>
+    matches(template, pattern),
+  );
   assert.deepEqual(namesOf(element?.slots), unique([...slots, 'hotspot-*', 'sound']));
   const panelParts = matches(source('dynamic/controls-panel.ts'), /part: '([a-z-]+)'/g);
   assert.ok(panelParts.length > 0);

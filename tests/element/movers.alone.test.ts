@@ -1,4 +1,4 @@
-/** What moves the camera by itself, at the limits of where it may go and while a scene comes in parts. */
+/** Automatic camera motion, at the camera's limits and while a scene loads in parts. */
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import type { Bounds } from '@gaussian-splat/core';
@@ -20,9 +20,9 @@ function framed(changes: Partial<RawAttributes> = {}): CameraController {
   return camera;
 }
 
-function rotating(camera: CameraController): AutoRotateController {
+function rotating(camera: CameraController, rotationPerSecond = 100 * degrees): AutoRotateController {
   const controller = new AutoRotateController(host, {
-    ...{ camera, mayTurn: true, attributes: { autoRotateDelay: 0, rotationPerSecond: 100 * degrees } },
+    ...{ camera, mayTurn: true, attributes: { autoRotateDelay: 0, rotationPerSecond } },
     requestFrame: () => undefined,
   });
   controller.start();
@@ -46,6 +46,14 @@ test('auto-rotation turns back at the limits, and stops where it may go nowhere'
   stuck.advance(0);
   assert.equal(stuck.advance(16), false, 'it goes on though nothing moves');
   assert.equal(fixed.step(16, 0), null);
+});
+
+test('auto-rotation at a speed of 0 asks for no frames', () => {
+  const controller = rotating(framed(), 0);
+  assert.deepEqual(
+    [0, 16, 32].map((now) => controller.advance(now)),
+    [false, false, false],
+  );
 });
 
 test('the prompt leaves the camera where it was, at a limit too', (t) => {

@@ -5,6 +5,7 @@ import fc from 'fast-check';
 import { keyOf, orbitOf, panOf, pinchOf, wheelOf } from '../../packages/element/src/camera/gestures.js';
 import {
   cameraOfPose,
+  eyeOfPose,
   framingDistance,
   nearPlane,
   orbitAxes,
@@ -15,7 +16,10 @@ import {
 } from '../../packages/element/src/camera/orbit.js';
 import { OrbitCamera } from '../../packages/element/src/camera/orbit-camera.js';
 import { limitsOf, poseOf } from '../../packages/element/src/camera/settings.js';
+import { project } from '../../packages/element/src/camera/projection.js';
 import { CameraController } from '../../packages/element/src/controllers/camera-controller.js';
+import { boxOf } from '../../packages/element/src/scene-queries.js';
+import { LabelView, type Located } from '../../packages/element/src/controllers/label-box.js';
 import { settings } from '../support/camera-settings.js';
 
 /** Rows of the frame of each up axis, as they stand in no formula. */
@@ -141,6 +145,34 @@ test('automatic limits give way to what the attributes ask for outright', () => 
   assert.deepEqual([camera.goal.phi, camera.goal.radius], [0, 1000]);
 });
 
+test('limits of the file replace automatic ones, and give way to those of the attributes', () => {
+  const bounds = { ...BOUNDS, orbit: { minPhi: 0.8, maxPhi: 1.2, minRadius: 20 } };
+  const steered = (given: Parameters<typeof settings>[0]): OrbitCamera => {
+    const camera = new OrbitCamera(poseOf(settings(given), bounds, 1));
+    camera.limits = limitsOf(settings(given), bounds, 1);
+    return camera;
+  };
+  const camera = steered({});
+  // The automatic pose lies within: 75 degrees and the framing distance do not.
+  assert.deepEqual([camera.goal.phi, camera.goal.radius], [1.2, 20]);
+  camera.orbitBy(0, -9);
+  camera.zoomBy(1e-6);
+  assert.deepEqual([camera.goal.phi, camera.goal.radius], [0.8, 20]);
+  const other = steered({ minCameraOrbit: 'auto 0.5rad 1m', cameraOrbit: '0rad 1.5rad 5m' });
+  assert.deepEqual([other.goal.phi, other.goal.radius], [1.5, 5]);
+  other.orbitBy(0, -9);
+  other.zoomBy(1e-6);
+  assert.deepEqual([other.goal.phi, other.goal.radius], [0.5, 1]);
+  other.orbitBy(0, 9);
+  assert.equal(other.goal.phi, 1.5);
+});
+
+test('a smallest radius far beyond the scene does not take the camera out of its range', () => {
+  const bounds = { ...BOUNDS, orbit: { minRadius: 1e30 } };
+  const { radius } = poseOf(settings({}), bounds, 1);
+  assert.equal(radius, limitsOf(settings({}), BOUNDS, 1).max.radius);
+});
+
 test('limits hold for gestures', () => {
   const limited = settings({
     minCameraOrbit: '-10deg 60deg 1m',
@@ -250,6 +282,98 @@ test('a new aspect reframes, unless a person has chosen the distance', () => {
   controller.reset('none');
   controller.jumpToGoal();
   assert.equal(controller.orbit.radius, framingDistance(2, controller.fieldOfView.radians, 2));
+});
+
+test('a camera that flies or walks stays where it is while the picture gets another shape', () => {
+  const controller = new CameraController(settings(), () => undefined);
+  controller.frame(BOUNDS);
+  controller.setAspect(2);
+  controller.pivot = 'eye';
+  const { radius } = controller.orbit;
+  controller.setAspect(0.5);
+  assert.ok(controller.orbit.radius > 1.5 * radius, 'before a visitor moves it, the scene is framed');
+  controller.moveBy(0.1, 0, 0.5);
+  controller.lookBy(0.2, 0.1);
+  controller.jumpToGoal();
+  const eye = eyeOfPose(controller.goal);
+  controller.setAspect(2);
+  controller.jumpToGoal();
+  near(eyeOfPose(controller.goal), eye);
+});
+
+test('limits of the target do not hold a walker back, nor do they move it when it looks around', () => {
+  const limits = settings({ minCameraTarget: '0m 0m 0m', maxCameraTarget: '1m 1m 1m' });
+  const controller = new CameraController(limits, () => undefined);
+  controller.frame(BOUNDS);
+  controller.pivot = 'eye';
+  const eye: Vector3 = [7, 1.6, -3];
+  controller.walkTo(eye);
+  near(eyeOfPose(controller.goal), eye);
+  controller.lookBy(2, 0.4);
+  near(eyeOfPose(controller.goal), eye);
+  controller.applySettings(limits);
+  near(eyeOfPose(controller.goal), eye);
+  controller.applySettings({ ...limits, orthographic: true });
+  assert.equal(controller.view(30, 20).orthographic, undefined, 'walking has perspective');
+  controller.pivot = 'target';
+  assert.equal(controller.view(30, 20).orthographic, true);
+  controller.orbitBy(0.1, 0);
+  const { x, y, z } = controller.goal;
+  assert.ok(
+    [x, y, z].every((value) => value >= 0 && value <= 1),
+    'they apply again to an orbit',
+  );
+});
+
+test('labels are at the projections of their points, in perspective and in orthographic views', () => {
+  const pose: CameraPose = { theta: 0.4, phi: 1.2, radius: 6, x: 1, y: 2, z: 3, fieldOfView: 0.8 };
+  const frame = viewerFrame([0, -1, 0]);
+  for (const orthographic of [false, true]) {
+    const controller = new CameraController(settings({ orthographic }), () => undefined);
+    controller.frame(BOUNDS);
+    controller.moveTo(pose);
+    const camera = controller.view(300, 200);
+    const view = new LabelView(camera, frame, 150, 100);
+    const towards = (normal: Vector3): boolean => {
+      const label = { ...at([0, 0, 0]), normal };
+      view.locate(label);
+      return label.facesCamera;
+    };
+    const at = (position: Vector3): Located => ({
+      ...{ position, normal: null, x: 0, y: 0, depth: 0, facesCamera: false },
+    });
+    for (const position of [
+      [1, 2, 3],
+      [0, 3, 2],
+      [2, 1, 4],
+    ] as Vector3[]) {
+      const label = at(position);
+      view.locate(label);
+      const expected = project(camera, toScene(frame, position));
+      near([label.x, label.y, label.depth], [expected.x / 2, expected.y / 2, expected.depth]);
+    }
+    const { backward } = orbitAxes(pose.theta, pose.phi);
+    assert.deepEqual([towards(backward), towards(backward.map((v) => -v) as unknown as Vector3)], [true, false]);
+  }
+});
+
+test('the box of a scene has all of its corners, whatever is up', () => {
+  const { min, max } = BOUNDS;
+  for (const up of UPS) {
+    const frame = viewerFrame(up);
+    const corners = Array.from({ length: 8 }, (_, k) =>
+      toViewer(frame, [0, 1, 2].map((axis) => (k & (1 << axis) ? max : min)[axis]) as unknown as Vector3),
+    );
+    const found = boxOf(frame, BOUNDS)!;
+    for (const [corner, pick] of [
+      [found.min, Math.min],
+      [found.max, Math.max],
+    ] as const)
+      near(
+        [corner.x, corner.y, corner.z],
+        [0, 1, 2].map((axis) => pick(...corners.map((place) => place[axis]))),
+      );
+  }
 });
 
 test('a changed target leaves the orbit where a person has put it', () => {

@@ -1,6 +1,5 @@
 /**
- * The pace of moving pictures against many simulated GPUs, whose levels win as little as on real ones, nothing at all or less than nothing: it comes to the truest level
- * that is in time, or to one that is as fast as any, and turns at most once in five seconds.
+ * Dynamic quality against many simulated GPUs, whose levels save as little as on real ones, nothing, or less than nothing: it reaches the most accurate level that is in time, or one that is as fast as any, and changes direction at most once in five seconds.
  */
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
@@ -11,14 +10,14 @@ import { randomSource } from '../support/gpu.js';
 type Random = (from: number, to: number) => number;
 type Curve = readonly number[];
 
-/** What levels take as multiples of the target, until a time in ms and after it. */
+/** Costs of the levels as multiples of the target, until a time in ms and after it. */
 interface Load {
   readonly before: Curve;
   readonly after: Curve;
   readonly at: number;
 }
 
-/** Two steps of an H200 (docs/benchmark.md), the skull close up on it (docs/decisions/0014), and a picture that leaves most of such a GPU idle. */
+/** Two steps of an H200 (docs/benchmark.md), the skull close up on it (docs/decisions/0014), and a frame that leaves most of such a GPU idle. */
 const STEEP = [1, 0.93, 0.92, 0.88, 0.73, 0.58, 0.58, 0.58, 0.58, 0.59];
 const FLAT = [1, 0.99, 0.99, 0.97, 0.96, 0.95, 0.95, 0.96, 0.98, 1.04];
 const WIDE = [1, 0.81, 0.75, 0.74, 0.67, 0.62, 0.59, 0.59, 0.59, 0.64];
@@ -29,43 +28,43 @@ const RUN_MS = 30_000;
 const RUNS = 20;
 
 const times = (curve: Curve, load: number): Curve => curve.map((share) => share * load);
-/** What no level makes faster. */
-const floor = (least: number, load: number): Curve => COSTS.map((cost) => Math.max(least, load * cost));
+/** Time that no level shortens. */
+const floor = (min: number, load: number): Curve => COSTS.map((cost) => Math.max(min, load * cost));
 const withFixed = (share: number, load: number): Curve => COSTS.map((cost) => load * (share + (1 - share) * cost));
-/** Other work makes whole pictures longer. */
+/** Other work makes full frames longer. */
 const disturbed = ([whole, ...others]: Curve): Curve => [whole * 1.33, ...others];
 const always = (curve: Curve): Load => ({ before: curve, after: curve, at: STEP_AT });
 const step = (before: Curve, after: Curve): Load => ({ before, after, at: STEP_AT });
 
 const stepped =
-  (curve: Curve, least: number, most: number) =>
+  (curve: Curve, min: number, max: number) =>
   (random: Random): Load =>
-    step(times(curve, random(least, most)), times(curve, random(least, most)));
+    step(times(curve, random(min, max)), times(curve, random(min, max)));
 
-/** Kinds of GPUs and loads, and how much longer than on the fastest level frames may take where none is in time. */
+/** Kinds of GPUs and loads, and the allowed frame time relative to the fastest level if no level is in time. */
 const kinds: Record<string, { readonly make: (random: Random) => Load; readonly excess?: number }> = {
   'the lowest levels take as long as one another, all too long': {
     make: (random) => {
-      const least = random(1.02, 2.5);
-      return always(floor(least, least * random(1, 3)));
+      const min = random(1.02, 2.5);
+      return always(floor(min, min * random(1, 3)));
     },
   },
   'so they do after a step': {
     make: (random) => {
-      const least = random(1.02, 2.5);
-      return step(times(COSTS, random(0.2, 2)), floor(least, least * random(1, 3)));
+      const min = random(1.02, 2.5);
+      return step(times(COSTS, random(0.2, 2)), floor(min, min * random(1, 3)));
     },
   },
   'and just in time, or just not': {
     make: (random) => {
-      const least = random(0.8, 1.02);
-      return always(floor(least, least * random(1, 3)));
+      const min = random(0.8, 1.02);
+      return always(floor(min, min * random(1, 3)));
     },
   },
   'and well in time': {
     make: (random) => {
-      const least = random(0.3, 0.8);
-      return always(floor(least, least * random(1, 4)));
+      const min = random(0.3, 0.8);
+      return always(floor(min, min * random(1, 4)));
     },
   },
   'no level wins anything': {
@@ -92,8 +91,8 @@ const kinds: Record<string, { readonly make: (random: Random) => Load; readonly 
     make: (random) => {
       const growth = random(1.02, 1.15);
       const from = Math.floor(random(3, 8));
-      const [least, load] = [random(0.8, 2.5), random(1, 2)];
-      return always(COSTS.map((cost, rung) => least * Math.max(1, load * cost) * growth ** Math.max(0, rung - from)));
+      const [min, load] = [random(0.8, 2.5), random(1, 2)];
+      return always(COSTS.map((cost, rung) => min * Math.max(1, load * cost) * growth ** Math.max(0, rung - from)));
     },
     excess: 1.32,
   },
@@ -101,7 +100,7 @@ const kinds: Record<string, { readonly make: (random: Random) => Load; readonly 
   'a step of an H200, from afar': { make: stepped(FLAT, 0.3, 3) },
   'a picture too small for the GPU': { make: stepped(SMALL, 0.5, 3) },
   'a wide GPU': { make: stepped(WIDE, 0.3, 1.6) },
-  // The lowest takes so much longer than the fastest.
+  // The time of the lowest level relative to the fastest.
   'a wide GPU, too slow': { make: stepped(WIDE, 1.7, 4), excess: 1.09 },
   'a wide GPU, other work beside whole pictures': {
     make: (random) => step(disturbed(times(WIDE, random(0.3, 1.6))), disturbed(times(WIDE, random(0.3, 1.6)))),
@@ -189,7 +188,7 @@ test('a load that comes and goes: the pace learns to keep to the highest', () =>
 });
 
 test('levels that take something else every tenth of a second: two changes of direction in five seconds at most', () => {
-  let most = 0;
+  let max = 0;
   for (let i = 0; i < RUNS; i++) {
     const random = within(70_000 + i);
     const gpu = gpuOf(random, i + 1);
@@ -198,9 +197,9 @@ test('levels that take something else every tenth of a second: two changes of di
     );
     const shares = (now: number): Curve => curves[Math.min(curves.length - 1, Math.floor(now / 100))];
     const { frames } = run({ ...gpu, load: () => 1, shares }, 5_000);
-    most = Math.max(most, reversals(frames, 0, 5_000));
+    max = Math.max(max, reversals(frames, 0, 5_000));
   }
-  assert.ok(most <= 2, `${most} changes of direction`);
+  assert.ok(max <= 2, `${max} changes of direction`);
 });
 
 test('the low clock of an idle GPU at the beginning of a gesture does not make the picture less', () => {

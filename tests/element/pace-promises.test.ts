@@ -1,4 +1,4 @@
-/** What is no reason to draw less than the whole image in motion: single late frames, a search for variants, another tab, a pipeline that is compiled, the low clock of an idle GPU. */
+/** Events that must not lower the quality in motion: single late frames, a search for variants, another tab, a pipeline that is compiled, the low clock of an idle GPU. */
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { randomSource } from '../support/gpu.js';
@@ -7,7 +7,7 @@ import { run, type Frame, type Gpu } from '../support/pace-gpu.js';
 const RUNS = 40;
 const RUN_MS = 12_000;
 const TARGET_MS = (0.8 * 1000) / 60;
-/** What one H100 takes for 250,000 splats, 1920 x 1080. */
+/** Frame time of one H100 for 250,000 splats, 1920 x 1080. */
 const FAST_MS = 0.6;
 
 type Random = (from: number, to: number) => number;
@@ -18,7 +18,7 @@ function gpuOf(seed: number): { random: Random; gpu: Omit<Gpu, 'load'> } {
   return { random, gpu: { hertz: 60, fixed: 0.2, noise: 0.2, spikes: 0, latency: Math.floor(random(0, 4)), seed } };
 }
 
-/** Draws with a GPU that takes 0.6 ms for a frame, and so much more, ms, for those that begin at a time. */
+/** Draws with a GPU that takes 0.6 ms for a frame, plus an additional time, ms, for those that start at a time. */
 function draw(name: string, moreOf: (random: Random) => (now: number) => number): void {
   test(`a scene of ${FAST_MS} ms is drawn whole on a page of 60 Hz, whatever ${name}`, () => {
     for (let i = 0; i < RUNS; i++) {

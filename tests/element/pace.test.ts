@@ -1,4 +1,4 @@
-/** The pace of moving pictures against simulated GPUs: fast, slow, noisy, with a load that steps, at several refresh rates. */
+/** Dynamic quality against simulated GPUs: fast, slow, noisy, with a load that steps, at several refresh rates. */
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import fc from 'fast-check';
@@ -9,7 +9,7 @@ import { INITIAL_QUALITY } from '../../packages/element/src/dynamic-quality/star
 import { COSTS, LEVELS, p95, restlessWindows, reversals, run } from '../support/pace-gpu.js';
 
 const LOWEST = COSTS.length - 1;
-/** Where the dead band ends, and the noise of what is in it. */
+/** The end of the dead band, and the noise of times within it. */
 const TOLERANCE = 1.1;
 
 const STEP_MS = 6_000;
@@ -41,7 +41,10 @@ test('load steps: in time within a second, turning at most once in five', () => 
   );
 });
 
-/** What an H200 took for the skull close up, 1920 x 1080 (docs/decisions/0014); and a picture so small that fewer pixels leave most of such a GPU idle. */
+/**
+ * Times of an H200 for the skull close up, 1920 x 1080 (docs/decisions/0014); and for a frame so small that fewer
+ * pixels leave most of such a GPU idle.
+ */
 const WIDE = [1, 0.81, 0.75, 0.74, 0.67, 0.62, 0.59, 0.59, 0.59, 0.64];
 const SMALL = [1, 0.95, 0.93, 1, 1.05, 1.1, 1.2, 1.3, 1.5, 1.9];
 
@@ -75,7 +78,7 @@ test('a picture becomes so small that fewer pixels take longer than all: the tru
       { ...gpu, load: (now) => (isLarge(now) ? 2.2 : load), shares: (now) => (isLarge(now) ? WIDE : SMALL) },
       26_000,
     );
-    // The sixth takes 1.05 of what the lowest take, which is no longer by the law's tolerance.
+    // The sixth takes 1.05 of the time of the lowest level, which is no longer by the law's tolerance.
     assert.ok(frames.find(({ at }) => at > 8_000)!.level >= 5, 'the large one takes the lowest levels');
     const levels = frames.filter(({ at }) => at > 22_000).map(({ level }) => level);
     assert.ok(
@@ -187,7 +190,7 @@ test('a GPU that is far too slow, with much that no level makes cheaper, turns a
 });
 
 test('where the lowest levels are no faster and still too slow, the level turns at most once in five seconds', () => {
-  // Two steps of an H200 (docs/benchmark.md), and pictures with a part that no level makes cheaper.
+  // Two steps of an H200 (docs/benchmark.md), and frames with a part that no level makes cheaper.
   const measured = [
     [1, 0.93, 0.92, 0.88, 0.73, 0.58, 0.58, 0.58, 0.58, 0.59],
     [1, 0.99, 0.99, 0.97, 0.96, 0.95, 0.95, 0.96, 0.98, 1.04],
@@ -229,15 +232,15 @@ test('when the load is gone the whole image comes back within a second, without 
 });
 
 test('a level that costs more than the ladder says is tried again once in two minutes', () => {
-  // The first level down makes the frame more than twice as fast, though the ladder promises less.
+  // The first level down makes the frame more than twice as fast, although the levels promise less.
   const targetMs = 13.3;
-  let pace = INITIAL_QUALITY;
+  let quality = INITIAL_QUALITY;
   const changes: number[] = [];
   for (let now = 0; now < 600_000; now += 16.7) {
-    const { level } = pace;
+    const { level } = quality;
     const milliseconds = targetMs * (level === 0 ? 1.3 : 0.5);
-    pace = nextQuality(pace, { now, level, milliseconds }, { targetMs, levels: LEVELS });
-    if (pace.level === 0 && level > 0) changes.push(now);
+    quality = nextQuality(quality, { now, level, milliseconds }, { targetMs, levels: LEVELS });
+    if (quality.level === 0 && level > 0) changes.push(now);
   }
   assert.ok(changes.length >= 3 && changes.length <= 5, changes.join(' '));
   const gaps = changes.slice(1).map((at, i) => at - changes[i]);
@@ -249,47 +252,51 @@ test('a level that costs more than the ladder says is tried again once in two mi
 
 test('frames that took next to nothing do not keep belief low: slow ones are answered within a second and a half', () => {
   const rules = { targetMs: 13, levels: LEVELS };
-  let pace = INITIAL_QUALITY;
+  let quality = INITIAL_QUALITY;
   let now = 0;
-  // Past a corner of the scene, with nothing in sight.
-  for (; now < 2_000; now += 16) pace = nextQuality(pace, { now, level: pace.level, milliseconds: 0.01 }, rules);
+  // Past a corner of the scene, with no splat in view.
+  for (; now < 2_000; now += 16)
+    quality = nextQuality(quality, { now, level: quality.level, milliseconds: 0.01 }, rules);
   const begin = now;
-  for (; pace.level === 0 && now < begin + 10_000; now += 60)
-    pace = nextQuality(pace, { now, level: pace.level, milliseconds: 60 }, rules);
+  for (; quality.level === 0 && now < begin + 10_000; now += 60)
+    quality = nextQuality(quality, { now, level: quality.level, milliseconds: 60 }, rules);
   assert.ok(now - begin < 1_500, `answered after ${now - begin} ms`);
 });
 
 test('frames of another level say nothing', () => {
-  const pace = { ...INITIAL_QUALITY, level: 3 };
-  assert.equal(nextQuality(pace, { now: 0, level: 0, milliseconds: 500 }, { targetMs: 13, levels: LEVELS }), pace);
+  const quality = { ...INITIAL_QUALITY, level: 3 };
+  assert.equal(
+    nextQuality(quality, { now: 0, level: 0, milliseconds: 500 }, { targetMs: 13, levels: LEVELS }),
+    quality,
+  );
 });
 
 test('what the true image took at rest is what the pace comes back to where less takes longer', () => {
   const targetMs = 13.3;
-  let [pace, now] = [INITIAL_QUALITY, 0];
+  let [quality, now] = [INITIAL_QUALITY, 0];
   const draw = (level: number, milliseconds: number): void => {
-    pace = nextQuality(pace, { now: (now += 16.7), level, milliseconds }, { targetMs, levels: LEVELS });
+    quality = nextQuality(quality, { now: (now += 16.7), level, milliseconds }, { targetMs, levels: LEVELS });
   };
   const move = (seconds: number, shares: readonly number[], load: number): void => {
-    for (const end = now + 1000 * seconds; now < end;) draw(pace.level, targetMs * load * shares[pace.level]);
+    for (const end = now + 1000 * seconds; now < end;) draw(quality.level, targetMs * load * shares[quality.level]);
   };
   move(8, COSTS, 2);
-  assert.ok(pace.level >= 3, `${pace.level}`);
-  // The element becomes small: all levels are too slow, and the whole picture is the fastest.
+  assert.ok(quality.level >= 3, `${quality.level}`);
+  // The element becomes small: all levels are too slow, and the full frame is the fastest.
   move(4, SMALL, 5);
-  const { level } = pace;
+  const { level } = quality;
   assert.ok(level > 4, `${level}`);
   draw(0, targetMs * 5);
   move(2, SMALL, 5);
   // Within 5 % of the fastest.
-  assert.ok(pace.level <= 1, `${pace.level}`);
+  assert.ok(quality.level <= 1, `${quality.level}`);
   // At rest it took less than in motion: that was measured, and counts.
   move(8, COSTS, 2);
-  const settled = pace.level;
+  const settled = quality.level;
   assert.ok(settled >= 3, `${settled}`);
   draw(0, targetMs * 0.5);
   move(6, COSTS, 2);
-  assert.equal(pace.level, settled);
+  assert.equal(quality.level, settled);
 });
 
 test("the element's levels: the whole image, then others by their names, whose scale is the one that is drawn", () => {

@@ -47,7 +47,7 @@ test(
   },
 );
 
-/** What only some pages need, by words that nothing else says. */
+/** Code that only some pages need, identified by words that occur nowhere else. */
 const ELSEWHERE: Readonly<Record<string, string>> = {
   'manifests of streamed scenes': 'JSON that gaussian-splat detail wrote',
   'pages of streamed scenes': 'gs.requests.staging',

@@ -3,14 +3,20 @@ import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { PlaybackController, type PlaybackEvent } from '../../packages/element/src/controllers/playback-controller.js';
 
-/** A clock of a scene of four seconds, with the frames that it asked for and its events. */
-function clock(loop = false): { playback: PlaybackController; events: PlaybackEvent[]; frames: () => number } {
+/** A clock of a scene of four seconds, with the frames that it asked for, its events, and listeners of these. */
+function clock(
+  loop = false,
+  listeners: Partial<Record<PlaybackEvent, () => void>> = {},
+): { playback: PlaybackController; events: PlaybackEvent[]; frames: () => number } {
   const events: PlaybackEvent[] = [];
   let frames = 0;
   const playback = new PlaybackController({
     attributes: { loop, time: null },
     requestFrame: () => frames++,
-    playbackEvent: (type) => events.push(type),
+    playbackEvent: (type) => {
+      events.push(type);
+      listeners[type]?.();
+    },
   });
   playback.setDuration(4);
   return { playback, events, frames: () => frames };
@@ -71,4 +77,47 @@ test('a clock that starts again before a time that is not loaded says that it wa
   playback.tick(1516, 1.5);
   playback.tick(1532, 1.5);
   assert.equal(events.filter((type) => type === 'waiting').length, 1);
+});
+
+test('a listener of seeked that seeks decides the time, and one that pauses stops the clock there', () => {
+  const listeners: Parameters<typeof clock>[1] = {};
+  const { playback, events } = clock(false, listeners);
+  playback.play();
+  playback.tick(0);
+  playback.currentTime = 1;
+  listeners.seeked = () => {
+    listeners.seeked = undefined;
+    playback.currentTime = 3;
+  };
+  playback.tick(100);
+  assert.deepEqual([playback.currentTime, playback.seeking], [3, true]);
+  playback.tick(200);
+  assert.ok(playback.currentTime > 3 && !playback.seeking, `${playback.currentTime} s`);
+  playback.currentTime = 3.95;
+  listeners.seeked = () => playback.pause();
+  playback.tick(300);
+  assert.deepEqual([playback.currentTime, playback.paused], [3.95, true]);
+  assert.deepEqual(events.slice(-2), ['timeupdate', 'pause'], 'neither a second pause nor an end');
+});
+
+test('a pause ends the wait: the next play() waits anew, and another scene does not go on from it', () => {
+  const { playback, events } = clock();
+  const count = (type: PlaybackEvent): number => events.filter((each) => each === type).length;
+  playback.play();
+  for (const now of [0, 1500, 1516]) playback.tick(now, 1.5);
+  playback.pause();
+  playback.play();
+  playback.tick(1532, 1.5);
+  assert.equal(count('waiting'), 2);
+  playback.empty();
+  playback.setDuration(4);
+  playback.play();
+  playback.tick(1600);
+  assert.equal(count('canplay'), 0);
+});
+
+test('loadedmetadata is for scenes that move', () => {
+  const { playback, events } = clock();
+  playback.setDuration(NaN);
+  assert.deepEqual(events, ['durationchange', 'loadedmetadata', 'durationchange']);
 });

@@ -3,7 +3,10 @@ import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { poseOf, turnsOf } from '../../packages/element/src/dynamic/pose-of.js';
 
-/** Axis-angle, radians: nothing, little, around each axis, half turns where matrices divide by another number each. */
+/**
+ * Axis-angle, radians: nothing, little, around each axis, half turns, for which matrices divide by a different number
+ * each.
+ */
 const TURNS = [
   ...[0, 0, 0],
   ...[1e-4, 0, -2e-4],

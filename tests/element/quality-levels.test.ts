@@ -1,4 +1,4 @@
-/** The levels of frames in motion against what was measured of them: docs/frontier/frontier-*.json, written by `npm run lab:frontier`. */
+/** The levels of frames in motion against their measurements: docs/frontier/frontier-*.json, written by `npm run lab:frontier`. */
 import assert from 'node:assert/strict';
 import { readdirSync, readFileSync } from 'node:fs';
 import { test } from 'node:test';
@@ -13,7 +13,7 @@ interface Line {
 
 const folder = new URL('../../docs/frontier/', import.meta.url);
 const files = readdirSync(folder).filter((name) => /^frontier-.*\.json$/.test(name));
-/** Share of the time that bursts are good for. */
+/** Fraction of the time that bursts save. */
 const NOISE = 1.03;
 /** Smaller images than that win nothing of a small scene on a wide GPU: half of its time does not depend on the pixels (docs/benchmark.md). */
 const SMALLEST_THAT_WINS = 0.5;

@@ -1,4 +1,4 @@
-/** The clock of frames against a simulated page: one thread, a queue that is told late, other work on it; and what the controller makes of it. */
+/** The clock of frames against a simulated page: one thread, a queue with late reports, other work on it; and the controller's conclusions. */
 import assert from 'node:assert/strict';
 import { test, type TestContext } from 'node:test';
 import { QueueClock, type WorkTime } from '@gaussian-splat/renderer/tools';
@@ -8,10 +8,10 @@ import type { FrameScheduler } from '../../packages/element/src/gpu/frame-schedu
 import { LEVELS } from '../support/pace-gpu.js';
 
 const INTERVAL = 1000 / 60;
-/** Milliseconds until the GPU has got what is submitted, and until the page hears that it is done. */
+/** Milliseconds until the GPU has received submitted work, and until the page learns that it is done. */
 const [THERE, BACK] = [0.8, 1.5];
 
-/** A page whose clock runs by what it does, and its GPU. */
+/** A page whose clock advances by its work, and its GPU. */
 class Page {
   /** Clocks do not run back. */
   static #started = 0;
@@ -36,7 +36,7 @@ class Page {
       submit: () => this.work(0),
       onSubmittedWorkDone: () =>
         new Promise<void>((resolve) => {
-          // The browser answers when it has looked at all that it was sent.
+          // The browser answers when it has checked all commands sent to it.
           const answer = (): unknown => (this.#seen + BACK > this.now ? this.#after(1, answer) : resolve());
           this.#after(Math.max(0, this.#free - this.now) + BACK, answer);
         }),
@@ -53,7 +53,7 @@ class Page {
     deleteSync: () => undefined,
   } as unknown as WebGL2RenderingContext;
 
-  /** Submits so much work, ms, at which the browser looks for so long first. */
+  /** Submits work of a duration in ms, which the browser validates for a time first. */
   work(milliseconds: number, looks = 0): void {
     this.#seen = Math.max(this.#seen, this.now + THERE) + looks;
     this.#free = Math.max(this.#free, this.#seen) + milliseconds;
@@ -64,7 +64,7 @@ class Page {
     this.now += milliseconds;
   }
 
-  /** Runs what is due until a time. */
+  /** Runs events that are due until a time. */
   async until(time: number): Promise<void> {
     for (;;) {
       this.#tasks.sort((a, b) => a.at - b.at || a.id - b.id);
@@ -72,7 +72,7 @@ class Page {
       const { at, run } = this.#tasks.shift()!;
       this.now = Math.max(this.now, at);
       run();
-      // What waits for it.
+      // Callbacks that wait for it.
       await new Promise(setImmediate);
     }
     this.now = Math.max(this.now, time);
@@ -133,9 +133,9 @@ test('the clock of WebGL: frames that are drawn before the last is done take wha
   await page.until(page.now + 300);
   assert.equal(times.length, expected.length);
   times.forEach(({ lowerBound, upperBound }, k) => {
-    // What waiting for nothing takes is not taken off, and pages ask once a millisecond.
-    const [least, most] = [expected[k] - 2, expected[k] + THERE + BACK + 2];
-    assert.ok(lowerBound >= least && upperBound <= most, `${k}: ${lowerBound} to ${upperBound}, not ${expected[k]} ms`);
+    // The time of waiting for no work is not subtracted, and pages ask once a millisecond.
+    const [min, max] = [expected[k] - 2, expected[k] + THERE + BACK + 2];
+    assert.ok(lowerBound >= min && upperBound <= max, `${k}: ${lowerBound} to ${upperBound}, not ${expected[k]} ms`);
   });
 });
 
@@ -168,7 +168,7 @@ test('a frame that is told of late, since the thread was busy, took something be
 /** Turns for three seconds. @returns the level at the end */
 async function turn(page: Page, work: number, looks = 0, onFrame: () => void = () => undefined): Promise<string> {
   const clock = await page.clock();
-  const pace = new DynamicQualityController({
+  const quality = new DynamicQualityController({
     isOn: () => true,
     scheduler: () => ({ displayInterval: INTERVAL, clients: 1 }) as FrameScheduler,
     frameBudget: () => Infinity,
@@ -182,7 +182,7 @@ async function turn(page: Page, work: number, looks = 0, onFrame: () => void = (
     const next = page.now + INTERVAL;
     // As browsers do, no more than two.
     if (flying < 2) {
-      const plan = pace.plan({ now: page.now, pixels: 2e6, hasChanged: true, goesOn: true });
+      const plan = quality.plan({ now: page.now, pixels: 2e6, hasChanged: true, goesOn: true });
       flying++;
       void clock
         .time(() => {
@@ -191,15 +191,15 @@ async function turn(page: Page, work: number, looks = 0, onFrame: () => void = (
         })
         .then((time) => {
           flying--;
-          pace.sample(plan, time);
+          quality.sample(plan, time);
         });
       onFrame();
     }
     await page.until(next);
   }
   await page.until(page.now + 1_000);
-  pace.stop();
-  return pace.report.moving;
+  quality.stop();
+  return quality.report.moving;
 }
 
 test('a GPU that works for 1 ms and whose frames take 20, since the browser looks at them for long, is drawn with less', async (context) => {

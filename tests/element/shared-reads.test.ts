@@ -1,4 +1,4 @@
-/** Files that several frames of a sequence need are read once, for as long as one of them waits, and forgotten where they take much. */
+/** Files that several frames of a sequence need are read once, for as long as one of them waits, and released if they are large. */
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { SharedReads } from '@gaussian-splat/core/fetch';

@@ -1,4 +1,4 @@
-/** What `stats` says of a scene, in sentences for people. */
+/** The sentences of `stats` about a scene. */
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { faultsOf } from '@gaussian-splat/renderer/tools';
@@ -14,17 +14,17 @@ const scene = {
 } as unknown as LoadedGaussians;
 
 test('splats for which the device has no room are told of, after they were counted', () => {
-  const pace = { moving: 'whole' } as unknown as StatsContext['dynamicQuality'];
+  const quality = { moving: 'whole' } as unknown as StatsContext['dynamicQuality'];
   const context = {
     quality: 'default',
-    dynamicQuality: pace,
+    dynamicQuality: quality,
     isPreview: false,
     frameBytes: 0,
     pixels: 0,
     parts: [],
   } as const;
   const whyOf = (left: number): string =>
-    statsOf([scene], { ...context, counts: { drawn: 60, left, contributed: 9 } }).why.join();
+    statsOf([scene], { ...context, counts: { drawn: 60, left, contributing: 9 } }).reasons.join();
   assert.equal(whyOf(0), '');
   assert.match(whyOf(1200), /^1200 splats are not drawn: the GPU allows no buffer/);
 });
@@ -32,15 +32,31 @@ test('splats for which the device has no room are told of, after they were count
 test('what the self-test found wrong is told of', () => {
   const { context } = scene.place;
   faultsOf(context).push('The self-test finds errors of this GPU: parallel prefix sums.');
-  const pace = { moving: 'whole' } as unknown as StatsContext['dynamicQuality'];
+  const quality = { moving: 'whole' } as unknown as StatsContext['dynamicQuality'];
   const known = {
     quality: 'default',
-    dynamicQuality: pace,
+    dynamicQuality: quality,
     isPreview: false,
     frameBytes: 0,
     pixels: 0,
     parts: [],
   } as const;
-  assert.deepEqual(statsOf([scene], { ...known, counts: undefined }).why, faultsOf(context));
+  assert.deepEqual(statsOf([scene], { ...known, counts: undefined }).reasons, faultsOf(context));
   assert.deepEqual(faultsOf({}), []);
+});
+
+test('a streamed scene says what it rests at', () => {
+  const progress = { resident: 3, total: 9, limit: 'memory', reasons: ['3 of 9 pages are on the GPU'] } as const;
+  const streamed = { ...scene, gaussians: { ...scene.gaussians, progress } } as unknown as LoadedGaussians;
+  const found = statsOf([scene, streamed], {
+    quality: 'default',
+    dynamicQuality: { moving: 'whole' } as unknown as StatsContext['dynamicQuality'],
+    counts: undefined,
+    isPreview: false,
+    frameBytes: 0,
+    pixels: 0,
+    parts: [],
+  });
+  assert.deepEqual(found.streamed, [progress]);
+  assert.ok(found.reasons.includes(progress.reasons[0]));
 });

@@ -8,6 +8,7 @@ import type { AddressInfo } from 'node:net';
 import { after, before, test } from 'node:test';
 import { serialize } from 'node:v8';
 import { strToU8, zipSync } from 'fflate';
+import { LoadBudget, SogFiles } from '@gaussian-splat/formats';
 import { openBoxes } from '../../packages/element/src/loading/lod-boxes.js';
 import { smallCloud } from '../formats/support/small-cloud.js';
 import { writeSog } from '../formats/support/sog-writer.js';
@@ -53,7 +54,7 @@ async function open(folder: string, filenames: readonly string[], boxes: number,
   return { answer, bytes: index.length, cpuMs: (user + system) / 1000 };
 }
 
-/** What the page gets besides the splats, which are transferred. */
+/** The message to the page besides the splats, which are transferred. */
 const messageBytes = (answer: Exclude<Awaited<ReturnType<typeof open>>['answer'], string>): number =>
   serialize({ ...answer, levels: { ...answer.levels, first: undefined } }).length;
 
@@ -93,4 +94,12 @@ test('many honest files are read', async () => {
   const names = Array.from({ length: 60 }, (_, k) => `p${k}.sog`);
   for (const name of names) files.set(name, files.get('part.sog')!);
   assert.notEqual(typeof (await open('honest', names, 60)).answer, 'string');
+});
+
+test('a cached file raises the limit of its scene once', async () => {
+  const sog = files.get('part.sog')!;
+  const [budget, cache] = [new LoadBudget(0), new SogFiles()];
+  const run = { url: 'https://a.example/part.sog', name: 'part.sog', first: 0, count: 1 };
+  for (let k = 0; k < 3; k++) await cache.read(run, () => Promise.resolve(sog), undefined, budget);
+  assert.equal(budget.arrived, sog.length);
 });

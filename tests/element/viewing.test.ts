@@ -56,7 +56,7 @@ test('names of views: quarters around, thirds from above to below, any number of
 });
 
 test('words of the page: JSON or an object; anything else is malformed', async () => {
-  const { readSpokenStrings } = await load<Words>('../words');
+  const { readSpokenStrings } = await load<Words>('../strings');
   assert.deepEqual(readSpokenStrings('{"front": "vorn", "back": 7}'), { front: 'vorn' });
   assert.deepEqual(readSpokenStrings(null), {});
   for (const malformed of ['{', '[]', '7', 'null', 7])

@@ -248,7 +248,7 @@ test('a flight arrives at its end, and gives way to whoever moves the camera, bu
     given.advance(600);
     assert.deepEqual([taken.goal.theta, await given.finished], [theta, false]);
   }
-  // Out of sight no frame comes.
+  // No frame is drawn off-screen.
   const unseen = framed();
   const timed = new Flight(unseen, way(unseen), 1000);
   t.mock.timers.tick(1200);
@@ -269,6 +269,18 @@ test('a flight goes where automatic limits would not let hands go, but not beyon
   limited.frame(BOUNDS);
   limited.moveTo(above);
   near([limited.orbit.phi], [(40 * Math.PI) / 180], 'phi');
+});
+
+test('a view straight down or up keeps the azimuth', () => {
+  const given = context();
+  const from = { ...given.from, theta: 0.7 };
+  for (const y of [9, -9]) {
+    const pose = poseOfView({ position: [1, y, 3], lookAt: [1, 3, 3] }, { ...given, from });
+    near([pose.theta, pose.phi], [0.7, y > 3 ? 0 : Math.PI], 'angles');
+    // A matrix in float32 is vertical only nearly.
+    const almost = poseOfView({ position: [1 + 1e-8, y, 3 - 1e-8], lookAt: [1, 3, 3] }, { ...given, from });
+    near([almost.theta], [0.7], 'azimuth');
+  }
 });
 
 test('eyes and targets in viewer space', () => {

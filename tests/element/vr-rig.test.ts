@@ -1,4 +1,4 @@
-/** Where a person in a headset stands: turns, steps and jumps on the floor alone. */
+/** The position of a person in a headset: turns, steps and jumps on the floor alone. */
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { VrRig } from '../../packages/element/dist/xr/vr-rig.js';
@@ -14,25 +14,27 @@ const identity = Float64Array.from([1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0,
 
 interface Stick {
   readonly handedness: string;
-  readonly axes?: readonly number[];
+  /** Null for a hand, which has no gamepad. */
+  readonly axes?: readonly number[] | null;
   readonly pressed?: readonly number[];
-  /** Of its ray: column-major. */
+  /** Matrix of its ray, column-major. */
   readonly ray?: readonly number[];
 }
 
-function rigAt(heading = 0, stepsOnly = false, onLeave = (): void => undefined) {
+function rigAt(heading = 0, stepsOnly = false, onLeave = (): void => undefined, hasMap = true) {
   const rig = new VrRig({ eye: [0, 2.6, 0], heading, toViewer: identity, isFloor: true, stepsOnly }, onLeave);
-  rig.map = map as never;
-  const head = {
-    position: { x: 0.1, y: 1.6, z: 0.2 },
-    matrix: Float32Array.from([1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0.1, 1.6, 0.2, 1]),
-  };
-  /** @returns where the head is in the scene */
+  if (hasMap) rig.map = map as never;
+  /** Position of the head in the space of the session. */
+  const place = { x: 0.1, y: 1.6, z: 0.2 };
+  /** @returns the position of the head in the scene */
   const frame = (sticks: readonly Stick[] = [], seconds = 0.1): number[] => {
-    const inputSources = sticks.map(({ handedness, axes = [0, 0, 0, 0], pressed = [], ray }) => ({
-      ...{ handedness, targetRaySpace: ray },
-      gamepad: { axes, buttons: Array.from({ length: 6 }, (_, i) => ({ pressed: pressed.includes(i) })) },
-    }));
+    const { x, y, z } = place;
+    const head = { position: place, matrix: Float32Array.from([1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, x, y, z, 1]) };
+    const inputSources = sticks.map((stick) => {
+      const { handedness, axes = [0, 0, 0, 0], pressed = [], ray } = stick;
+      const buttons = Array.from({ length: 6 }, (_, i) => ({ pressed: pressed.includes(i) }));
+      return Object.assign(stick, { handedness, targetRaySpace: ray, gamepad: axes && { axes, buttons } });
+    });
     const getPose = (ray: readonly number[]) => ({ transform: { matrix: Float32Array.from(ray) } });
     const m = rig.place(
       { session: { inputSources }, getPose } as never,
@@ -41,10 +43,10 @@ function rigAt(heading = 0, stepsOnly = false, onLeave = (): void => undefined) 
       seconds,
     );
     // The inverse of a rotation and a translation, at the head.
-    const p = [0.1 - m[3], 1.6 - m[7], 0.2 - m[11]];
+    const p = [x - m[3], y - m[7], z - m[11]];
     return [0, 1, 2].map((k) => m[k] * p[0] + m[4 + k] * p[1] + m[8 + k] * p[2]);
   };
-  return { rig, frame };
+  return { rig, frame, place };
 }
 
 const near = (found: readonly number[], expected: readonly number[], digits = 1e-6): void =>
@@ -97,6 +99,61 @@ test('a jump goes to the floor that is aimed at, and nowhere else', () => {
   aim(3, [0]);
   assert.equal(rig.target, undefined);
   near(aim(3, []), before);
+});
+
+test('a hand without a gamepad aims while it pinches, also one that is an input only meanwhile', () => {
+  for (const remains of [true, false]) {
+    const { rig, frame } = rigAt();
+    const hand: Stick = { handedness: 'right', axes: null, ray: rayTo(0) };
+    near(frame(remains ? [hand] : []), [0, 2.6, 0]);
+    rig.aim(hand as never);
+    frame([hand]);
+    assert.ok(rig.target, 'the place that is aimed at');
+    rig.choose(hand as never);
+    near(frame(remains ? [hand] : []), [0, 2.6, -1.5], 0.06);
+    near(frame(remains ? [hand] : []), [0, 2.6, -1.5], 0.06);
+    assert.equal(rig.target, undefined);
+  }
+});
+
+test('a controller that vanishes with its trigger held goes nowhere when it comes back', () => {
+  const { frame } = rigAt();
+  frame([{ handedness: 'right', pressed: [0], ray: rayTo(0) }]);
+  frame([]);
+  near(frame([{ handedness: 'right', ray: rayTo(0) }]), [0, 2.6, 0]);
+});
+
+test('a hand beside a controller of the same side does not release its trigger', () => {
+  const { rig, frame } = rigAt();
+  const both: Stick[] = [
+    { handedness: 'right', pressed: [0], ray: rayTo(0) },
+    { handedness: 'right', axes: [], ray: rayTo(0) },
+  ];
+  for (let i = 0; i < 3; i++) near(frame(both), [0, 2.6, 0]);
+  assert.ok(rig.target);
+});
+
+test('a map that comes late leaves people where they have gone, and holds from there', () => {
+  const { rig, frame } = rigAt(0, false, undefined, false);
+  frame();
+  const ahead = [{ handedness: 'left', axes: [0, 0, 0, -1] }];
+  let at: number[] = [];
+  for (let i = 0; i < 10; i++) at = frame(ahead);
+  near(at, [0, 2.6, -1.4]);
+  rig.map = map as never;
+  near(frame(), [0, 2.6, -1.4]);
+  for (let i = 0; i < 10; i++) at = frame(ahead);
+  assert.ok(at[2] > -2, `beyond the floor, at ${at}`);
+});
+
+test('steps of their own count: the floor ends where the head is, not where it would be', () => {
+  const { frame, place } = rigAt();
+  frame();
+  place.z -= 1.5;
+  near(frame(), [0, 2.6, -1.5]);
+  let at: number[] = [];
+  for (let i = 0; i < 20; i++) at = frame([{ handedness: 'left', axes: [0, 0, 0, -1] }]);
+  assert.ok(at[2] > -2, `beyond the floor, at ${at}`);
 });
 
 test('the button that leaves is held for a second', () => {

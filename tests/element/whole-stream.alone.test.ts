@@ -1,4 +1,4 @@
-/** Streamed scenes where WebGL 2 draws: as much of them is loaded as fits, the coarsest first. */
+/** Streamed scenes with WebGL 2: as much of them is loaded as fits, the coarsest first. */
 import assert from 'node:assert/strict';
 import { createServer, type Server } from 'node:http';
 import type { AddressInfo } from 'node:net';
@@ -66,7 +66,7 @@ function along({ packed: { geometry, origin, count } }: LoadedScene): number[] {
 const xs = Array.from({ length: COUNT }, (_, i) => cloud.positions[3 * i]).sort((a, b) => a - b);
 function assertNear(found: readonly number[], expected: readonly number[]): void {
   assert.equal(found.length, expected.length);
-  const worst = found.reduce((most, x, i) => Math.max(most, Math.abs(x - expected[i])), 0);
+  const worst = found.reduce((max, x, i) => Math.max(max, Math.abs(x - expected[i])), 0);
   assert.ok(worst < 0.01, `places differ by ${worst}`);
 }
 

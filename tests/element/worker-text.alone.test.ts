@@ -40,7 +40,7 @@ test('each chunk names what it needs and what it loads later, and nothing else',
     );
     for (const each of loaded) reached.add(each);
   }
-  // What nobody asks for under that name is asked of a function of the code's own.
+  // Names that no request matches are passed to a function of the test.
   assert.deepEqual(
     names.filter((name) => !reached.has(name)),
     [],
@@ -83,7 +83,7 @@ test('a chunk that two loads ask for at once is there for both', async () => {
   const sent = new Set<string>();
   const port: { onmessage?: (event: object) => void; postMessage: (question: { id: number; chunk: string }) => void } =
     {
-      // As the page answers: what has been sent is not sent again.
+      // Answers as the page does: sent data is not sent again.
       postMessage({ id, chunk }) {
         const wanted = sent.has(chunk) ? [] : [texts[chunk]];
         sent.add(chunk);

@@ -1,4 +1,4 @@
-/** What a session takes of a streamed scene: the finest that fits into a budget of splats. SECURITY.md does not allow for more, nor do headsets. */
+/** The pages of a streamed scene in a session: the finest level that fits into a budget of splats. SECURITY.md does not allow for more, nor do headsets. */
 import assert from 'node:assert/strict';
 import { createServer, type Server } from 'node:http';
 import type { AddressInfo } from 'node:net';
@@ -12,7 +12,7 @@ import { smallCloud } from '../formats/support/small-cloud.js';
 import { detailFolder } from '../support/detail-folder.js';
 
 const COUNT = 450_000;
-const MOST = { handheld: 400_000, computer: 1_500_000 };
+const MAX = { handheld: 400_000, computer: 1_500_000 };
 let server: Server;
 let base: string;
 
@@ -34,7 +34,7 @@ after(() => {
   server.close();
 });
 
-/** What a session loads, up to the upload, for which there is no GPU here. */
+/** The load of a session up to the upload, since there is no GPU here. */
 async function loaded(isHandheld: boolean): Promise<number> {
   const { matchMedia } = globalThis;
   globalThis.matchMedia = (() => ({ matches: isHandheld })) as unknown as typeof matchMedia;
@@ -62,6 +62,6 @@ async function loaded(isHandheld: boolean): Promise<number> {
 
 test('a headset or a phone shows the finest that 400,000 splats allow, a computer more', async () => {
   const handheld = await loaded(true);
-  assert.ok(handheld > 0.85 * MOST.handheld && handheld < 1.02 * MOST.handheld, `${handheld} splats`);
+  assert.ok(handheld > 0.85 * MAX.handheld && handheld < 1.02 * MAX.handheld, `${handheld} splats`);
   assert.equal(await loaded(false), COUNT);
 });

@@ -1,17 +1,13 @@
-/** What a frame of a session may take, by the rate of the headset, and how the size of what is drawn follows. */
+/** Time limits of a session's frame by the headset's rate, and the resulting size of the image. */
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
+import { ViewOrder } from '../../packages/element/dist/xr/view-order.js';
 import { XrLoop } from '../../packages/element/dist/xr/xr-session.js';
-
-class Layer {
-  readonly framebuffer = null;
-}
-Object.assign(globalThis, { XRWebGLLayer: Layer });
 
 function loopAt(frameRate: number | undefined): XrLoop {
   const session = { frameRate, updateRenderState: () => undefined, requestAnimationFrame: () => 0 };
   const guide = { background: [0, 0, 0, 1] as const, place: () => null };
-  return new XrLoop(session as never, { gl: {} as never, isOwn: true }, {} as never, guide);
+  return new XrLoop(session as never, {} as never, {} as never, guide);
 }
 
 for (const [rate, milliseconds] of [
@@ -36,3 +32,28 @@ for (const [rate, milliseconds] of [
     assert.equal(loop.scale, 1);
   });
 }
+
+test('one sort that was interrupted does not end orders by depth, and slow sorts do', (t) => {
+  // A sort takes the time from one reading of the clock to the next.
+  let [now, sortMs] = [0, 3];
+  t.mock.method(performance, 'now', () => (now += sortMs));
+  let orders = 0;
+  const scene = {
+    positions: Float32Array.from([0, 0, 1, 0, 0, 2]),
+    origin: [0, 0, 0],
+    renderer: { setOrder: () => orders++ },
+  };
+  const order = new ViewOrder(scene as never, false, () => assert.fail('a worker'));
+  let depth = 0;
+  const update = (milliseconds: number): boolean => {
+    sortMs = milliseconds;
+    const before = orders;
+    const worldToCamera = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, (depth += 0.1), 0, 0, 0, 1];
+    const camera = { ...{ worldToCamera, width: 8, height: 8, fx: 8, fy: 8, cx: 4, cy: 4, near: 0.1, far: 9 } };
+    order.update([camera as never]);
+    return orders > before;
+  };
+  for (const milliseconds of [3, 3, 80, 3, 3]) assert.equal(update(milliseconds), true, `${milliseconds} ms`);
+  for (let i = 0; i < 3; i++) update(20);
+  assert.ok(order.milliseconds > 8, `${order.milliseconds} ms`);
+});

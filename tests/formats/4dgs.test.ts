@@ -1,6 +1,5 @@
 /**
- * `.4dgs` files: every case of the format's conformance corpus is shown as its own decoder shows it, or refused with what is wrong with it.
- * tests/fixtures/4dgs/README.md says where the corpus is from.
+ * `.4dgs` files: every case of the format's conformance corpus is shown as its own decoder shows it, or refused with the fault's name. tests/fixtures/4dgs/README.md names the source of the corpus.
  */
 import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
@@ -66,8 +65,8 @@ function assertNear(found: Omit<Moment, 't'>, expected: Moment, where: string, t
   for (const key of ['opacity', 'position', 'color', 'scale', 'turn', 'sh'] as const)
     expected[key]?.forEach((value, k) => {
       const own = found[key]![k];
-      const most = tolerance * Math.max(1, expected.count, Math.abs(value));
-      assert.ok(Math.abs(own - value) <= most, `${where}: ${key} ${k}: ${own}, not ${value}`);
+      const max = tolerance * Math.max(1, expected.count, Math.abs(value));
+      assert.ok(Math.abs(own - value) <= max, `${where}: ${key} ${k}: ${own}, not ${value}`);
     });
 }
 
@@ -194,7 +193,7 @@ test('records that come too late, and an index that says something else, are ref
     assert.equal((await refusal(new Uint8Array(late), `late ${opcode}`)).code, 'decode/header');
   }
   const entries = records.filter(({ opcode }) => opcode === 0x08);
-  // Splats that the chunk says something of; splats that are there.
+  // Splats that the chunk describes; splats that exist.
   for (const [place, k] of [
     [32, 1],
     [60, 2],
@@ -205,6 +204,49 @@ test('records that come too late, and an index that says something else, are ref
     assert.equal(code, 'decode/header', message);
     assert.match(message, /index.*splats/s);
   }
+});
+
+/** A record with its opcode and its length. */
+function recordOf(opcode: number, content: Uint8Array): Buffer {
+  const head = Buffer.alloc(9);
+  head.writeUInt8(opcode);
+  head.writeBigUInt64LE(BigInt(content.length), 1);
+  return Buffer.concat([head, content]);
+}
+
+test('a table of many windows is read, and changes of nothing and days of nothing are refused at once', async () => {
+  const start = performance.now();
+  const source = fileOf('TenWindows-UseCrc');
+  const windows = recordsIn(source).find(({ opcode }) => opcode === 0x04)!;
+  const count = 150_000;
+  const table = Buffer.alloc(4 + 16 * count);
+  table.writeUInt32LE(count);
+  Buffer.from(source.subarray(windows.start + 13, windows.end)).copy(table, 4);
+  for (let k = 10; k < count; k++) {
+    table.writeDoubleLE(k * k * 1e-9, 4 + 16 * k);
+    table.writeDoubleLE(k * k * 1e-9 + 1, 12 + 16 * k);
+  }
+  const many = [source.subarray(0, windows.start), recordOf(0x04, table), source.subarray(windows.end)];
+  assert.ok((await FourDgsClip.open(new Uint8Array(Buffer.concat(many)), 'many')).index.frameCount > 0);
+
+  const keyed = fileOf('keyframe/KeyframeDeltaChurn-UseChunkIndex-UseCrc-UseStatistics');
+  const [keyframe, delta] = [0x05, 0x10].map((wanted) => recordsIn(keyed).find(({ opcode }) => opcode === wanted)!);
+  // The mode that refers to the chunk before.
+  keyed[delta.start + 29] = 1;
+  const without = Buffer.concat([keyed.subarray(0, keyframe.start), keyed.subarray(keyframe.end)]);
+  const orphan = await refusal(new Uint8Array(without), 'orphan');
+  assert.equal(orphan.code, 'decode/corrupt', orphan.message);
+  assert.match(orphan.message, /a reference to byte/);
+
+  const long = source.slice();
+  const view = new DataView(long.buffer);
+  // Two texts precede the duration in the header.
+  let at = recordsIn(source)[0].start + 9;
+  for (let k = 0; k < 2; k++) at += 4 + view.getUint32(at, true);
+  view.setFloat64(at, 999_999, true);
+  const { code, message } = await refusal(long, 'days');
+  assert.equal(code, 'out-of-memory/budget', message);
+  assert.ok(performance.now() - start < 5000, `${performance.now() - start} ms`);
 });
 
 test('no damage of a file ends otherwise than in a named error', async () => {

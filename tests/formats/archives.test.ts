@@ -52,6 +52,18 @@ test('archives with several scenes, and with sizes that deflate cannot reach, ar
   await expectRefusal(bomb, 'decode/corrupt', /a size that deflate can reach.*2,147,483,647/, { name: 'a.zip' });
 });
 
+test('inflating ends where the directory of an archive says that a file ends', async () => {
+  const content = Buffer.concat([ksplat, Buffer.alloc(1 << 25)]);
+  const zip = zipSync({ 'a.ksplat': content }, { level: 9 });
+  const directory = Buffer.from(zip).indexOf('PK\x01\x02', 0, 'latin1');
+  const view = new DataView(zip.buffer, zip.byteOffset);
+  view.setUint32(directory + 16, crc32(ksplat), true);
+  view.setUint32(directory + 24, ksplat.length, true);
+  // The data after the first 20 KB, which inflate to many megabytes, are damaged.
+  zip.fill(0xff, 20_000, directory);
+  await expectRefusal(zip, 'decode/corrupt', /an intact deflate stream, found more than \d+ bytes/, { name: 'a.zip' });
+});
+
 test('of what a training wrote the splats after most iterations are read, not the points that it began with', async () => {
   const written = [7, 9].map((seed) => {
     const cloud = smallCloud(4, 0, seed);
@@ -90,7 +102,7 @@ test('what archivers write beside and around files is passed over', async () => 
   assertSameCloud(await readScene(Buffer.concat([plain, comment]), { name: 'a.zip' }), direct);
 });
 
-/** The same archive with its one entry, its place and the directory told in 64 bits, and its sizes behind the content. */
+/** The same archive with its one entry, its place and the directory given in 64 bits, and its sizes behind the content. */
 function inZip64(content: Uint8Array, path: string, count = 1): Buffer {
   const deflated = deflateSync(content);
   const long = (...values: number[]): Buffer => Buffer.from(BigUint64Array.from(values, BigInt).buffer);
@@ -138,6 +150,16 @@ test('content that is not what was packed is refused by name', async () => {
     zip[start + at] ^= 1;
     await expectRefusal(zip, 'decode/corrupt', /scene\.ksplat.*CRC-32 [0-9a-f]{8}/, { name: 'a.zip' });
   }
+});
+
+test('content that is longer than the directory says is damage, not a lack of memory', async () => {
+  // Blocks without compression are copied as they are, which fails beyond the declared size.
+  const zip = zipSync({ 'scene.ksplat': deflateSync(new Uint8Array(5000), { level: 0 }) }, { level: 0 });
+  const view = new DataView(zip.buffer, zip.byteOffset);
+  const directory = Buffer.from(zip).indexOf('PK\x01\x02', 0, 'latin1');
+  view.setUint16(directory + 10, 8, true);
+  view.setUint32(directory + 24, 4000, true);
+  await expectRefusal(zip, 'decode/corrupt', /scene\.ksplat.*deflate/, { name: 'a.zip' });
 });
 
 test('encrypted files and compressions that are not deflate are refused by name', async () => {

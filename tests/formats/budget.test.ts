@@ -1,5 +1,5 @@
 /**
- * What a file costs is bounded by its bytes, however often it names the same thing: SECURITY.md gives the figures. Damaged bytes cannot show that; here references are multiplied.
+ * The cost of a file is bounded by its bytes, however often it names the same thing: SECURITY.md gives the figures. Damaged bytes cannot show that; here references are multiplied.
  * SECURITY.md: "A scene costs what it weighs", "Pages set their own limits".
  */
 import assert from 'node:assert/strict';
@@ -18,9 +18,12 @@ import { smallCloud } from './support/small-cloud.js';
 import { buildGltf, writeGlb } from './support/gltf-writer.js';
 
 const SCRIPT = fileURLToPath(new URL('./support/read-measured.ts', import.meta.url));
-/** What grows with references shows at the largest factor whose file is small enough, and at one where the file is next to nothing; the laboratory has those between. */
+/**
+ * Costs that grow with references show at the largest factor whose file is small enough, and at one with a tiny file;
+ * the laboratory tests factors between them.
+ */
 const FACTORS = [10, 1_000, 30_000, 1_000_000];
-/** Larger files are what they are for. */
+/** They are for larger files. */
 const MAX_FILE_BYTES = 8e6;
 /** The program and what its libraries take while they work, beyond the account of SECURITY.md. */
 const OWN_BYTES = 100e6;

@@ -1,5 +1,5 @@
 /**
- * Clips: what is read is what was written, splats come and go, and what an index says is checked before anything is made of it.
+ * Clips: the reader returns the written values, splats appear and disappear, and an index is checked before it is used.
  * SECURITY.md: "A scene costs what it weighs".
  */
 import assert from 'node:assert/strict';
@@ -34,19 +34,19 @@ const partsOf = (group: number): Promise<ClipPartContent[]> =>
     }),
   );
 
-/** Distance from each splat that can be seen to the nearest of another cloud that has its colour. */
+/** Distance from each splat that can be seen to the nearest of another cloud that has its color. */
 function farthest(from: GaussianCloud, to: GaussianCloud): number {
-  let most = 0;
+  let max = 0;
   for (let i = 0; i < from.count; i++) {
     if (from.opacities[i] < 0.05) continue;
-    let least = Infinity;
+    let min = Infinity;
     for (let k = 0; k < to.count; k++) {
       if (Math.abs(from.sh[3 * i] - to.sh[3 * k]) > 0.2 || to.opacities[k] === 0) continue;
-      least = Math.min(least, Math.hypot(...[0, 1, 2].map((a) => from.positions[3 * i + a] - to.positions[3 * k + a])));
+      min = Math.min(min, Math.hypot(...[0, 1, 2].map((a) => from.positions[3 * i + a] - to.positions[3 * k + a])));
     }
-    most = Math.max(most, least);
+    max = Math.max(max, min);
   }
-  return most;
+  return max;
 }
 
 test('the index says where groups and parts are', () => {
@@ -78,6 +78,22 @@ test('splats are followed though no frame says which they were, and are gone whe
     assert.ok(Math.abs(alive - sources[frame].count) <= 0.02 * sources[frame].count, `frame ${frame}: ${alive} splats`);
     const [lost, added] = [farthest(sources[frame], found), farthest(found, sources[frame])];
     assert.ok(lost < 0.05 && added < 0.05, `frame ${frame}: ${lost} and ${added} away`);
+  }
+});
+
+test('splats fade in and out by their lives, not by curves', async () => {
+  for (const [group, { first, frames }] of index.groups.entries()) {
+    const parts = await partsOf(group);
+    for (const { motion } of parts) {
+      assert.ok(motion.lives?.fades, 'a part has fades');
+      assert.ok(motion.parts.opacity.rank <= 1, `${motion.parts.opacity.rank} curves of opacities`);
+    }
+    for (let frame = 0; frame < frames; frame++) {
+      const found = clipFrame(parts, frame, 'a.gsv', new LoadBudget(1 << 24));
+      const sum = (cloud: GaussianCloud): number => cloud.opacities.reduce((all, opacity) => all + opacity, 0);
+      const [expected, seen] = [sum(sources[first + frame]), sum(found)];
+      assert.ok(Math.abs(seen - expected) < 0.01 * expected, `frame ${first + frame}: ${seen} of ${expected}`);
+    }
   }
 });
 
@@ -182,6 +198,16 @@ test('parts that say more than they hold, or hold more than they say, are refuse
       {},
       /^decode\/corrupt.*live/,
     ],
+    [
+      'version 2, without fades',
+      concat(
+        edited((_, own) => own.setUint32(0, 2, true)).subarray(0, lives + 4 * part.splats),
+        motion.subarray(lives + 8 * part.splats),
+      ),
+      {},
+      /^nothing$/,
+    ],
+    ['a version to come', edited((_, own) => own.setUint32(0, 4, true)), {}, /^decode\/unsupported.*2 or 3/],
     ['endless curves', edited((_, own) => own.setUint32(12, 2 ** 31, true)), {}, /^decode\/header.*curves/],
     ['other frames', edited((_, own) => own.setUint32(8, 2 ** 31, true)), {}, /^decode\/header.*frames/],
     ['other splats', edited((_, own) => own.setUint32(4, 2 ** 31, true)), {}, /^decode\/header/],

@@ -100,7 +100,7 @@ test('a fallback without an extension needs no decoder', async () => {
   assert.equal((await read(plain)).triangles, 1);
 });
 
-/** A UASTC image of 4096 x 4096 pixels: 16 MiB of zeros, of which Zstandard makes 521 bytes. */
+/** A UASTC image of 4096 x 4096 pixels: 16 MiB of zeros, which Zstandard compresses to 521 bytes. */
 function largeImage(small: Uint8Array): Uint8Array<ArrayBuffer> {
   const BLOCK = 2 ** 17;
   const blocks = Array.from({ length: 128 }, (_, i) => (i === 127 ? 1 : 0) | (1 << 1) | (BLOCK << 3));

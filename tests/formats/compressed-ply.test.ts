@@ -114,14 +114,14 @@ test('rotations: the two highest bits name the component of (w, x, y, z) that is
   );
 });
 
-test('colours: plain 0..1 with 12 chunk properties, between the bounds with 18; opacity 255 is 1', async () => {
+test('colors: plain 0..1 with 12 chunk properties, between the bounds with 18; opacity 255 is 1', async () => {
   const splats = [{ color: 0xff8000ff }, { color: 0x00000000 }];
   const plain = await readScene(writePly(compressed(splats)));
-  const colours = (sh: Float32Array) => Array.from(sh, (v) => 0.5 + 0.28209479177387814 * v);
-  near(colours(plain.sh), [1, 128 / 255, 0, 0, 0, 0]);
+  const colors = (sh: Float32Array) => Array.from(sh, (v) => 0.5 + 0.28209479177387814 * v);
+  near(colors(plain.sh), [1, 128 / 255, 0, 0, 0, 0]);
   assert.deepEqual([...plain.opacities], [1, 0]);
   const bounded = await readScene(writePly(compressed(splats, { ...BOUNDS, ...COLOR_BOUNDS })));
-  near(colours(bounded.sh), [1, (2 * 128) / 255, 0.25, -1, 0, 0.25]);
+  near(colors(bounded.sh), [1, (2 * 128) / 255, 0.25, -1, 0, 0.25]);
 });
 
 for (const [restCount, degree] of [

@@ -47,7 +47,7 @@ test('attributes that lie element by element', async () => {
   assertSameCloud(await read({ accessors: moved, bufferViews: [view] }, bytes), direct);
 });
 
-test('normalised integers', async () => {
+test('normalized integers', async () => {
   const rotation = primitive.attributes['KHR_gaussian_splatting:ROTATION'];
   const opacity = primitive.attributes['KHR_gaussian_splatting:OPACITY'];
   const floats = (k: number): Float32Array => {
@@ -113,10 +113,10 @@ function sparse(
 test('sparse accessors, over numbers and over zeros', async () => {
   const at = [1, 4, 8];
   const numbers = Float32Array.from({ length: 9 }, (_, k) => k + 1);
-  const colour = primitive.attributes['KHR_gaussian_splatting:SH_DEGREE_0_COEF_0'];
+  const color = primitive.attributes['KHR_gaussian_splatting:SH_DEGREE_0_COEF_0'];
   for (const indexType of [5121, 5123, 5125] as const) {
     for (const zeros of [false, true]) {
-      const { changed, bytes } = sparse(colour, at, numbers, indexType, zeros);
+      const { changed, bytes } = sparse(color, at, numbers, indexType, zeros);
       const { sh, positions } = await read(changed, bytes);
       const expected = direct.sh.slice();
       for (let i = 0; i < COUNT; i++) {
@@ -130,10 +130,10 @@ test('sparse accessors, over numbers and over zeros', async () => {
       assert.equal(largestDifference(positions, direct.positions), 0);
     }
   }
-  const wrong = (indices: readonly number[], zeros: boolean, k = colour) => sparse(k, indices, numbers, 5125, zeros);
+  const wrong = (indices: readonly number[], zeros: boolean, k = color) => sparse(k, indices, numbers, 5125, zeros);
   const beyond = wrong([1, 4, 9], false);
   await expectRefusal(file(beyond.changed, beyond.bytes), 'decode/corrupt', /sparse.*9/, options(beyond.bytes));
-  // Places must be in the file: they bound what is allocated.
+  // Places must be in the file: they bound the allocation.
   const nowhere = wrong(at, true, primitive.attributes.POSITION);
   await expectRefusal(file(nowhere.changed, nowhere.bytes), 'decode/unsupported', /bufferView/, options(nowhere.bytes));
   const short = wrong(at, false);

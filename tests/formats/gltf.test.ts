@@ -38,8 +38,8 @@ const transform = (m: readonly number[], s: readonly number[]): number[] => {
   return product(product(m, s), m, (row, column) => m[3 * column + row]);
 };
 
-/** Colour of a splat in a direction, before 0.5 is added. */
-const colour = ({ sh, shDegree }: GaussianCloud, i: number, direction: Vector3): number[] => {
+/** Color of a splat in a direction, before 0.5 is added. */
+const color = ({ sh, shDegree }: GaussianCloud, i: number, direction: Vector3): number[] => {
   const basis = shBasis(shDegree, direction);
   return [0, 1, 2].map((c) => basis.reduce((sum, y, k) => sum + y * sh[3 * basis.length * i + 3 * k + c], 0));
 };
@@ -62,7 +62,7 @@ for (const [what, node, linear] of [
   ['flattened askew', { matrix: [1, 1, 0, 0, 0, 0, 2, 0, 2, 2, 2, 0, 0, 0, 0, 1] }, [1, 0, 2, 1, 0, 2, 0, 2, 2]],
   ['sheared', { matrix: [1, 0, 0, 0, 0.5, 1, 0, 0, 0, 0.2, 2, 0, 4, 5, 6, 1] }, [1, 0.5, 0, 0, 1, 0.2, 0, 0, 2]],
 ] as const) {
-  test(`a node that is ${what} moves covariances and turns colours`, async () => {
+  test(`a node that is ${what} moves covariances and turns colors`, async () => {
     const cloud = smallCloud(12, 3, 5);
     const found = await read([[{ cloud }]], [{ children: [1] }, { mesh: 0, ...node }], [0]);
     const keepsShapes = what === 'turned and scaled alike' || what === 'mirrored';
@@ -77,15 +77,11 @@ for (const [what, node, linear] of [
         'covariance',
       );
       if (!keepsShapes) continue;
-      // What is seen in a turned direction is what was seen in the old one.
+      // The color in a turned direction equals the color in the original one.
       const d = random.direction();
       const size = Math.cbrt(Math.abs(determinant(toCloud)));
       const turned = [0, 1, 2].map((r) => [0, 1, 2].reduce((sum, k) => sum + (toCloud[3 * r + k] * d[k]) / size, 0));
-      assertAtMost(
-        largestDifference(colour(found, i, turned as unknown as Vector3), colour(cloud, i, d)),
-        1e-5,
-        'colour',
-      );
+      assertAtMost(largestDifference(color(found, i, turned as unknown as Vector3), color(cloud, i, d)), 1e-5, 'color');
     }
   });
 }
@@ -139,7 +135,7 @@ test('primitives of mixed degree and meshes in several places become one cloud',
   assertAtMost(Math.abs(found.positions[36] - (found.positions[0] - 10)), 1e-5, 'the second place');
 });
 
-test('drafts of the extension: other names, and opacities in the colours', async () => {
+test('drafts of the extension: other names, and opacities in the colors', async () => {
   const cloud = smallCloud(7, 0);
   const { json, buffer } = buildGltf([[{ cloud }]], [{ mesh: 0 }], [0]);
   const recent = await readScene(writeGlb(json, buffer), { name: 'a.glb' });
@@ -162,17 +158,17 @@ test('drafts of the extension: other names, and opacities in the colours', async
   };
   const file = writeGlb(copy as Record<string, unknown>, Buffer.concat([buffer, Buffer.from(rgba.buffer)]));
   const draft = await readScene(file, { name: 'a.glb' });
-  assertAtMost(largestDifference(draft.sh, recent.sh), 1e-6, 'colours');
+  assertAtMost(largestDifference(draft.sh, recent.sh), 1e-6, 'colors');
   assertSameCloud({ ...draft, sh: recent.sh }, recent);
 });
 
 test('SPZ inside is the same scene as the SPZ file', async () => {
-  // The extension names the frame, whatever the file's writer would have meant by itself.
+  // The extension names the frame, which overrides the writer's convention.
   const spz = writeSpz(rawSplats(9, 1), { version: 2, axes: [1, -1, -1] });
   const found = await read([[{ cloud: smallCloud(1, 0), spz }]], [{ mesh: 0 }], [0]);
   const direct = halfTurned(await readScene(spz, { name: 'a.spz' }));
   assertAtMost(largestDifference(found.positions, direct.positions), 1e-6, 'positions');
-  assertAtMost(largestDifference(found.sh, direct.sh), 1e-5, 'colours');
+  assertAtMost(largestDifference(found.sh, direct.sh), 1e-5, 'colors');
 });
 
 test('JSON with a buffer of its own, and with one written as text', async () => {

@@ -6,7 +6,7 @@ import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import fc from 'fast-check';
 import { needsSharedData, sharedFile } from '../support/data.js';
-import { assertHelpful, refusalOf } from './support/expect.js';
+import { assertHelpful, expectRefusal, refusalOf } from './support/expect.js';
 import { writePly } from './support/ply-writer.js';
 import { inriaColumns, rawSplats } from './support/splats.js';
 import { spzBody, writeSpz } from './support/spz-writer.js';
@@ -209,4 +209,31 @@ test('lists within lists within lists, where a description has something else, a
     assert.ok(error);
     assertHelpful(error, name);
   }
+});
+
+test('texts whose patterns could be matched in countless ways are read or refused at once', async () => {
+  const start = performance.now();
+  await expectRefusal(Buffer.from(`${'<!---->'.repeat(140)}x`), 'decode/unknown-format', /a text: "<!---->/);
+  const spaces = '\xa0'.repeat(200_000);
+  for (const comment of [
+    `sortmethod${spaces}a b`,
+    `antialiased${spaces}a b`,
+    `filter_variance${spaces}a b`,
+    `vertical axis:${spaces}\r.`,
+    `vertical axis: ${'1,'.repeat(100_000)}`,
+  ]) {
+    const file = writePly([{ name: 'vertex', columns }], { headerLines: [`comment ${comment}`] });
+    assert.equal(await refusalOf(file, { name: 'a.ply' }), undefined, comment.slice(0, 20));
+  }
+  const openFile = async (): Promise<Uint8Array> => Buffer.from('{"asset":{"version":"2.0"}}');
+  for (const [length, sentence] of [
+    [2_000, /1 tiles without/],
+    [200_000, /addresses of at most 2,048 characters/],
+  ] as const) {
+    const uri = `${'a'.repeat(length)}/b.glb`;
+    const tileset = { asset: { version: '1.1' }, geometricError: 1, root: { content: { uri } } };
+    const error = await refusalOf(Buffer.from(JSON.stringify(tileset)), { name: 'tileset.json', openFile });
+    assert.match(error?.message ?? '', sentence);
+  }
+  assert.ok(performance.now() - start < 2000, `${performance.now() - start} ms`);
 });

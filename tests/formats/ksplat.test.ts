@@ -12,9 +12,9 @@ import { writeKsplat } from './support/ksplat-writer.js';
 import { smallCloud } from './support/small-cloud.js';
 
 const BOUNDS = [
-  { position: 0, scale: 0, rotation: 1e-6, colour: 0.5 / 255 / 0.28 },
-  { position: 1e-4, scale: 2e-4, rotation: 1e-6, colour: 0.5 / 255 / 0.28 },
-  { position: 1e-4, scale: 2e-4, rotation: 1e-6, colour: 1.5 / 255 / 0.28 },
+  { position: 0, scale: 0, rotation: 1e-6, color: 0.5 / 255 / 0.28 },
+  { position: 1e-4, scale: 2e-4, rotation: 1e-6, color: 0.5 / 255 / 0.28 },
+  { position: 1e-4, scale: 2e-4, rotation: 1e-6, color: 1.5 / 255 / 0.28 },
 ] as const;
 
 for (const level of [0, 1, 2] as const) {
@@ -28,7 +28,7 @@ for (const level of [0, 1, 2] as const) {
       assertAtMost(largestDifference(read.scales, cloud.scales), bound.scale, 'scales');
       assertAtMost(largestRotationError(read, cloud), bound.rotation, 'rotations');
       assertAtMost(largestDifference(read.opacities, cloud.opacities), 0.51 / 255, 'opacities');
-      assertAtMost(largestDifference(read.sh, cloud.sh), bound.colour, 'colours');
+      assertAtMost(largestDifference(read.sh, cloud.sh), bound.color, 'colors');
     });
   }
 }

@@ -1,4 +1,4 @@
-/** What of a file is not drawn is said: by a warning with counts, or an error where nothing sensible is left. Files that are known but not read are named for what they are. */
+/** Dropped parts of a file are reported: by a warning with counts, or an error if no usable part is left. Unsupported formats are named. */
 import assert from 'node:assert/strict';
 import { readdirSync, readFileSync } from 'node:fs';
 import { test } from 'node:test';
@@ -20,7 +20,7 @@ const column = (name: string, count: number, value = 0): PlyColumn => ({
   values: new Array<number>(count).fill(value),
 });
 
-/** A PLY of 100 splats of which the first so many have a value that cannot be drawn. */
+/** A PLY of 100 splats whose first splats, by a count, have a value that cannot be drawn. */
 function spoiled(count: number, property: string, value: number): Uint8Array {
   const columns = inriaColumns(rawSplats(100, 0)).map((own) =>
     own.name === property ? { ...own, values: [...own.values].map((v, i) => (i < count ? value : Number(v))) } : own,
@@ -54,7 +54,7 @@ test('triangles beside splats, in PLY and glTF', async () => {
   const [mesh] = json.meshes as { primitives: object[] }[];
   const meshes = [{ primitives: [...mesh.primitives, { attributes: { POSITION: 0 } }] }];
   const extensionsUsed = ['KHR_gaussian_splatting', 'KHR_lights_punctual', 'EXT_splat_motion'];
-  // The file's meshes are told of in a hint: who draws them, as the element does, leaves out nothing.
+  // A hint reports the file's meshes: callers that draw them, as the element does, omit nothing.
   const both = await readScene(glb({ meshes, extensionsUsed }), { name: 'a.glb' });
   assert.deepEqual([both.hints?.meshes, both.warnings ?? []], [true, []]);
   assert.match((await warningsOf(glb({ animations: [{}] }), 'a.glb'))[0], /^1 animations are left out for splats/);
@@ -66,7 +66,7 @@ test('properties of splats that are not known are named; those that change nothi
   const read = (...names: string[]): Promise<readonly string[]> =>
     warningsOf(writePly([{ name: 'vertex', columns: [...plain, ...names.map((name) => column(name, 5))] }]));
   assert.deepEqual(await read('obj_dc_0', 'semantic_id', 'label'), []);
-  assert.match((await read('t', 'scale_t', 'motion'))[0], /left out: t, scale_t, motion\. If they move or recolour/);
+  assert.match((await read('t', 'scale_t', 'motion'))[0], /left out: t, scale_t, motion\. If they move or recolor/);
   assert.match((await warningsOf(writePly([{ name: 'vertex', columns: plain }]), 'x/offset.ply'))[0], /LAM/);
 });
 
@@ -79,7 +79,7 @@ test('degree 4 and extensions of SPZ', async () => {
   const record = new Uint8Array(new Uint32Array([0x12345678, 4, 0]).buffer);
   const splats = rawSplats(5, 0);
   assert.deepEqual(await warningsOf(writeSpz(splats, { version: 4, extensions: record }), 'a.spz'), [
-    'The SPZ extension 0x12345678 is not known and is left out.',
+    'The SPZ extension 0x12345678 is left out.',
   ]);
 });
 
@@ -126,7 +126,7 @@ test('extensions that a glTF requires are named, with what to do', async () => {
   }
 });
 
-/** Each case of the review of formats: read, with what it says of itself, or refused by its right name. */
+/** Each case of the review of formats: read, with its metadata, or refused by its right name. */
 const CASES: Readonly<Record<string, RegExp>> = {
   'axes-source.ply': /^3 splats classic$/,
   'glb-3.7.0-right.glb': /^3 splats classic$/,
@@ -141,7 +141,7 @@ const CASES: Readonly<Record<string, RegExp>> = {
   'tileset.json': /decode\/unsupported.*0\/0\.glb: expected a way to open the other files/,
   'up-nerfstudio-z.ply': /^\d+ splats classic up 0 0 1$/,
 };
-/** Those of the third review; opacities and the first position that their source has. */
+/** Cases of the third review; opacities and the first position that their source has. */
 const LATER_CASES: Readonly<Record<string, RegExp>> = {
   'activated.ply': /^60 splats classic No scale_/,
   'axes-source.ply': /^3 splats classic$/,
@@ -176,7 +176,7 @@ for (const [folder, cases] of [
         error instanceof GaussianSplatError ? `${error.code} ${error.message}` : String(error),
       );
       context.diagnostic(`${file}: ${found}`);
-      // What comes later must at least be told.
+      // Later parts must at least be reported.
       assert.match(found, cases[file] ?? /^\d+ splats|decode\/(unsupported|not-splats)/, file);
     }
   });

@@ -1,4 +1,4 @@
-/** Streamed SOG box by box: which files are fetched, how often, and what is kept of them. */
+/** Streamed SOG box by box: which files are fetched, how often, and which of them are cached. */
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { setImmediate as turn } from 'node:timers/promises';
@@ -14,11 +14,11 @@ const sky = smallCloud(7, 0, 3);
 const folder = lodFolder(cloud, { levels: 3, boxes: 4, environment: sky });
 const INDEX = 'https://lod.test/a%20b/lod-meta.json';
 
-/** A server of a folder that notes what it is asked for. */
+/** A server of a folder that records its requests. */
 class Server {
   readonly log: string[] = [];
   readonly signals: AbortSignal[] = [];
-  /** What answers wait for. */
+  /** Promises that answers wait for. */
   waits: Promise<void> = Promise.resolve();
   readonly #folder: LodFolder;
 
@@ -153,7 +153,7 @@ test('a run is the part of its file, and runs that are asked for together share 
   const again = await files.read(runs[2], server.fetch);
   assertSameCloud(again, found[2]);
   assert.equal(server.described.length, 1, 'kept');
-  // What is kept is not what was handed out.
+  // Cached arrays are not those that were returned.
   again.positions.fill(NaN);
   assertSameCloud(await files.read(runs[2], server.fetch), found[2]);
 });

@@ -1,4 +1,4 @@
-/** What files say beside their numbers, and what tells that their numbers are no plain splats'. */
+/** Metadata of files beside their splats, and signs that their numbers are not a plain splat's. */
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { encodingsFor } from '@gaussian-splat/economise';
@@ -109,7 +109,7 @@ function glbWith(
 
 const scaleCases: readonly [string, readonly number[], readonly number[]][] = [
   ['splat-transform 2.3.1', [-1, -2, -3, -1, 1, 0], [-1, -2, -3, -1, 1, 0].map(Math.exp)],
-  // No scale below 0: the version tells.
+  // No scale is below 0: the version decides.
   ['splat-transform 1.10.1', [1, 2, 3, 1, 1, 0.5], [1, 2, 3, 1, 1, 0.5].map(Math.exp)],
   ['splat-transform 2.5.0', [1, 2, 3, -1, -1, -1], [1, 2, 3, -1, -1, -1].map(Math.exp)],
   ['splat-transform v3.7.0', [1, 2, 3, 1, 1, 1], [1, 2, 3, 1, 1, 1]],
@@ -162,7 +162,7 @@ test('linear colors of a GLB are encoded as sRGB, and the cloud says so', async 
   assert.match(warnings!.join(), /Colors are linear/);
 });
 
-/** A PLY of so many splats whose scales and opacities are as given, and the element color_space of SHARP. */
+/** A PLY with a number of splats whose scales and opacities are as given, and the element color_space of SHARP. */
 function sharpLike(
   opacities: PlyColumn,
   logScale: number,
@@ -199,7 +199,7 @@ test('a PLY with numbers that look activated says so, and only such a one', asyn
     ),
     '',
   );
-  // Of so few, all may be so by chance.
+  // All values may match by chance if splats are few.
   assert.equal(
     await warningsOf(
       sharpLike(

@@ -1,4 +1,4 @@
-/** Files of motion: frames come back as near as their steps say, and whatever else is in a file ends in a named error. */
+/** Files of motion: frames come back as near as their steps say, and all other contents of a file end in a named error. */
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { constants, deflateRawSync, inflateRawSync } from 'node:zlib';
@@ -13,7 +13,7 @@ const deflate = (bytes: Uint8Array): Uint8Array => deflateRawSync(bytes, { finis
 const FRAMES = 12;
 const name = 'motion.bin';
 
-/** Splats that turn about the middle, pulse, fade and change colour, by another curve each. */
+/** Splats that turn about the middle, pulse, fade and change color, by another curve each. */
 function frameOf(first: GaussianCloud, frame: number): GaussianCloud {
   const share = (frame + 1) / FRAMES;
   const angle = 2.5 * share;
@@ -63,10 +63,10 @@ test('each attribute of each frame is as near as its step', async () => {
   for (const [frame, asked] of frames.entries()) {
     const found = applyMotion(first, motion, frame, name, budget());
     const far = (a: Float32Array, b: Float32Array): number =>
-      a.reduce((most, value, i) => Math.max(most, Math.abs(value - b[i])), 0);
+      a.reduce((max, value, i) => Math.max(max, Math.abs(value - b[i])), 0);
     assert.ok(far(found.positions, asked.positions) < 6 * STEPS.position, `positions of ${frame}`);
     assert.ok(far(found.opacities, asked.opacities) < 6 * STEPS.opacity, `opacities of ${frame}`);
-    assert.ok(far(found.sh, asked.sh) < 6 * STEPS.color, `colours of ${frame}`);
+    assert.ok(far(found.sh, asked.sh) < 6 * STEPS.color, `colors of ${frame}`);
     for (let i = 0; i < first.count; i++) {
       const [own, other] = [covariance(found, i), covariance(asked, i)];
       const size = Math.max(...other);

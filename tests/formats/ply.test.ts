@@ -125,6 +125,17 @@ test('tags of trainers set antialiased', async () => {
   assert.equal(await read('comment not antialiased 1'), false);
 });
 
+test('long comments are searched in linear time', async () => {
+  // Expressions match this space of Latin-1, at which words are not separated.
+  const tags = ['sort_method', 'antialiased', 'filter_variance'];
+  const headerLines = tags.map((tag) => `comment ${tag}${'\u00a0'.repeat(40_000)}1 1`);
+  const file = writePly([{ name: 'vertex', columns: inriaColumns(rawSplats(4, 0)) }], { headerLines });
+  const start = process.cpuUsage();
+  assert.equal((await readScene(file, { name: 'a.ply' })).count, 4);
+  const { user } = process.cpuUsage(start);
+  assert.ok(user < 1e6, `${user / 1e3} ms`);
+});
+
 test('a tag of trainers that order splats pixel by pixel', async () => {
   const columns = inriaColumns(rawSplats(1, 0));
   const read = async (line: string) =>
@@ -148,7 +159,7 @@ test('2D Gaussians without scale_2 are flat discs', async () => {
   assert.match(cloud.warnings?.join() ?? '', /2DGS/, 'they are drawn otherwise than trained');
 });
 
-test('plain colours become the constant coefficient', async () => {
+test('plain colors become the constant coefficient', async () => {
   const splats = rawSplats(2, 0);
   const plain = (type: PlyType, white: number): PlyColumn[] =>
     ['red', 'green', 'blue'].map((name, k) => ({ name, type, values: [white, k === 1 ? white : 0] }));
@@ -159,8 +170,8 @@ test('plain colours become the constant coefficient', async () => {
   ] as const) {
     const columns = inriaColumns(splats).filter(({ name }) => !name.startsWith('f_dc'));
     const { sh } = await readScene(writePly([{ name: 'vertex', columns: [...columns, ...plain(type, white)] }]));
-    const colours = Array.from(sh, (value) => 0.5 + 0.28209479177387814 * value);
-    assertAtMost(largestDifference(colours, [1, 1, 1, 0, 1, 0]), 1e-6, type);
+    const colors = Array.from(sh, (value) => 0.5 + 0.28209479177387814 * value);
+    assertAtMost(largestDifference(colors, [1, 1, 1, 0, 1, 0]), 1e-6, type);
   }
 });
 

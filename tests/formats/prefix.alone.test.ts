@@ -1,12 +1,14 @@
-/** Files that are still arriving: what is there is read, and it is the same as in the whole file. */
+/** Files that are still arriving: the received part is read, and equals the same part of the whole file. */
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { gzipSync } from 'node:zlib';
 import { shCoefficientCount } from '@gaussian-splat/core';
+import { encodingsFor } from '@gaussian-splat/economise';
 import { readPrefix, readScene } from '@gaussian-splat/formats';
 import { needsSharedData, sharedFile } from '../support/data.js';
 import { assertAtMost, assertSameNumbers } from './support/expect.js';
 import { writePly } from './support/ply-writer.js';
+import { smallCloud } from './support/small-cloud.js';
 import { inriaColumns, rawSplats } from './support/splats.js';
 
 const HALF = 0.5;
@@ -20,13 +22,13 @@ const FILES: readonly [file: string, share: number, splats: [number, number], de
   ['formats/playbot3.niantic-v4.spz', 0.95, [31_000, 31_000], 0],
 ];
 
-for (const [name, share, [least, most], degree] of FILES) {
+for (const [name, share, [min, max], degree] of FILES) {
   test(`${name}, the first ${100 * share} %`, { skip: needsSharedData }, async () => {
     const file = sharedFile(name);
     const whole = await readScene(file, { name });
     const part = await readPrefix(file.subarray(0, Math.floor(share * file.length)), { name });
     assert.ok(part, 'there are splats');
-    assert.ok(part.count >= least && part.count <= most, `${part.count} splats`);
+    assert.ok(part.count >= min && part.count <= max, `${part.count} splats`);
     assert.equal(part.shDegree, degree);
     assertSameNumbers(part.positions, whole.positions.subarray(0, 3 * part.count), 'positions');
     assertSameNumbers(part.opacities, whole.opacities.subarray(0, part.count), 'opacities');
@@ -35,9 +37,21 @@ for (const [name, share, [least, most], degree] of FILES) {
       { length: own * part.count },
       (_, k) => whole.sh[stride * Math.floor(k / own) + (k % own)],
     );
-    assertSameNumbers(part.sh, expected, 'colours');
+    assertSameNumbers(part.sh, expected, 'colors');
   });
 }
+
+test('the beginning of an SPZ of economise has the axes that the end of the file declares', async () => {
+  const cloud = smallCloud(3000, 3);
+  const [encoding] = encodingsFor('a.spz', cloud);
+  const file = await encoding.write({ cloud, degrees: new Uint8Array(cloud.count).fill(3) });
+  const whole = await readScene(file, { name: 'a.spz' });
+  assertAtMost(Math.abs(whole.positions[1] - cloud.positions[1]), 1e-4, 'the height of the first splat');
+  const part = await readPrefix(file.subarray(0, Math.floor(0.9 * file.length)), { name: 'a.spz' });
+  assert.ok(part, 'there are splats');
+  assertSameNumbers(part.positions, whole.positions, 'positions');
+  assertSameNumbers(part.rotations, whole.rotations, 'rotations');
+});
 
 test(
   'too little to show, and formats that cannot be read in part, give nothing',

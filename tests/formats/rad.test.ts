@@ -1,9 +1,10 @@
 /** RAD, the format of Spark: `npm run lab:tools` holds it against Spark's own decoder. */
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
+import { zipSync } from 'fflate';
 import { detectFormat, readScene } from '@gaussian-splat/formats';
 import type { GaussianCloud } from '@gaussian-splat/core';
-import { expectRefusal } from './support/expect.js';
+import { assertSameCloud, expectRefusal } from './support/expect.js';
 import { writeRad, type RadOptions } from './support/rad-writer.js';
 import { smallCloud } from './support/small-cloud.js';
 
@@ -16,7 +17,7 @@ function assertNear(found: ArrayLike<number>, expected: ArrayLike<number>, toler
     assert.ok(Math.abs(found[k] - expected[k]) <= tolerance, `${what} ${k}: ${found[k]} for ${expected[k]}`);
 }
 
-/** Of quaternions either sign will do. */
+/** Either sign of a quaternion is right. */
 const signed = ({ rotations }: GaussianCloud): Float32Array =>
   rotations.map((value, k) => value * Math.sign(rotations[4 * Math.floor(k / 4)]));
 
@@ -40,6 +41,12 @@ for (const [name, options] of Object.entries(EXACT)) {
     assertNear(found.sh, cloud.sh, 1e-6, 'harmonics');
   });
 }
+
+test('an archive of a file and of the chunks beside it is that scene', async () => {
+  const files = writeRad(smallCloud(50, 1), { chunkSize: 16, isSplit: true, isExact: true });
+  const zip = zipSync(Object.fromEntries(Object.entries(files).map(([path, bytes]) => [`a/${path}`, bytes])));
+  assertSameCloud(await readScene(zip, { name: 'a.zip' }), await read(files));
+});
 
 test('the encodings that Spark chooses are read within their steps', async () => {
   const cloud = smallCloud(50, 2);
@@ -84,8 +91,24 @@ test('what is wrong with a RAD is said', async () => {
   await expectRefusal(bytes.subarray(0, -100), 'decode/truncated', /chunks\[0\]/, { name: 'a.rad' });
   await expectRefusal(changed('gsplat', 'points'), 'decode/unsupported', /type gsplat/, { name: 'a.rad' });
   await expectRefusal(changed('"r8"', '"q8"'), 'decode/unsupported', /alpha.*known encoding.*q8/, { name: 'a.rad' });
-  await expectRefusal(changed('"center"', '"centre"'), 'decode/header', /property center/, { name: 'a.rad' });
+  await expectRefusal(changed('"center"', '"middle"'), 'decode/header', /property center/, { name: 'a.rad' });
   await expectRefusal(changed('"shCodeCount":4', '"shCodeCount":3'), 'decode/corrupt', /deflate stream of \d+ bytes/, {
     name: 'a.rad',
   });
+});
+
+test('a chunk in another file is charged for each reference to it', async () => {
+  const part = (signature: string, json: object, more: number): Uint8Array => {
+    const text = Buffer.from(JSON.stringify(json));
+    const bytes = Buffer.alloc(8 + 8 * Math.ceil(text.length / 8) + more);
+    bytes.write(signature, 'latin1');
+    bytes.writeUInt32LE(text.length, 4);
+    text.copy(bytes, 8);
+    return new Uint8Array(bytes);
+  };
+  const chunk = part('RADC', { version: 1, count: 0, properties: [] }, 1 << 20);
+  const chunks = Array.from({ length: 500 }, () => ({ filename: 'chunk.radc' }));
+  const index = part('RAD0', { version: 1, type: 'gsplat', chunks }, 0);
+  const openFile = (): Promise<Uint8Array> => Promise.resolve(chunk);
+  await expectRefusal(index, 'out-of-memory/budget', /at most [\d,]+ bytes/, { name: 'a.rad', openFile });
 });

@@ -63,7 +63,7 @@ describe('one captured scene in seven files', { skip: needsSharedData }, () => {
     assert.deepEqual([compressed.count, compressed.shDegree, compressed.droppedCount], [31_000, 2, 0]);
     const pairs = matchByPosition(compressed, ply);
     const share = pairs.filter(([a, b]) => isCounterpart(compressed, a, ply, b)).length / pairs.length;
-    // Where several splats lie within one step of the position, the nearest need not be the same.
+    // If several splats lie within one step of the position, the nearest need not be the same.
     assert.ok(share > 0.97, `${share} of the splats are where and as they were`);
   });
 });
@@ -76,7 +76,7 @@ function assertScales(spz: GaussianCloud, ply: GaussianCloud): void {
 
 /**
  * Half a step, with values clamped to the format's range: constant terms ±1/0.3 in 255 steps, others -1..127/128 in
- * steps of 1/128, of which Niantic's packer keeps 5 bits for degree 1 and 4 bits above.
+ * steps of 1/128, and Niantic's packer keeps 5 bits for degree 1 and 4 bits above.
  */
 function assertColors(spz: GaussianCloud, ply: GaussianCloud): void {
   for (let k = 0; k < 9; k++) {
@@ -176,7 +176,7 @@ describe('other real files', { skip: needsSharedData }, () => {
     assertAtMost(largestDifference(ksplat.positions, splat.positions), 0, 'positions');
     assertAtMost(largestDifference(ksplat.scales, splat.scales), 0, 'scales');
     assertAtMost(largestDifference(ksplat.opacities, splat.opacities), 0, 'opacities');
-    assertAtMost(largestDifference(ksplat.sh, splat.sh), 0, 'colours');
+    assertAtMost(largestDifference(ksplat.sh, splat.sh), 0, 'colors');
   });
 
   test('bytes after the last splat are left alone', async () => {

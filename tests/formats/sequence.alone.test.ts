@@ -91,6 +91,8 @@ test('manifests that say nothing sensible are refused by name', async () => {
     [manifest({ frames: '{1}.spz', count: 1e9 }), /count: expected 1 to/],
     [manifest({ frames: `{${'0'.repeat(16)}}.spz`, count: 9 }), /frames: expected at most 15 digits/],
     [manifest({ frames: ['a.spz'], framesPerSecond: 0 }), /framesPerSecond/],
+    [manifest({ frames: [`${'./'.repeat(2_000)}a.spz`] }), /frames: expected paths of at most 2,048 characters/],
+    [manifest({ frames: `${'./'.repeat(2_000)}{1}.spz`, count: 9 }), /at most 2,048 characters/],
     [text({ gaussianSplatSequence: 3 }), /version 1 or 2/],
   ];
   for (const [bytes, message] of cases) assert.throws(() => parseSequence(bytes, 'a.json'), message);

@@ -1,4 +1,4 @@
-/** Scenes of several files on servers that let nobody in without the right query. */
+/** Scenes of several files on servers that refuse requests without the right query. */
 import assert from 'node:assert/strict';
 import { createServer } from 'node:http';
 import type { AddressInfo } from 'node:net';

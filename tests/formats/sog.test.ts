@@ -1,6 +1,7 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { zipSync } from 'fflate';
+import { writeSog as writeBundle } from '@gaussian-splat/economise';
 import { readScene } from '@gaussian-splat/formats';
 import {
   assertAtMost,
@@ -12,6 +13,7 @@ import {
 } from './support/expect.js';
 import { smallCloud } from './support/small-cloud.js';
 import { writeSog, writeSogV1, type SogFiles } from './support/sog-writer.js';
+import { writeWebp } from './support/webp-writer.js';
 
 const cloud = smallCloud(300, 2);
 const bundle = (files: SogFiles): Uint8Array => zipSync(files, { level: 6 });
@@ -27,11 +29,24 @@ test('version 2, bundle and folder, give every attribute to the bits of the form
   assertAtMost(largestDifference(read.positions, cloud.positions), (2 * Math.log(3) * 1.5) / 65_535, 'positions');
   assertAtMost(largestRotationError(read, cloud), 3e-5, 'rotations');
   assertAtMost(largestDifference(read.opacities, cloud.opacities), 0.5 / 255 + 1e-6, 'opacities');
-  assertAtMost(largestDifference(read.sh, cloud.sh), 0.02, 'colours');
+  assertAtMost(largestDifference(read.sh, cloud.sh), 0.02, 'colors');
   const logs = (values: Float32Array): number[] => Array.from(values, Math.log);
   assertAtMost(largestDifference(logs(read.scales), logs(cloud.scales)), 0.1, 'logarithms of scales');
   const unpacked = await readScene(files['meta.json'], { name: 'meta.json', openFile: folder(files) });
   assert.deepEqual(unpacked, read);
+});
+
+test('flat splats remain flat in a SOG of economise', async () => {
+  const scales = cloud.scales.map((scale, k) => (k % 3 === 2 ? 0 : scale));
+  const steps = { place: 1, size: 1e-3, turn: 1, opacity: 1, color: 1e-3, harmonics: 1e-3 };
+  const encodeWebp = async (rgba: Uint8ClampedArray, width: number, height: number): Promise<Uint8Array> =>
+    writeWebp(new Uint8Array(rgba), width, height);
+  const file = await writeBundle({ ...cloud, scales }, { steps, palette: 64, encodeWebp });
+  const read = await readScene(file, { name: 'a.sog' });
+  for (let i = 0; i < read.count; i++) {
+    const [a, b, c] = read.scales.subarray(3 * i, 3 * i + 3);
+    assertAtMost(c / Math.max(a, b), 1.1e-4, `thickness of splat ${i}`);
+  }
 });
 
 test('version 1 gives every attribute to the bits of the format', async () => {
@@ -40,7 +55,7 @@ test('version 1 gives every attribute to the bits of the format', async () => {
   assert.deepEqual([read.count, read.shDegree], [300, 0]);
   assertAtMost(largestRotationError(read, cloud), 3e-5, 'rotations');
   assertAtMost(largestDifference(read.opacities, cloud.opacities), 0.01, 'opacities');
-  assertAtMost(largestDifference(read.sh, coefficient(cloud, 0)), 0.5 * (2 / 255) + 1e-5, 'colours');
+  assertAtMost(largestDifference(read.sh, coefficient(cloud, 0)), 0.5 * (2 / 255) + 1e-5, 'colors');
 });
 
 test('a codebook without its first entry, as early tools wrote it, goes on one step below the second', async () => {
@@ -111,7 +126,7 @@ function lossy(): Uint8Array {
   return new Uint8Array(Buffer.from('RIFF\x16\0\0\0WEBPVP8 \x0a\0\0\0\0\0\0\0\0\0\0\0\0\0', 'latin1'));
 }
 
-/** Announces 16384 x 16384 pixels of one colour, for which no bits are needed. */
+/** Announces 16384 x 16384 pixels of one color, which needs no bits. */
 function huge(): Uint8Array {
   return new Uint8Array(
     Buffer.from('RIFF\x20\0\0\0WEBPVP8L\x10\0\0\0\x2f\xff\xff\xff\x1f\0\0\0\0\0\0\0\0\0\0\0', 'latin1'),

@@ -1,4 +1,4 @@
-/** Reading a scene a few splats at a time, as threads do that share the work: all of them together are what is read at once. */
+/** Reading a scene a few splats at a time, as threads do that divide the work: together they equal a single read. */
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import type { GaussianCloud } from '@gaussian-splat/core';
@@ -69,6 +69,12 @@ test('glTF whose primitives differ in degree, in several places', async () => {
   ];
   const { json, buffer } = buildGltf([[{ cloud: a }, { cloud: b }], [{ cloud: c }]], nodes, [0, 1, 2]);
   await assertSameInRanges(writeGlb(json, buffer), 'a.glb', [40, 11, 5, 1]);
+});
+
+test('glTF of drafts, whose attributes have other names', async () => {
+  const { json, buffer } = buildGltf([[{ cloud: smallCloud(9, 2) }]], [{ mesh: 0 }], [0]);
+  const draft = JSON.parse(JSON.stringify(json).replaceAll('KHR_gaussian_splatting:', '_')) as Record<string, unknown>;
+  await assertSameInRanges(writeGlb(draft, buffer), 'a.glb', [5, 1]);
 });
 
 test('what must be read whole is said to', async () => {

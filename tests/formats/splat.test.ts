@@ -28,10 +28,10 @@ test('every value arrives', async () => {
   assert.equal(cloud.shDegree, 0);
   assert.equal(largestDifference(cloud.positions, splats.positions.flat()), 0);
   assertAtMost(largestDifference(cloud.scales, splats.logScales.flat().map(Math.exp)), 3e-7, 'scales');
-  assertAtMost(largestDifference(cloud.sh, splats.sh.flat(2)), 0.5 / 255 / 0.28209479177387814 + 1e-6, 'colours');
+  assertAtMost(largestDifference(cloud.sh, splats.sh.flat(2)), 0.5 / 255 / 0.28209479177387814 + 1e-6, 'colors');
   const opacities = splats.logits.map((logit) => 1 / (1 + Math.exp(-logit)));
   assertAtMost(largestDifference(cloud.opacities, opacities), 0.5 / 255 + 1e-6, 'opacities');
-  assertAtMost(largestDifference(cloud.rotations, splats.rotations.flat()), 0.02, '8 bits, normalised');
+  assertAtMost(largestDifference(cloud.rotations, splats.rotations.flat()), 0.02, '8 bits, normalized');
 });
 
 test('the same bytes at an odd address give the same cloud', async () => {
@@ -81,7 +81,7 @@ test('its first bytes may be those of a text, of gzip or of anything else', asyn
   for (const first of ['[0', '{"', '[-', '<a ', '\x1f\x8b', 'GIF8', '%PDF', '<htm']) {
     const one = file.slice();
     for (let k = 0; k < first.length; k++) one[k] = first.charCodeAt(k);
-    // A number that a centre may be.
+    // A number that a center may be.
     one[3] = 0x3f;
     assert.equal(detectFormat(one, 'a.splat'), 'splat', JSON.stringify(first));
     assert.equal((await readScene(one, { name: 'a.splat' })).count, 20);

@@ -11,7 +11,7 @@ import { writePly } from './support/ply-writer.js';
 import { activated, inriaColumns, rawSplats, type RawSplats } from './support/splats.js';
 
 const VERSIONS = [1, 2, 3, 4] as const;
-/** 1 - |dot| that the quantisation of rotations costs at most: 8 bits, or 9 bits of magnitude. */
+/** 1 - |dot| that the quantization of rotations costs at most: 8 bits, or 9 bits of magnitude. */
 const ROTATION_BOUND = { 1: 1e-2, 2: 1e-2, 3: 4e-6, 4: 4e-6 };
 
 function assertHolds(cloud: GaussianCloud, splats: RawSplats, version: 1 | 2 | 3 | 4): void {
@@ -99,7 +99,7 @@ test('the marks of writers decide the frame of files that name none, which the c
   assert.equal(cloud.hints?.isUpAssumed, undefined);
 });
 
-test('extensions are skipped, save the one that names the coordinate system', async () => {
+test('the coordinate system is found among other extensions', async () => {
   const splats = rawSplats(20, 3);
   const other = extensionRecord(0xadbe0002, new Uint8Array(12));
   const system = (value: number) => extensionRecord(0xadbe0003, Uint8Array.of(value, 0, 0, 0));
@@ -160,7 +160,7 @@ test('what stands behind the splats is left alone, unless the header may name th
     for (const tail of [new Uint8Array(1), Uint8Array.of(10, 20, 30), new Uint8Array(1000), new Uint8Array(65_536)]) {
       for (const file of behind(version, tail)) assertHolds(await readScene(file), splats, version);
     }
-    // Nobody pads with so much; it is inflated no further.
+    // No writer pads as much; inflating stops there.
     for (const file of behind(version, new Uint8Array(65_537)))
       await expectRefusal(file, 'decode/corrupt', /found more/);
   }
@@ -171,7 +171,7 @@ test('what stands behind the splats is left alone, unless the header may name th
       await expectRefusal(file, 'decode/corrupt', /1,400 bytes for 50 splats of version 2, found/);
     }
   }
-  // Version 4 tells how long its streams are.
+  // Version 4 stores the lengths of its streams.
   const streams = Buffer.concat([writeSpz(splats, { version: 4 }), Buffer.alloc(99, 7)]);
   assertHolds(await readScene(new Uint8Array(streams)), splats, 4);
 });
@@ -259,7 +259,7 @@ test('damaged gzip streams are told from cut ones', async () => {
 });
 
 test('a gzip stream is read to its checksum even where the body ends with a block of the inflater', async () => {
-  // 16 + 3276·20 bytes are 65,536, a multiple of the sizes in which inflaters hand out their output.
+  // 16 + 3276·20 bytes are 65,536, a multiple of the block sizes of inflaters.
   const body = spzBody(rawSplats(3276, 0), { version: 3 });
   assert.equal(body.length, 65_536);
   const damaged = new Uint8Array(gzipSync(body));

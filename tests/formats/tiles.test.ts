@@ -111,12 +111,35 @@ test('tiles without splats are left out with a warning, and a tileset of them is
   });
 });
 
+test('tiles of 3D Tiles 1.0 are left out as others without splats are', async () => {
+  for (const magic of ['b3dm', 'i3dm', 'pnts', 'cmpt']) {
+    const old = new Uint8Array(Buffer.concat([Buffer.from(magic), Buffer.alloc(24)]));
+    const children = [tile('fine/a.glb'), tile('old')];
+    const files = { ...TREE, old, 'tileset.json': tileset(tile(undefined, { children })) };
+    const found = await readTiles(files);
+    assert.equal(found.count, 20);
+    assert.match(found.warnings!.join(), /1 tiles without splats/);
+  }
+});
+
+test('files beside a tile are found in a folder whose name is encoded in its address', async () => {
+  const { json: gltf, buffer } = buildGltf([[{ cloud: smallCloud(8, 1) }]], [{ mesh: 0 }], [0]);
+  const files = {
+    'tileset.json': tileset(tile('a%20b/inner.json?key=1')),
+    'a b/inner.json': tileset(tile('c%C3%A4/tile.gltf')),
+    'a b/c\u00e4/tile.gltf': json({ ...gltf, buffers: [{ uri: 'own%20data.bin', byteLength: buffer.length }] }),
+    'a b/c\u00e4/own data.bin': buffer,
+  };
+  assert.equal((await readTiles(files)).count, 8);
+});
+
 test('what is wrong with a tileset is said', async () => {
   const refused = (root: object, code: string, message: RegExp): Promise<unknown> =>
     expectRefusal(tileset(root), code, message, { name: 'tileset.json', openFile: () => Promise.resolve(glb(3, 1)) });
   await refused(tile('a.glb', { implicitTiling: {} }), 'decode/unsupported', /root.*implicit tiling/);
   await refused(tile('a.glb', { transform: [1, 2] }), 'decode/header', /root.transform.*16 numbers/);
   await refused(tile(undefined, { children: [3] }), 'decode/header', /root.children\[0\].*a tile/);
+  await refused(tile(`${'./'.repeat(2_000)}a.glb`), 'decode/header', /addresses of at most 2,048 characters/);
   const itself = tileset(tile('again.json'));
   await expectRefusal(itself, 'decode/header', /at most 16 deep/, {
     name: 'tileset.json',

@@ -1,4 +1,4 @@
-/** Triangles of glTF files: what a viewer gets of them, and what is refused before it. */
+/** Triangles of glTF files: the data for a viewer, and refusals before it. */
 import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
 import { test } from 'node:test';
@@ -75,6 +75,72 @@ const REFUSED: Readonly<Record<string, [file: object, message: RegExp]>> = {
   'no list of primitives': [changed({ meshes: [{}] }), /primitives.*a list.*decode\/header/],
   'a primitive that is none': [changed({ meshes: [{ primitives: [null] }] }), /decode\/header/],
 };
+
+const BUDGET = /out-of-memory\/budget/;
+/** Accessors without views: their elements are zeros, and take no bytes of the file. */
+const zeros = (count: number, type: string, componentType = 5126): object => ({ count, type, componentType });
+const many = <T>(count: number, make: (k: number) => T): T[] => Array.from({ length: count }, (_, k) => make(k));
+const png = new Uint8Array(64);
+png.set([0x89, 0x50, 0x4e, 0x47, 13, 10, 26, 10]);
+new DataView(png.buffer).setUint32(16, 512);
+new DataView(png.buffer).setUint32(20, 512);
+const textured = { index: 0, extensions: { KHR_texture_transform: { scale: [2, 2] } } };
+
+/** Files that contain an object once, of which three.js makes many. */
+const MULTIPLIED: Readonly<Record<string, object>> = {
+  'instances of a node, for each primitive of its mesh': changed({
+    nodes: [{ mesh: 0, extensions: { EXT_mesh_gpu_instancing: { attributes: { TRANSLATION: 1 } } } }],
+    accessors: [zeros(3, 'VEC3'), zeros(150_000, 'VEC3'), zeros(2, 'SCALAR', 5123)],
+    meshes: [{ primitives: many(150, () => ({ attributes: { POSITION: 0 }, indices: 2 })) }],
+  }),
+  'an image, for each transform of a texture': changed({
+    accessors: [zeros(3, 'VEC3')],
+    meshes: [{ primitives: many(100, (material) => ({ attributes: { POSITION: 0 }, material })) }],
+    materials: many(100, () => ({ emissiveTexture: textured })),
+    textures: [{ source: 0 }],
+    images: [{ uri: `data:image/png;base64,${Buffer.from(png).toString('base64')}` }],
+  }),
+  'times of a sampler, for each channel': changed({
+    accessors: [zeros(3, 'VEC3'), zeros(4_000_000, 'SCALAR', 5121), zeros(1, 'VEC3')],
+    animations: [
+      {
+        samplers: [{ input: 1, output: 2 }],
+        channels: many(100, () => ({ sampler: 0, target: { node: 0, path: 'translation' } })),
+      },
+    ],
+  }),
+  'a channel of weights, for each child of its node': changed({
+    nodes: [{ mesh: 0, children: many(200, (k) => k + 1) }, ...many(200, () => ({}))],
+    accessors: [zeros(3, 'VEC3'), zeros(1, 'SCALAR')],
+    animations: [
+      {
+        samplers: [{ input: 1, output: 1 }],
+        channels: many(200, () => ({ sampler: 0, target: { node: 0, path: 'weights' } })),
+      },
+    ],
+  }),
+  'vertices of a mesh, for each of its nodes': changed({
+    scenes: [{ nodes: many(200, (k) => k) }],
+    nodes: many(200, () => ({ mesh: 0 })),
+    accessors: [zeros(500_000, 'VEC3'), zeros(3, 'SCALAR', 5123)],
+    meshes: [{ primitives: [{ attributes: { POSITION: 0 }, indices: 1 }] }],
+  }),
+};
+for (const [what, file] of Object.entries(MULTIPLIED))
+  test(`charged: ${what}`, () => assert.rejects(read(file), BUDGET));
+
+test('weights beyond the morph targets are left out', async () => {
+  const weights = many(1_000, () => 1);
+  const { json } = await read(
+    changed({
+      nodes: [{ mesh: 0, weights }],
+      meshes: [{ primitives: [{ attributes: { POSITION: 0 }, targets: [{ POSITION: 0 }] }], weights }],
+    }),
+  );
+  const [[node], [mesh]] = [json.nodes, json.meshes] as { weights: number[] }[][];
+  assert.deepEqual([node.weights, mesh.weights], [[1], [1]]);
+});
+
 for (const [what, [file, message]] of Object.entries(REFUSED))
   test(`refused by name: ${what}`, () => assert.rejects(read(file), message));
 

@@ -4,6 +4,7 @@ import { existsSync, mkdtempSync, readFileSync, rmSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { test } from 'node:test';
+import { gunzipSync, gzipSync } from 'node:zlib';
 import type { GaussianCloud, Vector3 } from '@gaussian-splat/core';
 import { readScene } from '@gaussian-splat/formats';
 import {
@@ -158,6 +159,45 @@ test('the spoilt room: jitter, faint splats and floaters let no one out', () => 
   assert.equal(wander(map, isOutside).out, 0);
 });
 
+test('a path does not leave one side of the map to enter it at the other', () => {
+  // Two arms at the left and the right edge, which meet only at the far end.
+  const [width, depth, cell] = [10, 12, 0.05];
+  const layer = Float32Array.from({ length: width * depth }, (_, i) => {
+    const [x, z] = [i % width, Math.floor(i / width)];
+    return x < 2 || x >= width - 2 || z === depth - 1 ? 0 : NaN;
+  });
+  const map: WalkMap = {
+    ...{ cell, corner: [0, 0], width, depth, layers: [layer], step: 0.3, start: [0.025, 0, 0.025], area: 1 },
+  };
+  for (const [from, to] of [
+    [0.475, 0.025],
+    [0.025, 0.475],
+  ]) {
+    const way = wayTo(map, [from, 0, 0.125], [to, 0, 0.125]);
+    assert.ok(way.length >= 24, `${way.length} cells, 24 lead around`);
+    way.reduce(
+      (before, place) => {
+        assert.ok(Math.hypot(place[0] - before[0], place[2] - before[2]) < 1.5 * cell, `${before} to ${place}`);
+        return place;
+      },
+      [from, 0, 0.125] as readonly number[],
+    );
+  }
+});
+
+test('a path over a floor of 1,000 m² is found in the time of a few frames', () => {
+  const side = 640;
+  const map: WalkMap = {
+    ...{ cell: 0.05, corner: [0, 0], width: side, depth: side, step: 0.3, start: [0, 0, 0], area: 1024 },
+    layers: [new Float32Array(side * side)],
+  };
+  const before = process.cpuUsage();
+  assert.equal(wayTo(map, [0, 0, 0], [31.99, 0, 31.99]).length, side - 1);
+  const { user, system } = process.cpuUsage(before);
+  assert.ok(user + system < 0.5e6, `${(user + system) / 1e6} s of CPU`);
+  assert.deepEqual(wayTo(map, [1.01, 0, 1.01], [1.02, 0, 1.03]), [[1.02, 0, 1.03]], 'within a cell');
+});
+
 test('a walk map is stored in centimeters and read again', () => {
   const map = makeWalkMap(cloudOf(ROOM.slice(0, 5)), { frame: FRAME, near: [0, 1.5, 2] });
   const file = encodeWalkMap(map);
@@ -185,6 +225,21 @@ test('damaged walk maps are refused by name', () => {
       assert.equal((error as { code?: string }).code, 'decode/corrupt', String(error));
     }
   assert.throws(() => decodeWalkMap(file.subarray(0, 40)), { code: 'decode/corrupt' });
+});
+
+test('walk maps whose first line claims more than there is are refused by name', () => {
+  const map = { cell: 0.1, corner: [0, 0], width: 1, depth: 1, step: 0.3, start: [0, 0, 0], area: 1 } as const;
+  const whole = gunzipSync(encodeWalkMap({ ...map, layers: [Float32Array.of(0)] }));
+  const head = JSON.parse(new TextDecoder().decode(whole.subarray(0, whole.indexOf(10)))) as object;
+  for (const claim of [
+    { corner: 5 },
+    { corner: [0, 0, 0], start: [0, 0] },
+    { start: 'abc' },
+    { width: 0, depth: 0, layers: 10_000_000 },
+  ]) {
+    const file = gzipSync(new TextEncoder().encode(`${JSON.stringify({ ...head, ...claim })}\n`));
+    assert.throws(() => decodeWalkMap(file), { code: 'decode/corrupt' }, JSON.stringify(claim));
+  }
 });
 
 test('what is no room has no floor, and no exception', () => {

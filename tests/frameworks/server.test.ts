@@ -1,4 +1,4 @@
-/** What servers write of the element, and that they need nothing of a browser for it: the documents of React and Vue promise it. */
+/** The markup that servers write for the element without any browser API: the documents of React and Vue promise it. */
 import assert from 'node:assert/strict';
 import { existsSync } from 'node:fs';
 import { test } from 'node:test';

@@ -1,4 +1,4 @@
-/** Roles to values: each checked against what it means, by projecting points, not against the code's own matrices. */
+/** Roles to values: each checked against its meaning, by projecting points, not against the code's own matrices. */
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { eyeOf, GaussianSplatError, lookAt, type Camera, type Vector3 } from '@gaussian-splat/core';
@@ -169,7 +169,7 @@ test('the same inputs are told from others: then nothing needs to run', () => {
     bindInputs(header, contract, { camera, ...state });
   assert.equal(sameInputs(at({}), at({ timeSeconds: 0, seed: 5, controls: { other: 1 } })), true);
   assert.equal(sameInputs(at({}), at({ timeSeconds: 1e-6 })), false);
-  // What the generator does not look at does not count.
+  // Inputs that the generator ignores do not count.
   assert.equal(sameInputs(at({}), at({ camera: { ...camera, fx: 1 } })), true);
   const worldToCamera = lookAt([1, -2, -4.001], [0.2, 0.1, 0], [0, -1, 0]);
   assert.equal(sameInputs(at({}), at({ camera: { ...camera, worldToCamera } })), false);

@@ -1,4 +1,4 @@
-/** What counts as another result, and what as rounding: the pure half of the comparison of a page's GPU with its CPU. */
+/** The difference between another result and rounding: the pure half of the comparison of a page's GPU with its CPU. */
 import assert from 'node:assert/strict';
 import test from 'node:test';
 import type { AttributeSlice } from '@gaussian-splat/core/contract';
@@ -19,7 +19,7 @@ const slice = (
 });
 const SLICES = [slice('positions', 0, 3), slice('covariances', 3, 6), slice('opacities', 9, 1)];
 
-/** Centres of some metres, covariances of a thousandth, logits. */
+/** Centers of some meters, covariances of a thousandth, logits. */
 const rows = (): Float32Array =>
   Float32Array.from({ length: 10 * ROWS }, (_, i) => {
     const column = i % 10;
@@ -69,7 +69,7 @@ test('roundings, and a row that falls to the other side of a threshold, are no d
   assert.ok(!isDifferent(opaque), JSON.stringify(opaque));
 });
 
-test('covariances that are wrong are seen beside centres that are a thousand times larger, in a piece from the middle, too', () => {
+test('covariances that are wrong are seen beside centers that are a thousand times larger, in a piece from the middle, too', () => {
   for (const start of [0, 7]) {
     const [found, expected] = [changed((x, i) => (i % 10 === 4 ? 1.5 * x : x)), rows()].map((all) => all.slice(start));
     const comparison = compareOutputs([part(found, expected, start)], SLICES);
@@ -86,14 +86,14 @@ test('numbers that are none on one side alone are a difference, and on both are 
 
 test('a picture is compared as a whole, float16 with room for its rounding', () => {
   const halves = (value: number): Uint8Array => new Uint8Array(new Uint16Array(64).fill(value).buffer);
-  const picture = (found: number, expected: number): OutputDifference => ({
+  const image = (found: number, expected: number): OutputDifference => ({
     tensor: 'out',
     dtype: 'float16',
     start: 0,
     found: halves(found),
     expected: halves(expected),
   });
-  // 1 and its neighbour; 1 and 1.5.
-  assert.ok(!isDifferent(compareOutputs([picture(0x3c01, 0x3c00)])));
-  assert.ok(isDifferent(compareOutputs([picture(0x3e00, 0x3c00)])));
+  // 1 and its neighbor; 1 and 1.5.
+  assert.ok(!isDifferent(compareOutputs([image(0x3c01, 0x3c00)])));
+  assert.ok(isDifferent(compareOutputs([image(0x3e00, 0x3c00)])));
 });

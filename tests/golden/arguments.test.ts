@@ -1,4 +1,4 @@
-/** Requests that types alone would refuse: errors with a name, before the device hears of anything. */
+/** Requests that types alone would refuse: errors with a name, before any call of the device. */
 import assert from 'node:assert/strict';
 import { after, test } from 'node:test';
 import { cameraFromCalibration, type CalibratedView } from '@gaussian-splat/core';
@@ -140,7 +140,7 @@ test('targets that encode what is written hold the same numbers as others', asyn
     const plain = await bytes(rasterizer, 'rgba8unorm');
     const encoding = await bytes(rasterizer, 'rgba8unorm-srgb');
     assert.ok(plain.some((byte) => byte > 200));
-    const worst = plain.reduce((most, byte, i) => Math.max(most, Math.abs(byte - encoding[i])), 0);
+    const worst = plain.reduce((max, byte, i) => Math.max(max, Math.abs(byte - encoding[i])), 0);
     assert.ok(worst <= 1, `${rasterizer}: ${worst} steps of 255`);
   }
   gaussians.destroy();

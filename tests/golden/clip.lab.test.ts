@@ -40,9 +40,9 @@ const packed = (parts: readonly ClipPartContent[]): PackedAnimation[] =>
   parts.map(({ cloud, motion }) => packAnimation(cloud, motion, index.origin));
 
 const room = index.groups[0].parts.map((_, k) => {
-  const most = (of: (part: (typeof index.groups)[0]['parts'][0]) => number): number =>
+  const max = (of: (part: (typeof index.groups)[0]['parts'][0]) => number): number =>
     Math.max(...index.groups.map(({ parts }) => of(parts[k])));
-  return { rows: most(({ splats }) => splats), planes: most(({ planes }) => planes), frames: 8 };
+  return { rows: max(({ splats }) => splats), planes: max(({ planes }) => planes), frames: 8 };
 });
 
 const [camera] = viewsAround(index.bounds, 1, { width: 256, height: 192 });

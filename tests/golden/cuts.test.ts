@@ -1,4 +1,4 @@
-/** Cuts against the float64 oracle: four shapes, soft and hard, of two scenes, and what they do. */
+/** Cuts against the float64 oracle: four shapes, soft and hard, of two scenes, with each action. */
 import assert from 'node:assert/strict';
 import { after, test } from 'node:test';
 import { lookAt, multiply, type Camera, type GaussianCloud, type Matrix4 } from '@gaussian-splat/core';
@@ -153,7 +153,7 @@ test('a splat across a plane is trimmed to what lies above it; a shape without a
   };
   const plane: SplatCut = { shape: 'plane', shapeToWorld: stretch(1), opacity: 0 };
   const { cloud } = cutCloud(one, [plane]);
-  // Of half of a normal distribution: its mean, and its variance.
+  // Mean and variance of half of a normal distribution.
   const [mean, variance] = [Math.sqrt(2 / Math.PI), 1 - 2 / Math.PI];
   assert.ok(Math.abs(cloud.positions[1] - 0.1 * mean) < 1e-6, `${cloud.positions[1]}`);
   const found = cloud.axes![0].map((row) => row.reduce((sum, value) => sum + value * value, 0));

@@ -1,4 +1,4 @@
-/** What short depth keys cost: the figures behind the default of 24 bits (docs/decisions/0006). */
+/** The cost of short depth keys: the figures behind the default of 24 bits (docs/decisions/0006). */
 import assert from 'node:assert/strict';
 import { after, test } from 'node:test';
 import type { Camera, GaussianCloud } from '@gaussian-splat/core';

@@ -1,4 +1,4 @@
-/** Levels of detail in pictures: none where none is asked for, how true they are, and how little they pop. */
+/** Images with levels of detail: unchanged without a request, accurate, and with little popping. */
 import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
 import { after, test } from 'node:test';
@@ -16,7 +16,7 @@ import { Renderer } from '../support/renderer.js';
 const size = { width: 120, height: 80, fovXDegrees: 60 };
 const serial = { threads: 'serial', sort: 'serial' } as const;
 
-/** Looks at the middle of the scene from so far away. */
+/** Views of the scene's middle from a distance. */
 const viewFrom = (distance: number, angle = 0.4): Camera =>
   cameraAt([distance * Math.cos(angle), -0.5 * distance, distance * Math.sin(angle)], [0, 0, 0], size);
 
@@ -91,7 +91,10 @@ let shared: Promise<Skull> | undefined;
 /** Built and uploaded once. */
 const skull = (): Promise<Skull> => (shared ??= loadSkull());
 
-/** How much farther than where it fills the picture, least dB, and most splats drawn for one of the whole scene, that each lever is held to. */
+/**
+ * Limits of each setting: the distance relative to the framing distance, minimum dB, and the maximum ratio of drawn
+ * splats to all.
+ */
 const HELD: readonly (readonly [farther: number, detail: number, decibels: number, share: number])[] = [
   [1, 1, 45, 1.01],
   [1, 2, 32, 0.7],
@@ -105,9 +108,9 @@ test('from afar fewer splats are drawn, and the picture stays', async () => {
   for (const [farther, detail, decibels, share] of HELD) {
     const camera = viewFrom(farther * away);
     const truth = await readFrame(device, renderer, { gaussians: plain, camera });
-    const { visible: all } = await renderer.statistics();
+    const { visible: all } = await renderer.stats();
     const found = await readFrame(device, renderer, { gaussians: detailed, camera, detail });
-    const { visible } = await renderer.statistics();
+    const { visible } = await renderer.stats();
     const covered = truth.filter((_, i) => i % 4 === 3).map((alpha) => (alpha > 0 ? 1 : 0));
     const close = psnr(truth, found, { channels: 4, mask: covered });
     console.log(`${farther} times as far, detail ${detail}: ${close.toFixed(1)} dB with ${visible} of ${all} splats`);
@@ -118,21 +121,20 @@ test('from afar fewer splats are drawn, and the picture stays', async () => {
 });
 
 /**
- * Largest change of the picture, in dB, while the camera stands still and the error allowed grows by one part in a hundred a frame: what a dolly of that speed
- * changes because levels change, without what it changes anyway.
+ * Largest change of the image, in dB, while the camera stands still and the error allowed grows by one part in a hundred a frame: the changes of levels in a dolly of that speed, without the other changes.
  */
 async function largestPop(detailFade: number): Promise<number> {
   const { device, detailed, away } = await skull();
   const renderer = new Renderer(device, { ...serial, detailFade });
   const camera = viewFrom(3 * away);
-  let [last, least]: [Float32Array | undefined, number] = [undefined, Infinity];
+  let [last, min]: [Float32Array | undefined, number] = [undefined, Infinity];
   for (let step = 0; step < 5; step++) {
-    const picture = await readFrame(device, renderer, { gaussians: detailed, camera, detail: 1.6 * 1.01 ** step });
-    if (last) least = Math.min(least, psnr(last, picture, { channels: 4 }));
-    last = picture;
+    const image = await readFrame(device, renderer, { gaussians: detailed, camera, detail: 1.6 * 1.01 ** step });
+    if (last) min = Math.min(min, psnr(last, image, { channels: 4 }));
+    last = image;
   }
   renderer.destroy();
-  return least;
+  return min;
 }
 
 test('levels fade: at 1 % nearer a frame no picture differs by 55 dB from the one before, and some do without the fade', async () => {

@@ -17,7 +17,7 @@ const FILTERS: readonly [string, Mode, number | undefined][] = [
   ['mip', 'antialiased', 0.1],
 ];
 
-/** dB that each must reach, and that another filter must not: the pictures would not tell them apart. */
+/** Minimum PSNR of each filter in dB, and an upper limit for the other filters, so that the images distinguish them. */
 const [LIMIT_DB, OTHER_DB] = [59, 45];
 
 const { cloud, cameras } = proceduralScenes.find(({ name }) => name === 'pixelSplats')!();

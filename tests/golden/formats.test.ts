@@ -13,7 +13,7 @@ import { isFull } from '../support/extent.js';
 import { endNodeDevice, serialDevice } from '../support/node-device.js';
 import { resized } from '../support/scenes.js';
 
-/** dB to the image of the PLY file that each format must keep, a little under what it was seen to keep. */
+/** dB to the image of the PLY file that each format must keep, a little below the measured value. */
 const FORMATS: readonly {
   readonly file: string;
   readonly toPly: number;
@@ -28,7 +28,7 @@ const FORMATS: readonly {
   { file: 'formats/playbot3.niantic-v4.spz', toPly: 40 },
   { file: 'formats/playbot3.pc-v4.spz', toPly: 40, isTwin: true },
   { file: 'formats/playbot3.glb', toPly: Infinity },
-  // Colours outside 0..1 do not fit a .ksplat, and the last has degree 1 only.
+  // Colors outside 0..1 do not fit a .ksplat, and the last has degree 1 only.
   { file: 'formats/playbot3.c0.sh2.ksplat', toPly: 39.5 },
   { file: 'formats/playbot3.c1.sh2.ksplat', toPly: 39.5 },
   { file: 'formats/playbot3.c2.sh1.ksplat', toPly: 31 },
@@ -50,7 +50,7 @@ function viewOfAll(): Camera {
   return resized(camera, Math.round(camera.width / 2));
 }
 
-/** Captured scenes of which there is no PLY. */
+/** Captured scenes without a PLY. */
 const OTHERS = ['scenes/massa.sog', 'scenes/logo-sog-v1/meta.json'];
 
 test('one scene through every format', { skip: needsSharedData }, async () => {

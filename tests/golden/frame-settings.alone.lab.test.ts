@@ -1,9 +1,9 @@
-/** Settings of single frames: the same picture as of a renderer that has them for good, and nothing made on the way. */
+/**
+ * Settings of single frames: the same image as from a renderer with these settings as options, without new resources.
+ */
 import assert from 'node:assert/strict';
 import { after, test } from 'node:test';
 import { GaussianBuffers, packGaussians, type PerFrameSettings, type RasterizerName } from '@gaussian-splat/renderer';
-import { SpanTimer } from '@gaussian-splat/renderer/tools';
-import { spanOf } from '../../packages/renderer/src/gpu/span-timer.js';
 import { requestNodeAdapter } from '../../packages/cli/src/lib/node-gpu.mjs';
 import { cloudOf, repeat } from '../support/clouds.js';
 import { randomSource } from '../support/gpu.js';
@@ -72,7 +72,7 @@ for (const rasterizer of ['quads', 'tiles'] as RasterizerName[]) {
     const gaussians = await GaussianBuffers.upload(device, packGaussians(cloud));
     const renderer = new Renderer(device, { rasterizer });
     const format = 'rgba8unorm';
-    // What an element's canvas allows: drawing, and storing by tiles.
+    // Usages of an element's canvas: drawing, and storing by tiles.
     const target = device.createTexture({ size: [size.width, size.height], format, usage: 0x18 });
     const made: string[] = [];
     renderer.prepare(mixes, format);
@@ -113,7 +113,7 @@ test('a smaller picture is enlarged the same by a compute shader as by drawing',
     assert.equal(counter.take().renderPasses, 0, 'stored');
     const drawn = await readFrame(device, tiles, request, GPUTextureUsage.RENDER_ATTACHMENT);
     assert.equal(counter.take().renderPasses, 1, 'drawn');
-    const worst = stored.reduce((most, value, i) => Math.max(most, Math.abs(value - drawn[i])), 0);
+    const worst = stored.reduce((max, value, i) => Math.max(max, Math.abs(value - drawn[i])), 0);
     assert.ok(stored.some((value) => value > 0.6) && worst < 1e-5, `${JSON.stringify(settings)}: ${worst}`);
   }
   tiles.destroy();
@@ -144,60 +144,6 @@ test('values that a lever does not know are refused', async () => {
   }
   assert.throws(() => packGaussians(cloud, { sh: 'int4' as 'int8' }), { code: 'argument/value', found: 'int4' });
   renderer.destroy();
-});
-
-test('the span of every frame comes back, beside the frames', async (t) => {
-  const adapter = await requestNodeAdapter();
-  if (!adapter.features.has('timestamp-query')) return t.skip('no timestamps here');
-  const device = await asOnSwiftShader(await adapter.requestDevice({ requiredFeatures: ['timestamp-query'] }));
-  const gaussians = await GaussianBuffers.upload(device, packGaussians(cloud));
-  const renderer = new Renderer(device);
-  const target = device.createTexture({ size: [size.width, size.height], format: 'rgba8unorm', usage: 0x10 });
-  const timer = new SpanTimer(device);
-  const spans: (number | null)[] = [];
-  for (let k = 0; k < 12; k++) {
-    const began = performance.now();
-    const span = await new Promise<number | null>((resolve) => {
-      assert.ok(timer.expect(resolve));
-      renderer.render({ gaussians, camera: views[k % views.length], target, timer });
-    });
-    assert.ok(span === null || (span > 0 && span <= performance.now() - began + 1), `${span} ms`);
-    spans.push(span);
-  }
-  assert.ok(spans.filter((span) => span !== null).length >= 10, String(spans));
-  // Painted in more submissions than there are timestamps for: it is the whole that counts.
-  const divided = new Renderer(device, { submissions: 40 });
-  const span = await new Promise<number | null>((resolve) => {
-    assert.ok(timer.expect(resolve));
-    divided.render({ gaussians, camera: views[0], target, timer });
-  });
-  assert.ok(span !== null && span > 0, `${span} ms in 40 submissions`);
-  divided.destroy();
-  timer.destroy();
-  renderer.destroy();
-  gaussians.destroy();
-  device.destroy();
-});
-
-test('frames that are shorter than a step of the clock take nothing; clocks that stand still or run backwards say nothing', () => {
-  const spans = (...frames: bigint[][]): (number | null)[] => {
-    let before = 0n;
-    return frames.map((stamps) => {
-      const [begin, milliseconds] = spanOf(BigUint64Array.from(stamps), before);
-      before = begin;
-      return milliseconds;
-    });
-  };
-  // Chromium's step: 0.1 ms.
-  assert.deepEqual(spans([300_000n, 300_000n], [17_000_000n, 17_000_000n, 17_000_000n, 17_100_000n]), [0, 0.1]);
-  assert.deepEqual(spans([5n, 5n], [5n, 5n], [5n, 5n]).slice(1), [null, null]);
-  assert.deepEqual(spans([0n, 0n], [0n, 9n]), [null, null]);
-  assert.deepEqual(spans([9_000_000n, 1_000_000n], [8_000_000n, 8_500_000n], [9_000_000n, 9_500_000n]), [
-    null,
-    null,
-    0.5,
-  ]);
-  assert.deepEqual(spans([1n, 90_000_000_000n]), [null]);
 });
 
 after(endNodeDevice);

@@ -1,4 +1,4 @@
-/** The lever `shDegree`: scenes of any degree, stored either way, drawn up to any other, are those whose higher coefficients are zeros. */
+/** The setting `shDegree`: scenes of any degree, stored either way, drawn up to any other, are those whose higher coefficients are zeros. */
 import assert from 'node:assert/strict';
 import { after, test } from 'node:test';
 import { shCoefficientCount, type GaussianCloud, type ShDegree } from '@gaussian-splat/core';
@@ -27,7 +27,7 @@ function scene(degree: ShDegree): GaussianCloud {
   return cloudOf(splats, degree);
 }
 
-/** The same without what lies above a degree. */
+/** The same without the coefficients above a degree. */
 function cutAt(cloud: GaussianCloud, degree: ShDegree): GaussianCloud {
   const [own, kept] = [cloud.shDegree, degree].map((d) => 3 * shCoefficientCount(d as ShDegree));
   return { ...cloud, sh: cloud.sh.map((x, i) => (i % own < kept ? x : 0)) };

@@ -16,7 +16,7 @@ const HAZES = [100, 500, 1000];
 const hazeAlone = (splats: number): GaussianCloud =>
   cloudOf(repeat(splats, (i) => ({ position: [0, 0, i / splats], scale: 1, opacity: 0.006, color: [0.9, 0.6, 0.3] })));
 
-/** Haze of nearly the colour of the wall behind it: quads are blended from there to the front, each in steps of what is there already. The wall leaves some light, or it would end the pixel, which quads cannot. */
+/** Haze of nearly the color of the wall behind it: quads are blended from there to the front, each in steps of the stored value. The wall leaves some light, or it would end the pixel, which quads cannot. */
 function hazeBeforeWall(splats: number): GaussianCloud {
   const wall = { position: [0, 0, 17], scale: [30, 30, 0.01], opacity: 0.99, color: [0.5, 0.5, 0.5] } as const;
   const faint = { scale: 8, opacity: 0.006, color: [0.55, 0.58, 0.52] } as const;

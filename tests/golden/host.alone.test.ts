@@ -55,11 +55,11 @@ const BOTH: readonly FrameSettings[] = [
 ];
 
 for (const how of BOTH) {
-  test(`${how.rasterizer}: a frame in a host's encoder, over what it has drawn, is the frame over that colour`, async () => {
+  test(`${how.rasterizer}: a frame in a host's encoder, over what it has drawn, is the frame over that color`, async () => {
     const device = await serialDevice();
     const { world, scene } = await skullWorld(device);
     const viewpoint = new Viewpoint(device, world, { settings: how });
-    const expected = await capture(device, viewpoint, { camera, over: [...CLEAR, 1] });
+    const expected = await capture(device, viewpoint, { camera, background: [...CLEAR, 1] });
     device.pushErrorScope('validation');
     for (const format of ['rgba8unorm', 'rgba16float'] as const) {
       const texture = target(device, format);
@@ -68,13 +68,13 @@ for (const how of BOTH) {
         const encoder = device.createCommandEncoder();
         clear(encoder, texture, CLEAR);
         counter.take();
-        viewpoint.record(encoder, camera, { target: texture, over: 'target' });
+        viewpoint.record(encoder, camera, { target: texture, background: 'load' });
         assert.equal(counter.take().submits, 0, 'the host submits');
         device.queue.submit([encoder.finish()]);
         await new Promise((resolve) => setTimeout(resolve, 1));
       }
       const found = await readTexture(device, texture);
-      const worst = found.reduce((most, value, i) => Math.max(most, Math.abs(value - Math.min(1, expected[i]))), 0);
+      const worst = found.reduce((max, value, i) => Math.max(max, Math.abs(value - Math.min(1, expected[i]))), 0);
       assert.ok(worst <= 1.6 / 255, `${format}: ${255 * worst} / 255`);
       texture.destroy();
     }
@@ -83,17 +83,39 @@ for (const how of BOTH) {
     scene.destroy();
   });
 
+  test(`${how.rasterizer}: two frames that a host records and submits in one task are valid`, async () => {
+    const device = await serialDevice();
+    const { world, scene } = await skullWorld(device);
+    const viewpoint = new Viewpoint(device, world, { settings: how, limitsOverdraw: true });
+    const small: Camera = { ...camera, width: 48, height: 32, fx: camera.fx / 2, fy: camera.fy / 2, cx: 24, cy: 16 };
+    const cameras = [camera, small];
+    const targets = cameras.map((each) => target(device, 'rgba8unorm', each));
+    viewpoint.maxSizes = 2;
+    device.pushErrorScope('validation');
+    for (let frame = 0; frame < 3; frame++) {
+      for (const [k, each] of cameras.entries()) {
+        const encoder = device.createCommandEncoder();
+        viewpoint.record(encoder, each, { target: targets[k] });
+        device.queue.submit([encoder.finish()]);
+      }
+      await new Promise((resolve) => setTimeout(resolve, 1));
+      await device.queue.onSubmittedWorkDone();
+    }
+    assert.equal(await device.popErrorScope(), null);
+    for (const owner of [viewpoint, scene, ...targets]) owner.destroy();
+  });
+
   test(`${how.rasterizer}: over linear light splats are blended in encoded colors`, async () => {
     const device = await serialDevice();
     const { world, scene } = await skullWorld(device);
     const viewpoint = new Viewpoint(device, world, { settings: how });
-    const expected = await capture(device, viewpoint, { camera, over: [...CLEAR, 1] });
+    const expected = await capture(device, viewpoint, { camera, background: [...CLEAR, 1] });
     const colors = new LinearColors(device);
     for (const format of ['rgba16float', 'rgba8unorm-srgb'] as const) {
       const texture = target(device, format);
       const encoder = device.createCommandEncoder();
       clear(encoder, texture, CLEAR.map(decode));
-      viewpoint.record(encoder, camera, { target: texture, over: 'target', colors });
+      viewpoint.record(encoder, camera, { target: texture, background: 'load', colors });
       device.queue.submit([encoder.finish()]);
       const found = await readTexture(device, texture);
       const isEncoded = format.endsWith('-srgb');
@@ -107,7 +129,9 @@ for (const how of BOTH) {
       texture.destroy();
     }
     const texture = target(device, 'rgba8unorm-srgb');
-    assert.throws(() => viewpoint.draw(camera, { target: texture, over: 'target' }), { where: 'FrameTarget.colors' });
+    assert.throws(() => viewpoint.draw(camera, { target: texture, background: 'load' }), {
+      where: 'FrameTarget.colors',
+    });
     colors.destroy();
     viewpoint.destroy();
     scene.destroy();
@@ -126,7 +150,9 @@ test('several views at once are as each alone, and keep their buffers', async ()
   const cameras = [camera, right, small];
   const targets = cameras.map((each) => target(device, 'rgba8unorm', each));
   const views = cameras.map((each, k) => ({ camera: each, target: { target: targets[k] } }));
-  viewpoint.drawAll(views);
+  const drawAll = (): void => views.forEach((each) => viewpoint.draw(each.camera, each.target));
+  viewpoint.maxSizes = 2;
+  drawAll();
   const found = await Promise.all(targets.map((texture) => readTexture(device, texture)));
   for (const [k, each] of cameras.entries()) {
     const alone = new Viewpoint(device, world, { settings: BOTH[0] });
@@ -135,9 +161,9 @@ test('several views at once are as each alone, and keep their buffers', async ()
     alone.destroy();
   }
   const counter = countWork(device);
-  viewpoint.drawAll(views);
+  drawAll();
   counter.take();
-  viewpoint.drawAll(views);
+  drawAll();
   const { buffersCreated, bytesAllocated } = counter.take();
   assert.deepEqual([buffersCreated, bytesAllocated], [0, 0]);
   viewpoint.destroy();

@@ -16,7 +16,7 @@ const rows = (width: number, at: (row: number, column: number) => number): numbe
   Array.from({ length: COUNT }, (_, row) => Array.from({ length: width }, (__, column) => at(row, column)));
 
 const positions = rows(3, () => uniform(-0.7, 0.7));
-/** Of round Gaussians: all three scales are one. */
+/** All three scales of round Gaussians are 1. */
 const sizes = rows(1, () => uniform(0.01, 0.06));
 const scales = sizes.map(([size]) => [size, size, size]);
 const rotations = rows(4, () => uniform(0.1, 1));
@@ -74,7 +74,7 @@ const withAxes = (shape: Written): Record<string, Written> => ({
 const flat = (...attributes: (readonly (readonly number[])[])[]): number[][] =>
   Array.from({ length: COUNT }, (_, row) => attributes.flatMap((attribute) => [...attribute[row]]));
 
-/** Pixels of what a model writes. */
+/** Pixels of a model's output. */
 async function draw(
   outputs: Contract['outputs'],
   tensors: Record<string, Written>,

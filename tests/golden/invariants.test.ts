@@ -1,8 +1,9 @@
-/** What must hold for the renderer whatever the scene: repeatable, hostile-proof, free of steady-state allocation. */
+/** Invariants of the renderer for all scenes: repeatable, hostile-proof, free of steady-state allocation. */
 import assert from 'node:assert/strict';
 import { after, test } from 'node:test';
 import type { GaussianCloud } from '@gaussian-splat/core';
 import { GaussianBuffers, packGaussians, type PackedGaussians } from '@gaussian-splat/renderer';
+import * as shaders from '@gaussian-splat/renderer/stages';
 import { renderOracle } from '../oracle/oracle.js';
 import { cloudOf, repeat } from '../support/clouds.js';
 import { closeness, renderCloud } from '../support/compare.js';
@@ -12,6 +13,22 @@ import { endNodeDevice, anyDevice } from '../support/node-device.js';
 import { randomSource } from '../support/gpu.js';
 import { cameraAt, equalDepthPlane, movedBy, offCenter, resized, room, withHostileSplats } from '../support/scenes.js';
 import { capture, Renderer } from '../support/renderer.js';
+
+test('the visible splats of a plan are followed by those beyond the capacity: they are copied together', () => {
+  const { visible, overflow } = shaders.layouts.Plan.fields;
+  assert.equal(overflow.offset, visible.offset + 4);
+});
+
+test('every storage texture `image` is declared as the renderer replaces its format', () => {
+  const all = Object.values(shaders).filter(
+    (shader): shader is typeof shaders.composeStored =>
+      typeof shader === 'object' && 'bindings' in shader && 'image' in shader.bindings,
+  );
+  const stored = all.filter(({ bindings: { image } }) => image.type === 'storage-texture');
+  assert.ok(stored.length > 2);
+  for (const { name, code, bindings } of stored)
+    assert.ok(code.includes(`texture_storage_2d<${bindings.image.format}`), name);
+});
 
 const sameBytes = (a: Float32Array, b: Float32Array): boolean =>
   Buffer.compare(
@@ -53,7 +70,7 @@ for (const { make, frames } of [
       const next = await capture(device, renderer, { gaussians, camera });
       assert.ok(sameBytes(first, next), `frame ${frame} differs`);
     }
-    assert.ok((await renderer.statistics()).visible > 1000, 'the scene is visible');
+    assert.ok((await renderer.stats()).visible > 1000, 'the scene is visible');
     renderer.destroy();
     gaussians.destroy();
   });
@@ -79,7 +96,7 @@ test('an image of no splats is the background', async () => {
   const pixels = await capture(device, renderer, { gaussians, camera, background: [0.25, 0.5, 0.125, 0.75] });
   for (let i = 0; i < pixels.length; i += 4) assert.deepEqual([...pixels.subarray(i, i + 4)], [0.25, 0.5, 0.125, 0.75]);
   const nothing = { visible: 0, overflow: 0, pairs: 0, pairOverflow: 0, unusable: 0, budgetError: 0, covered: 0 };
-  assert.deepEqual(await renderer.statistics(), nothing);
+  assert.deepEqual(await renderer.stats(), nothing);
 });
 
 test('background shines through by transmittance, premultiplied', async () => {
@@ -190,7 +207,7 @@ test('more splats with SH3 than a buffer holds at default limits span pages', { 
   const bytes = Math.max(few.geometry.byteLength, few.sh.byteLength) / few.count;
   const packed = spread(few, Math.ceil((1.05 * device.limits.maxStorageBufferBindingSize) / bytes));
   const gaussians = await GaussianBuffers.upload(device, packed);
-  assert.equal(gaussians.pages.length, 2, 'two pages');
+  assert.equal(gaussians.blocks.length, 2, 'two pages');
   const renderer = new Renderer(device);
   const camera = cameraAt([0, 0, -2], [0, 0, 0], { width: 160, height: 120 });
   const pixels = await capture(device, renderer, { gaussians, camera });

@@ -1,4 +1,4 @@
-/** Shapes of a host's depth through scenes: a leaning plane, a sphere, a bar two pixels wide. Both rasterizers end each pixel where the float64 oracle does. What `npm test` has of it is in world.alone.test.ts: a bar and a wall. */
+/** Shapes of a host's depth through scenes: a leaning plane, a sphere, a bar two pixels wide. Both rasterizers end each pixel at the float64 oracle's splat. `npm test` has a bar and a wall in world.alone.test.ts. */
 import assert from 'node:assert/strict';
 import { after, test } from 'node:test';
 import type { Camera, GaussianCloud } from '@gaussian-splat/core';
@@ -23,10 +23,10 @@ import { resized, room } from '../support/scenes.js';
 after(endNodeDevice);
 
 const LIMIT_DB = 59;
-/** Below that, the shape hides so much that a frame without it is another. */
+/** Lower limit of PSNR between frames with and without the shape: it hides a large part below it. */
 const MUCH_DB = 45;
 
-/** Depth along the camera's axis where the ray of a pixel meets a shape; Infinity where it does not. `x` and `y` are its slopes, `at` the depth of the scene's middle. */
+/** Depth along the camera's axis at which the ray of a pixel meets a shape; Infinity if it misses. `x` and `y` are its slopes, `at` the depth of the scene's middle. */
 type Shape = (x: number, y: number, at: number, pixel: number) => number;
 
 const SHAPES: Readonly<Record<string, Shape>> = {
@@ -57,7 +57,7 @@ async function holdAll(name: string, cloud: GaussianCloud, camera: Camera): Prom
   world.add({ scene });
   const mode = cloud.antialiased ? 'antialiased' : 'classic';
   const whole = renderOracleWorld([{ cloud, mode }], camera, { rules: 'gsplat' });
-  // The depth of what is seen, in half of the pixels: shapes there hide and are hidden.
+  // The depth of the visible surface in half of the pixels: shapes there hide and are hidden.
   const seen = whole.medianDepth.filter((value) => value > 0).sort();
   const at = seen[seen.length >> 1];
   for (const [what, shape] of Object.entries(SHAPES)) {

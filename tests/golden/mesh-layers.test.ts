@@ -1,4 +1,4 @@
-/** What a host has drawn, as layers of color among the splats: an antialiased card and a pane of glass, before, behind and between splats, against the float64 composite. */
+/** A host's images as layers of color among the splats: an antialiased card and a pane of glass, before, behind and between splats, against the float64 composite. */
 import assert from 'node:assert/strict';
 import { after, test } from 'node:test';
 import type { Camera } from '@gaussian-splat/core';
@@ -24,7 +24,7 @@ after(endNodeDevice);
 const camera: Camera = cameraAt([0, 0, -4], [0, 0, 0], { width: 112, height: 80 });
 const pixels = camera.width * camera.height;
 
-/** An opaque wall far away, and faint and opaque splats before it, on both sides of where the layers are. */
+/** An opaque wall far away, and faint and opaque splats before it, on both sides of the layers. */
 const random = seededRandom(47);
 const cloud = cloudOf([
   ...repeat(500, (i) => ({

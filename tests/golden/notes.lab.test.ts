@@ -1,4 +1,4 @@
-/** What tiles note besides the image: what each splat contributed, and the depth of each pixel. */
+/** Auxiliary outputs of tiles besides the image: the contribution of each splat, and the depth of each pixel. */
 import assert from 'node:assert/strict';
 import { after, test } from 'node:test';
 import type { Camera, GaussianCloud } from '@gaussian-splat/core';
@@ -32,7 +32,7 @@ async function readBuffer(device: GPUDevice, source: GPUBuffer | GPUTexture): Pr
   );
 }
 
-/** Notes of two frames of a turned camera, the second of which counts. */
+/** Auxiliary outputs of two frames of a turned camera. The second one counts. */
 async function notesOf(device: GPUDevice, cloud: GaussianCloud, cameras: readonly Camera[]) {
   const gaussians = await GaussianBuffers.upload(device, packGaussians(cloud));
   const renderer = new Renderer(device, { rasterizer: 'tiles' });
@@ -53,13 +53,13 @@ async function notesOf(device: GPUDevice, cloud: GaussianCloud, cameras: readonl
       }),
     );
   }
-  const noted = { weights: await readBuffer(device, contributions), depths: await readBuffer(device, depth) };
+  const recorded = { weights: await readBuffer(device, contributions), depths: await readBuffer(device, depth) };
   const plain = await readFrame(device, renderer, { gaussians, camera: cameras.at(-1)! });
   contributions.destroy();
   depth.destroy();
   renderer.destroy();
   gaussians.destroy();
-  return { ...noted, image: images.at(-1)!, plain };
+  return { ...recorded, image: images.at(-1)!, plain };
 }
 
 test('contributions are the largest weights that the oracle finds, over all frames; the image stays as it is', async () => {

@@ -12,8 +12,8 @@ import { maxAbs, psnr, shareAbove } from '../support/metrics.js';
 
 /**
  * Rounding to 8 bits alone costs 58.9 dB and up to 0.5/255; a fragment whose alpha float32 puts on the other side of
- * 1/255 costs up to 1/255 more. PSNR hardly sees an error that is small against the rounding, so the share of channels
- * off by more than the rounding explains is limited too, to twice the largest share that was found.
+ * 1/255 costs up to 1/255 more. PSNR hardly sees an error that is small against the rounding, so the fraction of
+ * channels with an error above the rounding is limited too, to twice the largest fraction found.
  */
 const LIMITS = { coveredDecibel: 58.5, worst: 1.5 / 255, shareUnexplained: 2e-4 };
 const ROUNDING = 0.5001 / 255;

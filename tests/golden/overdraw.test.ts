@@ -35,20 +35,20 @@ async function viewpointOf(
   rasterizer: 'quads' | 'tiles',
   limitsOverdraw: boolean,
 ): Promise<{ viewpoint: Viewpoint; incomplete(): number; end(): void }> {
-  let told = 0;
+  let reported = 0;
   const world = new World();
   const scene = await GaussianBuffers.upload(device, packGaussians(cloud));
   world.add({ scene });
   const viewpoint = new Viewpoint(device, world, {
     settings: settings('default', { rasterizer }),
     limitsOverdraw,
-    onIncomplete: () => told++,
+    onIncomplete: () => reported++,
   });
   const end = (): void => {
     viewpoint.destroy();
     scene.destroy();
   };
-  return { viewpoint, incomplete: () => told, end };
+  return { viewpoint, incomplete: () => reported, end };
 }
 
 for (const rasterizer of ['quads', 'tiles'] as const) {
@@ -57,7 +57,7 @@ for (const rasterizer of ['quads', 'tiles'] as const) {
     for (const limitsOverdraw of [false, true]) {
       const { viewpoint, end } = await viewpointOf(honest, rasterizer, limitsOverdraw);
       images.push(await capture(device, viewpoint, { camera }));
-      const { covered } = await viewpoint.statistics();
+      const { covered } = await viewpoint.stats();
       assert.ok(covered > 50 && covered < 1_000, `covered ${covered} times`);
       assert.equal(viewpoint.pixelShare, 1);
       end();
@@ -78,7 +78,7 @@ for (const rasterizer of ['quads', 'tiles'] as const) {
       // Nothing of it is painted before the sum is known.
       assert.ok(performance.now() - begin < 20_000, `the first frame took ${performance.now() - begin} ms`);
       assert.ok(!(await viewpoint.isComplete()) || incomplete() > 0, 'the next frame is another one');
-      const { covered } = await viewpoint.statistics();
+      const { covered } = await viewpoint.stats();
       assert.ok(Math.abs(covered / 20_000 - 1) < 0.01, `covered ${covered} times`);
       assert.ok(Math.abs(viewpoint.pixelShare - 1_040 / 20_000 / 1.25) < 1e-3, `share ${viewpoint.pixelShare}`);
       const image = await capture(device, viewpoint, { camera });

@@ -25,7 +25,7 @@ const NARROW = { rasterizer: 'tiles', order: 'pixel' } as const;
 const WIDE = { ...NARROW, orderWindow: 32 } as const;
 const RULES = { rules: 'gsplat', order: 'pixel' } as const;
 
-/** Big flat splats that cut one another, as the floor and the walls of a room do: at no pixel the order of their centres is right for all. */
+/** Big flat splats that cut one another, as the floor and the walls of a room do: at no pixel the order of their centers is right for all. */
 function crossing(count: number): GaussianCloud {
   const random = seededRandom(38);
   return cloudOf(
@@ -41,7 +41,7 @@ function crossing(count: number): GaussianCloud {
 
 const view = cameraAt([0.4, -0.5, -3], [0, 0, 0], { width: 96, height: 64 });
 
-/** dB of each of some settings; the laboratory prints what the order of centres has, too (docs/accuracy.md). */
+/** PSNR in dB for each of some settings. The laboratory also prints the order of centers (docs/accuracy.md). */
 async function compare(
   name: string,
   cloud: GaussianCloud,
@@ -82,7 +82,7 @@ test('where more splats cut one another, a wider window is nearer', async () => 
   assert.ok(wide > narrow, `${narrow} and ${wide} dB`);
 });
 
-for (const [make, least] of [
+for (const [make, min] of [
   [needles, 55],
   [edgeOnDiscs, 42],
   [room, 40],
@@ -90,7 +90,7 @@ for (const [make, least] of [
   test(`procedural: ${make.name}`, async () => {
     const { name, cloud, cameras } = make();
     const [found] = await compare(name, cloud, resized(cameras[0], 120), [NARROW]);
-    assert.ok(found >= least, `${found} dB`);
+    assert.ok(found >= min, `${found} dB`);
   });
 }
 
@@ -133,7 +133,7 @@ test('several scenes, one of them faded, before and behind a wall that leans int
   const close = closeness(pixels, expected);
   console.log(describeCloseness('two scenes and a wall', close));
   const { psnr: found } = close;
-  // Where a splat meets the wall, a rounding decides whether a pixel has it.
+  // A rounding decides which pixels have a splat that meets the wall.
   assert.ok(found >= 47, `${found} dB`);
   const median = await readTexture(device, out);
   const off = expected.medianDepth.filter((depth, i) => Math.abs(median[i] - depth) > 0.01 * depth).length;

@@ -1,9 +1,10 @@
-/** Probing the last frame: as opaque as the image itself, at the depth where a wall stands, whatever drew it. */
+/** Probing the last frame: as opaque as the image itself, at a wall's depth, with either rasterizer. */
 import assert from 'node:assert/strict';
 import { after, test } from 'node:test';
 import type { GaussianCloud } from '@gaussian-splat/core';
 import { GaussianBuffers, packGaussians, type RasterizerName } from '@gaussian-splat/renderer';
 import { cloudOf, repeat } from '../support/clouds.js';
+import { onlyInLab } from '../support/extent.js';
 import { randomSource } from '../support/gpu.js';
 import { endNodeDevice, serialDevice } from '../support/node-device.js';
 import { cameraAt } from '../support/scenes.js';
@@ -58,6 +59,24 @@ for (const rasterizer of RASTERIZERS) {
   });
 }
 
+test('more points than one row of workgroups has: each gets its own answer', { skip: onlyInLab }, async () => {
+  const device = await serialDevice();
+  const gaussians = await GaussianBuffers.upload(
+    device,
+    packGaussians(cloudOf([{ position: [0, 0, 0], scale: 1, opacity: 0.9, color: [1, 1, 1] }])),
+  );
+  const camera = cameraAt([0, 0, -6], [0, 0, 0], { width: 96, height: 64 });
+  const renderer = new Renderer(device, { rasterizer: 'quads' });
+  await capture(device, renderer, { gaussians, camera });
+  const points = Array.from({ length: 65_535 + 100 }, (_, i) => ({ x: 0.5 + (i % 96), y: 32.5 }));
+  const answers = await renderer.probe(points);
+  assert.equal(answers.length, points.length);
+  for (let i = 96; i < answers.length; i++) assert.deepEqual(answers[i], answers[i % 96], `point ${i}`);
+  assert.ok(answers[48].depth !== null && answers[0].depth === null);
+  renderer.destroy();
+  gaussians.destroy();
+});
+
 test('a wall behind a veil: the depth is that of the wall, and only what is behind it is hidden', async () => {
   const device = await serialDevice();
   const sheet = (z: number, opacity: number) =>
@@ -73,8 +92,8 @@ test('a wall behind a veil: the depth is that of the wall, and only what is behi
   // Camera at the origin, looking along +z.
   const camera = { ...cameraAt([0, 0, 0], [0, 0, 1]), near: 0.1 };
   await capture(device, renderer, { gaussians, camera });
-  const centre = { x: camera.width / 2, y: camera.height / 2 };
-  const [before, between, behind] = await renderer.probe([2, 4, 6].map((depth) => ({ ...centre, depth })));
+  const center = { x: camera.width / 2, y: camera.height / 2 };
+  const [before, between, behind] = await renderer.probe([2, 4, 6].map((depth) => ({ ...center, depth })));
   assert.ok(behind.depth !== null && Math.abs(behind.depth - 5) < 5 / 1024, `depth ${behind.depth}`);
   assert.equal(before.transmittance, 1);
   assert.ok(between.transmittance > 0.7 && between.transmittance < 1, `veil: ${between.transmittance}`);
@@ -134,7 +153,7 @@ for (const sigma of [0.03, 0.1, 0.3]) {
     });
     errors.sort((a, b) => a - b);
     assert.ok(errors[60] < 0.01 && errors[114] < 0.02, `median ${errors[60]} m, 95 % ${errors[114]} m`);
-    // The image is what it was: the order that the probe needs for a moment is back.
+    // The image is unchanged: the order that the probe needs for a moment is restored.
     const again = await renderer.probe(points.slice(0, 3));
     assert.equal(again.length, 3);
     renderer.destroy();

@@ -1,4 +1,4 @@
-/** Each quality keeps its figure, with either rasterizer, near and far, on captured scenes and on those that have what a setting acts on: what `QUALITIES` promises. */
+/** Each quality keeps the figure that `QUALITIES` promises, with either rasterizer, near and far, on captured scenes and on those with splats that a setting affects. */
 import assert from 'node:assert/strict';
 import { after, test } from 'node:test';
 import type { Camera, GaussianCloud } from '@gaussian-splat/core';
@@ -13,15 +13,15 @@ import { psnr } from '../support/metrics.js';
 import { endNodeDevice, serialDevice } from '../support/node-device.js';
 import { cameraAt, resized, room } from '../support/scenes.js';
 import { stressScenes } from '../support/scenes/stress.js';
-import { yawed } from '../stability/support/pictures.js';
+import { yawed } from '../stability/support/images.js';
 import { capture, Renderer, type RendererOptions } from '../support/renderer.js';
 
 /** dB against the oracle: of any scene, and of captured ones. */
 const LIMITS: Record<Quality, number> = { reference: 75, default: 59, balanced: 42, fast: 36 };
 const CAPTURED: Record<Quality, number> = { ...LIMITS, balanced: 50, fast: 44 };
-/** Of 1: what is seen. */
+/** Smallest visible difference, in a range of 1. */
 const VISIBLE = 16 / 255;
-/** Share of a captured scene's pixels that may be off by that. */
+/** Fraction of a captured scene's pixels that may differ by that. */
 const MAX_VISIBLE = 0.001;
 
 const skull = await readScene(readFileSync(new URL('../../demo/scenes/skull.spz', import.meta.url)), {
@@ -33,7 +33,7 @@ interface View {
   readonly cloud: GaussianCloud;
   readonly camera: Camera;
   readonly isCaptured?: boolean;
-  /** Tiles take minutes where there is no GPU. */
+  /** Tiles take minutes without a GPU. */
   readonly withoutTiles?: boolean;
 }
 
@@ -45,7 +45,7 @@ const views: View[] = [
     ...{ isCaptured: true, withoutTiles: !isLab },
   },
   { name: 'skull, near', cloud: skull, camera: cameraAt([0.25, -0.2, -0.5], [0, 0, 0], size), isCaptured: true },
-  // Splats of less than a pixel: levers that go by area fail here.
+  // Splats of less than a pixel: settings that depend on area fail here.
   { name: 'skull from afar', cloud: skull, camera: cameraAt([2, -1.5, -5], [0, 0, 0], size), isCaptured: true },
   { name: 'room', cloud: room().cloud, camera: resized(room().cameras[0], 240), withoutTiles: true },
   ...stressScenes(),
@@ -57,7 +57,7 @@ const daily = isLab ? views : views.filter(({ name }) => name !== 'skull');
 /** The camera turned a little, so that a frame is sorted by the short keys. */
 const LITTLE = 0.01;
 
-/** Share of pixels of which a channel is off by what is seen, and the largest error of an alpha. */
+/** Fraction of pixels with a visible error in a channel, and the largest error of an alpha. */
 function visibleErrors(image: Float32Array, { color, transmittance }: OracleImage): { share: number; alpha: number } {
   let [off, alpha] = [0, 0];
   for (let i = 0; i < transmittance.length; i++) {
@@ -89,7 +89,8 @@ for (const { name, cloud, camera, isCaptured, withoutTiles } of daily) {
     const mode = cloud.antialiased ? 'antialiased' : 'classic';
     const oracle = renderOracle(cloud, camera, { rules: 'gsplat', mode });
     for (const quality of Object.keys(LIMITS) as Quality[]) {
-      // Made scenes are for what qualities leave out; what the others draw is held by `tiles-oracle` and `renderer-oracle`.
+      // Synthetic scenes test the splats that qualities omit; `tiles-oracle` and `renderer-oracle` test the accuracy of
+      // the others.
       const isStress = !isCaptured && !withoutTiles;
       if (isStress && (quality === 'reference' || quality === 'default')) continue;
       const gaussians = await GaussianBuffers.upload(
@@ -111,8 +112,8 @@ for (const { name, cloud, camera, isCaptured, withoutTiles } of daily) {
         const { share, alpha } = visibleErrors(image, oracle);
         const seen = `${(100 * share).toFixed(3)} % seen, alpha ${(255 * alpha).toFixed(1)}`;
         console.log(describeCloseness(what, close), seen);
-        const least = (isCaptured ? CAPTURED : LIMITS)[quality];
-        assert.ok(close.psnr >= least, `${what}: ${close.psnr} dB`);
+        const min = (isCaptured ? CAPTURED : LIMITS)[quality];
+        assert.ok(close.psnr >= min, `${what}: ${close.psnr} dB`);
         assert.ok(isCaptured ? share < MAX_VISIBLE : alpha <= VISIBLE, `${what}: ${seen}`);
       }
       gaussians.destroy();

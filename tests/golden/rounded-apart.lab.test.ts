@@ -6,7 +6,7 @@ import assert from 'node:assert/strict';
 import { after, test } from 'node:test';
 import { GaussianBuffers, packGaussians, type RasterizerName } from '@gaussian-splat/renderer';
 import { faultyDevice } from '../stability/support/devices.js';
-import { notFinite, turnedAway } from '../stability/support/pictures.js';
+import { notFinite, turnedAway } from '../stability/support/images.js';
 import { cloudOf, repeat } from '../support/clouds.js';
 import { psnr } from '../support/metrics.js';
 import type { Miscompilation } from '../support/miscompilation.js';
@@ -19,7 +19,7 @@ import { Renderer } from '../support/renderer.js';
 /** Eight roundings of float32. */
 const MOVE = 1e-6;
 
-/** What `cull` finds stays; what is computed after it moves to one side (1 or -1). */
+/** Results of `cull` stay; values computed after it move to one side (1 or -1). */
 function movedBy(side: number): readonly Miscompilation[] {
   const factor = (1 + side * MOVE).toFixed(7);
   return [
@@ -33,7 +33,7 @@ function movedBy(side: number): readonly Miscompilation[] {
         e.sigma_v *= ${factor};
         e.opacity *= ${factor};`,
     },
-    // What the listing of bins finds, against what painting finds of the same splats.
+    // Splats found by the listing of bins, against the painted ones.
     {
       shader: /gs\.bin_count/,
       from: 'opacity / ALPHA_MIN',
@@ -68,7 +68,7 @@ async function drawTurning(device: GPUDevice, rasterizer: RasterizerName): Promi
   const renderer = new Renderer(device, { rasterizer, threads: 'serial' });
   await readFrame(device, renderer, { gaussians, camera: turnedAway(camera) });
   const pixels = await readFrame(device, renderer, { gaussians, camera });
-  const { visible } = await renderer.statistics();
+  const { visible } = await renderer.stats();
   renderer.destroy();
   gaussians.destroy();
   return [pixels, visible];

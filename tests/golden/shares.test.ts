@@ -20,7 +20,7 @@ interface Kind {
   /** Size of the harmonics above the constant one. */
   readonly shine?: number;
   readonly away?: number;
-  /** Every so many-th splat cannot be drawn. */
+  /** Step of the indices of splats that cannot be drawn. */
   readonly unusable?: number;
   readonly isFlat?: boolean;
 }
@@ -108,7 +108,7 @@ for (const [name, kind] of Object.entries(KINDS)) {
   });
 }
 
-/** How far chunks reach, in the mean. */
+/** Mean extent of the chunks. */
 const reachOfChunks = ({ chunks, count }: PackedGaussians): number => {
   let sum = 0;
   for (let at = 0; at < chunks.length; at += 8)

@@ -9,7 +9,7 @@ import * as stages from '@gaussian-splat/renderer/stages';
 import { requestNodeAdapter } from '../../packages/cli/src/lib/node-gpu.mjs';
 import { endNodeDevice } from '../support/node-device.js';
 
-/** What this test needs of the plugin's own module and the others. */
+/** Functions of the plugin's own module and of others for this test. */
 interface Plugin {
   readonly piecesIn: (text: string) => Map<string, string>;
   readonly joinedIn: (text: string) => string[][];
@@ -61,7 +61,7 @@ async function bothForms(): Promise<{ readable: Stage[]; short: Stage[] }> {
     const { code } = plugin.transform(readFileSync(file, 'utf8'), file)!;
     const own = join(folder, basename(dirname(dirname(dirname(file)))));
     cpSync(dirname(file), own, { recursive: true });
-    // Those of economise take their shared pieces from the renderer's.
+    // Shaders of economise import their shared pieces from the renderer's.
     const copy = join(own, basename(file));
     writeFileSync(copy, code.replace('@gaussian-splat/renderer/stages', '../renderer/shaders.js'));
     short.push(...stagesIn((await import(pathToFileURL(copy).href)) as object));
@@ -74,13 +74,13 @@ const forms = await bothForms();
 
 const scan = (code: string): Token[] => new WgslScanner(code).scanTokens();
 
-/** Words in attributes are the language's: what is behind `@`, and behind `@builtin(`. */
+/** Words in attributes belong to the language: those behind `@`, and behind `@builtin(`. */
 function isOfAttribute(tokens: readonly Token[], at: number): boolean {
   const [word, bracket, before] = [3, 2, 1].map((back) => tokens[at - back]?.lexeme);
   return before === '@' || (before === '(' && ['builtin', 'interpolate'].includes(bracket) && word === '@');
 }
 
-/** Fields are told from other names by their place: `.near` is not `near`. */
+/** The position distinguishes fields from other names: `.near` is not `near`. */
 function isField(tokens: readonly Token[], at: number, isInStruct: boolean): boolean {
   return tokens[at - 1].lexeme === '.' || (isInStruct && tokens[at + 1].lexeme === ':');
 }
@@ -93,7 +93,7 @@ test('token by token they are the same but for names, each has one other, and tw
   forms.readable.forEach(({ name, code }, k) => {
     const [was, is] = [scan(code), scan(forms.short[k].code)];
     assert.equal(is.length, was.length, name);
-    // Of the function, struct, constant or variable that a token is in.
+    // The function, struct, constant or variable that contains a token.
     let nameOf = new Map<string, string>();
     let isInStruct = false;
     let depth = 0;

@@ -16,25 +16,25 @@ import {
   hugeSplats,
   needles,
   offCenter,
-  opacityLadder,
+  opacitySteps,
   resized,
 } from '../support/scenes.js';
 import { capture, Renderer } from '../support/renderer.js';
 
-/** Colours around 4 cost more in a float16 target than those around 1. */
+/** Colors around 4 cost more in a float16 target than those around 1. */
 const LIMITS = { psnr: 69, p999: 0.5 / 255 };
 
 /**
- * The worst pixel: a splat more or less at its rim, where alpha is 1/255 and shapes stored to 14 bits decide otherwise than float64, is 1/255
- * of its colour, and colours reach 4 in one scene.
+ * The worst pixel: a splat more or less at its rim, at which alpha is 1/255 and shapes stored to 14 bits decide differently from float64, is 1/255
+ * of its color, and colors reach 4 in one scene.
  */
 const worstOf = (scene: string): number => (scene === 'brightColors' ? 4.3 : 1.1) / 255;
 
-for (const make of [needles, hugeSplats, opacityLadder, brightColors, edgeOnDiscs, offCenter]) {
+for (const make of [needles, hugeSplats, opacitySteps, brightColors, edgeOnDiscs, offCenter]) {
   test(`tiles: ${make.name}`, async () => {
     const { name, cloud, cameras } = make();
     for (const [i, whole] of cameras.entries()) {
-      // Tiles are slow on SwiftShader, by the pixel; what a scene is hard for shows in these.
+      // Tiles are slow on SwiftShader, by the pixel; these show the difficulties of a scene.
       const camera = resized(whole, 180);
       const close = await compareWithOracle(await anyDevice(), cloud, camera, 'classic', { rasterizer: 'tiles' });
       console.log(describeCloseness(`tiles ${name} ${i}`, close));
@@ -48,7 +48,7 @@ for (const make of [needles, hugeSplats, opacityLadder, brightColors, edgeOnDisc
 /** Stages before the tiles that SwiftShader compiles quickly. */
 const SERIAL = { rasterizer: 'tiles', threads: 'serial', sort: 'serial' } as const;
 
-/** Storing that cuts off what the format has no room for, as an NVIDIA H200 does with float16. */
+/** Storing truncates values beyond the format's precision, as an NVIDIA H200 does with float16. */
 const cutsOff = (stored: string): Promise<{ device: GPUDevice; befallen: string[] }> =>
   faultyDevice([
     {
@@ -80,7 +80,7 @@ test('tiles: bytes are the nearest, on an adapter that cuts off, too', async () 
   device.destroy();
   const floats = await renderCloud(await anyDevice(), cloud, camera, 'classic', SERIAL);
   // Half a step, and what float16 rounds.
-  const worst = floats.reduce((most, x, i) => Math.max(most, Math.abs(255 * Math.min(1, x) - exact[i])), 0);
+  const worst = floats.reduce((max, x, i) => Math.max(max, Math.abs(255 * Math.min(1, x) - exact[i])), 0);
   assert.ok(worst <= 0.5 + 255 * 2 ** -12, `${worst} steps`);
 });
 
@@ -124,12 +124,12 @@ const crowdCamera = cameraAt([0, 0, -3], [0, 0, 0], { width: 64, height: 1100 })
 test('tiles: over capacity the farthest pairs are left out, the frame says so, and the next one has room', async () => {
   const device = await anyDevice();
   const gaussians = await GaussianBuffers.upload(device, packGaussians(crowd));
-  let told: () => void = () => undefined;
-  const incomplete = new Promise<void>((resolve) => (told = resolve));
-  const renderer = new Renderer(device, { rasterizer: 'tiles', onIncomplete: () => told() });
+  let reported: () => void = () => undefined;
+  const incomplete = new Promise<void>((resolve) => (reported = resolve));
+  const renderer = new Renderer(device, { rasterizer: 'tiles', onIncomplete: () => reported() });
   const target = device.createTexture({ size: [64, 1100], format: 'rgba16float', usage: 0x8 | 0x10 });
   renderer.render({ gaussians, camera: crowdCamera, target });
-  const first = await renderer.statistics();
+  const first = await renderer.stats();
   assert.deepEqual([first.pairs, first.pairOverflow], [65_536, 72_000 - 65_536]);
   await incomplete;
   const close = closeness(
@@ -138,7 +138,7 @@ test('tiles: over capacity the farthest pairs are left out, the frame says so, a
   );
   console.log(describeCloseness('tiles with room again', close));
   assert.ok(close.psnr >= LIMITS.psnr && close.max <= worstOf(''), `${close.psnr} dB, worst ${255 * close.max}/255`);
-  const second = await renderer.statistics();
+  const second = await renderer.stats();
   assert.deepEqual([second.pairs, second.pairOverflow], [72_000, 0]);
 });
 
@@ -163,23 +163,23 @@ for (const [what, cameras, pauseMs] of [
   test(`tiles: a single picture that is ${what} is looked at, and told of where it lacks room`, async () => {
     const device = await anyDevice();
     const gaussians = await GaussianBuffers.upload(device, packGaussians(crowd));
-    let told = 0;
-    const renderer = new Renderer(device, { rasterizer: 'tiles', onIncomplete: () => told++ });
+    let reported = 0;
+    const renderer = new Renderer(device, { rasterizer: 'tiles', onIncomplete: () => reported++ });
     const [before, after] = cameras.map(({ width, height, ...rest }) =>
       cameraAt([0, 0, 'far' in rest ? -2000 : -3], [0, 0, 0], { width, height }),
     );
     const targetOf = ({ width, height }: Camera): GPUTexture =>
       device.createTexture({ size: [width, height], format: 'rgba16float', usage: 0x8 | 0x10 });
-    // The third frame of a view is not looked at for its number.
+    // The number of a view's third frame is ignored.
     for (let frame = 0; frame < 2; frame++) {
       renderer.render({ gaussians, camera: before, target: targetOf(before) });
-      assert.equal((await renderer.statistics()).pairOverflow, 0);
+      assert.equal((await renderer.stats()).pairOverflow, 0);
     }
     await pause(pauseMs);
     renderer.render({ gaussians, camera: after, target: targetOf(after) });
-    assert.ok((await renderer.statistics()).pairOverflow > 0);
+    assert.ok((await renderer.stats()).pairOverflow > 0);
     await pause(50);
-    assert.equal(told, 1);
+    assert.equal(reported, 1);
   });
 }
 

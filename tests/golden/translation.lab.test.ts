@@ -1,4 +1,4 @@
-/** A renderer that follows a camera draws what a fresh one draws: nothing of an earlier view is left in the order. */
+/** A renderer that follows a camera draws the same as a fresh one: no state of an earlier view stays in the order. */
 import assert from 'node:assert/strict';
 import { after, test } from 'node:test';
 import type { Camera } from '@gaussian-splat/core';
@@ -66,7 +66,7 @@ test('several scenes are drawn in their common order while the camera moves', as
   let worst = 0;
   for (let i = 0; i < found.length; i++) worst = Math.max(worst, Math.abs(found[i] - expected[i]));
   assert.ok(worst < 0.01, `worst difference ${worst}`);
-  assert.ok((await moving.statistics()).visible > 1000);
+  assert.ok((await moving.stats()).visible > 1000);
 });
 
 for (const rasterizer of ['quads', 'tiles'] as const) {

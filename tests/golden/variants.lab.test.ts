@@ -23,7 +23,7 @@ test('serial and parallel stages draw the same bytes, moving and turning', async
     ];
     assert.deepEqual(Buffer.from(parallel.buffer), Buffer.from(serial.buffer));
   }
-  assert.ok((await renderers[1].statistics()).visible > 1000);
+  assert.ok((await renderers[1].stats()).visible > 1000);
 });
 
 test('every variant gives the known answer, and a wrong rule does not', async () => {
@@ -33,7 +33,7 @@ test('every variant gives the known answer, and a wrong rule does not', async ()
       assert.ok(await passesSelfTest(device, { threads, rasterizer }), `${threads} ${rasterizer}`);
     }
   }
-  assert.equal(await passesSelfTest(device, { shDegree: 0 }), false, 'no view-dependent colour');
+  assert.equal(await passesSelfTest(device, { shDegree: 0 }), false, 'no view-dependent color');
   assert.equal(await passesSelfTest(device, { resolutionScale: 0.5 }), false, 'half the pixels');
 });
 
@@ -52,7 +52,7 @@ test('the spheres that variants are judged by are packed as files are', () => {
   }
 });
 
-/** Spheres that are packed within one task of a page's thread: 64,000 took a desktop processor 250 ms. */
+/** Spheres that are packed within one task of the main thread: 64,000 took a desktop CPU 250 ms. */
 const AT_ONCE = 4_096;
 
 test('the scenes that variants are timed with are copies of a few spheres', () => {
@@ -93,13 +93,13 @@ test('the choice is made once, kept for the adapter, and made anew from a damage
   for (const damage of ['{', 'null', '{"rasterizer":"crayons"}']) {
     entries.set(key, damage);
     const device = await newDevice();
-    const anew = await autotune(device, { store });
-    await assertSuits(device, anew);
-    assert.deepEqual(JSON.parse(entries.get(key)!), anew, damage);
+    const again = await autotune(device, { store });
+    await assertSuits(device, again);
+    assert.deepEqual(JSON.parse(entries.get(key)!), again, damage);
     await autotune(device);
     const renderer = new Renderer(device);
-    assert.equal(renderer.resolvedSettings.threads, anew.threads);
-    assert.equal(renderer.resolvedSettings.rasterizer, anew.rasterizer);
+    assert.equal(renderer.resolvedSettings.threads, again.threads);
+    assert.equal(renderer.resolvedSettings.rasterizer, again.rasterizer);
     renderer.destroy();
     device.destroy();
   }
@@ -124,12 +124,12 @@ test('a device that is lost while variants are tried leaves the choice for its a
     await choosing;
     assert.deepEqual([...entries.values()], isKnown ? [kept] : [], moment);
   }
-  // Trials that are made anew may end otherwise on a GPU that has other things to do; what was kept counts.
+  // Repeated trials may end differently on a busy GPU; the stored choice counts.
   entries.set(key, kept);
   assert.deepEqual(await autotune(await newDevice(), { store }), chosen);
 });
 
-/** A device whose adapter does not say that it is a processor. */
+/** A device whose adapter does not report that it is software. */
 async function deviceLikeAny(): Promise<GPUDevice> {
   const device = await newDevice();
   Object.defineProperty(device, 'adapterInfo', { value: { ...chosenBy(device), isFallbackAdapter: false } });
@@ -201,7 +201,7 @@ test('nor where the adapter says that it is a processor', async (t) => {
   processor.destroy();
 });
 
-/** What a choice is kept under. */
+/** The key of a stored choice. */
 function chosenBy({ adapterInfo }: GPUDevice): Partial<GPUAdapterInfo> {
   const { vendor, architecture, device, description } = adapterInfo;
   return { vendor, architecture, device, description };
@@ -209,7 +209,7 @@ function chosenBy({ adapterInfo }: GPUDevice): Partial<GPUAdapterInfo> {
 
 const newDevice = async (): Promise<GPUDevice> => (await requestNodeAdapter()).requestDevice();
 
-/** On SwiftShader one choice is right. Elsewhere measuring decides, and may decide differently the next time, but never for what draws another picture. */
+/** On SwiftShader one choice is right. Elsewhere measuring decides, and may decide differently the next time, but never for variants that draw another image. */
 async function assertSuits(device: GPUDevice, chosen: Variants): Promise<void> {
   assert.ok(await passesSelfTest(device, chosen), JSON.stringify(chosen));
   if (!isSwiftShader(device)) return;

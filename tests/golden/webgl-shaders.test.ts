@@ -1,4 +1,4 @@
-/** The committed shaders of the WebGL renderer are made of the WGSL that is here: they are no copy that somebody keeps in step. */
+/** The committed shaders of the WebGL renderer match the current WGSL: they are generated, and not edited by hand. */
 import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
 import { test } from 'node:test';

@@ -1,7 +1,7 @@
 /**
  * How much work a frame is: splats, passes, dispatches, bytes. Times on a shared machine say little; these figures are the
  * same everywhere, so a change that makes a frame more expensive is seen by its author.
- * `UPDATE_WORK_COUNTERS=1 npm test -- work-counters` writes work-counters.json anew.
+ * `UPDATE_WORK_COUNTERS=1 npm test -- work-counters` writes work-counters.json again.
  */
 import assert from 'node:assert/strict';
 import { readFileSync, writeFileSync } from 'node:fs';
@@ -30,7 +30,7 @@ const file = fileURLToPath(new URL('work-counters.json', import.meta.url));
 const expected = JSON.parse(readFileSync(file, 'utf8')) as Record<string, Figures>;
 const found: Record<string, Figures> = {};
 
-/** Passes and calls are exact; what follows from arithmetic in float32 may differ by this share between GPUs. */
+/** Passes and calls are exact; results of arithmetic in float32 may differ by this fraction between GPUs. */
 const TOLERANCE: Readonly<Record<string, number>> = {
   visible: 0.001,
   pairs: 0.005,
@@ -75,7 +75,7 @@ async function measure(name: string, options: RendererOptions): Promise<Figures>
   const { buffersCreated, bytesAllocated } = counter.take();
   draw();
   const { buffersCreated: buffersPerFrame, bytesAllocated: bytesPerFrame, ...frame } = counter.take();
-  const { visible, ...others } = await renderer.statistics();
+  const { visible, ...others } = await renderer.stats();
   const figures = {
     visible,
     ...('pairs' in others ? { pairs: others.pairs as number } : {}),
@@ -163,7 +163,7 @@ for (const [name, options] of CONFIGURATIONS) {
       const { dispatches, indirectCalls } = counter.take();
       assert.ok(dispatches > 30);
       assert.equal(indirectCalls, 0);
-      assert.ok((await renderer.statistics()).visible > 100, 'something is drawn');
+      assert.ok((await renderer.stats()).visible > 100, 'something is drawn');
       [renderer, gaussians, target].forEach((owner) => owner.destroy());
     });
   }

@@ -1,4 +1,4 @@
-/** Several scenes in one picture, against the float64 oracle: placed by any affine matrix, faded, cropped, and hidden by what a host has drawn. */
+/** Several scenes in one image, against the float64 oracle: placed by any affine matrix, faded, cropped, and hidden by a host's meshes. */
 import assert from 'node:assert/strict';
 import { after, test } from 'node:test';
 import { lookAt, multiply, type Camera, type GaussianCloud, type Matrix4 } from '@gaussian-splat/core';
@@ -152,7 +152,7 @@ function barDepth({ width, height, fx, cx, cy, orthographic: isFlat }: Camera): 
 
 const [NEAR, FAR] = [0.5, 40];
 
-/** What a GPU would hold. */
+/** Values that a GPU would store. */
 function stored(
   depth: number,
   { reversed, isFlat, far = FAR }: { reversed: boolean; isFlat: boolean; far?: number },
@@ -223,7 +223,7 @@ for (const rasterizer of RASTERIZERS) {
     const device = await serialDevice();
     const { world, free } = await worldOf(device, placedPair);
     const viewpoint = new Viewpoint(device, world, { settings: settings('default', { rasterizer }) });
-    // What a depth means does not depend on who paints.
+    // The meaning of a depth does not depend on the rasterizer.
     const stores = rasterizer === 'quads' || isLab ? VARIANTS : VARIANTS.slice(0, 2);
     for (const { format, isFlat = false, ...host } of stores) {
       const camera = isFlat ? orthographic : view();
@@ -277,7 +277,7 @@ test('the median depth is that of the oracle', async () => {
   };
   const close = medianDepth.reduce((sum, value, i) => sum + +isClose(value, i), 0);
   assert.ok(medianDepth.some((value) => value > 0));
-  // Where half of the light is left to a rounding, the next splat is taken.
+  // The next splat is drawn if rounding decides about half of the light.
   assert.ok(close >= 0.998 * medianDepth.length, `${close} of ${medianDepth.length}`);
   viewpoint.destroy();
   free();
@@ -476,7 +476,7 @@ test('the opacity of a scene is that of an opaque surface of many splats', async
 });
 
 test('the bounds of a world hold what is visible of it', () => {
-  const scene = { pages: [] } as unknown as GaussianScene;
+  const scene = { blocks: [] } as unknown as GaussianScene;
   const bounds = { min: [-1, -1, -1], max: [1, 1, 1], center: [0, 0, 0], radius: 1 } as const;
   const world = new World();
   assert.equal(boundsOfWorld(world), undefined);

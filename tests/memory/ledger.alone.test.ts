@@ -1,4 +1,4 @@
-/** The ledger of GPU memory: what it declares is what is allocated, and it refuses before anything is. */
+/** The ledger of GPU memory: its declarations equal the allocations, and it refuses before anything is allocated. */
 import assert from 'node:assert/strict';
 import { after, test } from 'node:test';
 import { GaussianSplatError } from '@gaussian-splat/core';

@@ -6,6 +6,7 @@ import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { GaussianSplatError } from '@gaussian-splat/core';
 import { bytesSource, readOnnxHeader, type OnnxHeader } from '@gaussian-splat/core/onnx';
+import { openModel } from '../../packages/element/src/loading/open-model.js';
 import { isLab } from '../support/extent.js';
 import { fixtureBytes, fixtureNames } from '../support/generators.js';
 import { seededRandom } from '../support/random.js';
@@ -58,7 +59,7 @@ test(`${MUTATIONS} mutations: a header or a named error, the same in one piece a
   assert.ok(seconds < 60, `${seconds} s of work`);
 });
 
-/** Flips, replaces, inserts, removes or repeats bytes, mostly in the first and last 200, where the structure is. */
+/** Flips, replaces, inserts, removes or repeats bytes, mostly in the first and last 200, which hold the structure. */
 function mutate(original: Uint8Array, random: () => number): Uint8Array {
   let bytes = original.slice();
   const place = (): number => {
@@ -120,4 +121,34 @@ test('a file of 60 MB of empty fields is refused within seconds', async () => {
   assert.ok(result instanceof GaussianSplatError && result.code === 'decode/unsupported', String(result));
   const seconds = process.cpuUsage(start).user / 1e6;
   assert.ok(seconds < 20, `${seconds} s of work`);
+});
+
+const joined = (parts: readonly Uint8Array[]): Uint8Array => new Uint8Array(Buffer.concat(parts));
+
+test('a node of very many attributes is read in linear time', async () => {
+  const text = (value: string): Uint8Array => new TextEncoder().encode(value);
+  const attributes = Array.from({ length: 50_000 }, (_, k) => {
+    return field(5, joined([field(1, text(`a${k}`)), Uint8Array.of(0x18, 1)]));
+  });
+  const start = process.cpuUsage();
+  const result = await outcome(model(field(1, joined([field(4, text('Add')), ...attributes]))));
+  const seconds = process.cpuUsage(start).user / 1e6;
+  assert.ok(!(result instanceof GaussianSplatError), String(result));
+  assert.equal(Object.keys(result.nodes[0].numbers!).length, 50_000);
+  assert.ok(seconds < 3, `${seconds} s of work`);
+});
+
+test('a node of more names than a page can receive is refused', async () => {
+  const inputs = new Uint8Array(2 * 1_000_001);
+  for (let i = 0; i < inputs.length; i += 2) inputs[i] = 0x0a;
+  const place = { bytes: model(field(1, inputs)), name: 'model.onnx' };
+  const opened = openModel({ place, limits: undefined }, new AbortController().signal);
+  await assert.rejects(opened, { code: 'out-of-memory/budget' });
+});
+
+test('a page that is only comments is refused at once', async () => {
+  const start = process.cpuUsage();
+  const result = await outcome(new TextEncoder().encode('<!---->'.repeat(28)));
+  assert.ok(result instanceof GaussianSplatError, String(result));
+  assert.ok(process.cpuUsage(start).user < 1e6);
 });

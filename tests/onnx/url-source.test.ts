@@ -81,6 +81,13 @@ const ROUTES: Readonly<Record<string, Route>> = {
   '/page.onnx': (_, response) => response.writeHead(200).end('<!doctype html><title>Not found</title>'),
   '/empty.onnx': (_, response) => response.writeHead(200).end(),
   '/private.onnx': status(403),
+  '/endless.onnx': (_, response) => {
+    const more = (): void => {
+      while (!response.destroyed && response.write(new Uint8Array(65_536)));
+    };
+    response.writeHead(200).on('drain', more);
+    more();
+  },
   '/broken.onnx': (_, response) => {
     response.writeHead(200, { 'Content-Length': 5000 });
     response.write(SMALL.subarray(0, 1000), () => setTimeout(() => response.destroy(), 20));
@@ -179,4 +186,9 @@ test('no server, no address, and a caller who gave up', async () => {
   await refused('x.onnx', 'network/url');
   const aborted = openUrl(`${base}/small.onnx`, { signal: AbortSignal.abort(new Error('gave up')) });
   await assert.rejects(aborted, /gave up/);
+});
+
+test('a response beyond the limit is given up', async () => {
+  const opening = openUrl(`${base}/endless.onnx`, { maxBytes: 1e6, signal: AbortSignal.timeout(10_000) });
+  await assert.rejects(opening, { code: 'out-of-memory/budget' });
 });

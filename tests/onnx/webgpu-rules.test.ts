@@ -1,4 +1,4 @@
-/** One rule set, one corpus: what this checker finds in every file of the fixtures is what the Python exporter's finds (test_placement.py). */
+/** One rule set, one corpus: this checker finds the same faults in every file of the fixtures as the Python exporter's (test_placement.py). */
 import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
 import test from 'node:test';

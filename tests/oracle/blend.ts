@@ -18,21 +18,21 @@ export interface ScreenSplat {
   readonly opacity: number;
   /** Red, green, blue; 0 or more, may exceed 1. */
   readonly color: Vector3;
-  /** Depth in camera axes, 0 where that is behind the camera, at which the splat is densest along the ray of a pixel. */
+  /** Depth in camera axes at which the splat is densest along the ray of a pixel, 0 if that is behind the camera. */
   readonly depthAt?: (column: number, row: number) => number;
 }
 
-/** What the oracle draws. Rows run from the top, pixels within a row from the left. */
+/** The oracle's image. Rows run from the top, pixels within a row from the left. */
 export interface OracleImage {
   readonly width: number;
   readonly height: number;
   /** [height, width, 3] red, green, blue, weighted by alpha (premultiplied), background included; not clamped. */
   readonly color: Float64Array;
-  /** [height, width] share of the background that is seen, 0..1. Alpha is 1 less this. */
+  /** [height, width] visible fraction of the background, 0..1. Alpha is 1 less this. */
   readonly transmittance: Float64Array;
   /** [height, width] number of splats that were added to the pixel. */
   readonly contributors: Uint32Array;
-  /** [height, width] depth of the splat that leaves half of the light or less; 0 where none does. */
+  /** [height, width] depth of the splat that leaves half of the light or less; 0 if none does. */
   readonly medianDepth: Float64Array;
   /** [N] largest weight alpha·T that each splat of the cloud has in any pixel; 0 if it is not seen. */
   readonly maxWeight: Float64Array;
@@ -50,16 +50,16 @@ export function emptyImage(width: number, height: number, splatCount: number): O
   };
 }
 
-/** The splats in the order in which they are blended: nearest first. Leaves the array it is given alone. */
+/** The splats in blending order, nearest first. Does not change the given array. */
 export function nearestFirst(splats: readonly ScreenSplat[]): ScreenSplat[] {
   return [...splats].sort((a, b) => a.key - b.key || a.index - b.index);
 }
 
-/** What else is in the picture, pixel by pixel: it lies among the splats by its depth. */
+/** Other contents of the image, pixel by pixel, at their depth among the splats. */
 export interface OracleLayer {
-  /** [height, width] depth in camera axes; Infinity where there is nothing. */
+  /** [height, width] depth in camera axes; Infinity if there is nothing. */
   readonly depth: ArrayLike<number>;
-  /** [height, width, 4] premultiplied red, green, blue, and the share that is covered. */
+  /** [height, width, 4] premultiplied red, green, blue, and the covered fraction. */
   readonly color: ArrayLike<number>;
 }
 
@@ -85,7 +85,7 @@ class LayersAmong {
     }
   }
 
-  /** Those behind all splats. */
+  /** Contents behind all splats. */
   passAll(finished: ArrayLike<number>): void {
     if (this.#layers.length === 0) return;
     for (let pixel = 0; pixel < finished.length; pixel++) if (!finished[pixel]) this.passUpTo(pixel, Infinity);
@@ -94,7 +94,7 @@ class LayersAmong {
 
 /**
  * Blends splats, nearest first, into the image, pixel by pixel: C += T·alpha·c, then T *= 1 - alpha.
- * @param limit [height, width] depth of what else is in the picture: splats behind it are hidden
+ * @param limit [height, width] depth of other contents of the image: splats behind it are hidden
  */
 export function blend(
   image: OracleImage,
@@ -109,7 +109,7 @@ export function blend(
   among.passAll(finished);
 }
 
-/** What one pixel takes. */
+/** The blending state of one pixel. */
 interface Fragment {
   readonly splat: ScreenSplat;
   readonly alpha: number;
@@ -117,8 +117,7 @@ interface Fragment {
 }
 
 /**
- * Blends splats in an order of each pixel's own: by where along its ray each is densest, equal depths in the order that is given. A splat is hidden where
- * that lies behind the limit.
+ * Blends splats in a separate order for each pixel: by the depth at which each is densest along its ray, equal depths in the given order. A splat is hidden if that depth is behind the limit.
  */
 export function blendByPixel(
   image: OracleImage,
@@ -182,7 +181,7 @@ function blendSplat(
 /** exp is the dear part: below this power alpha is surely under minAlpha. The margin leaves the decision to the test. */
 const hopelessPower = ({ opacity }: ScreenSplat, { minAlpha }: Rules): number => Math.log(minAlpha / opacity) - 1e-6;
 
-/** 0 where the splat does not reach the pixel. */
+/** 0 if the splat does not reach the pixel. */
 function alphaAt(
   { ellipse, opacity }: ScreenSplat,
   column: number,

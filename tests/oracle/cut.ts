@@ -1,5 +1,5 @@
 /**
- * Cuts, by their definition: a splat changes by the share of it that lies in a shape, whose surface counts as its tangent plane. Of a splat that is hidden in part the rest is a Gaussian again.
+ * Cuts, by their definition: a splat changes by its fraction within a shape, whose surface counts as its tangent plane. The rest of a partly hidden splat is a Gaussian again.
  */
 import { inverse, multiply, type GaussianCloud, type Matrix4, type Vector3 } from '@gaussian-splat/core';
 import type { SplatCut } from '@gaussian-splat/renderer/modifiers';
@@ -8,7 +8,7 @@ import { thinnedBy } from './thinned.js';
 
 const IDENTITY: Matrix4 = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1];
 
-/** Share of the standard normal distribution below x: its series, and far out the continued fraction of its tail. */
+/** Fraction of the standard normal distribution below x: its series, and far out the continued fraction of its tail. */
 export function normalBelow(x: number): number {
   if (x < 0) return 1 - normalBelow(-x);
   const density = Math.exp(-0.5 * x * x) / Math.sqrt(2 * Math.PI);
@@ -18,7 +18,7 @@ export function normalBelow(x: number): number {
   return 0.5 + density * sum;
 }
 
-/** A coordinate of the shape at a splat's center, its gradient in the scene's frame, and the values between which the shape lies. */
+/** A coordinate of the shape at a splat's center, its gradient in the scene's frame, and the shape's bounds. */
 interface Slab {
   readonly at: number;
   readonly gradient: number[];
@@ -49,7 +49,7 @@ function slabsOf(shape: SplatCut['shape'], [x, y, z]: number[], rows: number[][]
 const density = (x: number): number => Math.exp(-0.5 * x * x) / Math.sqrt(2 * Math.PI);
 const weighted = (x: number): number => (Number.isFinite(x) ? x * density(x) : 0);
 
-/** What lies between the limits of one coordinate of a shape: of a splat, softened by the edge. */
+/** The part of a splat between the limits of one coordinate of a shape, softened by the edge. */
 interface Limits {
   readonly share: number;
   /** Root of the covariance, transposed, times the gradient. */
@@ -80,7 +80,7 @@ function limitsOf(cloud: GaussianCloud, i: number, cut: SplatCut, sceneToWorld: 
   });
 }
 
-/** Share of splat `i` that a cut changes. */
+/** Fraction of splat `i` that a cut changes. */
 export function shareCut(cloud: GaussianCloud, i: number, cut: SplatCut, sceneToWorld: Matrix4 = IDENTITY): number {
   const inside = limitsOf(cloud, i, cut, sceneToWorld).reduce((product, { share }) => product * share, 1);
   return cut.side === 'outside' ? 1 - inside : inside;
@@ -97,8 +97,7 @@ interface Trimmed {
 const [MIN_VARIANCE, MIN_MASS] = [0.01, 0.004];
 
 /**
- * What a cut that hides leaves of a splat: the Gaussian whose mass, mean and variance along each coordinate of the shape are those of the splat times the opacity of the cut at each place,
- * where the others of the coordinates count by their means.
+ * The rest of a splat after a cut that hides: the Gaussian whose mass, mean and variance along each coordinate of the shape are those of the splat times the opacity of the cut at each place, at which the other coordinates count by their means.
  */
 function trim(splat: Trimmed, cloud: GaussianCloud, i: number, cut: SplatCut, sceneToWorld: Matrix4): Trimmed {
   const { opacity = 1, side, edge } = cut;
@@ -132,7 +131,7 @@ function trim(splat: Trimmed, cloud: GaussianCloud, i: number, cut: SplatCut, sc
   return { opacity: splat.opacity * Math.min(1, mass / narrowed), position, axes };
 }
 
-/** The gradient g of which `spread` is axesᵀ · g, by Cramer's rule. */
+/** The gradient g with `spread` = axesᵀ · g, by Cramer's rule. */
 function solved(axes: number[][], spread: number[]): number[] {
   const rows = [0, 1, 2].map((k) => [axes[0][k], axes[1][k], axes[2][k]]);
   const det = (m: number[][]): number =>

@@ -1,9 +1,9 @@
-/** Where along a ray a splat is densest: the depths of an order for each pixel (Radl et al. 2024), of the splat as it is painted, filter included. */
+/** The point of a ray at which a splat is densest: the depths of an order for each pixel (Radl et al. 2024), of the splat as it is painted, filter included. */
 import type { Camera, GaussianCloud, Vector3 } from '@gaussian-splat/core';
 import { linearPart, rotationTimesScale } from './projection.js';
 import type { Rules } from './rules.js';
 
-/** For splat `i` with its centre at `center` in camera axes: the depth at which it is densest along the ray of a pixel, 0 if that is behind the camera. */
+/** For splat `i` with its center at `center` in camera axes: the depth of its maximum along the ray of a pixel, 0 if that is behind the camera. */
 export function densestDepth(
   cloud: GaussianCloud,
   i: number,
@@ -22,12 +22,12 @@ export function densestDepth(
   const shrink = orthographic ? 1 : z;
   covariance[0][0] += rules.dilation * (shrink / fx) ** 2;
   covariance[1][1] += rules.dilation * (shrink / fy) ** 2;
-  // What is flat in the direction of the ray, where the filter adds nothing, has no inverse: next to nothing makes it one.
+  // A shape that is flat along the ray has no inverse if the filter adds nothing: a tiny value makes it invertible.
   const thickness = 1e-14 * (covariance[0][0] + covariance[1][1] + covariance[2][2]);
   for (const k of [0, 1, 2]) covariance[k][k] += thickness;
   const inverse = inverse3(covariance);
   if (orthographic) {
-    // Along (dx, dy, t) from the centre the exponent is least where its derivative by t is 0.
+    // Along (dx, dy, t) from the center the exponent has its minimum at the zero of its derivative by t.
     const [a, b, c] = inverse[2];
     return (column, row) => Math.max(0, z - (a * ((column + 0.5 - cx) / fx - x) + b * ((row + 0.5 - cy) / fy - y)) / c);
   }

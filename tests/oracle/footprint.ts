@@ -35,7 +35,7 @@ function boxOf(ellipse: Ellipse, opacity: number, camera: Camera, rules: Rules):
 }
 
 /**
- * INRIA's cut: the tiles that a square around the 3-sigma circle touches. There, pixel centres are whole numbers, hence
+ * INRIA's cut: the tiles that a square around the 3-sigma circle touches. There, pixel centers are whole numbers, hence
  * the half pixel; tile bounds are found by integer division after adding a tile less one pixel.
  */
 function tilesOf(ellipse: Ellipse, camera: Camera): PixelRect {

@@ -9,7 +9,7 @@ import { cameraAt, movedBy, room } from '../support/scenes.js';
 import { renderOracle, toRgba, type OracleOptions } from './oracle.js';
 import { RULES } from './rules.js';
 
-/** 32x32 pixels, focal length 32, so that a unit at depth 32 is a pixel; pixel (16, 16) has its centre on the axis. */
+/** 32x32 pixels, focal length 32, so that a unit at depth 32 is a pixel; pixel (16, 16) has its center on the axis. */
 const camera: Camera = {
   ...cameraAt([0, 0, 0], [0, 0, 1], { width: 32, height: 32, fovXDegrees: 90 }),
   fx: 32,
@@ -20,7 +20,7 @@ const camera: Camera = {
 const classic: OracleOptions = { rules: 'gsplat', mode: 'classic' };
 const CENTER = 16 * 32 + 16;
 
-/** A ball of 2 px standard deviation (before dilation) on the axis, unless told otherwise. */
+/** A ball of 2 px standard deviation (before dilation) on the axis, by default. */
 const ball = (splat: Partial<SplatDescription>): SplatDescription => ({
   position: [0, 0, 32],
   scale: 2,
@@ -32,7 +32,7 @@ const ball = (splat: Partial<SplatDescription>): SplatDescription => ({
 const close = (found: number, expected: number, what: string, tolerance = 1e-6): void =>
   assert.ok(Math.abs(found - expected) <= tolerance, `${what}: ${found}, expected ${expected}`);
 
-test('one Gaussian has alpha o·exp(-r²/2σ²) at every pixel centre, and nothing where that is under 1/255', () => {
+test('one Gaussian has alpha o·exp(-r²/2σ²) at every pixel center, and nothing where that is under 1/255', () => {
   const image = renderOracle(cloudOf([ball({ opacity: 0.75, color: [1, 0.25, 2] })]), camera, classic);
   let drawn = 0;
   for (let row = 0; row < 32; row++) {
@@ -88,13 +88,13 @@ test('nearer splats cover farther ones, whatever their order in the cloud', () =
 
 test('equal depths are blended in the order of the cloud, unless the caller gives keys', () => {
   const cloud = cloudOf([ball({ color: [1, 0, 0] }), ball({ color: [0, 1, 0] })]);
-  const centre = (options: OracleOptions): number[] => [
+  const center = (options: OracleOptions): number[] => [
     ...renderOracle(cloud, camera, options).color.subarray(3 * CENTER, 3 * CENTER + 2),
   ];
-  close(centre(classic)[0], 0.5, 'red first');
-  close(centre(classic)[1], 0.25, 'green second');
-  close(centre({ ...classic, depthKeys: [7, 3] })[0], 0.25, 'red second');
-  close(centre({ ...classic, depthKeys: [7, 3] })[1], 0.5, 'green first');
+  close(center(classic)[0], 0.5, 'red first');
+  close(center(classic)[1], 0.25, 'green second');
+  close(center({ ...classic, depthKeys: [7, 3] })[0], 0.25, 'red second');
+  close(center({ ...classic, depthKeys: [7, 3] })[1], 0.5, 'green first');
 });
 
 test('depth is compared in float32, as renderers do', () => {
@@ -113,7 +113,7 @@ test('a pixel is finished before its transmittance falls under 1e-4, and stays s
     assert.equal(image.contributors[CENTER], 13); // 2^-13 = 1.2e-4, 2^-14 = 6.1e-5
     close(image.transmittance[CENTER], 2 ** -13, 'transmittance', 1e-12);
     assert.ok(image.maxWeight[20] > 0, 'the faint one is seen beside the finished pixels');
-    assert.ok(image.maxWeight[20] < 0.0099, 'but not at the centre');
+    assert.ok(image.maxWeight[20] < 0.0099, 'but not at the center');
   }
 });
 
@@ -128,7 +128,7 @@ test('at exactly the least transmittance gsplat stops and INRIA goes on', () => 
   }
 });
 
-test('centres before the near plane and beyond the far plane are not drawn; on the near plane gsplat draws', () => {
+test('centers before the near plane and beyond the far plane are not drawn; on the near plane gsplat draws', () => {
   const seen = (z: number, rules: 'gsplat' | 'inria'): boolean => {
     const planes = { ...camera, near: 2, far: 8 };
     const image = renderOracle(cloudOf([ball({ position: [0, 0, z], scale: 0.1 })]), planes, {
@@ -155,8 +155,8 @@ test('antialiased, a splat has the energy that it would have without dilation', 
     });
     const energy = image.transmittance.reduce((sum, t) => sum + 1 - t, 0);
     const [exact, dilated] = [scale ** 2, scale ** 2 + 0.3];
-    close(image.transmittance[CENTER], 1 - (0.9 * exact) / dilated, 'centre', 1e-7);
-    // The whole integral is 2π·o·det^½; what lies under alpha 1/255 is not drawn: 2π·det_dilated^½ / 255.
+    close(image.transmittance[CENTER], 1 - (0.9 * exact) / dilated, 'center', 1e-7);
+    // The whole integral is 2π·o·det^½; the part under alpha 1/255 is not drawn: 2π·det_dilated^½ / 255.
     const expected = 2 * Math.PI * (0.9 * exact - dilated / 255);
     close(energy / expected, 1, `energy at scale ${scale}`, 0.02);
   }
@@ -180,7 +180,7 @@ test('the cuts of INRIA are the only visible difference of the rule sets: under 
   assert.ok(lost > 10, 'INRIA does cut something here');
 });
 
-test('a colour depends on the direction from the eye to the splat', () => {
+test('a color depends on the direction from the eye to the splat', () => {
   // Degree 1 of red along z: looking along +z it adds, looking back along -z it subtracts.
   const cloud = cloudOf([ball({ position: [0, 0, 0], color: [0.5, 0.5, 0.5], sh: [0, 0, 0, 0.4, 0, 0, 0, 0, 0] })], 1);
   const red = (z: number): number => {
@@ -207,7 +207,7 @@ const orbit = cameraAt([0.4, -0.9, -3], [0.1, 0, 0], { width: 48, height: 40 });
 test('turning the scene and the camera together leaves the image as it was', () => {
   fc.assert(
     fc.property(fc.integer(), (seed) => {
-      // A quarter turn about z: (x, y, z) -> (-y, x, z), exact in float32 but for the quaternion.
+      // A quarter turn about z: (x, y, z) -> (-y, x, z), exact in float32 except for the quaternion.
       const h = Math.SQRT1_2;
       const splats = someSplats(seededRandom(seed));
       const turned = splats.map((s): SplatDescription => {
@@ -259,7 +259,7 @@ test('twice as large and twice as far is the same image, to the last bit', () =>
   );
 });
 
-test('a scene a thousand kilometres from the origin of the world looks the same', () => {
+test('a scene a thousand kilometers from the origin of the world looks the same', () => {
   const scene = room();
   const [here, there] = [scene, movedBy(scene, [1e6, -2e6, 5e5])].map(({ cloud, cameras }) =>
     renderOracle(
@@ -272,7 +272,7 @@ test('a scene a thousand kilometres from the origin of the world looks the same'
   assert.ok(decibel > 75, `${decibel} dB`);
 });
 
-test('toRgba gives premultiplied colour and alpha', () => {
+test('toRgba gives premultiplied color and alpha', () => {
   const image = renderOracle(cloudOf([ball({ color: [1, 0.5, 0] })]), camera, classic);
   const rgba = toRgba(image);
   assert.equal(rgba.length, 4 * 32 * 32);

@@ -1,5 +1,5 @@
 /**
- * The true image: 3D Gaussian splatting (Kerbl et al. 2023) in float64, written to be read.
+ * The reference image: 3D Gaussian splatting (Kerbl et al. 2023) in float64, written to be read.
  * Renderers are measured against it; the rules it follows are measured against reference images of gsplat.
  */
 import {
@@ -43,13 +43,13 @@ export interface OracleOptions {
   readonly mode: Mode;
   /** Red, green, blue behind everything; default black. */
   readonly background?: Vector3;
-  /** [height, width] depth of what else is in the picture, world units in camera axes: splats behind it are hidden. */
+  /** [height, width] depth of other contents of the image, world units in camera axes: splats behind it are hidden. */
   readonly depth?: ArrayLike<number>;
   /** Layers of color among the splats. */
   readonly layers?: readonly OracleLayer[];
   /** [N] one key for each splat of the cloud, blended ascending; default float32 z in camera axes. */
   readonly depthKeys?: ArrayLike<number>;
-  /** `pixel`: each pixel blends by where along its ray each splat is densest, whatever the keys say. Default `center`. */
+  /** `pixel`: each pixel blends by the depth at which each splat is densest along its ray, regardless of keys. Default `center`. */
   readonly order?: 'center' | 'pixel';
 }
 
@@ -154,7 +154,7 @@ function requireFinite(index: number, values: number[]): void {
   if (values.every(Number.isFinite)) return;
   throw new GaussianSplatError('argument/cloud', {
     where: `splat ${index}`,
-    expected: 'finite conic, centre, opacity, colour and depth key',
+    expected: 'finite conic, center, opacity, color and depth key',
     found: values.join(', '),
     remedy: 'leave out splats that isUsable() refuses before asking the oracle',
   });

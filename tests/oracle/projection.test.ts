@@ -103,7 +103,7 @@ test('beyond 15 % of the image size outside the view the slope in the Jacobian s
   }
 });
 
-test('the clamp moves the shape, never the centre', () => {
+test('the clamp moves the shape, never the center', () => {
   const cloud = cloudOf([{ position: [50, -20, 1], scale: 0.1, opacity: 1, color: [1, 1, 1] }]);
   const ellipse = projectEllipse(cloud, 0, camera, [50, -20, 1], rules);
   near(ellipse.x, 50 * camera.fx + 170, 1e-14, 'x');
@@ -214,7 +214,7 @@ test('the compensation keeps the integral that the splat had before dilation, do
   );
 });
 
-test('the eye that colours are seen from is the centre of the view', () => {
+test('the eye that colors are seen from is the center of the view', () => {
   const eye: Vector3 = [3, -2, -5];
   toCamera(cameraAt(eye, [0, 0, 1]), eyeOf(cameraAt(eye, [0, 0, 1]).worldToCamera)).forEach((c) =>
     near(c, 0, 1e-12, 'eye'),
@@ -229,7 +229,7 @@ test('a needle that points at the eye keeps 0.005 of its opacity, the floor of b
   assert.equal(projectEllipse(cloud, 0, camera, [0, 0, 4], { ...rules, compensationFloor: 0 }).compensation, 0);
 });
 
-/** An ellipse as `projectEllipse` makes it, for whole-number pixel centres as INRIA counts them. */
+/** An ellipse as `projectEllipse` makes it, for whole-number pixel centers as INRIA counts them. */
 const ellipseAt = (x: number, y: number, covariance: Ellipse['covariance']): Ellipse => ({
   x: x + 0.5,
   y: y + 0.5,
@@ -248,7 +248,7 @@ test("INRIA's footprint is the 16x16 tiles that 3 standard deviations of the lon
   assert.deepEqual(footprint(ellipseAt(47, 50, long)), [32, 64, 32, 80]);
   // A slanted one has the same longest axis whichever way it points: eigenvalues 25 and 1.
   assert.deepEqual(footprint(ellipseAt(46, 49, { xx: 13, xy: 12, yy: 13 })), [16, 64, 32, 64]);
-  // A circle counts as at least sqrt(0.1) larger in variance: radius 3 where 3·sqrt(0.3) is 1.6.
+  // A circle counts as at least sqrt(0.1) larger in variance: radius 3 instead of 3·sqrt(0.3), which is 1.6.
   assert.deepEqual(footprint(ellipseAt(18, 19, { xx: 0.3, xy: 0, yy: 0.3 })), [0, 32, 16, 32]);
   // Off the image on the left and above; cut by the right and lower edges, 400 and 300, which tiles overlap.
   assert.deepEqual(footprint(ellipseAt(-40, -40, long)), [0, 0, 0, 0]);

@@ -11,14 +11,14 @@ export interface Symmetric2 {
 
 /** A Gaussian on the screen. */
 export interface Ellipse {
-  /** Centre in pixels; pixel (column, row) has its own centre at (column + 0.5, row + 0.5). */
+  /** Center in pixels; pixel (column, row) has its own center at (column + 0.5, row + 0.5). */
   readonly x: number;
   readonly y: number;
   /** Dilated screen covariance, px². */
   readonly covariance: Symmetric2;
   /** Its inverse, px⁻². */
   readonly conic: Symmetric2;
-  /** sqrt(det Σ / det(Σ + dilation·I)): the share of its peak that the Gaussian would lose by true convolution. */
+  /** sqrt(det Σ / det(Σ + dilation·I)): the fraction of its peak that the Gaussian would lose by true convolution. */
   readonly compensation: number;
 }
 
@@ -38,7 +38,7 @@ export function toCamera(camera: Camera, [x, y, z]: Vector3): Vector3 {
   ];
 }
 
-/** The screen ellipse of splat `i` whose centre lies at `center` in camera axes, z > 0. */
+/** The screen ellipse of splat `i` whose center lies at `center` in camera axes, z > 0. */
 export function projectEllipse(
   cloud: GaussianCloud,
   i: number,
@@ -66,7 +66,7 @@ export function projectEllipse(
 }
 
 /**
- * Derivative of the pixel position by the camera-space point: [[fx/z, 0, -fx·x/z²], [0, fy/z, -fy·y/z²]]. Centres far
+ * Derivative of the pixel position by the camera-space point: [[fx/z, 0, -fx·x/z²], [0, fy/z, -fy·y/z²]]. Centers far
  * outside the view are moved to just beyond its edge first, because the linear approximation explodes out there.
  */
 export function jacobian(camera: Camera, [x, y, z]: Vector3, rules: Rules): [number[], number[]] {

@@ -2,13 +2,13 @@
 
 export type RuleSet = 'inria' | 'gsplat';
 
-/** `classic` dilates and keeps the opacity; `antialiased` lowers it by what the dilation added (Mip-Splatting style). */
+/** `classic` dilates and keeps the opacity; `antialiased` lowers it by the dilation's addition (Mip-Splatting style). */
 export type Mode = 'classic' | 'antialiased';
 
 export interface Rules {
   /** Added to both diagonal elements of the screen covariance, px². */
   readonly dilation: number;
-  /** How far beyond the image edge the Jacobian still follows a centre, as a share of tan(fov / 2). */
+  /** How far beyond the image edge the Jacobian still follows a center, as a fraction of tan(fov / 2). */
   readonly jacobianMargin: number;
   /** Smallest det(Σ) / det(Σ + dilation·I) whose square root scales an antialiased opacity. */
   readonly compensationFloor: number;
@@ -20,7 +20,7 @@ export interface Rules {
   readonly minTransmittance: number;
   /** ...or exactly to it. */
   readonly stopsAtEquality: boolean;
-  /** True if a centre exactly on the near plane is drawn. */
+  /** True if a center exactly on the near plane is drawn. */
   readonly drawsOnNearPlane: boolean;
   /**
    * Which pixels a splat may reach. `ellipse`: all that pass the alpha test.
@@ -43,12 +43,11 @@ export const RULES: Record<RuleSet, Rules> = {
     footprint: 'tiles',
   },
   /**
-   * gsplat 1.5.3 (2025), of which the reference images are. They show its cap of 0.999: with 0.99, INRIA's and later gsplat's,
-   * the worst pixel is off by 3.6/255 instead of 1.3/255. They do not tell its missing compensation floor from the one that
-   * INRIA and later gsplat have, so that one stands here.
+   * gsplat 1.5.3 (2025), which made the reference images. They show its cap of 0.999: with 0.99, INRIA's and later gsplat's,
+   * the worst pixel is off by 3.6/255 instead of 1.3/255. They do not distinguish its missing compensation floor from that of INRIA and later gsplat, which is used here.
    *
    * Its screen rectangle, min(3.33, sqrt(2·ln(255·opacity))) standard deviations along each axis, is exactly the box around
-   * the pixels that pass the alpha test (sqrt(2·ln 255) = 3.329), so it cuts nothing by itself.
+   * the pixels that pass the alpha test (sqrt(2·ln 255) = 3.329), so it does not cut anything on its own.
    */
   gsplat: {
     dilation: 0.3,

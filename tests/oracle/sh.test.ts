@@ -6,7 +6,7 @@ import { cloudOf } from '../support/clouds.js';
 import { seededRandom } from '../support/random.js';
 import { shBasis, splatColor } from './sh.js';
 
-/** Real spherical harmonics from their definition: normalised associated Legendre functions times cos(mφ) or sin(mφ). */
+/** Real spherical harmonics from their definition: normalized associated Legendre functions times cos(mφ) or sin(mφ). */
 function fromLegendre(degree: number, [x, y, z]: Vector3): number[] {
   const phi = Math.atan2(y, x);
   const basis: number[] = [];
@@ -81,7 +81,7 @@ test('the three functions of degree 1 are -y, z, -x', () => {
   close(shBasis(1, [0, 0, 1])[2], c);
 });
 
-test('a colour is 0.5 + the sum over coefficients of its own channel, cut at 0 and not at 1', () => {
+test('a color is 0.5 + the sum over coefficients of its own channel, cut at 0 and not at 1', () => {
   const blueRow = Array.from({ length: 45 }, (_, i) => (i % 3 === 2 ? (i + 1) / 16 : 0));
   const cloud = cloudOf([{ position: [0, 0, 1], scale: 1, opacity: 1, color: [3.75, -2, 0.5], sh: blueRow }], 3);
   const direction: Vector3 = [-0.36, -0.48, 0.8];

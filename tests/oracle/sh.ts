@@ -1,4 +1,4 @@
-/** Colour of a splat seen from a direction: real spherical harmonics up to degree 3, as trainers write them. */
+/** Color of a splat seen from a direction: real spherical harmonics up to degree 3, as trainers write them. */
 import { shCoefficientCount, type GaussianCloud, type ShDegree, type Vector3 } from '@gaussian-splat/core';
 
 /**

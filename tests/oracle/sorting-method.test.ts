@@ -18,7 +18,7 @@ function distances({ positions, origin, count }: GaussianCloud, camera: Camera):
   );
 }
 
-/** The same view with a field of view as wide as of a room that is looked into: orders differ more to the sides. */
+/** The same view with a field of view as wide as for the inside of a room: orders differ more to the sides. */
 const wide = (camera: Camera): Camera => ({ ...camera, fx: camera.fx / 2, fy: camera.fy / 2 });
 
 test('order by z and by distance', { skip: onlyInLab || needsSharedData }, async (context) => {
@@ -40,7 +40,7 @@ test('order by z and by distance', { skip: onlyInLab || needsSharedData }, async
       found.push(decibels);
     }
   }
-  // They are other pictures: neither is within the 59 dB that the default promises.
+  // They are other images: neither is within the 59 dB that the default promises.
   assert.ok(Math.min(...found) < 59, `${Math.min(...found)} dB`);
   assert.ok(Math.min(...found) > 20, `${Math.min(...found)} dB`);
 });

@@ -12,7 +12,7 @@ import {
   needles,
   offCenter,
   OPACITY_STEPS,
-  opacityLadder,
+  opacitySteps,
 } from '../support/scenes.js';
 import { pixelSplats, proceduralScenes, room, withHostileSplats, type Scene } from '../support/scenes.js';
 import { renderOracle, type OracleImage } from './oracle.js';
@@ -114,11 +114,11 @@ test('each scene has in it what it is named for', () => {
   const pixels = ellipsesOf(pixelSplats()).filter(({ covariance }) => covariance.xx < 0.3 + 1);
   assert.ok(pixels.length > 50_000, `pixelSplats: ${pixels.length} of a pixel or less`);
 
-  const ladder = render(opacityLadder());
-  assert.equal(opacityLadder().cloud.opacities.filter((o) => o === 0 || o === 1).length, 2 * 210);
-  assert.ok(largest(ladder.contributors) >= 20, 'opacityLadder: as deep as its last row');
-  const stopped = ladder.transmittance.filter((t) => t > 1e-4 && t < 1e-3).length;
-  assert.ok(OPACITY_STEPS.length > 30 && stopped > 1000, `opacityLadder: ${stopped} pixels finished early`);
+  const steps = render(opacitySteps());
+  assert.equal(opacitySteps().cloud.opacities.filter((o) => o === 0 || o === 1).length, 2 * 210);
+  assert.ok(largest(steps.contributors) >= 20, 'opacitySteps: as deep as its last row');
+  const stopped = steps.transmittance.filter((t) => t > 1e-4 && t < 1e-3).length;
+  assert.ok(OPACITY_STEPS.length > 30 && stopped > 1000, `opacitySteps: ${stopped} pixels finished early`);
 
   const bright = render(brightColors()).color;
   assert.ok(largest(bright) > 3 && bright.some((c) => c === 0), `brightColors: up to ${largest(bright)}`);
@@ -140,7 +140,7 @@ test('each scene has in it what it is named for', () => {
 });
 
 test('hostile splats: the good ones are all there in order, every bad one is bad, every fault occurs', () => {
-  for (const make of [brightColors, opacityLadder]) {
+  for (const make of [brightColors, opacitySteps]) {
     const original = make().cloud;
     const { cloud, good, bad } = withHostileSplats(original);
     assert.equal(cloud.count, good.length + bad.length);

@@ -1,5 +1,5 @@
 /** Opacity of a scene, by its definition: the optical depth of each splat, integrated over its Gaussian, is multiplied by a factor. */
-/** Most that a splat covers. */
+/** Upper limit of a splat's coverage. */
 const ALPHA_MAX = 0.999;
 
 /** Integral of -ln(1 - a exp(-t)) over t > 0: the dilogarithm of `a`. */

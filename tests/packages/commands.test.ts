@@ -20,7 +20,7 @@ import { PNG } from 'pngjs';
 import { gpuEnvironment } from '../../scripts/lib/gpu-environment.mjs';
 import { buildGltf } from '../formats/support/gltf-writer.js';
 import { smallCloud } from '../formats/support/small-cloud.js';
-import { someOf } from '../support/extent.js';
+import { onlyInLab, someOf } from '../support/extent.js';
 import { fixturePath } from '../support/generators.js';
 
 const root = fileURLToPath(new URL('../../', import.meta.url));
@@ -29,18 +29,24 @@ after(() => rmSync(folder, { recursive: true }));
 
 const inFolder = (...path: string[]): string => join(folder, ...path);
 
-/** As npm runs a script for somebody who is in the folder of the test. */
-function command(script: string, ...args: string[]): { status: number | null; text: string } {
-  const { status, stdout, stderr } = spawnSync(
-    process.execPath,
-    ['packages/cli/bin/gaussian-splat.mjs', script, ...args],
-    {
-      cwd: root,
-      encoding: 'utf8',
-      env: { ...process.env, ...gpuEnvironment(), INIT_CWD: folder },
-    },
-  );
+/** Runs a command in the test's folder, as a script that npm has been asked for from another folder. */
+function command(...args: string[]): { status: number | null; text: string } {
+  const bin = join(root, 'packages/cli/bin/gaussian-splat.mjs');
+  const env = { ...process.env, ...gpuEnvironment(), INIT_CWD: root };
+  const { status, stdout, stderr } = spawnSync(process.execPath, [bin, ...args], {
+    cwd: folder,
+    encoding: 'utf8',
+    env,
+  });
   return { status, text: stdout + stderr };
+}
+
+/** Runs a command that must fail in a sentence. */
+function refused(status: number, sentence: RegExp, ...args: string[]): void {
+  const found = command(...args);
+  assert.equal(found.status, status, found.text);
+  assert.match(found.text, sentence);
+  assert.doesNotMatch(found.text, /\n\s+at /, 'no stack');
 }
 
 /** A glTF with its buffer beside it. */
@@ -134,6 +140,23 @@ test('gaussian-splat page copies files, not links to them, none from outside of 
   rmSync(inFolder('page'), { recursive: true });
 });
 
+test('gaussian-splat page copies no page and no script that a scene names', () => {
+  const names = ['index.html', 'cdn/gaussian-splat.min.js', 'CDN/x.bin', 'a.bin'];
+  mkdirSync(inFolder('evil', 'cdn'), { recursive: true });
+  mkdirSync(inFolder('evil', 'CDN'), { recursive: true });
+  for (const name of names) writeFileSync(inFolder('evil', name), 'of the scene');
+  const buffers = names.map((uri) => ({ uri }));
+  writeFileSync(inFolder('evil', 'a.gltf'), JSON.stringify({ asset: { version: '2.0' }, buffers }));
+  const { status, text } = command('page', 'evil/a.gltf', 'page', '--no-serve');
+  assert.equal(status, 0, text);
+  for (const name of names.slice(0, 2)) {
+    assert.notEqual(readFileSync(inFolder('page', name), 'utf8'), 'of the scene');
+    assert.match(text, new RegExp(`${name.replaceAll('.', '\\.')} \\(a page or a script\\)`));
+  }
+  rmSync(inFolder('page'), { recursive: true });
+  assert.deepEqual(filesOfPage('evil/a.gltf'), ['a.bin', 'a.gltf']);
+});
+
 test('gaussian-splat page takes a scene of several files from the folder of the page itself', () => {
   mkdirSync(inFolder('mine'));
   writeFileSync(inFolder('mine', 'meta.json'), '{}');
@@ -152,11 +175,57 @@ test('gaussian-splat page says in a sentence what it was asked wrongly', () => {
     [/camera\.json is a file/, 'gltf/scene.gltf', 'camera.json'],
   ];
   for (const [sentence, ...args] of someOf(wrong, 2)) {
-    const { status, text } = command('page', ...args, '--no-serve');
-    assert.equal(status, 1, text);
-    assert.match(text, sentence);
-    assert.doesNotMatch(text, /\n\s+at /, 'no stack');
+    refused(2, sentence, 'page', ...args, '--no-serve');
   }
+});
+
+test('gaussian-splat page brings ONNX Runtime for a generator, whatever the case of its name', () => {
+  copyFileSync(fixturePath('packed.onnx'), inFolder('LOUD.ONNX'));
+  const { status, text } = command('page', 'LOUD.ONNX', 'loud', '--no-serve');
+  assert.equal(status, 0, text);
+  const runtime = readdirSync(inFolder('loud', 'cdn', 'onnxruntime')).filter((name) => /^ort.*m?js$|wasm$/.test(name));
+  assert.deepEqual(runtime.sort(), [
+    'ort-wasm-simd-threaded.asyncify.wasm',
+    'ort-wasm-simd-threaded.jspi.wasm',
+    'ort.jspi.bundle.min.mjs',
+    'ort.webgpu.bundle.min.mjs',
+  ]);
+  refused(1, /needs ONNX Runtime/, 'page', 'LOUD.ONNX', 'single', '--single');
+});
+
+test('what cannot be written, or would replace what is read, is said before the work', () => {
+  const scene = readFileSync(inFolder('gltf', 'scene.gltf'));
+  const cases: readonly [RegExp, ...string[]][] = [
+    [/expected a command, found "toString"/, 'toString'],
+    [/--out: expected another file than gltf\/scene\.gltf/, 'floor', 'gltf/scene.gltf', '--out', 'gltf/scene.gltf'],
+    [/--out: the folder .*nowhere does not exist/, 'floor', 'gltf/scene.gltf', '--out', 'nowhere/a.floor'],
+    [/--up: expected x, .* found "toString"/, 'floor', 'gltf/scene.gltf', '--out', 'a.floor', '--up', 'toString'],
+    [/--out: the folder .*nowhere does not exist/, 'sequence', 'camera.json', '--out', 'nowhere/a.gsv'],
+    [/--out: .*camera\.json is no folder/, 'sequence', 'camera.json', '--out', 'camera.json/a'],
+    [/camera\.json is no folder/, 'page', 'gltf/scene.gltf', 'camera.json/a', '--no-serve'],
+    [/--out: .*camera\.json is no folder/, 'video', 'gltf/scene.gltf', '--turntable', '--out', 'camera.json/a'],
+  ];
+  for (const [sentence, ...args] of someOf(cases, 4)) refused(2, sentence, ...args);
+  assert.deepEqual(readFileSync(inFolder('gltf', 'scene.gltf')), scene);
+});
+
+test('a value may begin with a dash, and what a command cannot do is said without a stack', () => {
+  refused(
+    1,
+    /scene\.gltf has no floor: check --up/,
+    'floor',
+    'gltf/scene.gltf',
+    '--out',
+    'a.floor',
+    '--up',
+    '-z',
+    '--near',
+    '-1,0,2',
+    '--unit',
+    '1mm',
+  );
+  const { status, text } = command('floor', '-h');
+  assert.deepEqual([status, /--near X,Y,Z/.test(text)], [0, true], text);
 });
 
 test('gaussian-splat render draws a scene of several files', () => {
@@ -217,9 +286,11 @@ test('gaussian-splat video writes numbered frames of a turntable, with their alp
   assert.ok(frames.every(({ width, height }) => width === 16 && height === 12));
   assert.equal(frames[0].data[3], 0, 'a corner is transparent');
   assert.notDeepEqual(frames[0].data, frames[1].data, 'the camera moves');
+  const fewer = [...turn.slice(0, -1), '2', '--out', 'frames'];
+  refused(2, /has frames of another run, such as frame-0002\.png/, 'video', 'gltf/scene.gltf', ...fewer);
 });
 
-test('gaussian-splat video writes WebM by ffmpeg', { skip: !hasFfmpeg && 'no ffmpeg here' }, () => {
+test('gaussian-splat video writes WebM by ffmpeg', { skip: onlyInLab || (!hasFfmpeg && 'no ffmpeg here') }, () => {
   const turn = ['--turntable', '--size', '16x12', '--frames', '3'];
   const { status, text } = command('video', 'gltf/scene.gltf', ...turn, '--out', 'turn.webm');
   assert.equal(status, 0, text);

@@ -1,4 +1,4 @@
-/** Importing a package on a server: in plain Node, without a browser global, and with its exports where they should be. */
+/** Importing a package on a server: in plain Node, without a browser global, and with its exports in place. */
 import assert from 'node:assert/strict';
 import { spawnSync } from 'node:child_process';
 import { existsSync, readdirSync, readFileSync } from 'node:fs';

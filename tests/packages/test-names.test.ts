@@ -1,4 +1,4 @@
-/** Files of tests that share a process leave it as it was: those that do not say so by their names. */
+/** Files of tests that run in one process leave it as it was: those that do not say so by their names. */
 import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
 import { test } from 'node:test';
@@ -11,7 +11,7 @@ interface TestFiles {
 
 const { testFiles, byProcess } = (await scriptModule('lib/test-files.mjs')) as TestFiles;
 const CHANGES_PROCESS =
-  /\b(globalThis|mock|memoryUsage)\b|\bprocess\.(?!platform|execPath|cwd|env\.\w+\b(?! =))|performance\.now =|support\/(node-device|devices)|node-gpu/;
+  /\b(globalThis|mock|memoryUsage)\b|\bprocess\.(?!platform|execPath|cwd|cpuUsage|env\.\w+\b(?! =))|performance\.now =|support\/(node-device|devices)|node-gpu/;
 
 test('a file that changes its process, or takes a device, is named .alone.test.ts or lies where files share a device', () => {
   const { together } = byProcess(testFiles().node);

@@ -1,4 +1,4 @@
-/** The comparison: cameras in step, a line that the keyboard moves, pictures that differ by what the selects say. */
+/** The comparison: cameras in step, a line that the keyboard moves, images that differ by the selected settings. */
 import assert from 'node:assert/strict';
 import { after, before, describe, it } from 'node:test';
 import type { Page } from 'playwright-core';
@@ -9,20 +9,20 @@ interface Splat extends HTMLElement {
   readonly loaded: boolean;
   getCameraOrbit(): object;
 }
-const PATIENCE = { timeout: 100_000, polling: 100 };
+const TIMEOUT = { timeout: 100_000, polling: 100 };
 
 const bothLoaded = (tab: Page): Promise<unknown> =>
   tab.waitForFunction(
     () => [...document.querySelectorAll<Splat>('gaussian-splat')].every(({ loaded }) => loaded),
     undefined,
-    PATIENCE,
+    TIMEOUT,
   );
 const orbits = (tab: Page): Promise<string[]> =>
   tab.evaluate(() =>
     [...document.querySelectorAll<Splat>('gaussian-splat')].map((each) => String(each.getCameraOrbit())),
   );
 
-/** A ball of splats whose colours change with the direction: harmonics of degree 2, in the layout of INRIA's trainer. */
+/** A ball of splats whose colors change with the direction: harmonics of degree 2, in the layout of INRIA's trainer. */
 function glossy(): string {
   const numbered = (name: string, count: number): string[] => Array.from({ length: count }, (_, i) => `${name}_${i}`);
   const colors = [...numbered('f_dc', 3), ...numbered('f_rest', 24)];
@@ -69,7 +69,7 @@ describe('the comparison', { skip: isBuilt ? false : 'no site: npm run build' },
           return a === b && a !== old;
         },
         before,
-        PATIENCE,
+        TIMEOUT,
       );
     }
     await tab.focus('#split');
@@ -93,7 +93,7 @@ describe('the comparison', { skip: isBuilt ? false : 'no site: npm run build' },
     await tab.waitForFunction(
       () => document.querySelector('#status')!.textContent !== 'Measuring…',
       undefined,
-      PATIENCE,
+      TIMEOUT,
     );
     assert.match(
       (await tab.locator('#status').textContent())!,
@@ -107,13 +107,13 @@ describe('the comparison', { skip: isBuilt ? false : 'no site: npm run build' },
     assert.ok(Number(cells[1]) > 0 || cells[1] === 'too slow to tell', cells[1]);
     assert.ok(decibels > 5 && decibels < 40, `${decibels} dB`);
     assert.ok(worst > 5, `${worst} of 255`);
-    // The same on both sides is the same picture.
+    // The same settings on both sides give the same image.
     await tab.selectOption('#right-degree', '2');
     await tab.click('#measure');
     await tab.waitForFunction(
       () => document.querySelector('#figures td:nth-child(3)')!.textContent === 'the same',
       undefined,
-      PATIENCE,
+      TIMEOUT,
     );
     assert.deepEqual(faults, []);
   });

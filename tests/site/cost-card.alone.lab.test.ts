@@ -1,4 +1,4 @@
-/** A cost card tells what this machine says; the page without WebGPU tells what there is to tell. */
+/** A cost card shows this machine's measurements; the page without WebGPU shows the known facts. */
 import assert from 'node:assert/strict';
 import { after, before, describe, it } from 'node:test';
 import { statSync } from 'node:fs';
@@ -12,7 +12,7 @@ interface Splat extends HTMLElement {
   readonly error: { readonly reason: string } | null;
   readonly stats: { readonly renderer: string } | null;
 }
-const PATIENCE = { timeout: 100_000, polling: 100 };
+const TIMEOUT = { timeout: 100_000, polling: 100 };
 
 describe('cards and fallbacks', { skip: isBuilt ? false : 'no site: npm run build' }, () => {
   let open: OpenSite;
@@ -28,7 +28,7 @@ describe('cards and fallbacks', { skip: isBuilt ? false : 'no site: npm run buil
     await tab.waitForFunction(
       () => document.querySelector<Splat>('[data-example=file] gaussian-splat')!.loaded,
       undefined,
-      PATIENCE,
+      TIMEOUT,
     );
     const megabytes = (statSync(`${root}demo/scenes/skull.spz`).size / 1e6).toFixed(2);
     const before = (await card.locator('.cost').textContent())!;
@@ -51,7 +51,7 @@ describe('cards and fallbacks', { skip: isBuilt ? false : 'no site: npm run buil
     await tab.waitForFunction(
       () => document.querySelector<Splat>('[data-example=sequence] gaussian-splat')!.currentTime > 0.3,
       undefined,
-      PATIENCE,
+      TIMEOUT,
     );
     await card.locator('[data-time]').fill('1');
     await card.getByRole('button', { name: 'Play' }).waitFor();
@@ -60,7 +60,7 @@ describe('cards and fallbacks', { skip: isBuilt ? false : 'no site: npm run buil
     await tab.close();
   });
 
-  // SwiftShader takes longer with their networks than anybody waits: the scene is on show while the first picture is made.
+  // Their networks take too long on SwiftShader for a test: the scene is visible while the first frame is drawn.
   for (const name of ['oil', 'denoise']) {
     it(`${name}: a click puts the scene where the picture was`, { skip, timeout: 200_000 }, async () => {
       const { tab, faults } = await open.visit('/examples/', { width: 240, height: 300 });

@@ -9,7 +9,7 @@ interface Splat extends HTMLElement {
   getCameraOrbit(): { readonly theta: number; readonly phi: number };
   jumpCameraToGoal(): void;
 }
-const PATIENCE = { timeout: 100_000, polling: 100 };
+const TIMEOUT = { timeout: 100_000, polling: 100 };
 
 describe('the first page', { skip: isBuilt ? false : 'no site: npm run build' }, () => {
   let open: OpenSite;
@@ -22,7 +22,7 @@ describe('the first page', { skip: isBuilt ? false : 'no site: npm run build' },
 
   it('does not move when the scene comes', async () => {
     const { tab } = only;
-    await tab.waitForFunction(() => document.querySelector<Splat>('#hero')!.loaded, undefined, PATIENCE);
+    await tab.waitForFunction(() => document.querySelector<Splat>('#hero')!.loaded, undefined, TIMEOUT);
     const shifts = await tab.evaluate(
       () =>
         new Promise<number>((resolve) => {
@@ -57,7 +57,7 @@ describe('the first page', { skip: isBuilt ? false : 'no site: npm run build' },
 
   it('copies the view that somebody has turned to', async () => {
     const { tab, faults } = only;
-    await tab.waitForFunction(() => document.querySelector<Splat>('#hero')!.loaded, undefined, PATIENCE);
+    await tab.waitForFunction(() => document.querySelector<Splat>('#hero')!.loaded, undefined, TIMEOUT);
     await tab.evaluate(() => document.querySelector<Splat>('#hero')!.focus());
     await tab.keyboard.press('ArrowRight');
     const orbit = await tab.evaluate(() => {
@@ -68,7 +68,7 @@ describe('the first page', { skip: isBuilt ? false : 'no site: npm run build' },
     });
     await tab.click('#copy-view');
     assert.ok((await tab.locator('#snippet').textContent())!.includes(`camera-orbit="${orbit} `));
-    await tab.waitForFunction(() => document.querySelector('#copied')!.textContent !== '', undefined, PATIENCE);
+    await tab.waitForFunction(() => document.querySelector('#copied')!.textContent !== '', undefined, TIMEOUT);
     assert.deepEqual(faults, []);
   });
 
@@ -77,7 +77,7 @@ describe('the first page', { skip: isBuilt ? false : 'no site: npm run build' },
     const { x, y, width, height } = (await tab.locator('#hero').boundingBox())!;
     await tab.mouse.move(x + width / 2, y + height / 2);
     await tab.mouse.wheel(0, 200);
-    await tab.waitForFunction(() => scrollY > 0, undefined, PATIENCE);
+    await tab.waitForFunction(() => scrollY > 0, undefined, TIMEOUT);
     await tab.evaluate(() => scrollTo(0, 0));
   });
 

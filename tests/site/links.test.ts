@@ -18,13 +18,13 @@ function read(url: string): string {
 const unescape = (text: string): string =>
   text.replaceAll('&lt;', '<').replaceAll('&gt;', '>').replaceAll('&quot;', '"').replaceAll('&amp;', '&');
 
-/** Where tags of a page lead. Examples of code are text there, and have no tags. */
+/** Links of a page's tags. Examples of code are text there, and have no tags. */
 function linksOf(url: string): string[] {
   const tags = [...read(url).matchAll(/<[a-z][^<>]*>/g)].map(([tag]) => tag);
   const links = tags.flatMap((tag) =>
     [...tag.matchAll(/\s(?:href|src|poster|postprocess)="([^"]*)"/g)].map(([, link]) => unescape(link)),
   );
-  // One example shows what a file that is not there looks like.
+  // One example shows the element with a missing file.
   return links.filter((link) => !/^(https?:|data:|mailto:)|\/missing\.spz$/.test(link));
 }
 
@@ -72,12 +72,12 @@ test('every page is reached from the first', { skip }, () => {
   );
 });
 
-/** Attributes of every element, whatever it is. */
+/** Attributes of every element of any kind. */
 const GLOBAL = /^(id|class|style|slot|hidden|title|tabindex|key|ref|role|aria-[a-z]+|data-[a-z-]+|control-[\w-]+)$/;
 /** An ellipsis, and what templates of frameworks put before a name. */
 const IN_TEMPLATES = /^(…|@|:|v-|on[A-Z])/;
 
-/** Sources in which people read the tag. */
+/** Sources that show the tag to people. */
 function sources(folder: string): string[] {
   return readdirSync(join(root, folder), { withFileTypes: true }).flatMap((entry) => {
     const path = posix.join(folder, entry.name);

@@ -1,4 +1,4 @@
-/** What holds for every page, whatever is on it: one heading, a title, nothing wider than its window, nothing that axe finds, no fault. */
+/** Requirements of every page: one heading, a title, nothing wider than its window, nothing that axe finds, no fault. */
 import assert from 'node:assert/strict';
 import type { Page } from 'playwright-core';
 import { root, type Visit } from './support.js';
@@ -19,7 +19,7 @@ interface Screen {
   readonly colorScheme: 'light' | 'dark';
   readonly forcedColors?: 'active';
 }
-/** Light on a phone, dark on a desk; with SITE=full also a desk zoomed to 200 % whose system forces its colours. */
+/** Light on a phone, dark on a desk; with SITE=full also a desk zoomed to 200 % whose system forces its colors. */
 const SCREENS: readonly Screen[] = [
   { width: 390, colorScheme: 'light' },
   { width: 1280, colorScheme: 'dark' },
@@ -27,9 +27,9 @@ const SCREENS: readonly Screen[] = [
 ];
 
 export interface PageCheckOptions {
-  /** Looks at the colours, which over a long document takes axe longer than all the rest. */
+  /** Looks at the colors, which over a long document takes axe longer than all the rest. */
   readonly colors?: boolean;
-  /** Looks at the second screen, too: documents share layout, markup and colours. */
+  /** Looks at the second screen, too: documents share layout, markup and colors. */
   readonly bothScreens?: boolean;
 }
 
@@ -40,7 +40,7 @@ export async function checkPage(
 ): Promise<void> {
   assert.equal(await tab.locator('h1').count(), 1, 'one heading of the first rank');
   assert.notEqual(await tab.title(), '');
-  // What a page that is 1280 pixels wide has left when somebody has zoomed in to 400 %.
+  // Width of a page of 1280 pixels at a zoom of 400 %.
   await tab.setViewportSize({ width: NARROWEST, height: 400 });
   assert.ok((await overflowOf(tab)) <= 0, `wider than ${NARROWEST} pixels`);
   await addAxe(tab);
@@ -62,7 +62,7 @@ export async function addAxe(tab: Page): Promise<void> {
   await tab.addScriptTag({ path: AXE });
 }
 
-/** What axe finds on a page. */
+/** Violations that axe finds on a page. */
 export async function violations(tab: Page, colors = true): Promise<string[]> {
   const context = { include: [['html']], exclude: isFull ? [] : ALIKE.map((selector) => [selector]) };
   const options = { rules: { 'color-contrast': { enabled: colors } } };

@@ -14,10 +14,10 @@ const QUERIES: Readonly<Record<string, string>> = {
   '/bench/stability.html': '?only=S7&peers=0',
   '/bench/generators.html': '?models=/fixtures/compass.ply',
 };
-/** Pages whose scenes others test: theirs stay on their way here, which spares the processor that draws them. */
+/** Pages whose scenes other tests load: here their requests stay pending, which saves CPU time. */
 const WITHOUT_SCENES = ['/examples/', '/react/', '/vue/'];
 
-/** The document whose colours stand for those of all. */
+/** The document whose colors stand for those of all. */
 const LONGEST = '/docs/guide/troubleshooting/';
 const isDocument = (url: string): boolean => /^\/docs\/./.test(url);
 /** Documents have no scripts and one layout: `npm run test:site` and the laboratory open all of them, `npm test` one that has everything. */
@@ -39,7 +39,7 @@ describe('every page of the site', { skip: isBuilt ? false : 'no site: npm run b
       await tab.emulateMedia({ colorScheme: 'light' });
       const release = !isFull && WITHOUT_SCENES.includes(url) ? await withScenesToCome(tab) : undefined;
       await open.go(only, url + (QUERIES[url] ?? ''));
-      // Documents share layout, markup and colours: once over each is enough, and a third of the time.
+      // Documents share layout, markup and colors: once over each is enough, and a third of the time.
       // Pages that measure on opening have the form and the table of their index.
       const bothScreens = !isDocument(url) && (isFull || QUERIES[url] === undefined);
       await checkPage(only, { colors: !isDocument(url) || url === LONGEST, bothScreens });

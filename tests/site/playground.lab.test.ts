@@ -14,13 +14,13 @@ interface Splat extends Element {
   getFieldOfView(): object;
   jumpCameraToGoal(): void;
 }
-const PATIENCE = { timeout: 100_000, polling: 100 };
+const TIMEOUT = { timeout: 100_000, polling: 100 };
 const COMPASS = '/fixtures/compass.splat';
 
 const loaded = (tab: Page): Promise<unknown> =>
-  tab.waitForFunction(() => document.querySelector<Splat>('gaussian-splat')?.loaded, undefined, PATIENCE);
+  tab.waitForFunction(() => document.querySelector<Splat>('gaussian-splat')?.loaded, undefined, TIMEOUT);
 
-/** Attributes of a page's scene, and where its camera is. */
+/** Attributes of a page's scene, and its camera position. */
 const stateOf = (tab: Page): Promise<{ attributes: Record<string, string>; view: string[] }> =>
   tab.evaluate(() => {
     const scene = document.querySelector<Splat>('gaussian-splat')!;
@@ -68,7 +68,7 @@ describe('the playground', { skip: isBuilt ? false : 'no site: npm run build' },
     await loaded(tab);
     await tab.locator('summary', { hasText: 'Quality' }).click();
     await tab.fill('#attribute-alt', 'A compass, "painted" <by> me & you');
-    // Another quality would have other shaders, on both pages: what is tested is the attribute.
+    // Another quality would have other shaders, on both pages: only the attribute is tested.
     await tab.selectOption('#attribute-quality', 'default');
     await tab.fill('#attribute-max-sh-degree', '1');
     await tab.fill('#attribute-camera-orbit', '40deg 60deg 120%');
@@ -165,7 +165,7 @@ describe('the playground', { skip: isBuilt ? false : 'no site: npm run build' },
     ]) {
       const before = await said.textContent();
       await tab.mouse.click(box.x + x * box.width, box.y + y * box.height);
-      await tab.waitForFunction((old) => document.getElementById('copied')!.textContent !== old, before, PATIENCE);
+      await tab.waitForFunction((old) => document.getElementById('copied')!.textContent !== old, before, TIMEOUT);
       answers.push((await said.textContent())!.slice(0, 9));
       // Two at one place within half a second are a double click, which turns the camera to it.
       await tab.waitForTimeout(600);
@@ -238,7 +238,7 @@ describe('the playground', { skip: isBuilt ? false : 'no site: npm run build' },
     const { tab, faults } = visit;
     await tab.click('#reset');
     await tab.setInputFiles('#drop input', { name: 'floor.splat', mimeType: '', buffer: floorOf([0, -1, 0]) });
-    /** Waits until the box around what is left is this one. */
+    /** Waits until the box around the remaining splats is this one. */
     const boxIs = (wanted: number[]): Promise<unknown> =>
       tab.waitForFunction(
         (sides) => {
@@ -247,7 +247,7 @@ describe('the playground', { skip: isBuilt ? false : 'no site: npm run build' },
           return found?.every((value, i) => Math.abs(value - sides[i]) < 0.2);
         },
         wanted,
-        PATIENCE,
+        TIMEOUT,
       );
     await boxIs([-2, 2, -2, 2]);
     await tab.locator('summary', { hasText: 'Crop' }).click();
@@ -265,7 +265,7 @@ describe('the playground', { skip: isBuilt ? false : 'no site: npm run build' },
     await tab.waitForFunction(
       (wanted) => String(document.querySelector<Splat>('gaussian-splat')!.getCameraOrbit()) === wanted,
       turned,
-      PATIENCE,
+      TIMEOUT,
     );
     // A side at the end of its slider is far out: nothing of a sky goes.
     assert.ok(Number((await tab.inputValue('#attribute-crop')).split(' ')[0]) < -100);
@@ -301,8 +301,8 @@ describe('the playground', { skip: isBuilt ? false : 'no site: npm run build' },
       prepare: withCompass,
     });
     await loaded(other);
-    const least = await other.evaluate(() => document.querySelector('gaussian-splat')!.getBoundingBox()!.min.x);
-    assert.ok(Math.abs(least) < 1e-6, `by the link the least x is ${least}`);
+    const min = await other.evaluate(() => document.querySelector('gaussian-splat')!.getBoundingBox()!.min.x);
+    assert.ok(Math.abs(min) < 1e-6, `by the link the least x is ${min}`);
     await other.close();
     assert.deepEqual([faults, others], [[], []]);
   });

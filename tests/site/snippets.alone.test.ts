@@ -1,4 +1,4 @@
-/** What people copy out of documents works: TypeScript has the right types, commands exist, and HTML shows a picture. */
+/** Snippets of documents work: TypeScript has the right types, commands exist, and HTML draws a scene. */
 import assert from 'node:assert/strict';
 import { spawnSync, type SpawnSyncReturns } from 'node:child_process';
 import { copyFileSync, mkdirSync, mkdtempSync, readdirSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
@@ -18,7 +18,7 @@ import { snippets, type Snippet } from './snippets.js';
 const skip = isBuilt ? false : 'no site: npm run build';
 const isFull = process.env.SITE === 'full';
 
-/** What the reader of a snippet has at hand: names that the text around it speaks of, or that the snippet before it imports. */
+/** Names available to the reader of a snippet: those of the text around it, or imports of the snippet before. */
 const AT_HAND = `
 import type * as React from 'react';
 import type * as core from '@gaussian-splat/core';
@@ -66,7 +66,7 @@ declare global {
 }
 `;
 
-/** What `gaussian-splat page` makes of a scene whose name has to be written in another way in addresses and in HTML. */
+/** The page that `gaussian-splat page` makes of a scene whose name must be escaped in addresses and in HTML. */
 function makePage(folder: string): SpawnSyncReturns<string> {
   const scene = join(folder, '../mine & yours.ply');
   copyFileSync(join(root, 'tests/element/browser/fixtures/compass.ply'), scene);
@@ -98,7 +98,7 @@ describe('what documents tell people to write', { skip }, () => {
     );
     const files = typed.map(({ language, code, place }, i) => {
       const path = join(folder, `${i}.${language === 'js' ? 'ts' : language}`);
-      // Whatever stands in a document is a module, so that its names are its own.
+      // Every snippet is a module, so that its names are local.
       writeFileSync(path, `// ${place}\n${code}\nexport {};\n`);
       return path;
     });
@@ -138,7 +138,7 @@ describe('what documents tell people to write', { skip }, () => {
         },
       });
       assert.deepEqual(inTemplate, [], place);
-      // Whoever writes no TypeScript has no types to be wrong.
+      // Snippets of JavaScript have no types to check.
       if (descriptor.scriptSetup?.lang === 'ts') writeFileSync(join(folder, `${i}.vue`), code);
     }
     const config = { extends: '../../demo/vue/tsconfig.json', include: ['*.vue', '../../demo/vue/env.d.ts'] };
@@ -230,7 +230,7 @@ describe('what documents tell people to write', { skip }, () => {
 
 const fixture = (path: string): Buffer => readFileSync(join(root, 'tests', path));
 
-/** Whatever address a snippet names, a small scene of that kind is there. */
+/** A small scene of the right kind is served at every address in a snippet. */
 async function serveScenes(tab: Page, origin: string): Promise<void> {
   const knot = join(root, 'demo/dist/scenes/knot');
   const bodies = new Map(readdirSync(knot).map((name) => [name, readFileSync(join(knot, name))]));
@@ -315,7 +315,7 @@ const wantedOf = ({ place, code }: Snippet): State & { place: string } => ({
   plays: /\.play\(\)|autoplay/.test(code),
 });
 
-/** Of each section: is its scene on show, is anything in the picture, does its time run. */
+/** Checks for each section: its scene is visible, the image is not empty, its time runs. */
 function stateOf(tab: Page): Promise<State[]> {
   return tab.evaluate(async () => {
     interface Splat extends HTMLElement {
@@ -334,10 +334,10 @@ function stateOf(tab: Page): Promise<State[]> {
         states.push({ shown: false, error: scene.error?.message ?? 'no scene', covered: false, plays: false });
         continue;
       }
-      const picture = await createImageBitmap(await scene.toBlob());
-      const context = new OffscreenCanvas(picture.width, picture.height).getContext('2d')!;
-      context.drawImage(picture, 0, 0);
-      const { data } = context.getImageData(0, 0, picture.width, picture.height);
+      const image = await createImageBitmap(await scene.toBlob());
+      const context = new OffscreenCanvas(image.width, image.height).getContext('2d')!;
+      context.drawImage(image, 0, 0);
+      const { data } = context.getImageData(0, 0, image.width, image.height);
       const covered = data.some((value, i) => i % 4 === 3 && value > 128);
       states.push({ shown: scene.loaded, error: scene.error?.message ?? '', covered, plays: !scene.paused });
     }

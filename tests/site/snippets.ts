@@ -4,7 +4,7 @@ import { posix } from 'node:path';
 import { root } from './support.js';
 
 export interface Snippet {
-  /** Where it stands: a file and a line, or a tab of the first page. */
+  /** Its position: a file and a line, or a tab of the first page. */
   readonly place: string;
   /** As the fence says: `html`, `ts`, `tsx`, `js`, `vue`, `sh`, ... */
   readonly language: string;
@@ -13,7 +13,7 @@ export interface Snippet {
 
 const read = (path: string): string => readFileSync(`${root}${path}`, 'utf8');
 
-/** Every document that tells people what to write. */
+/** Every document with instructions for people. */
 function documents(): string[] {
   const within = (folder: string): string[] =>
     readdirSync(`${root}${folder}`).map((name) => posix.join(folder, name)).filter((path) => path.endsWith('.md')); // prettier-ignore

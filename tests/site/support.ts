@@ -14,7 +14,7 @@ export function pagesOf(): string[] {
   return JSON.parse(readFileSync(`${site}pages.json`, 'utf8')) as string[];
 }
 
-/** Missing where the site has not been built: `npm run build`. */
+/** Missing if the site has not been built: `npm run build`. */
 export const isBuilt = existsSync(`${site}pages.json`);
 
 const compass = readFileSync(`${root}tests/element/browser/fixtures/compass.ply`);
@@ -26,10 +26,10 @@ export interface Visit {
 }
 
 export interface VisitOptions {
-  /** Of the window, in CSS pixels. */
+  /** Size of the window in CSS pixels. */
   readonly width?: number;
   readonly height?: number;
-  /** What is to be done before the page is asked for. */
+  /** Called before the page is requested. */
   readonly prepare?: (tab: Page) => Promise<unknown>;
 }
 

@@ -1,4 +1,4 @@
-/** The check of words sees what it is for, and leaves code and other senses alone. */
+/** The check of words finds retired words, and ignores code and other senses. */
 import assert from 'node:assert/strict';
 import { existsSync, readdirSync, readFileSync } from 'node:fs';
 import { join } from 'node:path';

@@ -1,13 +1,11 @@
 /**
  * S24. Generators that write nonsense, too much, nothing, or late.
  *
- * Who fails: Visionary's shader has the check of the row number commented out (read in preprocess.wgsl), so rows of an earlier run stay on show; ONNX Runtime #26367 tells of
- * float16 models that write NaN.
+ * Who fails: Visionary's shader has the check of the row number commented out (read in preprocess.wgsl), so rows of an earlier run stay visible; ONNX Runtime #26367 reports float16 models that write NaN.
  *
- * Recipe: asked for NaN, counts that change, 0 and too many rows, late, throwing, times out of range, another type. Run with 300 random sequences of runs;
- * what needs a session is in tests/generator/browser.
+ * Recipe: asked for NaN, counts that change, 0 and too many rows, late, throwing, times out of range, another type. Run with 300 random sequences of runs; tests that need a session are in tests/generator/browser.
  *
- * Passes: whatever a run writes, and in whatever order runs come, the picture is that of the usable rows of the last accepted run; a refused run changes nothing and has a
+ * Passes: for any output of a run, and any order of runs, the image is that of the usable rows of the last accepted run; a refused run changes nothing and has a
  * code. Generators that are late, throw or lose their device are tried in the element: tests/generator/browser.
  */
 import { test } from 'node:test';
@@ -18,7 +16,7 @@ import { DynamicGaussians } from '@gaussian-splat/renderer';
 import { writeTensors } from '../support/generator-tensors.js';
 import { nodeDevice } from '../support/node-device.js';
 import { offCenter } from '../support/scenes.js';
-import { differingBytes, resized, THREADS } from './support/pictures.js';
+import { differingBytes, resized, THREADS } from './support/images.js';
 import { holds, sized } from './support/row.js';
 import { capture, Renderer } from '../support/renderer.js';
 
@@ -37,13 +35,13 @@ const [tensorName, words] = Object.entries(written.tensors)[0];
 const rows = new Float32Array(words.slice().buffer);
 const width = rows.length / cloud.count;
 
-/** What one run writes. */
+/** Output of one run. */
 const run = fc.record({
   rows: fc.oneof(
     { weight: 4, arbitrary: fc.nat(cloud.count) },
     { weight: 1, arbitrary: fc.constantFrom(0, cloud.count, cloud.count + 1, 2 ** 31, -1, 1.5, NaN) },
   ),
-  /** Every so many rows are spoilt, none for 0. */
+  /** Interval of the corrupted rows, none for 0. */
   spoil: fc.constantFrom(0, 1, 2, 7),
   value: fc.constantFrom(NaN, Infinity, -Infinity, 3e38, -1e30),
   column: fc.nat(width - 1),
@@ -116,7 +114,7 @@ test('any sequence of runs', async () => {
   holds('S24', 'runs that were refused, by name', refused, { atLeast: 1, unit: 'runs' });
 });
 
-/** A live count in a tensor, which nobody checks on the CPU. */
+/** A live count in a tensor, which the CPU does not check. */
 test('a live count of any 32 bits shows no row that was not written', async () => {
   const device = await nodeDevice();
   const layout = { ...written.layout, count: 'live' };

@@ -7,7 +7,7 @@
  * Recipe: asked for sizes from 1 to 1/64 against eight times as many pixels; levels of detail no worse. Run so; levels of detail are held to their own
  * figures in tests/detail.
  *
- * Passes: at every zoom, scenes that say they are antialiased are closer to the box-filtered picture of 8 times the resolution than drawn classically. Classic figures are
+ * Passes: at every zoom, scenes that say they are antialiased are closer to the box-filtered image of 8 times the resolution than drawn classically. Classic figures are
  * reported only.
  */
 import { test } from 'node:test';
@@ -17,7 +17,7 @@ import { psnr } from '../support/metrics.js';
 import { nodeDevice } from '../support/node-device.js';
 import { seededRandom } from '../support/random.js';
 import { cameraAt } from '../support/scenes.js';
-import { draw, resized } from './support/pictures.js';
+import { draw, resized } from './support/images.js';
 import { chart, holds, note, sized } from './support/row.js';
 
 const random = seededRandom(21);

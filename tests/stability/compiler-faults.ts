@@ -1,14 +1,12 @@
 /**
  * S16. Shader compilers that err.
  *
- * Who fails: whoever trusts them: Firefox on Direct3D 12 transposed matrices read through a pointer (PlayCanvas #9148), naga refused storage pointers (#8784,
- * #8450): a wrong picture, or none.
+ * Who fails: renderers that trust them: Firefox on Direct3D 12 transposed matrices read through a pointer (PlayCanvas #9148), naga refused storage pointers (#8784,
+ * #8450): a wrong image, or none.
  *
- * Recipe: asked for a known answer of 64 splats in less than 10 ms. Run with shaders broken on purpose; on a processor the answer takes longer, and the
- * figure is noted.
+ * Recipe: asked for a self-test of 64 splats in less than 10 ms. Run with shaders broken on purpose; on a CPU the test takes longer, and the figure is recorded.
  *
- * Passes: shaders are broken on purpose, one after another: the variant concerned fails its known answer and the next takes over with the right picture; where
- * no variant is right, that is an error with a code instead of a wrong picture.
+ * Passes: shaders are broken on purpose, one after another: the variant concerned fails its self-test and the next takes over with the right image; if no variant is right, that is an error with a code instead of a wrong image.
  */
 import { test } from 'node:test';
 import assert from 'node:assert/strict';
@@ -17,11 +15,11 @@ import { passesSelfTest } from '@gaussian-splat/renderer/stages';
 import { offCenter } from '../support/scenes.js';
 import type { Miscompilation } from '../support/miscompilation.js';
 import { faultyDevice, fullDevice } from './support/devices.js';
-import { compareImage, resized, truth } from './support/pictures.js';
+import { compareImage, resized, truth } from './support/images.js';
 import { capture, Renderer } from '../support/renderer.js';
 import { fullTest, holds, note, sized } from './support/row.js';
 
-/** What a compiler does to a stage, and what must be chosen in its place. */
+/** Damage that a compiler does to a stage, and the variant that must replace it. */
 const FAULTS: readonly { name: string; fault: Miscompilation; expected: Partial<Variants> }[] = [
   {
     name: 'the sort that needs no barriers loses a digit',
@@ -53,7 +51,8 @@ for (const { name, fault, expected } of sized(FAULTS.slice(1), FAULTS)) {
     const { device, befallen } = await faultyDevice([fault]);
     const chosen = await autotune(device, { store: null });
     assert.ok(befallen.length > 0, 'the shader was broken');
-    for (const [lever, value] of Object.entries(expected)) assert.equal(chosen[lever as keyof Variants], value, lever);
+    for (const [setting, value] of Object.entries(expected))
+      assert.equal(chosen[setting as keyof Variants], value, setting);
     holds('S16', `${name}: the variant that takes over`, await drawAsChosen(device), { atLeast: 59, unit: 'dB' });
     device.destroy();
   });

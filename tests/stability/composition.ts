@@ -1,7 +1,7 @@
 /**
  * S27. Composition.
  *
- * Who fails: renderers that sort each scene by itself and draw one after the other (three.js splat meshes without a common sort, CSS layers, one element over
+ * Who fails: renderers that sort each scene separately and draw one after the other (three.js splat meshes without a common sort, CSS layers, one element over
  * another): splats of a scene that reaches into another are then all in front or all behind. Meshes that cut through splats are either before or behind all of them.
  *
  * Recipe: asked for two scenes that reach into one another, turned around, a plane through both, a scene added and one moved between frames, one scene in two
@@ -18,7 +18,7 @@ import { closeness } from '../support/compare.js';
 import { nodeDevice } from '../support/node-device.js';
 import { seededRandom } from '../support/random.js';
 import { cameraAt } from '../support/scenes.js';
-import { RASTERIZERS, THREADS } from './support/pictures.js';
+import { RASTERIZERS, THREADS } from './support/images.js';
 import { holds, sized } from './support/row.js';
 
 const TURNS = sized(2, 12);
@@ -60,12 +60,12 @@ for (const rasterizer of RASTERIZERS) {
       placed.push({ cloud: clouds[k], mode: 'classic', sceneToWorld });
       return world.add({ scene: scenes[k], sceneToWorld });
     };
-    const least = { atLeast: 59, unit: 'dB' };
+    const min = { atLeast: 59, unit: 'dB' };
     const look = async (what: string, viewpoint: Viewpoint, angle: number, isCut = false): Promise<void> => {
       const view = { ...camera, worldToCamera: multiply(camera.worldToCamera, turned(angle, 0)) };
       const pixels = await capture(device, viewpoint, { camera: view, depth: isCut ? depth : undefined });
       const oracle = renderOracleWorld(placed, view, { rules: 'gsplat', depth: isCut ? values : undefined });
-      holds('S27', `${rasterizer}, ${what}`, closeness(pixels, oracle).psnr, least);
+      holds('S27', `${rasterizer}, ${what}`, closeness(pixels, oracle).psnr, min);
     };
     add(0, turned(0, -0.3));
     const moving = add(1, turned(1, 0.3));

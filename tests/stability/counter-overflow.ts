@@ -6,7 +6,7 @@
  *
  * Recipe: asked for five billion pairs, synthetic. Run with 2.2 million splats that each fill 8192 x 8192 pixels, and with 600 random lists of counts.
  *
- * Passes: sums stop at the largest number, whatever the counts: nothing is written where it does not belong, and the overflow is reported.
+ * Passes: sums stop at the largest number for any counts: nothing is written out of bounds, and the overflow is reported.
  */
 import { test } from 'node:test';
 import assert from 'node:assert/strict';
@@ -18,23 +18,23 @@ import { nodeDevice } from '../support/node-device.js';
 import { scanOnGpu } from '../support/scan.js';
 import { cameraAt } from '../support/scenes.js';
 import { deviceWith } from './support/devices.js';
-import { THREADS } from './support/pictures.js';
+import { THREADS } from './support/images.js';
 import { fullTest, holds, sized } from './support/row.js';
 import { Renderer } from '../support/renderer.js';
 
-const MOST = 0xffffffff;
+const MAX = 0xffffffff;
 
 /** The twin: exclusive sums that stop at the largest number, and behind them the total. */
 function saturatingSums(values: readonly number[]): number[] {
   const sums = [0];
-  for (const value of values) sums.push(Math.min(MOST, sums[sums.length - 1] + value));
+  for (const value of values) sums.push(Math.min(MAX, sums[sums.length - 1] + value));
   return sums;
 }
 
 test('prefix sums of any counts stop at the largest number', async () => {
   const device = await nodeDevice();
   let wrong = 0;
-  const count = fc.oneof(fc.nat(70_000), fc.constantFrom(0, 1, MOST, 0x80000000, 0x7fffffff, 5_000_000), fc.nat(MOST));
+  const count = fc.oneof(fc.nat(70_000), fc.constantFrom(0, 1, MAX, 0x80000000, 0x7fffffff, 5_000_000), fc.nat(MAX));
   const counts = fc
     .tuple(fc.array(count, { minLength: 1, maxLength: 40 }), fc.constantFrom(1, 3, 250))
     .map(([values, times]) => Array.from({ length: values.length * times }, (_, i) => values[i % values.length]));
@@ -84,8 +84,8 @@ async function countPairs(count: number, side: number): Promise<void> {
   const target = device.createTexture({ size: [side, side], format: 'rgba8unorm', usage: 0x8 | 0x10 | 0x1 });
   const camera = cameraAt([0, 0, -1], [0, 0, 0], { width: side, height: side });
   renderer.render({ gaussians, camera, target });
-  const { pairs, pairOverflow } = await renderer.statistics();
-  const counted = Math.min(MOST, demanded);
+  const { pairs, pairOverflow } = await renderer.stats();
+  const counted = Math.min(MAX, demanded);
   holds('S13', `pairs that are counted of ${demanded.toPrecision(3)}`, pairs + pairOverflow, {
     atLeast: counted,
     atMost: counted,
@@ -105,7 +105,7 @@ async function countPairs(count: number, side: number): Promise<void> {
     wrong += row.filter((value, i) => Math.abs(value - [64, 128, 191, 255][i % 4]) > 1).length;
     staging.unmap();
   }
-  holds('S13', 'wrong colour values in three rows of the picture', wrong, { atMost: 0, unit: 'values' });
+  holds('S13', 'wrong color values in three rows of the picture', wrong, { atMost: 0, unit: 'values' });
   assert.equal(isLost, false, 'the device is there');
   device.destroy();
 }

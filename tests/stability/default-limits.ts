@@ -18,7 +18,7 @@ import { nodeDevice } from '../support/node-device.js';
 import { cameraAt, offCenter } from '../support/scenes.js';
 import { spreadOver, visiblePart } from './support/large-scene.js';
 import { watchMemory } from './support/ledger.js';
-import { compareImage, truth, THREADS } from './support/pictures.js';
+import { compareImage, truth, THREADS } from './support/images.js';
 import { fullTest, holds } from './support/row.js';
 import { capture, Renderer } from '../support/renderer.js';
 
@@ -41,7 +41,7 @@ async function drawInPages(count: number): Promise<void> {
   );
   const visible = visiblePart(1000);
   const gaussians = await GaussianBuffers.upload(device, spreadOver(visible, count));
-  assert.ok(gaussians.pages.length > 1, 'several pages');
+  assert.ok(gaussians.blocks.length > 1, 'several pages');
   const renderer = new Renderer(device, { threads: THREADS, rasterizer: 'quads' });
   const camera = cameraAt([0, 0, -2], [0, 0, 0], { width: 96, height: 72 });
   const close = compareImage(await capture(device, renderer, { gaussians, camera }), truth(visible, camera));

@@ -20,7 +20,7 @@ import { nodeDevice } from '../support/node-device.js';
 import type { Quaternion } from '../support/random.js';
 import { cameraAt, edgeOnDiscs, needles } from '../support/scenes.js';
 import { judgeView, type Verdict } from './fuzz/judge.js';
-import { compare, RASTERIZERS, resized } from './support/pictures.js';
+import { compare, RASTERIZERS, resized } from './support/images.js';
 import { holds, sized } from './support/row.js';
 
 const scaleArbitrary = fc.oneof(
@@ -58,8 +58,7 @@ const verdictOn = async (splats: readonly Splat[]): Promise<Verdict> =>
   );
 
 /**
- * Shrunk by fast-check from its 571st scene. Where two pixels are covered by all five, the light that the last would leave is 1e-4, at which a pixel is
- * finished, to nine digits: 9.99999999e-5 in float64.
+ * Shrunk by fast-check from its 571st scene. In two pixels that all five cover, the last would leave light of 1e-4, the threshold of a finished pixel, to nine digits: 9.99999999e-5 in float64.
  */
 const ON_THE_STOP: readonly Splat[] = [
   { scale: [0, 1, 1], rotation: [0, 1, 0, -1], position: [0, 0, 0], opacity: 0.7347578108310701 },
@@ -69,7 +68,7 @@ const ON_THE_STOP: readonly Splat[] = [
   { scale: [1, 0, 1.3957548737525942], rotation: [5, -7, 0, -4], position: [0, 0, 0], opacity: 0.9999999701976776 },
 ];
 
-/** Whether a picture is that of the oracle, but for pixels that a rounding decides. */
+/** Whether an image equals the oracle's, except for pixels that a rounding decides. */
 const isTrue = ({ cause }: Verdict): boolean => cause === 'fine' || cause === 'threshold';
 
 test('any shape is the shape that the oracle draws', async () => {

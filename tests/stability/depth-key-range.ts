@@ -18,7 +18,7 @@ import { psnr } from '../support/metrics.js';
 import { toRgba } from '../oracle/oracle.js';
 import { seededRandom } from '../support/random.js';
 import { cameraAt } from '../support/scenes.js';
-import { compareImage, draw, RASTERIZERS, truth } from './support/pictures.js';
+import { compareImage, draw, RASTERIZERS, truth } from './support/images.js';
 import { chart, holds, note, sized } from './support/row.js';
 import { toCamera, worldPosition } from '../oracle/projection.js';
 import { renderOracle } from '../oracle/oracle.js';
@@ -63,7 +63,7 @@ test('error against bits of the key', async () => {
   }
   chart('S8', 'ours: logarithmic, over the visible', ours);
   const depths = Float64Array.from({ length: cloud.count }, (_, i) => toCamera(view, worldPosition(cloud, i))[2]);
-  const [least, most] = [Math.min(...depths), Math.max(...depths)];
+  const [min, max] = [Math.min(...depths), Math.max(...depths)];
   const options = { mask: oracle.contributors, channels: 4 };
   const curve = (name: string, key: (z: number, bits: number) => number): void => {
     const points = [10, 12, 14, 16, 20, 24].map((bits) => {
@@ -77,7 +77,7 @@ test('error against bits of the key', async () => {
     chart('S8', name, points);
     note('S8', `${name}, 16 bits`, points[3][1], { unit: 'dB' });
   };
-  curve('linear over all depths', (z, bits) => Math.floor(((z - least) / (most - least)) * (2 ** bits - 1)));
+  curve('linear over all depths', (z, bits) => Math.floor(((z - min) / (max - min)) * (2 ** bits - 1)));
   curve('zfar - z in float32, zfar 1e6', (z, bits) => {
     const words = new Uint32Array(Float32Array.of(1e6 - z).buffer);
     return -(words[0] >>> (32 - Math.min(32, bits + 8)));

@@ -1,12 +1,12 @@
 /**
  * S26. Devices that differ.
  *
- * Who fails: nobody was named; float16 centres (web-splat, Visionary, WebSplatter) and atomically appended splats make pictures differ between devices and runs.
+ * Who fails: no renderer was named; float16 centers (web-splat, Visionary, WebSplatter) and atomically appended splats make images differ between devices and runs.
  *
- * Recipe: asked for two adapters. Run with two devices of one, and against the picture of SwiftShader that is kept: with another adapter the same command
+ * Recipe: asked for two adapters. Run with two devices of one, and against the image of SwiftShader that is kept: with another adapter the same command
  * compares the two.
  *
- * Passes: two devices of one adapter agree to the byte; the picture of any adapter agrees with the one that SwiftShader has drawn, which is kept here, to 1/255 in 99.9 % of
+ * Passes: two devices of one adapter agree to the byte; the image of any adapter agrees with the one that SwiftShader has drawn, which is kept here, to 1/255 in 99.9 % of
  * all channels. With GAUSSIAN_SPLAT_GPU=system the row draws with the driver of the machine (llvmpipe, say).
  */
 import { test } from 'node:test';
@@ -15,7 +15,7 @@ import { existsSync, readFileSync, writeFileSync } from 'node:fs';
 import { offCenter } from '../support/scenes.js';
 import { percentile } from '../support/metrics.js';
 import { deviceWith } from './support/devices.js';
-import { differingBytes, draw, RASTERIZERS, resized } from './support/pictures.js';
+import { differingBytes, draw, RASTERIZERS, resized } from './support/images.js';
 import { holds, isFull } from './support/row.js';
 
 const { cloud, cameras } = offCenter();

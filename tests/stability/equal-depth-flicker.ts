@@ -15,7 +15,7 @@ import { cloudOf, repeat } from '../support/clouds.js';
 import { nodeDevice } from '../support/node-device.js';
 import { seededRandom } from '../support/random.js';
 import { cameraAt } from '../support/scenes.js';
-import { differingBytes, RASTERIZERS, yawed, THREADS } from './support/pictures.js';
+import { differingBytes, RASTERIZERS, yawed, THREADS } from './support/images.js';
 import { holds, sized } from './support/row.js';
 import { capture, Renderer } from '../support/renderer.js';
 
@@ -48,7 +48,7 @@ for (const rasterizer of RASTERIZERS) {
       atMost: 0,
       unit: 'bytes',
     });
-    // A turn and back: the visible are sorted anew, by short keys, among which the plane's are all equal.
+    // A turn and back: the visible are sorted again, by short keys, among which the plane's are all equal.
     const images: Float32Array[] = [];
     for (let turn = 0; turn < sized(2, 4); turn++) {
       await capture(device, renderer, { gaussians, camera: yawed(camera, 0.2 + 0.1 * turn) });

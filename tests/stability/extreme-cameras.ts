@@ -2,7 +2,7 @@
  * S19. Off-centre, wide, narrow, mirrored and sheared views.
  *
  * Who fails: a symmetric clamp of the Jacobian is wrong for an off-centre principal point (gsplat made its own asymmetric); PlayCanvas #8889 culled with one eye's frustum
- * in XR; the camera's centre taken from a transposed matrix is wrong when the view is sheared.
+ * in XR; the camera's center taken from a transposed matrix is wrong when the view is sheared.
  *
  * Recipe: asked for fields of view from 5 to 160 degrees, lens shifts, sheared and mirrored views, orthographic ones. Run with 500 random cameras for each
  * rasterizer; tests/golden/world.alone.test.ts draws orthographic projections.
@@ -17,7 +17,7 @@ import { nodeDevice } from '../support/node-device.js';
 import { seededRandom } from '../support/random.js';
 import { cameraAt } from '../support/scenes.js';
 import { toCamera } from '../oracle/projection.js';
-import { compare, RASTERIZERS } from './support/pictures.js';
+import { compare, RASTERIZERS } from './support/images.js';
 import { holds, sized } from './support/row.js';
 
 const random = seededRandom(19);
@@ -76,7 +76,7 @@ for (const rasterizer of RASTERIZERS) {
       { numRuns: rasterizer === 'quads' ? sized(25, 500) : sized(6, 500), seed: 19 },
     );
     holds('S19', `cameras at random, ${rasterizer}, worst`, worst, { atLeast: 59, unit: 'dB' });
-    holds('S19', 'distance of the eye that colours are seen from to the true one', offCenter, {
+    holds('S19', 'distance of the eye that colors are seen from to the true one', offCenter, {
       atMost: 1e-9,
       unit: 'units',
     });

@@ -1,12 +1,12 @@
 /**
  * S18. Images of 0, 1 and 8192 pixels, changes of size, hidden tabs.
  *
- * Who fails: a texture without size is a validation error (gpuweb #4193); cvlab-epfl/gaussian-splatting-web #23 stretches the picture after a resize.
+ * Who fails: a texture without size is a validation error (gpuweb #4193); cvlab-epfl/gaussian-splatting-web #23 stretches the image after a resize.
  *
  * Recipe: asked for 1,000 changes of size, 0 x 0 among them, densities and hidden tabs. Run so with both rasterizers; 0 x 0, density and tabs in the page
  * (browser/resize.lab.test.ts).
  *
- * Passes: after any sequence of sizes the picture is, byte for byte, that of a renderer that never had another size; no validation error. The page's part, with 0 x 0,
+ * Passes: after any sequence of sizes the image is, byte for byte, that of a renderer that never had another size; no validation error. The page's part, with 0 x 0,
  * `display: none` and hidden tabs, is in tests/stability/browser.
  */
 import { test } from 'node:test';
@@ -15,7 +15,7 @@ import fc from 'fast-check';
 import { GaussianBuffers, packGaussians } from '@gaussian-splat/renderer';
 import { nodeDevice } from '../support/node-device.js';
 import { offCenter } from '../support/scenes.js';
-import { compareImage, differingBytes, RASTERIZERS, truth, THREADS } from './support/pictures.js';
+import { compareImage, differingBytes, RASTERIZERS, truth, THREADS } from './support/images.js';
 import { holds, sized } from './support/row.js';
 import { capture, Renderer } from '../support/renderer.js';
 

@@ -14,7 +14,7 @@ import assert from 'node:assert/strict';
 import { GaussianBuffers, packGaussians, type PackedGaussians } from '@gaussian-splat/renderer';
 import { nodeDevice } from '../support/node-device.js';
 import { offCenter } from '../support/scenes.js';
-import { differingBytes, notFinite, RASTERIZERS, resized, THREADS } from './support/pictures.js';
+import { differingBytes, notFinite, RASTERIZERS, resized, THREADS } from './support/images.js';
 import { holds } from './support/row.js';
 import { shaderTexts } from './support/sources.js';
 import { capture, Renderer } from '../support/renderer.js';
@@ -35,7 +35,7 @@ test('shaders ask bits, not floats, whether a number is one', () => {
   assert.match(guard, /EXPONENT_BITS = 0x7f800000u/);
 });
 
-/** Bits of NaN, infinities and their negatives in every word of the geometry where a float's upper bits stand, a splat each. */
+/** Bits of NaN, infinities and their negatives in every word of the geometry that holds a float's upper bits, a splat each. */
 function withBadBits(packed: PackedGaussians): { spoilt: PackedGaussians; bad: Set<number> } {
   const geometry = packed.geometry.slice();
   const stride = geometry.length / packed.count;
@@ -77,7 +77,7 @@ for (const rasterizer of RASTERIZERS) {
     for (const scene of [without(packed, bad), spoilt]) {
       const gaussians = await GaussianBuffers.upload(device, scene);
       images.push(await capture(device, renderer, { gaussians, camera }));
-      ({ unusable } = await renderer.statistics());
+      ({ unusable } = await renderer.stats());
       gaussians.destroy();
     }
     holds('S5b', `bits of NaN and infinity, ${rasterizer}: differing bytes`, differingBytes(images[0], images[1]), {

@@ -1,7 +1,7 @@
 /**
  * S14. Loops that wait for another workgroup.
  *
- * Who fails: decoupled look-back spins until a neighbour has written; WebGPU promises no such progress. Visionary still does (`while true` in its source), web-splat
+ * Who fails: decoupled look-back spins until a neighbor has written; WebGPU promises no such progress. Visionary still does (`while true` in its source), web-splat
  * froze machines with M-series chips (MarcusAndreasSvensson/gaussian-splatting-webgpu #10), PlayCanvas found its one-sweep wrong on Mali, IMG and Adreno.
  *
  * Recipe: asked for a check of the text, a software adapter, and one thread. Run so.
@@ -22,7 +22,7 @@ test('no loop waits', () => {
   const faults: string[] = [];
   let loops = 0;
   for (const [name, text] of shaderTexts()) {
-    // Atomics in storage are the only way to hear of another workgroup within a dispatch.
+    // Atomics in storage are the only communication between workgroups within a dispatch.
     const storage = [...text.matchAll(/var<storage, read_write>\s+(\w+):[^;]*atomic/g)].map(([, variable]) => variable);
     for (const body of loopBodies(text)) {
       loops++;

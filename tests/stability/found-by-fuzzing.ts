@@ -1,7 +1,7 @@
 /**
- * Every case that `npm run lab:fuzz` has found worth keeping: faults that were mended, and the lowest pictures with the cause of each.
+ * Every case that `npm run lab:fuzz` has found worth keeping: faults that were fixed, and the worst images with the cause of each.
  *
- * Who fails: nobody else publishes such a corpus.
+ * Who fails: no other renderer publishes such a corpus.
  *
  * Passes: no number that is not finite; 59 dB or more in all pixels that no rounding decides.
  */

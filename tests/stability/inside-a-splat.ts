@@ -1,5 +1,5 @@
 /**
- * S3. The camera inside a splat, and centres at the near plane.
+ * S3. The camera inside a splat, and centers at the near plane.
  *
  * Who fails: web-splat, Visionary, PlayCanvas and Spark have no clamp of the Jacobian (read in their sources): 11 dB in a room, by a
  * float64 emulation of the rule; aras-p/UnityGaussianSplatting #14, #147 and #196, INRIA #963 and Resonite #4173 report screen-filling flashes.
@@ -7,7 +7,7 @@
  * Recipe: asked for a path through 500 large splats, depths about 0 and the near plane, up to 50 focal lengths aside. Run so: 25 steps with each rasterizer,
  * 1,000 single splats, and times of 25 frames.
  *
- * Passes: 50 dB or more along a path through 500 large splats, with centres beyond 50 focal lengths aside and a hair from the near plane; no NaN;
+ * Passes: 50 dB or more along a path through 500 large splats, with centers beyond 50 focal lengths aside and a hair from the near plane; no NaN;
  * no frame takes more than 3 times the median.
  */
 import { test } from 'node:test';
@@ -17,7 +17,7 @@ import { cloudOf, repeat } from '../support/clouds.js';
 import { nodeDevice } from '../support/node-device.js';
 import { seededRandom } from '../support/random.js';
 import { cameraAt } from '../support/scenes.js';
-import { compareImage, draw, notFinite, RASTERIZERS, truth, THREADS } from './support/pictures.js';
+import { compareImage, draw, notFinite, RASTERIZERS, truth, THREADS } from './support/images.js';
 import { fullTest, holds, sized } from './support/row.js';
 import { capture, Renderer } from '../support/renderer.js';
 

@@ -6,7 +6,7 @@
  *
  * Recipe: asked for an offset of 1e6 and 100 frames that pan by a pixel. Run so with both rasterizers, at distances from 10 to 1e8 besides.
  *
- * Passes: 59 dB or more to the picture of the same scene at the origin, a million units away, while the camera pans by a pixel a frame; also for files
+ * Passes: 59 dB or more to the image of the same scene at the origin, a million units away, while the camera pans by a pixel a frame; also for files
  * whose float32 coordinates are that large, and to the oracle close by, 5,000 units from the middle of a scene.
  */
 import { test } from 'node:test';
@@ -17,14 +17,14 @@ import { psnr } from '../support/metrics.js';
 import { nodeDevice } from '../support/node-device.js';
 import { seededRandom } from '../support/random.js';
 import { movedBy, offCenter, type Scene } from '../support/scenes.js';
-import { draw, RASTERIZERS, resized, truth } from './support/pictures.js';
+import { draw, RASTERIZERS, resized, truth } from './support/images.js';
 import { chart, holds, note, sized } from './support/row.js';
 
 const FAR: Vector3 = [1_000_000, -2_345_678.9, 1_234_567.8];
 const base = offCenter();
 const scene: Scene = { ...base, cameras: [resized({ ...base.cameras[0], cx: 180, cy: 135 }, 120)] };
 
-/** The camera moved aside so that what is 3 units away moves by a number of pixels. */
+/** The camera moved aside so that a point 3 units away moves by a number of pixels. */
 function panned(camera: Camera, pixels: number): Camera {
   const worldToCamera = Array.from(camera.worldToCamera);
   worldToCamera[3] -= (3 * pixels) / camera.fx;
@@ -55,7 +55,7 @@ const triple = (of: (axis: number) => number): Vector3 => [of(0), of(1), of(2)];
 function farCorner(distance: number): { cloud: GaussianCloud; camera: Camera } {
   const random = seededRandom(2);
   const place: Vector3 = [distance, 0.7 * distance, -0.4 * distance];
-  const within = (most: number): number => random.uniform(-most, most);
+  const within = (max: number): number => random.uniform(-max, max);
   const near = repeat(600, () => ({
     position: triple((axis) => Math.fround(place[axis] + within(1))),
     scale: triple(() => random.uniform(0.003, 0.02)),
@@ -118,7 +118,7 @@ test('error against distance', async () => {
     const far = movedBy({ ...scene, cameras: [camera] }, offset);
     const ours = psnr(await draw(device, far.cloud, far.cameras[0]), toRgba(expected), options);
     curves.ours.push([distance, ours]);
-    // What remains if positions are float32 numbers of the world, in all else exact.
+    // The remaining error with positions as float32 numbers of the world, and all else exact.
     const rounded = truth(asFloat32File(scene.cloud, offset).near, camera);
     curves.rounded.push([distance, psnr(toRgba(rounded), toRgba(expected), options)]);
     holds('S7', `${distance} units away: ours`, ours, { atLeast: 59, unit: 'dB' });

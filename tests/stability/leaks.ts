@@ -15,7 +15,7 @@ import { writeTensors } from '../support/generator-tensors.js';
 import { offCenter } from '../support/scenes.js';
 import { deviceWith } from './support/devices.js';
 import { watchMemory } from './support/ledger.js';
-import { resized, yawed, THREADS } from './support/pictures.js';
+import { resized, yawed, THREADS } from './support/images.js';
 import { holds, sized } from './support/row.js';
 import { capture, Renderer } from '../support/renderer.js';
 
@@ -61,7 +61,7 @@ test('load, draw and destroy, over and over', async () => {
   const device = await deviceWith([]);
   device.pushErrorScope('validation');
   const ledger = watchMemory(device);
-  // What is made once for a device stays.
+  // Resources that exist once for each device stay.
   for (const i of [0, 1, 2]) await cycle(device, i);
   const [bytes, objects] = [ledger.bytes, ledger.objects];
   const cycles = sized(9, 500);

@@ -6,7 +6,7 @@
  *
  * Recipe: asked for features taken away one by one. Run so, and all at once.
  *
- * Passes: with every optional feature removed, one by one and all together, at default limits, the picture is the same; only the precision of blending may follow
+ * Passes: with every optional feature removed, one by one and all together, at default limits, the image is the same; only the precision of blending may follow
  * float32-blendable.
  */
 import { test } from 'node:test';
@@ -15,7 +15,7 @@ import { deviceDescriptor, GaussianBuffers, packGaussians } from '@gaussian-spla
 import { requestNodeAdapter } from '../../packages/cli/src/lib/node-gpu.mjs';
 import { offCenter } from '../support/scenes.js';
 import { deviceWith } from './support/devices.js';
-import { compareImage, differingBytes, RASTERIZERS, resized, truth } from './support/pictures.js';
+import { compareImage, differingBytes, RASTERIZERS, resized, truth } from './support/images.js';
 import { holds, sized } from './support/row.js';
 import { shaderTexts } from './support/sources.js';
 import { capture, Renderer } from '../support/renderer.js';

@@ -21,7 +21,7 @@ import { nodeDevice } from '../support/node-device.js';
 import { seededRandom } from '../support/random.js';
 import { offCenter } from '../support/scenes.js';
 import { deviceWith } from './support/devices.js';
-import { resized, rolled, yawed, THREADS } from './support/pictures.js';
+import { resized, rolled, yawed, THREADS } from './support/images.js';
 import { fullTest, holds, sized } from './support/row.js';
 import { capture, Renderer, type RendererOptions } from '../support/renderer.js';
 
@@ -69,7 +69,7 @@ function moved(camera: Camera, one: Step): Camera {
   return { ...camera, worldToCamera };
 }
 
-/** What is drawn with, besides the variants that are fastest here. */
+/** Variants to draw with, besides the fastest ones here. */
 type Options = Pick<RendererOptions, 'rasterizer'>;
 
 test('any sequence of events', async () => {
@@ -136,7 +136,7 @@ async function worstOf(
         const fresh = new Renderer(device, { threads: THREADS, depthKeyBits: 32, ...options });
         const expected = await capture(device, fresh, { gaussians, camera });
         fresh.destroy();
-        // Keys of 24 bits may exchange neighbours that are equally deep to the seventh digit; stale content costs 30 dB and more.
+        // Keys of 24 bits may exchange neighbors that are equally deep to the seventh digit; stale content costs 30 dB and more.
         const close = psnr(found, expected, { channels: 4 });
         worst = Math.min(worst, close);
         compared++;

@@ -16,7 +16,7 @@ import { cloudOf, repeat } from '../support/clouds.js';
 import { nodeDevice } from '../support/node-device.js';
 import { seededRandom } from '../support/random.js';
 import { cameraAt } from '../support/scenes.js';
-import { compareImage, draw, REFERENCE, truth } from './support/pictures.js';
+import { compareImage, draw, REFERENCE, truth } from './support/images.js';
 import { holds, sized } from './support/row.js';
 import { matrix4, rotationMatrix, transformed, withTurnedHarmonics, type Matrix3 } from './support/transform.js';
 
@@ -68,7 +68,7 @@ test('scaled by (1, 2, 3)', async () => {
     atLeast: 75,
     unit: 'dB',
   });
-  // Colours are seen from the eye's place in the object, which the inverse of the matrix gives.
+  // Colors are seen from the eye's place in the object, which the inverse of the matrix gives.
   const cloud = cloudOf(splats, 3);
   const camera = through(view, stretch);
   const { psnr: close } = compareImage(await draw(device, cloud, camera, REFERENCE), truth(cloud, camera));

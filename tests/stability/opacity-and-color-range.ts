@@ -1,23 +1,23 @@
 /**
- * S6. Opacities 0, 1 and around the rules; colours below 0 and above 1.
+ * S6. Opacities 0, 1 and around the rules; colors below 0 and above 1.
  *
- * Who fails: renderers that accumulate into unorm targets clamp colours above 1 (58.9 dB, worst pixel 54/255 by a float64 emulation); caps of
- * 1.0 (Spark) and 0.999 (brush) and floors of 0.5/255 (Spark) differ from the trainer's (76 dB, 52 dB, emulated likewise).
+ * Who fails: renderers that accumulate into unorm targets clamp colors above 1 (58.9 dB, worst pixel 54/255 by a float64 emulation); caps of
+ * 1.0 (Spark) and 0.999 (brush) and floors of 0.5/255 (Spark) differ from the trainer's (76 dB, 52 dB, also emulated).
  *
- * Recipe: asked for a ladder of opacities and colours beyond white, at 75 dB. Run so in the quality `reference`; the default has a limit of 59.
+ * Recipe: asked for a series of opacities and colors beyond white, at 75 dB. Run so in the quality `reference`; the default has a limit of 59.
  *
- * Passes: 75 dB or more in the `reference` quality, as far as a display shows it; 59 in the default. Colours up to 4 times white are kept
- * in float16, which is 73 dB of a peak of 1 before a display clamps them.
+ * Passes: 75 dB or more in the `reference` quality, as far as a display shows it; 59 in the default. Colors up to 4 times white are kept
+ * in float16, which is 73 dB for a peak of 1 before a display clamps them.
  */
 import { test } from 'node:test';
 import { toRgba } from '../oracle/oracle.js';
 import { psnr } from '../support/metrics.js';
 import { nodeDevice } from '../support/node-device.js';
-import { brightColors, opacityLadder } from '../support/scenes.js';
-import { compareImage, draw, RASTERIZERS, REFERENCE, resized, truth } from './support/pictures.js';
+import { brightColors, opacitySteps } from '../support/scenes.js';
+import { compareImage, draw, RASTERIZERS, REFERENCE, resized, truth } from './support/images.js';
 import { holds, note, sized } from './support/row.js';
 
-for (const make of [opacityLadder, brightColors]) {
+for (const make of [opacitySteps, brightColors]) {
   test(make.name, async () => {
     const device = await nodeDevice();
     const { cloud, cameras } = make();

@@ -5,10 +5,10 @@
  * the driver allows, and the device is lost.
  *
  * Recipe: asked for 1,000 to 100,000 full-screen splats at 3840 x 2160, each submission at most 250 ms. Run with 100,000 at that size with tiles, and 1,000
- * with quads, which take hours for more on a processor; times of submissions are noted and not held, for a processor has no 250 ms.
+ * with quads, which take hours for more on a CPU; times of submissions are recorded and not limited, since a CPU cannot keep 250 ms.
  *
- * Passes: no loss of the device; the picture is right, and the same to the byte however it is divided into submissions; tiles are divided by themselves, the more the more
- * pairs of splat and bin there may be, quads where the lever `submissions` asks for it.
+ * Passes: no loss of the device; the image is right, and the same to the byte however it is divided into submissions; tiles are divided automatically, the more the more
+ * pairs of splat and bin there may be, quads if the setting `submissions` asks for it.
  */
 import { test } from 'node:test';
 import assert from 'node:assert/strict';
@@ -18,7 +18,7 @@ import { nodeDevice } from '../support/node-device.js';
 import { seededRandom } from '../support/random.js';
 import { cameraAt } from '../support/scenes.js';
 import { deviceWith } from './support/devices.js';
-import { compareImage, differingBytes, notFinite, RASTERIZERS, truth, THREADS } from './support/pictures.js';
+import { compareImage, differingBytes, notFinite, RASTERIZERS, truth, THREADS } from './support/images.js';
 import { fullTest, holds, note, sized } from './support/row.js';
 import { capture, Renderer } from '../support/renderer.js';
 
@@ -74,7 +74,7 @@ const specks = (count: number) =>
     })),
   );
 
-/** Submissions of so many ms can be told from the time that handing them over takes. */
+/** Submissions of this time in ms are distinguishable from the time of handing them over. */
 const MEASURABLE_MS = 20;
 
 /** Milliseconds of every submission of a device's queue, from when the one before it was done. */
@@ -125,7 +125,7 @@ test('quads, divided into many submissions, are the same to the byte, and none i
     unit: 'bytes',
   });
   const ratio = longest[1] / longest[0];
-  // What a GPU does in next to no time, the clock of the processor cannot compare.
+  // The CPU's clock cannot compare very short GPU work.
   if (longest[0] < MEASURABLE_MS)
     note('S9', 'longest of 64 submissions over the one, too short', ratio, { unit: 'times' });
   else holds('S9', 'longest of 64 submissions over the one', ratio, { atMost: 0.5, unit: 'times' });
@@ -205,7 +205,7 @@ for (const [rasterizer, count, width, height] of [
     const renderer = new Renderer(device, { threads: 'serial', rasterizer, submissions });
     const target = device.createTexture({ size: [width, height], format: 'rgba8unorm', usage: 0x8 | 0x10 });
     const camera = cameraAt([0, 0, -1], [0, 0, 0], { width, height });
-    // The first has no room for all pairs; the last has what the device allows.
+    // The first has no room for all pairs; the last has the device's maximum.
     for (let frame = 0; frame < 3; frame++) {
       const watch = timeSubmissions(device);
       renderer.render({ gaussians, camera, target });

@@ -4,9 +4,9 @@
  * Who fails: PlayCanvas' tile renderers #8574 (missing tiles after a jump) and #8586 (writes beyond the buffer end in tile 0), 16-bit tile numbers over
  * 5,000 pixels; brush needed a sentinel.
  *
- * Recipe: asked for ten times the capacity at once. Run so; `npm test` has four times. What is left out is the farthest of the whole image, not of each tile.
+ * Recipe: asked for ten times the capacity at once. Run so; `npm test` has four times. The farthest pairs of the whole image are dropped, not of each tile.
  *
- * Passes: with ten times the room demanded, the frame has no corrupt pixel: it is that of the nearest splats that fit; what was left out is counted;
+ * Passes: with ten times the room demanded, the frame has no corrupt pixel: it is that of the nearest splats that fit; dropped pairs are counted;
  * the next frame has room for all.
  * SECURITY.md: "A scene that asks for too much harms itself".
  */
@@ -17,7 +17,7 @@ import { cloudOf, repeat } from '../support/clouds.js';
 import { nodeDevice } from '../support/node-device.js';
 import { seededRandom } from '../support/random.js';
 import { cameraAt } from '../support/scenes.js';
-import { compareImage, differingBytes, notFinite, truth, THREADS } from './support/pictures.js';
+import { compareImage, differingBytes, notFinite, truth, THREADS } from './support/images.js';
 import { holds, sized } from './support/row.js';
 import { capture, Renderer } from '../support/renderer.js';
 
@@ -43,7 +43,7 @@ test('ten times the room, at once', async () => {
   const texture = device.createTexture({ size: [width, height], format: 'rgba32float', usage: 0x10 | 0x1 | 0x8 });
   renderer.render({ gaussians, camera, target: texture });
   const first = await readImage(device, texture);
-  const { pairs, pairOverflow } = await renderer.statistics();
+  const { pairs, pairOverflow } = await renderer.stats();
   holds('S10', 'pairs demanded over pairs with room', (pairs + pairOverflow) / pairs, {
     atLeast: sized(3.9, 9),
     unit: 'times',
@@ -55,7 +55,7 @@ test('ten times the room, at once', async () => {
   const close = compareImage(sampled(first, width, height, block), whole);
   holds('S10', 'the frame that lacked room, against the whole picture', close.psnr, { atLeast: 40, unit: 'dB' });
   const next = await capture(device, renderer, { gaussians, camera });
-  assert.equal((await renderer.statistics()).pairOverflow, 0, 'the next frame has room');
+  assert.equal((await renderer.stats()).pairOverflow, 0, 'the next frame has room');
   const fresh = new Renderer(device, { threads: THREADS, rasterizer: 'tiles' });
   const again = await capture(device, fresh, { gaussians, camera });
   holds('S10', 'the next frame against one with room from the start: differing bytes', differingBytes(next, again), {

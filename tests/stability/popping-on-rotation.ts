@@ -3,7 +3,7 @@
  *
  * Who fails: every renderer that sorts by depth along the camera's axis changes order as it turns; those that sort late add the
  * error of an old order: antimatter15's `splat` waits for 8.1 degrees, GaussianSplats3D for 8.1 degrees or a unit, Spark for 2.6 degrees or a
- * millimetre (thresholds read in their sources), PlayCanvas on WebGL for its worker.
+ * millimeter (thresholds read in their sources), PlayCanvas on WebGL for its worker.
  *
  * Recipe: asked for one fixed view with orders of other directions, and a pure roll; an order for each pixel 20 dB better at 1 degree. The oracle draws the old orders, at
  * eleven angles from 0.1 to 30 degrees; 40 frames of a turn. With `order: 'pixel'` two captured scenes turn by 0.25 degrees a frame: what each frame has that the float64 order of
@@ -25,7 +25,7 @@ import { onlyInLab } from '../support/extent.js';
 import { psnr } from '../support/metrics.js';
 import { nodeDevice } from '../support/node-device.js';
 import { room } from '../support/scenes.js';
-import { resized, rolled, yawed, THREADS } from './support/pictures.js';
+import { resized, rolled, yawed, THREADS } from './support/images.js';
 import { chart, holds, note, sized } from './support/row.js';
 import { capture, Renderer } from '../support/renderer.js';
 
@@ -76,13 +76,12 @@ test('a turning camera always has the order of its own direction; a roll too', a
 const STEP = radians(0.25);
 const WINDOWS = [16, 32] as const;
 
-/** What an image has that another has not: [height, width, 4] */
+/** The difference of one image to another: [height, width, 4] */
 const difference = (image: ArrayLike<number>, truth: ArrayLike<number>): Float64Array =>
   Float64Array.from(truth, (value, i) => image[i] - value);
 
 /**
- * Root mean square of how such differences change while the camera turns by an angle about its own vertical axis: the second is looked up where the turn has
- * taken what the first shows, which for a turn in place depends on nothing but the pixel.
+ * Root mean square of how such differences change while the camera turns by an angle about its own vertical axis: the second is sampled at the pixel to which the turn moves the first, which for a turn in place depends only on the pixel.
  */
 function jump(
   first: Float64Array,

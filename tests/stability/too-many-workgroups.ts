@@ -6,7 +6,7 @@
  *
  * Recipe: asked for 16.7, 16.8 and 40 million splats. Run so; `npm test` has the rules of the shaders' text alone.
  *
- * Passes: 16.7, 16.8 and 40 million splats are the picture of their visible part; every dispatch is a grid within the limits.
+ * Passes: 16.7, 16.8 and 40 million splats give the image of their visible part; every dispatch is a grid within the limits.
  */
 import { test } from 'node:test';
 import assert from 'node:assert/strict';
@@ -16,7 +16,7 @@ import { dispatchGrid } from '@gaussian-splat/renderer/stages';
 import { nodeDevice } from '../support/node-device.js';
 import { cameraAt } from '../support/scenes.js';
 import { spreadOver, visiblePart } from './support/large-scene.js';
-import { compareImage, truth, yawed, THREADS } from './support/pictures.js';
+import { compareImage, truth, yawed, THREADS } from './support/images.js';
 import { fullTest, holds } from './support/row.js';
 import { loopBodies, shaderTexts } from './support/sources.js';
 import { capture, Renderer } from '../support/renderer.js';
@@ -29,7 +29,7 @@ async function drawLarge(count: number): Promise<void> {
   const gaussians = await GaussianBuffers.upload(device, spreadOver(visible, count));
   const renderer = new Renderer(device, { threads: THREADS, rasterizer: 'quads' });
   const close = compareImage(await capture(device, renderer, { gaussians, camera }), truth(visible, camera));
-  holds('S11', `${count / 1e6} million splats in ${gaussians.pages.length} pages, in order`, close.psnr, {
+  holds('S11', `${count / 1e6} million splats in ${gaussians.blocks.length} pages, in order`, close.psnr, {
     atLeast: 59,
     unit: 'dB',
   });

@@ -1,12 +1,12 @@
 /**
  * S5. NaN, infinities, zero quaternions, denormals.
  *
- * Who fails: PlayCanvas #7243 and #7592, splat-transform #288: one such number in a file and parts of the picture or all of it are gone.
+ * Who fails: PlayCanvas #7243 and #7592, splat-transform #288: one such number in a file and parts of the image or all of it are gone.
  *
  * Recipe: asked for each attribute with NaN, infinities, -0, denormals, the largest number and a zero quaternion, in files and in what generators write. Run
  * so for files; for generators with NaN and infinities in every column of the rows.
  *
- * Passes: with bad splats of every kind mixed in, from a file and from a generator's tensors, the picture is bit for bit that of the scene
+ * Passes: with bad splats of every kind mixed in, from a file and from a generator's tensors, the image is bit for bit that of the scene
  * without them, and they are counted.
  * SECURITY.md: "Scene and model files are untrusted data".
  */
@@ -16,7 +16,7 @@ import { DynamicGaussians, packGaussians } from '@gaussian-splat/renderer';
 import { writeTensors } from '../support/generator-tensors.js';
 import { nodeDevice } from '../support/node-device.js';
 import { offCenter, room, withHostileSplats } from '../support/scenes.js';
-import { differingBytes, draw, RASTERIZERS, resized, THREADS } from './support/pictures.js';
+import { differingBytes, draw, RASTERIZERS, resized, THREADS } from './support/images.js';
 import { holds, sized } from './support/row.js';
 import { capture, Renderer } from '../support/renderer.js';
 
@@ -48,7 +48,7 @@ const SPEC = {
   dtype: 'float32',
 } as const;
 
-/** The picture of rows as a generator writes them. */
+/** The image of rows as a generator writes them. */
 async function drawTensors(
   rows: Float32Array<ArrayBuffer>,
   width: number,
@@ -62,7 +62,7 @@ async function drawTensors(
   gaussians.ingest({ [Object.keys(writeTensors(scene.cloud, SPEC).tensors)[0]]: tensor }, count);
   const renderer = new Renderer(device, { threads: THREADS });
   const pixels = await capture(device, renderer, { gaussians, camera });
-  const { unusable } = await renderer.statistics();
+  const { unusable } = await renderer.stats();
   renderer.destroy();
   gaussians.destroy();
   tensor.destroy();
@@ -74,7 +74,7 @@ test('in the tensors of a generator', async () => {
   const words = Object.values(tensors)[0];
   const clean = new Float32Array(words.slice().buffer);
   const width = clean.length / scene.cloud.count;
-  // A bad copy of every tenth row behind it, spoilt in one column after the other; the last rows make up for what is missing.
+  // A bad copy of every tenth row behind it, corrupted in one column after the other; the last rows replace the missing ones.
   const faults = [NaN, Infinity, -Infinity];
   const rows: number[][] = [];
   let bad = 0;

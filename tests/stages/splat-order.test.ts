@@ -1,7 +1,14 @@
 /** The order that a worker finds for the WebGL renderer, against a plain sort. SECURITY.md: "A scene that asks for too much harms itself". */
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { isSameView, orderView, SplatOrder, type OrderView } from '@gaussian-splat/renderer/webgl';
+import {
+  distanceView,
+  isSameImage,
+  isSameView,
+  orderView,
+  SplatOrder,
+  type OrderView,
+} from '@gaussian-splat/renderer/webgl';
 import { cameraAt } from '../support/scenes.js';
 
 /** Ascending depth as float32, equal ones by number. */
@@ -63,7 +70,7 @@ test('the sum of the areas on screen says how often the image is covered', () =>
   const order = new Uint32Array(4_000);
   splats.sort(orderView(camera, [0, 0, 0]), order);
   assert.equal(splats.covered, 3_000, 'each covers all of it');
-  // From 1,000 times as far a millionth of what it was, and beside the image nothing.
+  // The value from 1,000 times as far is a millionth, and beside the image it is 0.
   const far = cameraAt([300, -1000, -3000], [0, 0, 1]);
   splats.sort(orderView(far, [0, 0, 0]), order);
   assert.ok(splats.covered < 1, `${splats.covered} from afar`);
@@ -74,4 +81,22 @@ test('the sum of the areas on screen says how often the image is covered', () =>
   );
   beside.sort(orderView(camera, [0, 0, 0]), order);
   assert.ok(beside.covered < 300, `${beside.covered} beside the image`);
+});
+
+test('an order by distance is covered like one by depth, in whichever direction the camera looks', () => {
+  const areas = new Float32Array(3_000).fill(100);
+  const splats = new SplatOrder(new Float32Array(3 * 3_000), areas);
+  const order = new Uint32Array(4_000);
+  splats.sort(distanceView(camera, [0, 0, 0]), order);
+  assert.equal(splats.covered, 3_000);
+  const away = cameraAt([0.3, -1, -3], [0.3, -1, -9]);
+  assert.equal(splats.sort(distanceView(away, [0, 0, 0]), order), 3_000, 'listed');
+  assert.equal(splats.covered, 0, 'behind the camera');
+});
+
+test('a view that zooms or moves aside needs the coverage again', () => {
+  const at = (x: number): OrderView => orderView(cameraAt([x, 0, -3], [x, 0, 0]), [0, 0, 0]);
+  const zoomed = { ...at(0), shareOfArea: 2 * at(0).shareOfArea };
+  assert.ok(isSameImage(at(0), at(0)));
+  for (const view of [at(40), zoomed]) assert.ok(isSameView(at(0), view) && !isSameImage(at(0), view));
 });

@@ -3,7 +3,7 @@ import assert from 'node:assert/strict';
 import { readAttributes, type RawAttributes } from '../../packages/element/src/attributes.js';
 import type { CameraSettings } from '../../packages/element/src/camera/settings.js';
 
-/** What attributes say of the camera: these, and no others. */
+/** Camera values that attributes set: these, and no others. */
 export function settings(given: Partial<RawAttributes> = {}): CameraSettings {
   return readAttributes(given as RawAttributes, assert.fail).camera;
 }

@@ -1,13 +1,13 @@
 /**
- * `npm run lab:clip -- [options]`: what a clip costs whose splats come and go: a made, seeded fountain of 150,000 splats at 30 frames a second. Prints one table of measures,
- * aims and what was seen: the rate, the bytes before the first frame, and how long each of them takes at 2 and 8 Mbit/s.
+ * `npm run lab:clip -- [options]`: the cost of a clip whose splats appear and disappear: a synthetic, seeded fountain of 150,000 splats at 30 frames a second. Prints one table of measures,
+ * aims and results: the rate, the bytes before the first frame, and how long each of them takes at 2 and 8 Mbit/s.
  *
  * --splats N    splats at any time (default 150000)
  * --frames N    frames (default 300)
- * --per-file N  frames of a group (default 45)
- * --min-db DB   PSNR of the worst held-out view (default 45)
- * --jobs N      processes that share the groups (default: a quarter of the processors); each finds its own rounding
- * --out FILE    where the clip is written (default: nowhere)
+ * --per-file N  frames of a group (default 100)
+ * --min-psnr DB PSNR of the worst held-out view (default 45)
+ * --jobs N      processes that code the groups (default: a quarter of the CPU cores); each finds its own rounding
+ * --out FILE    path of the clip (default: none)
  */
 import { fork } from 'node:child_process';
 import { mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
@@ -26,7 +26,7 @@ const FRAMES_PER_SECOND = 30;
 const text = (fallback: string) => ({ type: 'string', default: fallback }) as const;
 const { values } = parseArgs({
   options: {
-    ...{ splats: text('150000'), frames: text('300'), 'per-file': text('45'), 'min-db': text('45') },
+    ...{ splats: text('150000'), frames: text('300'), 'per-file': text('100'), 'min-psnr': text('45') },
     jobs: text(String(Math.max(1, Math.floor(availableParallelism() / 4)))),
     out: { type: 'string' },
     // Frames of a process that another one started.
@@ -35,7 +35,7 @@ const { values } = parseArgs({
 });
 const [splats, frames, framesPerGroup] = [values.splats, values.frames, values['per-file']].map(Number);
 
-/** What a process says of the frames that it coded. */
+/** Statistics of a process for the frames that it coded. */
 interface Facts extends Omit<CodedClip, 'bytes'> {
   readonly cpuSeconds: number;
 }
@@ -51,7 +51,7 @@ async function codeFrames(from: number, until: number, out: string): Promise<voi
   const begin = performance.now();
   const { bytes, ...facts } = await codeClip({
     ...{ frameCount: until - from, framesPerSecond: FRAMES_PER_SECOND, framesPerGroup },
-    minDecibels: Number(values['min-db']),
+    minPsnr: Number(values['min-psnr']),
     openFrame: (frame) => Promise.resolve(frameOf(from + frame)),
     ...{ device, encodeWebp, deflate, deflateQuickly },
     onStep: (step) => console.error(`${((performance.now() - begin) / 1000).toFixed(0)} s, from ${from} on: ${step}`),
@@ -115,11 +115,7 @@ function printTable(bytes: Uint8Array, facts: readonly Facts[], seconds: number)
     ['measure', 'aim', 'seen'],
     ['splats at any time, frames, groups', '', `${splats}, ${frames}, ${index.groups.length} of ${framesPerGroup}`],
     ['splats of all groups, of some frames only', '', `${sum((own) => own.splats)}, ${sum((own) => own.passing)}`],
-    [
-      'worst held-out view',
-      `${values['min-db']} dB`,
-      `${Math.min(...facts.map((f) => f.worstDecibels)).toFixed(2)} dB`,
-    ],
+    ['worst held-out view', `${values['min-psnr']} dB`, `${Math.min(...facts.map((f) => f.worstPsnr)).toFixed(2)} dB`],
     ['rate', '8 Mbit/s', rate(bytes.length)],
     ['  of scenes, of motion', '', `${rate(lengths('sceneBytes'))}, ${rate(lengths('motionBytes'))}`],
     ['first frame at 2 Mbit/s', '1.7 s', at(2)],
@@ -140,7 +136,7 @@ function secondsAt(megabits: number, bytes: number): number {
   return (8e-6 * bytes) / megabits;
 }
 
-/** Seconds in which a clip stands still, because the coarse part of a group has not come when it is due. */
+/** Seconds for which a clip stalls, because the coarse part of a group is not loaded when it is due. */
 function waitsAt(megabits: number, { groups, framesPerSecond }: ClipIndex): number {
   let [late, start] = [0, 0];
   for (const { first: frame, parts } of groups) {

@@ -5,18 +5,19 @@ import { codeClip, encodingsFor, type CodedClip } from '@gaussian-splat/economis
 
 const STEPS = { position: 0.002, rotation: 0.01, scale: 0.01, opacity: 0.004, color: 0.01 };
 
-/** A clip whose groups have PLY files, so that nothing but motion is rounded. */
+/** A clip whose groups have PLY files, so that nothing but motion is rounded, or the finest files of another name. */
 export function clipOf(
   frameOf: (frame: number) => GaussianCloud,
   {
     frames,
     framesPerSecond = 10,
     framesPerGroup,
-  }: { frames: number; framesPerSecond?: number; framesPerGroup: number },
+    name = 'a.ply',
+  }: { frames: number; framesPerSecond?: number; framesPerGroup: number; name?: string },
 ): Promise<CodedClip> {
-  const [encoding] = encodingsFor('a.ply');
+  const encoding = encodingsFor(name).at(-1)!;
   return codeClip({
-    ...{ frameCount: frames, framesPerSecond, framesPerGroup, minDecibels: 45 },
+    ...{ frameCount: frames, framesPerSecond, framesPerGroup, minPsnr: 45 },
     openFrame: async (frame) => frameOf(frame),
     device: undefined as unknown as GPUDevice,
     encodeWebp: () => Promise.reject(new Error('not needed')),

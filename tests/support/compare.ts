@@ -37,7 +37,7 @@ export async function renderCloud(
   }
 }
 
-/** Compares an image over black with the oracle's: colour, and alpha as a fourth channel. */
+/** Compares an image over black with the oracle's: color, and alpha as a fourth channel. */
 export function closeness(pixels: Float32Array, oracle: OracleImage): Closeness {
   const expected = new Float64Array(pixels.length);
   const covered = oracle.contributors;

@@ -6,7 +6,7 @@ import { DETAIL_NUMBERS, DETAIL_PLACES, SLOT_CHUNKS } from '@gaussian-splat/rend
 import { shareDrawn, type DetailView } from './detail-twin.js';
 import { readRows } from './read-rows.js';
 
-/** Asserts that of each box the shares of its levels add up to 1, in whatever fade. @returns levels that are drawn, and pages that are there whole */
+/** Asserts that the weights of each box's levels add up to 1 during any fade. @returns levels that are drawn, and pages that are fully resident */
 export async function checkBoxes(
   { firstChunks, pages }: Pick<LevelScene, 'firstChunks' | 'pages'>,
   source: PageSource,

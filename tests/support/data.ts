@@ -6,7 +6,7 @@ import type { GaussianCloud } from '@gaussian-splat/core';
 
 const root = fileURLToPath(new URL('../../../shared/data/', import.meta.url));
 
-/** True where the shared data lies beside the checkout. */
+/** True if the shared data exists beside the checkout. */
 export const hasSharedData = existsSync(root);
 
 /** For `test(name, { skip: needsSharedData }, ...)`: false, or the message that says why a test is skipped. */

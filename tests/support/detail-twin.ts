@@ -1,4 +1,4 @@
-/** What shaders/shared/detail.wgsl does, in plain TypeScript; and the tree behind the rows of a packed scene. */
+/** The functions of shaders/shared/detail.wgsl in plain TypeScript; and the tree behind the rows of a packed scene. */
 import { eyeOf, type Camera } from '@gaussian-splat/core';
 import type { PackedGaussians } from '@gaussian-splat/renderer';
 import { constants, DETAIL_NUMBERS, DETAIL_PLACES } from '@gaussian-splat/renderer/stages';
@@ -45,7 +45,7 @@ function refined(pixels: number, { allowed, fade }: DetailView): number {
 
 const nearestStep = (share: number, steps: number): number => Math.floor(Math.min(1, Math.max(0, share)) * steps + 0.5);
 
-/** Share in which a chunk is drawn. */
+/** Weight with which a chunk is drawn. */
 export function shareDrawn(rows: Float32Array, chunk: number, view: DetailView): number {
   const at = DETAIL_NUMBERS * chunk;
   const full = rows[at + DETAIL_PLACES.fullError];

@@ -3,7 +3,7 @@ import type { StreamedGaussians } from '@gaussian-splat/renderer';
 import { anyDevice } from './node-device.js';
 import type { Renderer } from './renderer.js';
 
-/** Frames in a row in which nothing comes any more, and frames at most. */
+/** Successive frames without new pages, and the upper limit of frames. */
 const CALM = 10;
 const MAX_FRAMES = 3000;
 

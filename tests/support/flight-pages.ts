@@ -16,7 +16,7 @@ export class FlightPages {
   /** [P, 4] sphere. */
   readonly #spheres: Float64Array;
   readonly #errors: Float64Array;
-  /** [P, 7] centre and half size of the box, reach. */
+  /** [P, 7] center and half size of the box, reach. */
   readonly #boxes: Float64Array;
 
   /** @param fileOf gets a file's name, returns its bytes */
@@ -49,9 +49,9 @@ export class FlightPages {
 
   /**
    * Pixels that doing without each page costs a view, those out of view a part of it.
-   * @param most gets a page and its pixels, of those that cost more than `allowed`
+   * @param max gets a page and its pixels, of those that cost more than `allowed`
    */
-  request(camera: Camera, allowed: number, most: (page: number, pixels: number, isVisible: boolean) => void): void {
+  request(camera: Camera, allowed: number, max: (page: number, pixels: number, isVisible: boolean) => void): void {
     const focal = Math.max(camera.fx, camera.fy);
     const [ex, ey, ez] = eyeOf(camera.worldToCamera);
     const sides = sidesOf(camera);
@@ -64,7 +64,7 @@ export class FlightPages {
       if (pixels <= allowed) continue;
       const isVisible = this.#mayBeVisible(page, sides);
       const share = isVisible ? 1 : this.#mayBeVisible(page, nearby) ? NEARBY : UNSEEN;
-      most(page, share * pixels, isVisible);
+      max(page, share * pixels, isVisible);
     }
   }
 
@@ -72,11 +72,11 @@ export class FlightPages {
     const at = 7 * page;
     const box = this.#boxes;
     for (const { normal, shift, reach } of sides) {
-      let least = shift - reach * box[at + 6];
+      let min = shift - reach * box[at + 6];
       for (let axis = 0; axis < 3; axis++) {
-        least += normal[axis] * box[at + axis] - Math.abs(normal[axis]) * box[at + 3 + axis];
+        min += normal[axis] * box[at + axis] - Math.abs(normal[axis]) * box[at + 3 + axis];
       }
-      if (least > 0) return false;
+      if (min > 0) return false;
     }
     return true;
   }

@@ -1,4 +1,4 @@
-/** `npm run lab:detail:flight -- FOLDER`: the flight over a folder that `gaussian-splat detail` wrote, simulated, with wishes for where the camera will be and without. */
+/** `npm run lab:detail:flight -- FOLDER`: the flight over a folder that `gaussian-splat detail` wrote, simulated, with and without page requests for predicted cameras. */
 import { readFileSync } from 'node:fs';
 import { join, resolve } from 'node:path';
 import { checkManifest } from '@gaussian-splat/renderer';

@@ -16,18 +16,18 @@ import type { FlightPages } from './flight-pages.js';
 const FRAME_MS = 1000 / 60;
 /** Frames from a look to when it has been read back. */
 const READ_BACK = 2;
-/** Frames between two looks at a camera that moves. */
+/** Frames between two feedback passes for a camera that moves. */
 const LOOK = 3;
 
 export interface FlightOptions {
   readonly bounds: Bounds;
   readonly width: number;
   readonly height: number;
-  /** Of the pool. */
+  /** Bytes of the pool. */
   readonly slots: number;
-  /** Of a page in a slot. */
+  /** Bytes of a page in a slot. */
   readonly bytes: number;
-  /** Seconds at the place where the flight begins, and of the flight. */
+  /** Seconds at the flight's starting position, and of the flight. */
   readonly warm: number;
   readonly seconds: number;
   /** How much of the path is flown in these seconds. Default 1. */
@@ -35,7 +35,7 @@ export interface FlightOptions {
   /** Milliseconds until a file comes, and bytes a second of all of them. */
   readonly latencyMs: number;
   readonly bandwidth: number;
-  /** Milliseconds of the page's thread for a megabyte. */
+  /** Milliseconds of main-thread time for a megabyte. */
   readonly uploadMs: number;
   /** Bytes of files that are kept, and whether copies of a tree have files of their own, as no folder has them: such a scene is one without copies. */
   readonly kept: number;
@@ -53,9 +53,11 @@ const {
   degreesBetween: (a: Camera, b: Camera) => number;
 } = await benchModule('detail/flight-path.js');
 
-/** What a second of the flight ended with. */
+/** State of the flight at the end of a second. */
 export interface FlightSecond {
-  /** Most pixels that anything in view is off because a page is not there: at its end, and the mean of its frames. */
+  /**
+   * Largest error in pixels of anything in view whose page is missing: at the second's end, and the mean of its frames.
+   */
   readonly error: number;
   readonly mean: number;
   /** Degrees that the camera turned. */
@@ -127,7 +129,7 @@ export async function fly(pages: FlightPages, options: FlightOptions): Promise<F
     },
     now: () => server.now,
   });
-  const [pace, motion] = [new UploadBudget(), new CameraMotion()];
+  const [quality, motion] = [new UploadBudget(), new CameraMotion()];
   const rows: FlightSecond[] = [];
   let look: { readonly requests: Float32Array; readonly frame: number } | undefined;
   let [sum, placed, turned] = [0, 0, 0];
@@ -135,7 +137,7 @@ export async function fly(pages: FlightPages, options: FlightOptions): Promise<F
   const all = Math.round(60 * (options.warm + options.seconds));
   for (let frame = 0; frame < all; frame++) {
     await server.run(frame * FRAME_MS);
-    placed += upload(residency, traffic, pace, { now: server.now, ...options });
+    placed += upload(residency, traffic, quality, { now: server.now, ...options });
     traffic.sendForMore();
     // Files that are kept come at once.
     await turn();
@@ -165,23 +167,23 @@ export async function fly(pages: FlightPages, options: FlightOptions): Promise<F
 function upload(
   residency: Residency,
   traffic: PageStreamer<Uint32Array>,
-  pace: UploadBudget,
+  quality: UploadBudget,
   { now, bytes, uploadMs }: { readonly now: number; readonly bytes: number; readonly uploadMs: number },
 ): number {
-  const most = pace.startFrame(now);
+  const max = quality.startFrame(now);
   let [used, placed] = [0, 0];
-  while (used === 0 || used + bytes <= most) {
+  while (used === 0 || used + bytes <= max) {
     const next = traffic.next();
     if (next === undefined) break;
     used += bytes;
     if (residency.settle(next.page)) placed++;
     else traffic.refused();
   }
-  if (used > 0) pace.note(used, (used / 1e6) * uploadMs);
+  if (used > 0) quality.note(used, (used / 1e6) * uploadMs);
   return placed;
 }
 
-/** Pixels that a view may be off, and from which on pages are wished for: see shaders/page_feedback.wgsl. */
+/** Allowed error of a view in pixels, and the error that starts page requests: see shaders/page_feedback.wgsl. */
 const [ALLOWED, SOON] = [1, 0.93];
 
 function requestsOf(pages: FlightPages, residency: Residency, cameras: readonly Camera[]): Float32Array {
@@ -196,10 +198,10 @@ function requestsOf(pages: FlightPages, residency: Residency, cameras: readonly 
 }
 
 function lacking(pages: FlightPages, residency: Residency, camera: Camera): number {
-  let most = 0;
+  let max = 0;
   pages.request(camera, ALLOWED, (page, pixels, isVisible) => {
-    if (!isVisible || pixels <= most || residency.isResident(page)) return;
-    if (residency.isResident(pages.list.parent[page])) most = pixels;
+    if (!isVisible || pixels <= max || residency.isResident(page)) return;
+    if (residency.isResident(pages.list.parent[page])) max = pixels;
   });
-  return most;
+  return max;
 }

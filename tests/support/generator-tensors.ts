@@ -15,16 +15,16 @@ export interface TensorSpec {
   readonly dtype: 'float32' | 'float16';
 }
 
-/** What a run would have written. */
+/** The tensors that a run would write. */
 export interface WrittenTensors {
   readonly layout: GaussianLayout;
   /** 32-bit words of each tensor by its name. */
   readonly tensors: Readonly<Record<string, Uint32Array>>;
-  /** What the rounded numbers in the tensors say. */
+  /** The values of the rounded numbers in the tensors. */
   readonly cloud: GaussianCloud;
 }
 
-/** Writes a cloud. A spec with plain colours drops all harmonics but the first. */
+/** Writes a cloud. A spec with plain colors drops all harmonics but the first. */
 export function writeTensors(cloud: GaussianCloud, spec: TensorSpec): WrittenTensors {
   const columns = attributeColumns(cloud, spec);
   const layout = layoutOf(columns, cloud, spec);

@@ -63,7 +63,7 @@ function makeBench(device: GPUDevice, memory: GpuMemory): Bench {
   };
 }
 
-/** The same device, which says that it binds no more than so many bytes of a buffer. */
+/** The same device, which says that it binds at most the given number of bytes of a buffer. */
 export function withBufferLimit(device: GPUDevice, limit: number): GPUDevice {
   return new Proxy(device, {
     get(target, name) {
@@ -79,7 +79,7 @@ export function check(condition: boolean, message: string): asserts condition {
   if (!condition) throw new Error(message);
 }
 
-/** Fails at the first index where two arrays differ. */
+/** Fails at the first index at which two arrays differ. */
 export function checkEqual(actual: ArrayLike<number>, expected: ArrayLike<number>, what: string): void {
   check(actual.length >= expected.length, `${what}: ${actual.length} values, expected ${expected.length}`);
   for (let i = 0; i < expected.length; i++) {

@@ -4,9 +4,9 @@ import { shCoefficientCount, type GaussianCloud } from '@gaussian-splat/core';
 export interface HostileCloud {
   /** Good and bad splats mixed; not passed through `keepUsable`. */
   readonly cloud: GaussianCloud;
-  /** Where the splats of the original lie in it, in their order. */
+  /** Indices of the original's splats in it, in their order. */
   readonly good: Uint32Array;
-  /** For each bad splat, where it lies and what is wrong with it. */
+  /** Index and fault of each bad splat. */
   readonly bad: readonly { readonly index: number; readonly fault: string }[];
 }
 

@@ -1,6 +1,5 @@
 /**
- * Runs several test files in this process, on one device: `TEST_FILES="A B" node --import tsx --test tests/support/in-one-process.ts`. What a
- * device compiles once, the stages of a frame above all, every further file finds done.
+ * Runs several test files in this process, on one device: `TEST_FILES="A B" node --import tsx --test tests/support/in-one-process.ts`. Every further file reuses the compiled pipelines of the device.
  */
 import { resolve } from 'node:path';
 import { after, test } from 'node:test';

@@ -11,12 +11,12 @@ import {
 } from '@gaussian-splat/renderer/tools';
 import { writeSog } from '../formats/support/sog-writer.js';
 
-/** Address of the folders: nothing is there, whoever fetches has the files. */
+/** Address of the folders: no server exists, since the fetch function has the files. */
 const ADDRESS = 'https://lod.test/scene/';
 
 export interface LodFolder {
   readonly index: Uint8Array;
-  /** By their paths, relative to the index. */
+  /** Files by their paths, relative to the index. */
   readonly files: ReadonlyMap<string, Uint8Array>;
 }
 
@@ -30,7 +30,7 @@ export interface LodFolderOptions {
   readonly isOld?: boolean;
 }
 
-/** Some splats of a cloud, so much larger. */
+/** Some splats of a cloud, enlarged by a factor. */
 export function pick(cloud: GaussianCloud, indices: readonly number[], size = 1): GaussianCloud {
   const part = (values: Float32Array, stride: number, factor = 1): Float32Array => {
     const taken = new Float32Array(stride * indices.length);

@@ -1,7 +1,7 @@
-/** How far apart two images are. Values are numbers around 0..1, three channels to a pixel unless told otherwise. */
+/** Differences between two images. Values are numbers around 0..1, three channels to a pixel by default. */
 
 export interface ComparisonOptions {
-  /** [pixels] compare only pixels where this is not 0, for example those that any splat covers. Default: all. */
+  /** [pixels] compare only pixels at which this is not 0, for example those that any splat covers. Default: all. */
   readonly mask?: ArrayLike<number>;
   /** Clamp both images to 0..1 first, as an 8-bit image must. Default false. */
   readonly clamp?: boolean;
@@ -39,10 +39,10 @@ export function psnr(a: ArrayLike<number>, b: ArrayLike<number>, options?: Compa
 
 /** Largest absolute difference of any channel. */
 export function maxAbs(a: ArrayLike<number>, b: ArrayLike<number>, options?: ComparisonOptions): number {
-  return differences(a, b, options).reduce((most, x) => Math.max(most, x), 0);
+  return differences(a, b, options).reduce((max, x) => Math.max(max, x), 0);
 }
 
-/** The absolute difference that the given share of channels (0..1, for example 0.999) does not exceed. */
+/** The absolute difference that the given fraction of channels (0..1, for example 0.999) does not exceed. */
 export function percentile(
   a: ArrayLike<number>,
   b: ArrayLike<number>,
@@ -53,7 +53,7 @@ export function percentile(
   return sorted[Math.min(sorted.length - 1, Math.max(0, Math.ceil(share * sorted.length) - 1))];
 }
 
-/** Share of channels (0..1) whose absolute difference is above a limit. */
+/** Fraction of channels (0..1) whose absolute difference is above a limit. */
 export function shareAbove(
   a: ArrayLike<number>,
   b: ArrayLike<number>,

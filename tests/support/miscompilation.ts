@@ -23,7 +23,7 @@ export function miscompile(
   return changed;
 }
 
-/** The same device behind another compiler. What is made once for a device is made anew for it, and belongs to the device all the same. */
+/** The same device behind another compiler. Resources that exist once for each device are created again for it, and belong to the same device. */
 export function miscompiling(
   device: GPUDevice,
   faults: readonly Miscompilation[],

@@ -6,7 +6,7 @@ import { isFull } from './extent.js';
 const devices = new Map<string, Promise<GPUDevice>>();
 
 /**
- * Tests in Deno, `npm run lab:wgpu`. Its driver on a machine without a GPU, lavapipe, truncates what it blends into rgba16float: by 0.98 of a unit in the last place on average.
+ * Tests in Deno, `npm run lab:wgpu`. Its driver on a machine without a GPU, lavapipe, truncates values that it blends into rgba16float: by 0.98 of a unit in the last place on average.
  * The self-test refuses such quads, and pages blend into rgba32float there; so do these tests.
  */
 const IS_WGPU = 'Deno' in globalThis;
@@ -21,8 +21,8 @@ export function nodeDevice(): Promise<GPUDevice> {
 }
 
 /**
- * The same, for tests that are not about how stages share their work: renderers on it have the stages and the sort that pages on SwiftShader have, which it compiles in
- * a tenth of the time. Pictures are the same.
+ * The same, for tests that are not about how stages divide their work: renderers on it have the stages and the sort that pages on SwiftShader have, which it compiles in
+ * a tenth of the time. Images are the same.
  */
 export function serialDevice(): Promise<GPUDevice> {
   return once('serial', async () => asOnSwiftShader(await requestDevice()));
@@ -41,7 +41,7 @@ async function drawnWith(device: GPUDevice, threads: 'serial' | 'parallel'): Pro
   return device;
 }
 
-/** For what must hold however stages share their work: {@link nodeDevice} in `npm test -- --full`, else {@link serialDevice}, since `variants.test.ts` finds the pictures of both to be the same. */
+/** For tests that must pass however stages divide their work: {@link nodeDevice} in `npm test -- --full`, else {@link serialDevice}, since `variants.lab.test.ts` finds the images of both to be the same. */
 export function anyDevice(): Promise<GPUDevice> {
   return isFull ? nodeDevice() : serialDevice();
 }
@@ -68,7 +68,7 @@ export async function endNodeDevice(): Promise<void> {
   if (!isKept) await endDevices();
 }
 
-/** Where several files share this process, none of them ends the devices; the function returned does so for all. */
+/** If several files run in this process, none of them ends the devices. The function returned ends them for all. */
 export function keepNodeDevice(): () => Promise<void> {
   isKept = true;
   return endDevices;
@@ -79,6 +79,6 @@ async function endDevices(): Promise<void> {
     await device.queue.onSubmittedWorkDone();
     device.destroy();
   }
-  // Deno ends by itself, and cancels the test that runs when a process exits.
+  // Deno exits on its own, and cancels the test that runs when a process exits.
   if (!('Deno' in globalThis)) setImmediate(() => process.exit());
 }

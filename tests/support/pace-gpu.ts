@@ -1,4 +1,4 @@
-/** Simulated GPUs under the pace of moving pictures, and what is asked of the levels that it chose. */
+/** Simulated GPUs for dynamic quality, and measures of the chosen levels. */
 import type { QualityLevel } from '../../packages/element/src/dynamic-quality/quality-levels.js';
 import { nextQuality } from '../../packages/element/src/dynamic-quality/next-quality.js';
 import { quantile } from '../../packages/element/src/dynamic-quality/display-interval.js';
@@ -15,24 +15,24 @@ export const LEVELS: readonly QualityLevel[] = [
   })),
 ];
 
-/** What the levels of a simulated GPU take unless it says otherwise, as shares of the whole image: all of it scales with pixels. */
+/** Default costs of a simulated GPU's levels, as fractions of the full image: all of the cost scales with pixels. */
 export const COSTS = LEVELS.map(({ scale }, level) => [1, 0.73][level] ?? 0.72 * scale ** 2);
 
 export interface Gpu {
-  /** Pictures a second of the display. */
+  /** Frames per second of the display. */
   readonly hertz: number;
-  /** What the true image takes at a time in ms, as a multiple of the target. */
+  /** Time of the full image in ms, as a multiple of the target. */
   readonly load: (now: number) => number;
-  /** Share of a frame that no level makes cheaper. */
+  /** Fraction of a frame that no level makes cheaper. */
   readonly fixed: number;
-  /** What each level takes at a time, as a share of the first; COSTS unless given. */
+  /** Cost of each level as a fraction of the first; COSTS by default. */
   readonly shares?: (now: number) => readonly number[];
   /** Relative spread of times; and how many frames in a hundred take three times as long. */
   readonly noise: number;
   readonly spikes: number;
   /** Frames until a time is known. */
   readonly latency: number;
-  /** Whether the picture moves at a time; always unless given. */
+  /** Whether the camera moves at a time; always by default. */
   readonly moves?: (now: number) => boolean;
   readonly seed: number;
 }
@@ -40,26 +40,29 @@ export interface Gpu {
 export interface Frame {
   readonly at: number;
   readonly level: number;
-  /** As a share of the target. */
+  /** As a fraction of the target. */
   readonly share: number;
 }
 
-/** Draws a moving picture for so long: a frame begins with a picture of the display, once the GPU has at most one frame to do. */
-export function run(gpu: Gpu, milliseconds: number): { frames: Frame[]; pace: QualityState; targetMs: number } {
+/**
+ * Draws frames in motion for the given time: a frame starts with a display refresh, once the GPU has at most one frame
+ * queued.
+ */
+export function run(gpu: Gpu, milliseconds: number): { frames: Frame[]; quality: QualityState; targetMs: number } {
   const interval = 1000 / gpu.hertz;
   const targetMs = 0.8 * interval;
   const random = randomSource(gpu.seed);
   const frames: Frame[] = [];
   const waiting: { due: number; at: number; level: number; spent: number }[] = [];
-  let pace = INITIAL_QUALITY;
+  let quality = INITIAL_QUALITY;
   let free = 0;
   for (let at = 0; at < milliseconds; at += interval) {
     while (waiting.length > 0 && waiting[0].due <= at) {
       const { due, level, spent } = waiting.shift()!;
-      pace = nextQuality(pace, { now: due, level, milliseconds: spent }, { targetMs, levels: LEVELS });
+      quality = nextQuality(quality, { now: due, level, milliseconds: spent }, { targetMs, levels: LEVELS });
     }
     if (gpu.moves?.(at) === false || free > at + interval) continue;
-    const { level } = pace;
+    const { level } = quality;
     const whole = gpu.load(at) * (gpu.fixed + (1 - gpu.fixed) * (gpu.shares?.(at) ?? COSTS)[level]);
     const spread = 1 + gpu.noise * (random() + random() + random() - 1.5);
     const share = whole * spread * (random() < gpu.spikes / 100 ? 3 : 1);
@@ -68,7 +71,7 @@ export function run(gpu: Gpu, milliseconds: number): { frames: Frame[]; pace: Qu
     frames.push({ at, level, share });
     waiting.push({ due: free + gpu.latency * interval, at, level, spent });
   }
-  return { frames, pace, targetMs };
+  return { frames, quality: quality, targetMs };
 }
 
 /** Changes of direction of the level between two times. */

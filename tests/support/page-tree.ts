@@ -1,7 +1,7 @@
-/** Pages without files: what a scene of any size would have, for tests of who comes and goes. */
+/** Pages without files, like those of a scene of any size, for tests of loading and eviction. */
 import { emptyList, NONE, SLOT_CHUNKS, putBelow, type PageList } from '@gaussian-splat/renderer/stages';
 
-/** A full tree of so many pages of a slot each, and so many below each. */
+/** A full tree: the number of pages with one slot each, and the number of children of each. */
 export function pageTree(count: number, below = 16): PageList {
   const list = emptyList(new Uint32Array(count).fill(1));
   for (let page = 1; page < count; page++) list.parent[page] = Math.floor((page - 1) / below);
@@ -9,8 +9,8 @@ export function pageTree(count: number, below = 16): PageList {
 }
 
 /**
- * Page requests as a view notes them: only for pages whose parent is there, and each page less than its parent.
- * @param share gets a page, returns the share, 0 to 1, of its parent's need that it has
+ * Page requests as a view records them: only for pages whose parent is resident, and each page less than its parent.
+ * @param share returns the page's fraction, 0 to 1, of its parent's need
  */
 export function requestsOf(
   list: PageList,

@@ -1,6 +1,8 @@
 /** Notes the labels of all passes that a device records, until `stop` is called. */
 export function notePasses(device: GPUDevice): { readonly labels: string[]; stop(): void } {
   const labels: string[] = [];
+  // Set if others wrap it, too.
+  const own = Object.getOwnPropertyDescriptor(device, 'createCommandEncoder');
   const original = device.createCommandEncoder.bind(device);
   device.createCommandEncoder = (descriptor) => {
     const encoder = original(descriptor);
@@ -13,5 +15,9 @@ export function notePasses(device: GPUDevice): { readonly labels: string[]; stop
     }
     return encoder;
   };
-  return { labels, stop: () => void Reflect.deleteProperty(device, 'createCommandEncoder') };
+  const stop = (): void => {
+    Reflect.deleteProperty(device, 'createCommandEncoder');
+    if (own) Object.defineProperty(device, 'createCommandEncoder', own);
+  };
+  return { labels, stop };
 }

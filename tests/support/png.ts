@@ -24,7 +24,7 @@ export function readPng(bytes: Uint8Array): PngImage {
   return { width, height, color, alpha };
 }
 
-/** Writes an 8-bit RGBA PNG: values are clamped to 0..1 and rounded to the nearest level. Opaque where alpha is left out. */
+/** Writes an 8-bit RGBA PNG: values are clamped to 0..1 and rounded to the nearest level. Opaque without alpha. */
 export function writePng(image: Omit<PngImage, 'alpha'> & { readonly alpha?: Float64Array }): Uint8Array {
   const { width, height, color, alpha } = image;
   const png = new PNG({ width, height });

@@ -15,14 +15,14 @@ export interface RendererOptions extends FrameSettings {
 }
 
 /** One image to draw. */
-export interface FrameRequest extends Omit<FrameTarget, 'target' | 'over'> {
+export interface FrameRequest extends Omit<FrameTarget, 'target' | 'background'> {
   /** One scene, or several that are sorted and blended together. */
   readonly gaussians: GaussianScene | readonly GaussianScene[];
   readonly camera: Camera;
   readonly target: GPUTexture | GPUTextureView;
   /** Format of a target that is a view. */
   readonly targetFormat?: GPUTextureFormat;
-  readonly background?: FrameTarget['over'];
+  readonly background?: FrameTarget['background'];
   readonly detail?: number;
   readonly splatBudget?: number;
   /** Settings of this frame that differ from the renderer's. */
@@ -51,7 +51,11 @@ export class Renderer extends product.Viewpoint {
     this.show(gaussians);
     const isView = targetFormat !== undefined && !('createView' in target);
     const into = isView ? { view: target, format: targetFormat } : (target as GPUTexture);
-    this.draw(camera, { ...rest, target: into, over: background }, this.settingsOf({ detail, splatBudget, settings }));
+    this.draw(
+      camera,
+      { ...rest, target: into, background: background },
+      this.settingsOf({ detail, splatBudget, settings }),
+    );
   }
 
   /** Settings of a frame that names some of its own; undefined for one that names none. */
@@ -94,7 +98,7 @@ export function capture(
   renderer.show(gaussians);
   return product.capture(device, renderer, {
     ...rest,
-    over: background,
+    background: background,
     settings: renderer.settingsOf({ detail, splatBudget, settings }),
   });
 }

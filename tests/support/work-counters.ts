@@ -1,4 +1,4 @@
-/** Counts what a renderer asks of a device: work that is the same on every machine, unlike time. */
+/** Counts a renderer's calls of a device: work that is the same on every machine, unlike time. */
 
 /** Work since the last {@link WorkCounter.take}. */
 export interface Work {
@@ -20,7 +20,7 @@ export interface Work {
 }
 
 export interface WorkCounter {
-  /** What was counted since the last call; counting starts anew. */
+  /** The counts since the last call; counting starts again. */
   take(): Work;
 }
 
@@ -101,6 +101,8 @@ function after<T extends object, Result, Args extends unknown[]>(
   const original = target[name] as unknown as Method;
   Object.defineProperty(target, name, {
     configurable: true,
+    // Others wrap it, too.
+    writable: true,
     value: (...args: never[]) => {
       const result = original.apply(target, args);
       note(result as Result, ...(args as unknown as Args));

@@ -1,4 +1,4 @@
-/** The committed runs of `npm run lab:frontier`: for each chart of docs/frontier what was measured, on what, and when. */
+/** The committed runs of `npm run lab:frontier`: for each chart of docs/frontier the measurements, the adapter, and the date. */
 import { readdirSync, readFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { timeOf } from '../../../scripts/frontier/front.mjs';
@@ -24,10 +24,12 @@ function describe(name, { environment, scene, results, standard }) {
   };
 }
 
-/** What most visitors ask for: the qualities that the element has, and the others as they come. All by one clock. */
+/**
+ * Configurations for most visitors: the qualities of the element, and the others in their defaults. All by one clock.
+ */
 const QUALITIES = ['reference', 'default', 'balanced', 'fast'];
 const OTHERS = ['PlayCanvas', 'Spark'];
-/** What a difference of so many dB is to the eye. */
+/** Visibility of a difference in dB to the eye. */
 const TO_THE_EYE = [
   [59, 'no difference on a display'],
   [42, 'hardly visible'],
@@ -42,13 +44,13 @@ function firstOf(results, standard) {
       ? [{ name: wanted, isOther: OTHERS.includes(wanted), ms: timeOf(result, standard), psnr: result.quality.psnr }]
       : [];
   });
-  const most = Math.max(...rows.map(({ ms }) => ms));
+  const max = Math.max(...rows.map(({ ms }) => ms));
   return rows.map(({ ms, psnr, ...row }) => ({
     ...row,
     milliseconds: ms < 10 ? ms.toPrecision(2) : Math.round(ms).toLocaleString('en'),
-    share: (ms / most).toFixed(3),
+    share: (ms / max).toFixed(3),
     decibels: psnr.toFixed(0),
-    eye: TO_THE_EYE.find(([least]) => psnr >= least)[1],
+    eye: TO_THE_EYE.find(([min]) => psnr >= min)[1],
   }));
 }
 

@@ -58,7 +58,7 @@ function describeMember(member) {
   };
 }
 
-/** Comments name their neighbours by {@link}; the reference has them as code. */
+/** Comments name their neighbors by {@link}; the reference has them as code. */
 function plain(text) {
   return text
     .replace(/\{@link ([^}]+)\}/g, '$1')

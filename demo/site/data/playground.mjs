@@ -15,7 +15,7 @@ const GROUPS = {
     /^auto-rotate-|^rotation-/,
     /^interaction-prompt/,
   ],
-  Generators: ['controls-panel', 'time', 'autoplay', 'loop', 'pose', 'contract', 'chain', 'postprocess', 'compare'],
+  Generators: ['controls-panel', 'time', 'autoplay', 'loop', 'pose', 'contract', 'chain', 'postprocess', 'gpu-check'],
 };
 const REST = 'More';
 /** Has a field of its own above the others. */

@@ -1,7 +1,7 @@
 /** Names and ways through the site. */
 export default {
   name: 'gaussian-splat',
-  /** Where the site will be, for crawlers and previews of links; unknown unless SITE_URL says it. */
+  /** The site's address for crawlers and previews of links; unknown unless SITE_URL is set. */
   address: process.env.SITE_URL ?? '',
   /** The pages that every page leads to. */
   navigation: [
@@ -19,7 +19,7 @@ export default {
     { title: 'Hard cases', url: '/stability/' },
     { title: 'Measure this machine', url: '/bench/' },
   ],
-  /** What the foot of every page leads to. */
+  /** Links of every page's footer. */
   footer: [
     { title: 'Get started', url: '/docs/guide/start/' },
     { title: 'Generators', url: '/examples/' },
@@ -33,7 +33,7 @@ export default {
     { title: 'Contributing', url: '/docs/contributing/' },
     { title: 'Architecture', url: '/docs/architecture/' },
     { title: 'Changelog', url: '/docs/changelog/' },
-    { title: 'Licence', url: '/docs/license/' },
+    { title: 'License', url: '/docs/license/' },
     { title: 'Third parties', url: '/docs/third-party/' },
     { title: 'Attribution: scenes', url: '/docs/demo/scenes/attribution/' },
     { title: 'Attribution: generators', url: '/docs/demo/generators/attribution/' },

@@ -1,4 +1,4 @@
-/** The report of `npm run lab:stability -- --report` as the page shows it: charts, rows with others beside ours, and every row of the catalogue. */
+/** The report of `npm run lab:stability -- --report` as the page shows it: charts, rows with others beside ours, and every row of the catalog. */
 import { readFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { latestOf, titleOf } from '../../../scripts/stability/figures.mjs';
@@ -24,7 +24,7 @@ export default function stability() {
 
 const number = (value) => String(typeof value === 'number' ? Number(value.toPrecision(4)) : value);
 
-/** dB that a scene may cost a renderer against what it has on an ordinary one. */
+/** dB that a scene may cost a renderer against its value on an ordinary one. */
 const MAX_LOSS = 6;
 
 function describePages(pages) {
@@ -41,13 +41,13 @@ function describePages(pages) {
   };
 }
 
-/** What a renderer has on the scene that is there for comparison. */
+/** A renderer's value on the scene for comparison. */
 function ordinaryOf(rows, results) {
   const { row, title } = rows.find((each) => each.row === '-') ?? {};
   return results.get(`${row} ${title}`)?.figure;
 }
 
-/** A figure, and what the scene costs this renderer: it is held against itself, since others' usual image is not the reference image. */
+/** A figure, and the renderer's loss on the scene: it is compared with itself, since others' usual image is not the reference image. */
 function resultOf({ figure, unit, passes, error } = {}, ordinary) {
   if (error !== undefined) return { text: error, isLoss: true };
   if (passes === undefined) return { text: '', isLoss: false };
@@ -82,7 +82,7 @@ function describeRow({ id, title, fails, recipe, passes }, runs) {
 const hasLimit = ({ atLeast, atMost }) => atLeast !== undefined || atMost !== undefined;
 const isKept = ({ value, atLeast = -Infinity, atMost = Infinity }) => value >= atLeast && value <= atMost;
 
-/** What a reader wants to know of a row before opening it. Rows without figures pass or fail as tests. */
+/** Summary of a row for readers who have not opened it. Rows without figures pass or fail as tests. */
 function summaryOf(figures) {
   const limited = figures.filter(hasLimit);
   if (limited.length === 0) return figures.length === 0 ? 'a test without figures' : `${figures.length} figures`;

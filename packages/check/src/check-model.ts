@@ -16,9 +16,9 @@ import { openModel, readText, type ModelLocation } from './model-location.js';
 import { runModel, type RunReport, type Runtime } from './run-samples.js';
 
 export interface CheckOptions {
-  /** Path or address of a contract, which overrides all others. */
+  /** Path or URL of a contract, which takes precedence over all others. */
   readonly contract?: string;
-  /** Whether to run the model, too, and check its values. */
+  /** Whether the model is also run and its values checked. Default false. */
   readonly run?: boolean;
 }
 
@@ -28,14 +28,14 @@ export type CheckFault = ContractFault | GaussianSplatError;
 export interface CheckReport {
   readonly sections: readonly ReportSection[];
   readonly faults: readonly CheckFault[];
-  /** Inferences for a missing contract. */
+  /** Assumptions that were made because the model has no contract. */
   readonly warnings: readonly string[];
 }
 
 /**
  * Checks one model against its contract.
- * @param model Path or address of an ONNX file.
- * @returns Tables and every fault; only programming errors are thrown.
+ * @param model Path or URL of an ONNX file.
+ * @returns Tables for display, and every fault. Rejects only for programming errors.
  */
 export async function checkModel(model: string, options: CheckOptions = {}): Promise<CheckReport> {
   let location: ModelLocation | undefined;
@@ -64,7 +64,7 @@ async function checkLocation(location: ModelLocation, options: CheckOptions): Pr
   return { sections: rows.length > 0 ? [...sections, { title: 'Runs', rows }] : sections, faults, warnings };
 }
 
-/** Returns the contract, or its faults; the file's own tables are shown in either case. */
+/** Returns the contract, or its faults if it is missing or invalid. */
 async function contractOf(
   location: ModelLocation,
   header: OnnxHeader,
@@ -81,7 +81,7 @@ async function contractOf(
   }
 }
 
-/** Runs a model at a path or an address, see {@link runModel}. */
+/** Runs a model at a path or URL: see {@link runModel}. */
 async function runLocation(location: ModelLocation, header: OnnxHeader, contract: Contract): Promise<RunReport> {
   const externalData = await Promise.all(
     header.externalFiles.map(async ({ location: path }) => ({ path, data: await location.external(path) })),
@@ -89,7 +89,7 @@ async function runLocation(location: ModelLocation, header: OnnxHeader, contract
   return runModel(await loadRuntime(), { bytes: await location.bytes(), externalData }, header, contract);
 }
 
-/** Loaded only to run a model, because the runtime is large. */
+/** Loads ONNX Runtime for the CPU, only if a model is run, because it is large. */
 async function loadRuntime(): Promise<Runtime> {
   const ort = await loadModule('ONNX Runtime', () => import('onnxruntime-web'));
   ort.env.logLevel = 'error';

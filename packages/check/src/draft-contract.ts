@@ -1,13 +1,16 @@
-import type { Contract, InputBinding, OutputBinding } from '@gaussian-splat/core/contract';
+import { shOrderOf, type Contract, type InputBinding, type OutputBinding } from '@gaussian-splat/core/contract';
 import type { OnnxHeader, OnnxTensor } from '@gaussian-splat/core/onnx';
 
-/** A contract that is consistent with the names and shapes of a file, and questions for its author. */
+/** A draft of a contract that is consistent with the names and shapes of a file, and questions for its author. */
 export interface Draft {
   readonly contract: Contract;
   readonly questions: readonly string[];
 }
 
-/** Patterns for the name of an attribute's output, and the row lengths that identify it otherwise. */
+/**
+ * For each attribute, the pattern of its output's name, and the row lengths that identify an output whose name does not
+ * match.
+ */
 const NAMES: Readonly<Record<string, { readonly pattern: RegExp; readonly columns: readonly number[] }>> = {
   positions: { pattern: /pos|xyz|mean|cent/i, columns: [3] },
   covariances: { pattern: /cov/i, columns: [6, 9] },
@@ -18,17 +21,23 @@ const NAMES: Readonly<Record<string, { readonly pattern: RegExp; readonly column
   opacities: { pattern: /opac|alpha/i, columns: [1] },
 };
 
-/** Numbers in each row of scales, a quaternion and plain colors. */
+/** Row length of an output with positions, opacity, scales, a quaternion and plain colors, as in LGM. */
 const LGM_COLUMNS = 14;
 
 /**
- * Drafts the missing contract of a file: each input by its name and shape, each output by its name. Properties that no
- * header contains (units, activations, ranges) get common defaults, and a question.
+ * Drafts the missing contract of a file from the names and shapes of its inputs and outputs. Properties that no header
+ * contains (units, activations, ranges) get common defaults, and a question to the author.
  */
 export function draftContract(header: OnnxHeader): Draft {
   const questions: string[] = [];
   const inputs: Record<string, InputBinding> = {};
-  for (const input of header.inputs) inputs[input.name] = draftInput(input, questions);
+  const roles = new Set<string>();
+  for (const input of header.inputs) {
+    const binding = draftInput(input, questions);
+    const isTaken = roles.has(binding.role) && !REPEATABLE.has(binding.role);
+    inputs[input.name] = isTaken ? draftControl(input, questions) : binding;
+    roles.add(binding.role);
+  }
   const outputs = draftOutputs(header, questions);
   const isOpen = header.outputs.some(({ dims }) => dims?.some((dim) => typeof dim !== 'number'));
   if (isOpen && outputs.layout !== 'image') questions.push('nMax: the most Gaussians that one run writes');
@@ -39,7 +48,13 @@ export function draftContract(header: OnnxHeader): Draft {
   return { contract: { version: 1, name, inputs, outputs, ...(isOpen ? { nMax: 100_000 } : {}) }, questions };
 }
 
-function draftInput({ name, dims, dtype }: OnnxTensor, questions: string[]): InputBinding {
+/** Roles that a contract may give to several inputs. */
+const REPEATABLE: ReadonlySet<string> = new Set(
+  'control image state view camera_to_world intrinsics projection view_projection'.split(' '),
+);
+
+function draftInput(input: OnnxTensor, questions: string[]): InputBinding {
+  const { name, dims, dtype } = input;
   const sizes = (dims ?? []).filter((dim, i) => !(dim === 1 && i < (dims?.length ?? 0) - 1));
   const shape = sizes.join(',');
   const is = (pattern: RegExp): boolean => pattern.test(name);
@@ -54,7 +69,7 @@ function draftInput({ name, dims, dtype }: OnnxTensor, questions: string[]): Inp
     return { role: 'view', order: 'row-major', axes: 'RDF' };
   }
   if ((shape === '3,3' || shape === '4') && is(/^k$|intrin/i)) {
-    questions.push(`input ${name}: in pixels, or as shares of the image's width and height ("normalized")?`);
+    questions.push(`input ${name}: in pixels, or as fractions of the image's width and height ("normalized")?`);
     return { role: 'intrinsics', unit: 'pixels' };
   }
   if (shape === '3' && is(/cam|eye|origin/i)) return { role: 'camera_position' };
@@ -62,13 +77,18 @@ function draftInput({ name, dims, dtype }: OnnxTensor, questions: string[]): Inp
   if (dims?.length === 4 && is(/im(age|g)|picture|frame/i)) return { role: 'image' };
   const isOne = shape === '1' || shape === '';
   if (isOne && is(/^t$|time/i) && dtype === 'float32') {
-    questions.push(`input ${name}: seconds, or a share 0..1 ("normalized", with a duration)?`);
+    questions.push(`input ${name}: seconds, or a fraction 0..1 ("normalized", with a duration)?`);
     return { role: 'time', unit: 'seconds' };
   }
-  if (isOne && is(/frame/i)) return { role: 'frame' };
-  if (isOne && is(/seed/i)) return { role: 'seed' };
+  const isWhole = dtype === 'int32' || dtype === 'int64';
+  if (isOne && isWhole && is(/frame/i)) return { role: 'frame' };
+  if (isOne && isWhole && is(/seed/i)) return { role: 'seed' };
   if (is(/pose|joint|theta/i)) return draftPose(name, sizes, questions);
   if (is(/shape|beta/i) && sizes.length === 1) return { role: 'shape' };
+  return draftControl(input, questions);
+}
+
+function draftControl({ name }: OnnxTensor, questions: string[]): InputBinding {
   questions.push(`input ${name}: a control from 0 to 1? Give its range, its default and a label`);
   return { role: 'control', range: [0, 1], default: 0, label: name };
 }
@@ -82,12 +102,6 @@ function draftPose(name: string, sizes: readonly unknown[], questions: string[])
   return { role: 'pose', format: sizes.length === 2 && sizes[1] === 3 ? 'axis-angle' : 'parameters' };
 }
 
-/** Layout of spherical harmonics outputs: [N, 3, K] is channel-major, [N, K, 3] coefficient-major. */
-function shOrderOf(outputs: readonly OnnxTensor[], name: string): 'coefficient-major' | 'channel-major' {
-  const dims = outputs.find((output) => output.name === name)?.dims;
-  return dims?.length === 3 && dims[1] === 3 && dims[2] !== 3 ? 'channel-major' : 'coefficient-major';
-}
-
 function draftOutputs({ outputs }: OnnxHeader, questions: string[]): OutputBinding {
   const columns = ({ dims }: OnnxTensor): number => Number(dims?.at(-1) ?? 0);
   const [only] = outputs;
@@ -96,7 +110,7 @@ function draftOutputs({ outputs }: OnnxHeader, questions: string[]): OutputBindi
   const counted = count ? { count: count.name } : {};
   const packed = outputs.find((output) => [13, 22, 37, 58].includes(columns(output)));
   if (packed) {
-    questions.push(`output ${packed.name}: position 3, covariance 6, colour, opacity 0..1, in this order?`);
+    questions.push(`output ${packed.name}: position 3, covariance 6, color, opacity 0..1, in this order?`);
     const color =
       columns(packed) === 13 ? ({ color: 'rgb' } as const) : ({ color: 'sh', shOrder: 'coefficient-major' } as const);
     return { layout: 'packed', gaussians: packed.name, ...color, opacityActivation: 'linear', ...counted };
@@ -104,7 +118,7 @@ function draftOutputs({ outputs }: OnnxHeader, questions: string[]): OutputBindi
   const row = outputs.find((output) => columns(output) === LGM_COLUMNS);
   if (row) {
     questions.push(
-      `output ${row.name}: position 3, opacity 0..1, scale 3, rotation w x y z, colour 3, as LGM has them?`,
+      `output ${row.name}: position 3, opacity 0..1, scale 3, rotation w x y z, color 3, as LGM has them?`,
     );
     return {
       layout: 'packed',
@@ -138,7 +152,7 @@ function draftOutputs({ outputs }: OnnxHeader, questions: string[]): OutputBindi
     opacities: 'opacities',
     ...found,
     ...(found.scales ? { scaleActivation: 'linear', rotationOrder: 'wxyz' } : {}),
-    ...(found.sh ? { shOrder: shOrderOf(outputs, found.sh) } : {}),
+    ...(found.sh ? { shOrder: shOrderOf(outputs.find(({ name }) => name === found.sh)!) } : {}),
     opacityActivation: 'linear',
     ...counted,
   };

@@ -3,7 +3,10 @@ import { dirname, join } from 'node:path';
 import { isInside } from '@gaussian-splat/core/contract';
 import type { ByteSource, ExternalFile } from '@gaussian-splat/core/onnx';
 
-/** A file on disk, read in ranges. */
+/** Maximum bytes of one read. Node refuses to read 2 GiB at once, which weights beside a model may exceed. */
+const MAX_READ = 2 ** 30;
+
+/** A file on disk that is read in ranges of bytes. */
 export class FileSource implements ByteSource {
   readonly name: string;
   readonly size: number;
@@ -16,7 +19,7 @@ export class FileSource implements ByteSource {
     this.#handle = handle;
   }
 
-  /** @throws the error of `node:fs` if the file cannot be opened. */
+  /** Opens a file. @throws the error of `node:fs` if it cannot be opened, or one with the code EISDIR for a folder */
   static async open(path: string): Promise<FileSource> {
     const handle = await open(path);
     const status = await handle.stat();
@@ -26,8 +29,14 @@ export class FileSource implements ByteSource {
   }
 
   async read(offset: number, length: number): Promise<Uint8Array> {
-    const { buffer, bytesRead } = await this.#handle.read(new Uint8Array(length), 0, length, offset);
-    return buffer.subarray(0, bytesRead);
+    const bytes = new Uint8Array(length);
+    let done = 0;
+    while (done < length) {
+      const { bytesRead } = await this.#handle.read(bytes, done, Math.min(MAX_READ, length - done), offset + done);
+      if (bytesRead === 0) break;
+      done += bytesRead;
+    }
+    return bytes.subarray(0, done);
   }
 
   close(): Promise<void> {
@@ -35,7 +44,10 @@ export class FileSource implements ByteSource {
   }
 }
 
-/** Returns the sizes of a model's external files, by their location in the model. */
+/**
+ * Returns the sizes of a model's external files in bytes, by their location in the model. Files that are missing or
+ * outside the model's folder are left out.
+ */
 export async function externalSizes(model: string, files: readonly ExternalFile[]): Promise<Map<string, number>> {
   const sizes = new Map<string, number>();
   for (const { location } of files) {

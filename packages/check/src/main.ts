@@ -1,5 +1,6 @@
 import { parseArgs } from 'node:util';
 import { writeFile } from 'node:fs/promises';
+import { basename } from 'node:path';
 import { describeFault, sidecarName, type ReportSection } from '@gaussian-splat/core/contract';
 import { readOnnxHeader } from '@gaussian-splat/core/onnx';
 import { draftContract } from './draft-contract.js';
@@ -12,14 +13,15 @@ Checks an ONNX file (a path or an address) against the Gaussian Generator contra
 
   --contract FILE   the contract; otherwise the model's metadata, NAME.contract.json beside it, or its names
   --run             run the model on the CPU, too, and check its values
-  --draft           write the contract that the model lacks beside it, as NAME.contract.json, and say what to decide
+  --draft           write the contract that the model lacks beside it, as NAME.contract.json, and say what to decide;
+                    of a model at an address, to the working directory
 
 Exit status: 0 if it keeps the contract, 1 if not, 2 if the command is wrong.`;
 
 /**
- * Runs the command: prints tables and faults.
- * @param args Without the program's own name.
- * @returns The exit status.
+ * Runs the command and prints tables and faults.
+ * @param args Arguments without the name of the program.
+ * @returns The exit status: 0, 1 for faults, 2 for wrong arguments.
  */
 export async function main(args: readonly string[]): Promise<number> {
   let parsed: ReturnType<typeof parse>;
@@ -57,9 +59,11 @@ function parse(args: readonly string[]) {
   });
 }
 
-/** Writes a contract beside the model, unless there is one. */
+/** Writes the draft of a contract next to the model, unless the file exists. Returns the exit status. */
 async function draft(model: string): Promise<number> {
-  const path = sidecarName(model);
+  const isRemote = URL.canParse(model) && /^https?:/i.test(model);
+  // A contract for a model on a server is written to the working directory.
+  const path = sidecarName(isRemote ? basename(new URL(model).pathname) : model);
   try {
     const location = await openModel(model);
     const header = await readOnnxHeader(location.source);
@@ -67,16 +71,16 @@ async function draft(model: string): Promise<number> {
     const { contract, questions } = draftContract(header);
     await writeFile(path, `${JSON.stringify(contract, undefined, 2)}\n`, { flag: 'wx' });
     console.log([`wrote ${path}. To be decided:`, ...questions.map((question) => `  ${question}`)].join('\n'));
-    console.log(`Then: npm run gaussian-splat -- check ${model} --run`);
+    console.log(`Then: gaussian-splat check "${model}"${isRemote ? ` --contract "${path}"` : ''} --run`);
     return 0;
   } catch (error) {
     const isThere = (error as { code?: string }).code === 'EEXIST';
-    console.error(isThere ? `${path} is there already: delete it first.` : (error as Error).message);
+    console.error(isThere ? `${path} exists already: delete it first.` : (error as Error).message);
     return 1;
   }
 }
 
-/** Formats the report for a terminal. */
+/** Returns the report as text for a terminal. @param isRun Whether the model was run, too. */
 export function formatReport(model: string, { sections, faults, warnings }: CheckReport, isRun: boolean): string {
   const tables = sections.map(formatSection);
   const notes =
@@ -96,7 +100,7 @@ const lineOf = (fault: CheckFault): string => (fault instanceof Error ? fault.me
 function formatSection({ title, rows }: ReportSection): string {
   const widths: number[] = [];
   for (const row of rows) row.forEach((cell, i) => (widths[i] = Math.max(widths[i] ?? 0, cell.length)));
-  // The last column needs no padding.
+  // The last column is not padded.
   const lines = rows.map((row) =>
     row.map((cell, i) => (i < row.length - 1 ? cell.padEnd(widths[i]) : cell)).join('  '),
   );

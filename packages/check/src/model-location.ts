@@ -1,58 +1,69 @@
 import { readFile } from 'node:fs/promises';
 import { dirname, join } from 'node:path';
 import { GaussianSplatError } from '@gaussian-splat/core';
-import { partUrl } from '@gaussian-splat/core/fetch';
 import { sidecarName } from '@gaussian-splat/core/contract';
-import { openUrl, type ByteSource, type ExternalFile, type UrlSource } from '@gaussian-splat/core/onnx';
+import { externalUrl, openUrl, type ByteSource, type ExternalFile } from '@gaussian-splat/core/onnx';
 import { externalSizes, FileSource } from './file-source.js';
 
 /** A model on disk or on a server, with its companion files. */
 export interface ModelLocation {
   readonly source: ByteSource;
-  /** Text of the contract beside the model; undefined if there is none. */
+  /** Returns the text of the contract next to the model; undefined if there is none. */
   sidecar(): Promise<string | undefined>;
-  /** Sizes of external files, if they are known without a download. */
+  /** Returns the sizes of external files in bytes, by location; undefined if they are unknown without a download. */
   externalSizes(files: readonly ExternalFile[]): Promise<ReadonlyMap<string, number> | undefined>;
-  /** The whole model. */
+  /** Returns the bytes of the whole model. */
   bytes(): Promise<Uint8Array>;
-  /** A whole file beside the model. */
+  /** Returns the bytes of an external file. */
   external(location: string): Promise<Uint8Array>;
   close(): Promise<void>;
 }
 
-/** @param model A path, or an address that begins with http: or https:. */
+/**
+ * Opens a model.
+ * @param model Path, or URL that begins with http: or https:.
+ * @throws GaussianSplatError if the model cannot be read
+ */
 export function openModel(model: string): Promise<ModelLocation> {
   return /^https?:\/\//i.test(model) ? openRemote(model) : openLocal(model);
 }
 
-async function openLocal(path: string): Promise<ModelLocation> {
-  const source = await FileSource.open(path).catch((cause: unknown) => {
+const whole = (file: ByteSource): Promise<Uint8Array> => file.read(0, file.size);
+
+function openFile(path: string): Promise<FileSource> {
+  return FileSource.open(path).catch((cause: unknown) => {
     throw unreadable(path, cause);
   });
+}
+
+async function openLocal(path: string): Promise<ModelLocation> {
+  const source = await openFile(path);
   return {
     source,
     sidecar: () => readTextIfThere(sidecarName(path)),
     externalSizes: (files) => externalSizes(path, files),
-    bytes: () => readFile(path),
-    external: (location) => readFile(join(dirname(path), location)),
+    bytes: () => whole(source),
+    external: async (location) => {
+      const file = await openFile(join(dirname(path), location));
+      return whole(file).finally(() => file.close());
+    },
     close: () => source.close(),
   };
 }
 
 async function openRemote(url: string): Promise<ModelLocation> {
   const source = await openUrl(url);
-  const whole = (file: UrlSource): Promise<Uint8Array> => file.read(0, file.size);
   return {
     source,
     sidecar: () => fetchTextIfThere(sidecarName(url)),
     externalSizes: () => Promise.resolve(undefined),
     bytes: async () => source.whole ?? whole(await openUrl(url, { maxRequests: 1, chunk: source.size })),
-    external: async (location) => whole(await openUrl(partUrl(location, url), { maxRequests: 1 })),
+    external: async (location) => whole(await openUrl(externalUrl(location, url)!, { maxRequests: 1 })),
     close: () => Promise.resolve(),
   };
 }
 
-/** Returns the text of a file that the user names. @throws GaussianSplatError if it cannot be read. */
+/** Returns the text of a file whose path or URL the user has given. @throws GaussianSplatError if it cannot be read */
 export async function readText(path: string): Promise<string> {
   if (/^https?:\/\//i.test(path)) {
     const source = await openUrl(path);
@@ -70,7 +81,10 @@ async function readTextIfThere(path: string): Promise<string | undefined> {
   });
 }
 
-/** Many servers respond to unknown paths with their own page, which is not a sidecar. */
+/**
+ * Returns the text at a URL; undefined if there is none. Many servers respond to unknown paths with an HTML page, which
+ * does not count as text.
+ */
 async function fetchTextIfThere(url: string): Promise<string | undefined> {
   const text = await readText(url).catch((error: unknown) => {
     if (error instanceof GaussianSplatError && error.code === 'network/status') return undefined;

@@ -1,4 +1,4 @@
-/** Exports for the checker's page, without dependencies on Node. */
+/** Exports for the page of the checker, without dependencies on Node. */
 import { ContractError, type ContractFault } from '@gaussian-splat/core/contract';
 import {
   compareOutputs,
@@ -13,24 +13,24 @@ import type { Outputs, SampleInputs } from './run-instances.js';
 import { runModel, type RunReport, type Runtime } from './run-samples.js';
 
 export interface PageRun extends RunReport {
-  /** Session kind on the page's GPU, and the reasons for a fallback, for display. */
+  /** Kind of the session on the page's GPU, and the reasons for a fallback, in English for display. */
   readonly how: string;
 }
 
 const HOW = {
   captured: 'on the GPU, with its commands recorded',
-  webgpu: 'on the GPU, with commands made anew for every run',
+  webgpu: 'on the GPU, with commands encoded again for every run',
   wasm: 'on the CPU',
 } as const;
 
 /**
- * Runs a model as `gaussian-splat check --run` does, and each sample also on a GPU device as pages do: the report
+ * Runs a model as `gaussian-splat check --run` does, and each sample also on a GPU device, as pages do. The report
  * contains the differences.
  * @param ort ONNX Runtime for the CPU; its sessions run one after the other.
  */
 export async function runInPage(model: GeneratorModel, device: GPUDevice, ort: Runtime): Promise<PageRun> {
   const reasons: string[] = [];
-  // The comparison is done here, sample by sample.
+  // The session does not compare the results itself, because this function compares each sample.
   const whole = new GeneratorSession(model, device, (reason) => reasons.push(reason), false);
   const session = model.contract.instances === undefined ? whole : whole.forInstances(1);
   try {

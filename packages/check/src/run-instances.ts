@@ -5,14 +5,14 @@ import { groupInstances, inputsOfInstances, stackInputs, type Inputs } from '@ga
 import type { Sample } from './sample-inputs.js';
 
 export type SampleInputs = Sample['inputs'];
-/** Outputs of a run by name. */
+/** Outputs of a run by output name. */
 export type Outputs = Record<string, OutputTensor>;
 type Feed = (inputs: SampleInputs) => Promise<Outputs>;
 
-/** Tolerance for another order of summation, as a fraction of the largest number of a tensor. */
+/** Tolerance for another order of summation, by element type, as a fraction of the largest number of a tensor. */
 const ROUNDING = { float32: 1e-5, float16: 2e-3 } as const;
 
-/** Runs one instance of a model that takes several, in the format of any other model's run. */
+/** Runs one instance of a model that takes several. Returns outputs in the format of a model without instances. */
 export async function runAlone(
   feed: Feed,
   header: OnnxHeader,
@@ -22,7 +22,10 @@ export async function runAlone(
   return outputsOfInstance(await feed(stacked([inputs], header, contract)), 0);
 }
 
-/** Checks that instances write the same in one run as in separate runs, because no instance may depend on others. */
+/**
+ * Checks that instances give the same outputs in one run as in separate runs, because no instance may depend on others.
+ * Returns the faults.
+ */
 export async function compareTogether(
   feed: Feed,
   header: OnnxHeader,
@@ -45,7 +48,7 @@ export async function compareTogether(
   return [];
 }
 
-/** Stacks the inputs of several instances for one run. */
+/** Returns the inputs of one run of several instances. */
 export const stacked = (inputs: readonly SampleInputs[], header: OnnxHeader, contract: Contract): SampleInputs =>
   stackInputs(inputs as unknown as Inputs[], inputsOfInstances(header, contract)) as unknown as SampleInputs;
 
@@ -56,7 +59,7 @@ function differs(found: OutputTensor, { dtype, data }: OutputTensor): boolean {
   let largest = 0;
   for (let i = 0; i < data.length; i++) largest = Math.max(largest, Math.abs(numberAt(data, i)));
   const slack = largest * (dtype === 'float16' ? ROUNDING.float16 : ROUNDING.float32);
-  // The comparison is negated so that a NaN differs from everything.
+  // The negated comparison counts a NaN as different from everything.
   for (let i = 0; i < data.length; i++)
     if (!(Math.abs(numberAt(found.data, i) - numberAt(data, i)) <= slack)) return true;
   return false;

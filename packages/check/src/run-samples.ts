@@ -13,7 +13,7 @@ import { sampleInputs, type Sample } from './sample-inputs.js';
 
 export type Runtime = typeof OnnxRuntime;
 
-/** A model's bytes, and its external files. */
+/** Bytes of a model and of its external files. */
 export interface ModelFiles {
   readonly bytes: Uint8Array;
   readonly externalData: readonly { readonly path: string; readonly data: Uint8Array }[];
@@ -22,13 +22,16 @@ export interface ModelFiles {
 export interface RunReport {
   readonly faults: readonly ContractFault[];
   /**
-   * One row for each run: the label of its inputs, live rows, box of the centers, milliseconds; and the result of
-   * {@link Compare}.
+   * One row of text for each run: the label of its inputs, the number of live rows, the box of the centers,
+   * milliseconds, and the result of {@link Compare} if there is one.
    */
   readonly rows: readonly (readonly string[])[];
 }
 
-/** Runs the model on another backend with the inputs that wrote `expected` on the CPU, and describes the difference. */
+/**
+ * Runs the model on another backend with inputs whose outputs on the CPU are `expected`. Returns a text for the table
+ * and the faults.
+ */
 export type Compare = (
   inputs: SampleInputs,
   expected: Outputs,
@@ -38,6 +41,7 @@ export type Compare = (
  * Runs a model on the CPU with inputs at the limits that its contract declares, and checks every value of its output.
  * Gives the same results in Node and in browsers.
  * @param header Header of a model that satisfies the contract.
+ * @param compare Runs each sample on another backend, too.
  */
 export async function runModel(
   ort: Runtime,
@@ -73,7 +77,7 @@ export async function runModel(
 async function createSession(ort: Runtime, { bytes, externalData }: ModelFiles): Promise<InferenceSession> {
   return ort.InferenceSession.create(bytes, {
     executionProviders: ['wasm'],
-    // Without fusions, because some compute wrong results.
+    // The optimization level excludes fusions, because some of them compute wrong results.
     graphOptimizationLevel: 'basic',
     logSeverityLevel: 3,
     externalData: externalData.map(({ path, data }) => ({ path, data })),
@@ -89,7 +93,7 @@ async function runSamples(
   const faults = new Map<string, ContractFault>();
   const keep = (label: string, found: readonly ContractFault[]): void => {
     for (const fault of found) {
-      // One fault occurs in every run, mostly in other rows; the first is enough.
+      // A fault usually occurs in every run, mostly in other rows. Only its first occurrence is reported.
       const key = `${fault.code} ${fault.where.replace(/ of row \d+$/, '')}`;
       if (!faults.has(key)) faults.set(key, { ...fault, where: `${fault.where} (run with ${label})` });
     }
@@ -111,7 +115,7 @@ async function runSamples(
       rows.push([label, `[${outputs[contract.outputs.image]?.dims.join(', ')}]`, 'a picture', ...cells]);
       continue;
     }
-    const box = bounds ? `${bounds.min.map(short).join(' ')} to ${bounds.max.map(short).join(' ')}` : 'no centres';
+    const box = bounds ? `${bounds.min.map(short).join(' ')} to ${bounds.max.map(short).join(' ')}` : 'no centers';
     rows.push([label, count === live ? `${live} rows` : `${live} of ${count} rows`, box, ...cells]);
   }
   return { faults: [...faults.values()], rows };
@@ -139,6 +143,6 @@ function runFault(doing: string, error: unknown): ContractFault {
     where: `${doing} the model with ONNX Runtime on the CPU`,
     expected: 'no error',
     found: message.replace(/\s+/g, ' ').slice(0, 400),
-    remedy: 'run it with onnxruntime in Python, where messages are longer, and mend the export',
+    remedy: 'run it with onnxruntime in Python, whose messages are longer, and correct the export',
   };
 }

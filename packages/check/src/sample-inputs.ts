@@ -1,9 +1,9 @@
 import { lookAt, numberToHalf, type Camera, type Vector3 } from '@gaussian-splat/core';
-import { oneInstance, type Contract, type GaussiansInput } from '@gaussian-splat/core/contract';
+import { bareDims, inputRule, oneInstance, type Contract, type GaussiansInput } from '@gaussian-splat/core/contract';
 import type { OnnxHeader, OnnxTensor } from '@gaussian-splat/core/onnx';
 import { bindInputs, type GeneratorState } from '@gaussian-splat/generator';
 
-/** One input of a run: float16 as bits. */
+/** One input of a run. Data of float16 are bits in a Uint16Array. */
 export interface SampleTensor {
   readonly dtype: string;
   readonly dims: readonly number[];
@@ -11,22 +11,23 @@ export interface SampleTensor {
 }
 
 export interface Sample {
-  /** Description of the sample, for the table. */
+  /** Description of the sample for the table. */
   readonly label: string;
-  /** Whether controls, poses and shapes have their defaults: declared bounds must then hold. */
+  /** Whether controls, poses and shapes have their defaults, so that the output must lie in the declared bounds. */
   readonly isDefault: boolean;
   readonly inputs: Readonly<Record<string, SampleTensor>>;
 }
 
-/** Rows of the Gaussians for an input of a chain with a symbolic N, and pixels of images with symbolic sizes. */
+/** Sizes that replace symbolic dimensions: rows of the Gaussians in a chain, and pixels of each side of an image. */
 const SAMPLE_ROWS = 16;
 const SAMPLE_PIXELS = 64;
 
-/** Sampled fractions of the duration, besides its ends and its middle. */
+/** Fractions of the duration that are sampled besides its ends and its middle. */
 const TIMES = [0.13, 0.25, 0.37, 0.62, 0.75, 0.89];
 
 /**
- * Inputs of one instance for runs at the limits that the contract declares: times and views at defaults, then controls.
+ * Returns the inputs of one instance for runs at the limits that the contract declares: first at several times and
+ * views with default controls, then with the ends of the controls' ranges.
  */
 export function sampleInputs(header: OnnxHeader, contract: Contract): Sample[] {
   const given = givenTensors(header, contract);
@@ -38,7 +39,7 @@ export function sampleInputs(header: OnnxHeader, contract: Contract): Sample[] {
     ['last time, a third view', stateAt(contract, 4, end)],
   ];
   if (Object.values(contract.inputs).some(({ role }) => role === 'time' || role === 'frame')) {
-    // No simple fractions of a period, because a loop would be in the same state for all of them.
+    // The times are no simple fractions of a period, at all of which a loop could be in the same state.
     for (const [i, share] of TIMES.entries()) {
       states.push([`${share} of the time`, stateAt(contract, 2 + i, share * end)]);
     }
@@ -53,7 +54,11 @@ export function sampleInputs(header: OnnxHeader, contract: Contract): Sample[] {
   }));
 }
 
-/** @param controlEnd End of the ranges of controls; undefined for their defaults. */
+/**
+ * Returns the state for a view and a time.
+ * @param angle Azimuth of the view, radians.
+ * @param controlEnd End of the ranges of all controls; undefined for their defaults.
+ */
 function stateAt(contract: Contract, angle: number, timeSeconds: number, controlEnd?: 0 | 1): GeneratorState {
   const camera = cameraFor(contract, angle);
   if (controlEnd === undefined) return { camera, timeSeconds };
@@ -64,7 +69,7 @@ function stateAt(contract: Contract, angle: number, timeSeconds: number, control
   return { camera, timeSeconds, controls };
 }
 
-/** A view of 640x480 pixels around the declared bounds, or around the unit box. */
+/** Returns a camera with 640x480 pixels that frames the declared bounds, or else the box from -1 to 1. */
 function cameraFor({ bounds, coordinates }: Contract, angle: number): Camera {
   const { min, max } = bounds ?? { min: [-1, -1, -1], max: [1, 1, 1] };
   const center = min.map((low, axis) => (low + max[axis]) / 2) as unknown as Vector3;
@@ -79,7 +84,9 @@ function cameraFor({ bounds, coordinates }: Contract, angle: number): Camera {
   return { width: 640, height: 480, fx: 500, fy: 500, cx: 320, cy: 240, worldToCamera, near: 0.2, far: 1000 };
 }
 
-/** Tensors that the page does not set: images, and Gaussians of another generator. */
+/**
+ * Returns tensors for inputs that the page does not set: images, depths, states, and Gaussians of another generator.
+ */
 function givenTensors(header: OnnxHeader, contract: Contract): Record<string, SampleTensor> {
   const tensors: Record<string, SampleTensor> = {};
   for (const input of header.inputs) {
@@ -111,7 +118,7 @@ function sampleImage(input: OnnxTensor): SampleTensor {
   );
 }
 
-/** Nothing in the first columns, then a surface that recedes. */
+/** Returns a depth that is 0, for no surface, in the first columns, and then increases to the right. */
 function sampleDepth(input: OnnxTensor): SampleTensor {
   const dims = fixedDims(input, SAMPLE_PIXELS);
   const [size, width] = [dims.reduce((product, dim) => product * dim, 1), dims.at(-1)!];
@@ -122,35 +129,39 @@ function sampleDepth(input: OnnxTensor): SampleTensor {
   );
 }
 
-/** State before the first run. */
+/** Returns a state tensor as before the first run. */
 function sampleState(input: OnnxTensor, value = 0): SampleTensor {
   const dims = fixedDims(input, 1);
   return toSample(input, dims, new Array<number>(dims.reduce((product, dim) => product * dim, 1)).fill(value));
 }
 
-/** Small round Gaussians along a line. */
+/** Returns small round Gaussians along a line. */
 function sampleGaussians(input: OnnxTensor, binding: GaussiansInput): SampleTensor {
   const dims = fixedDims(input, SAMPLE_ROWS);
   if (binding.attribute === 'count') return toSample(input, dims, [SAMPLE_ROWS]);
-  const columns = dims.slice(1).reduce((product, dim) => product * dim, 1);
-  const rows = Array.from({ length: dims[0] }, (_, i) => sampleRow(binding, columns, i / dims[0]));
+  // The checked header has a shape of the rule, perhaps after dimensions of 1.
+  const [count, ...row] = bareDims(dims, inputRule(binding)!) as readonly number[];
+  const columns = row.reduce((product, dim) => product * dim, 1);
+  const rows = Array.from({ length: count }, (_, i) => sampleRow(binding, columns, i / count));
   return toSample(input, dims, rows.flat());
 }
 
+/** Covariance xx, xy, xz, yy, yz, zz of a ball. */
+const COVARIANCE = [0.01, 0, 0, 0.01, 0, 0.01];
+
 function sampleRow(binding: GaussiansInput, columns: number, share: number): number[] {
   const { attribute, opacityActivation, scaleActivation, rotationOrder, color } = binding;
-  const covariance = [0.01, 0, 0, 0.01, 0, 0.01];
   const opacity = opacityActivation === 'logit' ? 0 : 0.5;
   const colors = new Array<number>(attribute === 'packed' ? columns - 10 : columns).fill(color === 'rgb' ? 0.5 : 0.1);
   switch (attribute) {
     case 'packed':
-      return [share, 0, 0, ...covariance, ...colors, opacity];
+      return [share, 0, 0, ...COVARIANCE, ...colors, opacity];
     case 'positions':
       return [share, 0, 0];
     case 'covariances':
-      return covariance;
+      return columns === 9 ? [0.01, 0, 0, 0, 0.01, 0, 0, 0, 0.01] : COVARIANCE;
     case 'scales':
-      return [0.1, 0.1, 0.1].map((scale) => (scaleActivation === 'log' ? Math.log(scale) : scale));
+      return new Array<number>(columns).fill(scaleActivation === 'log' ? Math.log(0.1) : 0.1);
     case 'rotations':
       return rotationOrder === 'xyzw' ? [0, 0, 0, 1] : [1, 0, 0, 0];
     case 'opacities':

@@ -12,7 +12,7 @@ const COMMANDS = {
 };
 
 const [command] = process.argv.splice(2, 1);
-if (command in COMMANDS) await import(`../src/${command}.mjs`);
+if (Object.hasOwn(COMMANDS, command ?? '')) await import(`../src/${command}.mjs`);
 else {
   const lines = Object.entries(COMMANDS).map(([name, text]) => `  ${name.padEnd(10)} ${text}`);
   const usage = `usage: gaussian-splat COMMAND ..., or gaussian-splat COMMAND --help\n\n${lines.join('\n')}`;

@@ -1,5 +1,5 @@
 /**
- * Implementation of `gaussian-splat stream`: reads a scene, builds its levels of detail, and writes them as pages with
+ * Implementation of `gaussian-splat detail`: reads a scene, builds its levels of detail, and writes them as pages with
  * a manifest.
  */
 import { existsSync, mkdirSync, readdirSync, rmSync, statSync, writeFileSync } from 'node:fs';
@@ -16,19 +16,19 @@ import {
   DEFAULT_STEPS,
   writePages,
 } from '@gaussian-splat/economise/pages';
-import { from, parseSceneOptions, runCommand, sayWarnings, UsageError } from './lib/command.mjs';
+import { parseSceneOptions, runCommand, sayWarnings, UsageError } from './lib/command.mjs';
 import { deflate, deflateQuickly } from './lib/encoders.mjs';
-import { writeWhole } from './lib/output-file.mjs';
+import { obstacleToFolder, writeWhole } from './lib/output-file.mjs';
 import { readWhole } from './lib/input-file.mjs';
 
 const USAGE = `usage: gaussian-splat detail SCENE --out FOLDER [options]
 
   --out FOLDER    an empty folder, one that does not exist yet, or one where a run was ended early: detail.json and pages/, docs/lod-format.md describes them
   --degree D      spherical harmonics up to this degree, 0 to 3; default: those of the scene
-  --min-db DB     PSNR to SCENE over the covered pixels of held-out views that the finest pages reach, 30 to 60 (default 50): files are as small as that allows
-  --scored N      views from everywhere that tell how splats are seen, 24 to 2000 (default 216): what shows little of the harmonics is rounded more
+  --min-psnr DB   PSNR to SCENE over the covered pixels of held-out views that the finest pages reach, 30 to 60 (default 50): files are as small as that allows
+  --score-views N views from all directions that measure the visibility of splats, 24 to 2000 (default 216): harmonics that are hardly visible are rounded more
   --quantized     pages as the GPU reads them, not compressed: 66 dB and more, in two to three times the bytes
-  --exact         the same with centres, shapes and opacities as float32 keeps them, in three to four times the bytes
+  --exact         the same with centers, shapes and opacities as float32 keeps them, in three to four times the bytes
   --tile AxB      A times B copies of the scene on a plane, to try large scenes; they share their files
   --spacing LEN   world units between copies; default: 2.5 times the radius of the scene
 `;
@@ -40,18 +40,19 @@ function parseOptions(args) {
     degree: text,
     tile: text,
     spacing: text,
-    'min-db': { ...text, default: '50' },
-    scored: { ...text, default: '216' },
+    'min-psnr': { ...text, default: '50' },
+    'score-views': { ...text, default: '216' },
     quantized: { type: 'boolean' },
     exact: { type: 'boolean' },
   });
   if (parsed === undefined) return undefined;
   const { values } = parsed;
   if (values.out === undefined) throw new UsageError('--out is missing');
-  const out = resolve(from, values.out);
-  const scene = resolve(from, parsed.scene);
+  const out = resolve(values.out);
+  const scene = resolve(parsed.scene);
   if (existsSync(scene) && statSync(scene).isDirectory()) throw new UsageError(`${parsed.scene} is a folder, no scene`);
-  if (existsSync(out) && !statSync(out).isDirectory()) throw new UsageError(`--out: ${values.out} is no folder`);
+  const obstacle = obstacleToFolder(out);
+  if (obstacle) throw new UsageError(`--out: ${obstacle}`);
   if (existsSync(out) && !isEmpty(out) && !isUnfinished(out)) throw new UsageError(`--out: ${values.out} is not empty`);
   const tile = /^([1-9]\d{0,3})x([1-9]\d{0,3})$/.exec(values.tile ?? '1x1');
   if (tile === null) throw new UsageError(`--tile: expected AxB such as 24x24, found "${values.tile}"`);
@@ -63,19 +64,19 @@ function parseOptions(args) {
   if (!/^[0-3]$/.test(values.degree ?? '3'))
     throw new UsageError(`--degree: expected 0 to 3, found "${values.degree}"`);
   const degree = Number(values.degree ?? 3);
-  const minDecibels = Number(values['min-db']);
-  if (!(minDecibels >= 30 && minDecibels <= 60))
-    throw new UsageError(`--min-db: expected 30 to 60, found "${values['min-db']}"`);
-  const scored = Number(values.scored);
+  const minPsnr = Number(values['min-psnr']);
+  if (!(minPsnr >= 30 && minPsnr <= 60))
+    throw new UsageError(`--min-psnr: expected 30 to 60, found "${values['min-psnr']}"`);
+  const scored = Number(values['score-views']);
   if (!(Number.isInteger(scored) && scored >= 24 && scored <= 2000))
-    throw new UsageError(`--scored: expected a whole number from 24 to 2000, found "${values.scored}"`);
+    throw new UsageError(`--score-views: expected a whole number from 24 to 2000, found "${values['score-views']}"`);
   return {
     scene,
     out,
     degree,
     scored,
     geometry: values.exact ? undefined : 'quantized',
-    minDecibels: values.exact || values.quantized ? undefined : minDecibels,
+    minPsnr: values.exact || values.quantized ? undefined : minPsnr,
     columns: Number(tile[1]),
     rows: Number(tile[2]),
     spacing,
@@ -106,12 +107,12 @@ async function deviceToMeasure() {
 }
 
 /** Coding of the files, and its accuracy; undefined for uncompressed files. */
-async function chooseCoding({ tree, cloud, minDecibels, scored }) {
-  if (minDecibels === undefined) return undefined;
+async function chooseCoding({ tree, cloud, minPsnr, scored }) {
+  if (minPsnr === undefined) return undefined;
   const device = await deviceToMeasure();
   if (device === undefined) return { coding: codingFor(DEFAULT_STEPS), deflate };
   const { steps, ...found } = await findPageSteps({
-    ...{ tree, pages: cutPages(tree), cloud, device, minDecibels, scored, deflate: deflateQuickly },
+    ...{ tree, pages: cutPages(tree), cloud, device, minPsnr, scored, deflate: deflateQuickly },
     onStep: (step) => console.log(`  ${step}`),
   });
   return { coding: codingFor(steps), deflate, ...found };
@@ -140,11 +141,11 @@ function writeFolder(out, tree, coded, places) {
   }
 }
 
-async function main({ scene, out, degree, geometry, minDecibels, scored, columns, rows, spacing }) {
+async function main({ scene, out, degree, geometry, minPsnr, scored, columns, rows, spacing }) {
   const openFile = (path) => readWhole(join(dirname(scene), path));
   const read = await readScene(await readWhole(scene), { name: scene, openFile });
-  sayWarnings(scene, read);
-  // Pages cannot store another up direction.
+  sayWarnings(scene, read, 'detail.json');
+  // Pages store no up direction, so the scene is rotated to the default, (0, -1, 0).
   const cloud = upright(toDegree(degree, read));
   const start = performance.now();
   const tree = buildDetailTree(cloud, { geometry });
@@ -152,7 +153,7 @@ async function main({ scene, out, degree, geometry, minDecibels, scored, columns
   const isTiled = columns * rows > 1;
   if (isTiled && tree.levels.length === 1) throw new UsageError('--tile: expected a scene of more than 256 splats');
   const places = isTiled ? placesOnGrid(columns, rows, spacing ?? 2.5 * tree.bounds.radius) : undefined;
-  const choice = await chooseCoding({ tree, cloud, minDecibels, scored });
+  const choice = await chooseCoding({ tree, cloud, minPsnr, scored });
   const coded = performance.now();
   const { manifest, bytes } = writeFolder(out, tree, choice, places);
   const pages = manifest.instances.reduce((sum, { tree: t }) => sum + manifest.trees[t].pages.length, 0);
@@ -163,9 +164,9 @@ async function main({ scene, out, degree, geometry, minDecibels, scored, columns
     `${manifest.splats} splats${unusable} in ${pages} pages (${files} files, ${(bytes / 1e6).toFixed(1)} MB${perSplat}); levels in ` +
       `${((built - start) / 1000).toFixed(1)} s, pages in ${((performance.now() - coded) / 1000).toFixed(1)} s: ${join(out, 'detail.json')}`,
   );
-  if (choice?.decibels !== undefined)
+  if (choice?.psnr !== undefined)
     console.log(
-      `${choice.decibels.toFixed(2)} dB to the scene in held-out views together, ${choice.worstDecibels.toFixed(2)} dB in the worst`,
+      `${choice.psnr.toFixed(2)} dB to the scene in held-out views together, ${choice.worstPsnr.toFixed(2)} dB in the worst`,
     );
 }
 

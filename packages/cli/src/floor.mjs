@@ -9,9 +9,9 @@ import {
   voxelTreePath,
 } from '@gaussian-splat/formats/walk';
 import { basename, dirname, join, resolve } from 'node:path';
-import { from, parseSceneOptions, runCommand, sayWarnings, UsageError } from './lib/command.mjs';
+import { CommandError, parseSceneOptions, runCommand, sayWarnings, UsageError } from './lib/command.mjs';
 import { readWhole } from './lib/input-file.mjs';
-import { writeWhole } from './lib/output-file.mjs';
+import { checkOutput, writeWhole } from './lib/output-file.mjs';
 
 const USAGE = `usage: gaussian-splat floor SCENE|VOXELS.voxel.json --out FILE.floor [options]
 
@@ -24,9 +24,9 @@ const USAGE = `usage: gaussian-splat floor SCENE|VOXELS.voxel.json --out FILE.fl
 `;
 
 const METERS = { m: 1, cm: 0.01, mm: 0.001 };
-/** Free height above the eyes of a body, meters, same as in the element. */
+/** Free height in meters above the eyes of a body, the same as in the element. */
 const ABOVE_EYES = 0.1;
-/** Rows of the rotations to coordinates with y up, for the values of the element's attribute `up`. */
+/** Rows of the rotation to coordinates with y up, for each value of the option --up. */
 const FRAMES = {
   x: [
     [0, -1, 0],
@@ -69,7 +69,8 @@ function parseOptions(args) {
   if (parsed === undefined) return undefined;
   const { values, scene } = parsed;
   if (values.out === undefined) throw new UsageError('--out is missing');
-  if (values.up !== undefined && !(values.up in FRAMES))
+  checkOutput('out', values.out, { [scene]: scene });
+  if (values.up !== undefined && !Object.hasOwn(FRAMES, values.up))
     throw new UsageError(`--up: expected x, -x, y, -y, z or -z, found "${values.up}"`);
   const near = values.near?.split(',').map(Number);
   if (near && (near.length !== 3 || !near.every(Number.isFinite)))
@@ -81,20 +82,20 @@ function parseOptions(args) {
     return Number(number) * METERS[unit];
   };
   return {
-    scene: resolve(from, scene),
-    out: resolve(from, values.out),
+    scene: resolve(scene),
+    out: resolve(values.out),
     up: values.up,
     options: { near, metersPerUnit: length('unit'), voxel: length('cell'), height: length('eyes') + ABOVE_EYES },
   };
 }
 
-/** Name of the axis nearest to a file's own up direction. */
+/** Returns the name of the axis that is nearest to a direction. */
 function axisOf([x, y, z]) {
   const axes = { x, '-x': -x, y, '-y': -y, z, '-z': -z };
   return Object.entries(axes).reduce((best, axis) => (axis[1] > best[1] ? axis : best))[0];
 }
 
-/** Finds the floor from splat-transform's voxels of a scene. */
+/** Finds the floor of a scene from the voxels that splat-transform has written. */
 async function floorOfVoxels(scene, up, options) {
   const files = { head: await readWhole(scene), tree: await readWhole(voxelTreePath(scene)), name: basename(scene) };
   const { grid, solid } = readVoxels(files, FRAMES[up ?? '-y'], options.metersPerUnit);
@@ -111,9 +112,11 @@ async function floorOfScene(scene, up, options) {
 async function main({ scene, out, up, options }) {
   const map = await (isVoxelPath(scene) ? floorOfVoxels : floorOfScene)(scene, up, options);
   if (map.layers.length === 0)
-    throw new Error(`${basename(scene)} has no floor: check --up and --unit, or name a point above it with --near`);
+    throw new CommandError(
+      `${basename(scene)} has no floor: check --up and --unit, or name a point above it with --near`,
+    );
   const bytes = encodeWalkMap(map);
-  await writeWhole(out, bytes);
+  writeWhole(out, bytes);
   const heights = map.layers.flatMap((layer) => [...layer].filter((height) => !Number.isNaN(height)));
   const range = [Math.min, Math.max].map((pick) => heights.reduce((a, b) => pick(a, b)).toFixed(2));
   console.log(

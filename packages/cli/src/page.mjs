@@ -1,50 +1,71 @@
 /**
- * `gaussian-splat page SCENE FOLDER [--single] [--port 8000] [--no-serve]`: a page with your own scene. Copies the
- * element and the scene to FOLDER, writes an index.html unless there is one, and serves the folder. The result is
- * static, so any host can serve it. With `--single` the index.html contains the element and the scene, and can be
- * opened from a disk or sent by mail.
+ * Implementation of `gaussian-splat page SCENE FOLDER [--single] [--port 8000] [--no-serve]`. Copies the element and a
+ * scene to FOLDER, writes an index.html unless one exists, and serves the folder. Any static host can serve the result.
+ * With `--single`, the index.html contains the element and the scene, and can be opened from a disk.
  */
 import { cpSync, existsSync, mkdirSync, readFileSync, statSync, writeFileSync } from 'node:fs';
+import { createRequire } from 'node:module';
 import { basename, dirname, extname, join, relative, resolve } from 'node:path';
 import { fileURLToPath } from 'node:url';
-import { parseArgs } from 'node:util';
+import { CommandError, parseCommandLine, runCommand, UsageError } from './lib/command.mjs';
 import { filesBeside } from './lib/files-beside.mjs';
+import { obstacleToFolder } from './lib/output-file.mjs';
 import { serve } from './lib/server.mjs';
 
-const USAGE = 'gaussian-splat page SCENE FOLDER [--single] [--port 8000] [--no-serve]';
+const USAGE = `usage: gaussian-splat page SCENE FOLDER [options]
+
+  FOLDER        gets the element, the scene with the files that it names, and an index.html unless there is one
+  --single      an index.html that contains the element and the scene, and can be opened from a disk
+  --port N      port of the server that shows the page (default 8000, or a free one if it is taken)
+  --no-serve    ends when the page is written
+`;
 const elementFile = (path) => fileURLToPath(new URL(path, import.meta.resolve('@gaussian-splat/element/package.json')));
 const CDN = elementFile('cdn');
-/** The element in one module, including its late-loaded chunks. */
+/** Module with the element and all of its late-loaded chunks. */
 const ELEMENT = new URL('../dist/single.js', import.meta.url);
 const SCRIPT = '<script type="module" src="cdn/gaussian-splat.min.js"></script>';
 
-const { scene, folder, port, isServed, isSingle } = parseOptions();
-const page = join(folder, 'index.html');
+/** Files of ONNX Runtime that a page with a generator needs, in `onnxruntime-web/dist`. */
+const RUNTIME = [
+  ...['ort.jspi.bundle.min.mjs', 'ort.webgpu.bundle.min.mjs'],
+  ...['ort-wasm-simd-threaded.jspi.wasm', 'ort-wasm-simd-threaded.asyncify.wasm'],
+];
 
-mkdirSync(folder, { recursive: true });
-if (isSingle) await writeSingle();
-else await writeFolder();
-console.log(`\nThe page is ${isSingle ? page : `in ${folder}`}`);
-if (isServed) await show();
-
-async function writeFolder() {
-  copyElement(join(folder, 'cdn'));
-  const tag = tagOf(await copyScene());
-  if (existsSync(page))
-    console.log(`\n${page} is there already and stays as it is. Paste into it:\n\n${SCRIPT}\n${tag}`);
-  else writeFileSync(page, htmlOf(SCRIPT, tag, titleOf(basename(scene))));
+async function makePage({ scene, folder, port, isServed, isSingle }) {
+  const page = join(folder, 'index.html');
+  mkdirSync(folder, { recursive: true });
+  if (isSingle) await writeSingle(scene, page);
+  else await writeFolder(scene, folder, page);
+  console.log(`\nThe page is ${isSingle ? page : `in ${folder}`}`);
+  if (isServed) await show(folder, port);
 }
 
+async function writeFolder(scene, folder, page) {
+  copyElement(scene, join(folder, 'cdn'));
+  const tag = tagOf(await copyScene(scene, folder), titleOf(scene));
+  if (existsSync(page))
+    console.log(`\n${page} is there already and stays as it is. Paste into it:\n\n${SCRIPT}\n${tag}`);
+  else writeFileSync(page, htmlOf(SCRIPT, tag, titleOf(scene)));
+}
+
+/** Maximum bytes of a scene in a page of one file: its text must fit into a string of JavaScript. */
+const MAX_SINGLE = 384e6;
+
 /**
- * Embeds the element and the scene as text in the page. The scene becomes a file with its name again, because the name
- * identifies some formats.
+ * Writes an index.html that contains the element and the scene as text. The page converts the scene to a file with its
+ * name, because the name identifies some formats.
  */
-async function writeSingle() {
-  if (existsSync(page)) stop(`${page} is there already. With --single name a folder without one.`);
+async function writeSingle(scene, page) {
+  if (existsSync(page)) throw new CommandError(`${page} is there already. With --single name a folder without one.`);
   const { found, missing } = await filesBeside(scene);
-  if (isJson(scene) || found.length + missing.length > 0 || extname(scene) === '.onnx')
-    stop(
+  if (isJson(scene) || found.length + missing.length > 0 || isModel(scene))
+    throw new CommandError(
       `${scene} is of several files, or needs ONNX Runtime. --single takes a scene of one file: PLY, SPZ, SOG, .splat, .ksplat or GLB.`,
+    );
+  const { size } = statSync(scene);
+  if (size > MAX_SINGLE)
+    throw new CommandError(
+      `${scene}: expected at most ${MAX_SINGLE / 1e6} MB for --single, found ${Math.ceil(size / 1e6)} MB. Make a page of several files, without --single.`,
     );
   const title = titleOf(scene);
   const name = JSON.stringify(basename(scene)).replaceAll('<', '\\u003c');
@@ -59,73 +80,84 @@ async function writeSingle() {
   writeFileSync(page, htmlOf(script, `<gaussian-splat alt="${title}" camera-controls></gaussian-splat>`, title));
 }
 
-function parseOptions() {
+function parseOptions(args) {
   const flag = { type: 'boolean', default: false };
-  const options = { port: { type: 'string', default: '8000' }, 'no-serve': flag, single: flag, help: flag };
-  let parsed;
-  try {
-    parsed = parseArgs({ allowPositionals: true, options });
-  } catch (error) {
-    stop(`${error.message}. ${USAGE}`);
-  }
+  const options = { port: { type: 'string', default: '8000' }, 'no-serve': flag, single: flag };
+  const parsed = parseCommandLine(args, options);
+  if (parsed === undefined) return undefined;
   const { values, positionals } = parsed;
-  if (values.help) {
-    console.log(`usage: ${USAGE}`);
-    process.exit(0);
-  }
-  if (positionals.length !== 2) stop(`A scene and a folder are needed: ${USAGE}`);
-  // npm runs scripts in the repository's root, independent of the current folder.
-  const [scene, folder] = positionals.map((path) => resolve(process.env.INIT_CWD ?? '.', path));
-  if (!existsSync(scene)) stop(`There is no file ${scene}. ${USAGE}`);
-  if (!statSync(scene).isFile()) stop(`${scene} is a folder: name the scene's file in it. ${USAGE}`);
-  if (existsSync(folder) && !statSync(folder).isDirectory()) stop(`${folder} is a file: a folder is needed. ${USAGE}`);
+  if (positionals.length !== 2) throw new UsageError('A scene and a folder are needed');
+  const [scene, folder] = positionals.map((path) => resolve(path));
+  if (!existsSync(scene)) throw new UsageError(`There is no file ${scene}`);
+  if (!statSync(scene).isFile()) throw new UsageError(`${scene} is a folder: name the scene's file in it`);
+  if (existsSync(folder) && !statSync(folder).isDirectory())
+    throw new UsageError(`${folder} is a file: a folder is needed`);
+  const obstacle = obstacleToFolder(folder);
+  if (obstacle) throw new UsageError(obstacle);
   const port = Number(values.port);
   if (!(Number.isInteger(port) && port >= 0 && port < 65536))
-    stop(`--port: expected a number from 0 to 65535, found "${values.port}". ${USAGE}`);
+    throw new UsageError(`--port: expected a number from 0 to 65535, found "${values.port}"`);
   return { scene, folder, port, isServed: !values['no-serve'] && !values.single, isSingle: values.single };
 }
 
-function stop(message) {
-  console.error(message);
-  process.exit(1);
-}
-
-/** ONNX Runtime has 43 MB and is needed only for generators; source maps are for developers of the element. */
-function copyElement(target) {
+/** Copies the element without source maps, and ONNX Runtime (43 MB) if the scene is a generator. */
+function copyElement(scene, target) {
   const isNeeded = (path) => {
     const inside = relative(CDN, path);
-    return !inside.endsWith('.map') && (extname(scene) === '.onnx' || !inside.startsWith('onnxruntime'));
+    return !inside.endsWith('.map') && (isModel(scene) || !inside.startsWith('onnxruntime'));
   };
   cpSync(CDN, target, { recursive: true, filter: isNeeded });
+  if (!isModel(scene)) return;
+  // The published element does not contain the runtime, which is a dependency of the checker.
+  const dist = dirname(createRequire(import.meta.resolve('@gaussian-splat/check')).resolve('onnxruntime-web'));
+  for (const name of RUNTIME) {
+    const file = join(target, 'onnxruntime', name);
+    if (!existsSync(file)) cpSync(join(dist, name), file);
+  }
 }
 
 /**
- * Copies the scene with only the files that it names, and returns its path from the page. A scene described by a JSON
- * keeps its folder's name, because its files have the same names in every scene.
+ * Copies the scene and the files that it refers to, and returns its path relative to the page. A scene described by a JSON
+ * file is copied with its folder, because such scenes have the same file names.
  */
-async function copyScene() {
+async function copyScene(scene, folder) {
   const [name, from] = [basename(scene), dirname(scene)];
   const { found, missing } = await filesBeside(scene);
-  if (missing.length > 0) console.warn(`${name} names files that were not copied: ${missing.join(', ')}`);
   const own = isJson(scene) && from !== folder ? basename(from) : '';
   const to = join(folder, own);
-  // Dereferenced, because links would lead out of the folder.
-  if (from !== to) for (const file of [name, ...found]) cpSync(join(from, file), join(to, file), { dereference: true });
+  const isRefused = (file) => isCode(relative(folder, join(to, file)));
+  missing.push(...found.filter(isRefused).map((file) => `${file} (a page or a script)`));
+  if (missing.length > 0) console.warn(`${name} names files that were not copied: ${missing.join(', ')}`);
+  const files = [name, ...found.filter((file) => !isRefused(file))];
+  // Links are dereferenced, because their targets may be outside the folder.
+  if (from !== to) for (const file of files) cpSync(join(from, file), join(to, file), { dereference: true });
   return own === '' ? name : `${own}/${name}`;
+}
+
+/**
+ * Whether a file would run as code of the page's origin, or belongs to the page itself. Scenes are untrusted, so that none
+ * may bring or replace such a file.
+ */
+function isCode(path) {
+  return /\.(x?html?|svg|xml|[cm]?js|php\d?)$|^cdn[\\/]/i.test(path);
 }
 
 function isJson(path) {
   return extname(path).toLowerCase() === '.json';
 }
 
-function titleOf(source) {
-  const file = isJson(source) ? basename(dirname(scene)) : basename(source, extname(source));
+/** Whether a scene is a generator; the element ignores case, too. */
+const isModel = (path) => extname(path).toLowerCase() === '.onnx';
+
+/** Returns the title of a page: the name of the scene's file, or of the folder of a JSON file. */
+function titleOf(scene) {
+  const file = isJson(scene) ? basename(dirname(scene)) : basename(scene, extname(scene));
   return file.replaceAll('&', '&amp;').replaceAll('"', '&quot;').replaceAll('<', '&lt;');
 }
 
-function tagOf(source) {
+function tagOf(source, title) {
   const address = source.split('/').map(encodeURIComponent).join('/');
-  return `<gaussian-splat src="${address}" alt="${titleOf(source)}" camera-controls></gaussian-splat>`;
+  return `<gaussian-splat src="${address}" alt="${title}" camera-controls></gaussian-splat>`;
 }
 
 function htmlOf(script, tag, title) {
@@ -143,11 +175,15 @@ function htmlOf(script, tag, title) {
 `;
 }
 
-async function show() {
+/** Serves the page until the process is ended. */
+async function show(folder, port) {
   const mounts = { '/': folder };
   const server = await serve(mounts, { port }).catch((error) => {
     if (error.code !== 'EADDRINUSE') throw error;
     return serve(mounts);
   });
   console.log(`and at http://localhost:${server.address().port}/ (Ctrl+C ends it)\n`);
+  await new Promise((resolve) => server.once('close', resolve));
 }
+
+await runCommand(USAGE, parseOptions, makePage);

@@ -1,7 +1,7 @@
-/** Implementation of `gaussian-splat render`: one scene, one camera, one image, with the renderer of the element. */
+/** Implementation of `gaussian-splat render`: draws one image of a scene with the renderer of the element. */
 import { basename, resolve } from 'node:path';
 import { cameraFromCalibration } from '@gaussian-splat/core';
-import { from, parseSceneOptions, runCommand, sayWarnings, UsageError } from './lib/command.mjs';
+import { parseSceneOptions, runCommand, sayWarnings, UsageError } from './lib/command.mjs';
 import {
   DRAW_OPTIONS,
   encodePng,
@@ -11,7 +11,7 @@ import {
   toBytes,
 } from './lib/draw-scene.mjs';
 import { readJson } from './lib/input-file.mjs';
-import { isSameFile, obstacleTo, writeWhole } from './lib/output-file.mjs';
+import { checkOutput, isSameFile, writeWhole } from './lib/output-file.mjs';
 
 const USAGE = `usage: gaussian-splat render SCENE --camera CAMERA.json --out IMAGE.png [options]
 
@@ -50,7 +50,7 @@ function parseOptions(args) {
 function readCamera(path, name) {
   let content;
   try {
-    content = readJson(resolve(from, path));
+    content = readJson(resolve(path));
   } catch (error) {
     throw new UsageError(`--camera: cannot read ${path} as JSON: ${error.message}`);
   }
@@ -66,18 +66,12 @@ function readCamera(path, name) {
   return cameraFromCalibration(view, `${basename(path)}: view ${name}`);
 }
 
-/** Checks all paths before the work. */
+/** Checks before rendering that outputs can be written, and that all of them differ from the inputs and each other. */
 function checkFiles({ scene, camera, out, float }) {
   for (const [option, path] of Object.entries({ out, float })) {
-    if (!path) continue;
-    const file = resolve(from, path);
-    for (const read of [scene, camera])
-      if (isSameFile(file, resolve(from, read)))
-        throw new UsageError(`--${option}: expected another file than ${read}, which is never changed`);
-    const obstacle = obstacleTo(file);
-    if (obstacle) throw new UsageError(`--${option}: ${obstacle}`);
+    if (path) checkOutput(option, path, { [scene]: scene, [camera]: camera });
   }
-  if (out && float && isSameFile(resolve(from, out), resolve(from, float)))
+  if (out && float && isSameFile(resolve(out), resolve(float)))
     throw new UsageError('--float: expected another file than that of --out');
 }
 
@@ -89,10 +83,10 @@ async function render(options) {
   const renderer = await openSceneRenderer(cloud, options.drawing);
   const pixels = await renderer.draw(camera);
   const { viewpoint, accumulation, mode, adapterName } = renderer;
-  const statistics = await viewpoint.statistics();
+  const statistics = await viewpoint.stats();
 
-  if (options.out) writeWhole(resolve(from, options.out), encodePng(toBytes(pixels), camera.width, camera.height));
-  if (options.float) writeWhole(resolve(from, options.float), new Uint8Array(pixels.buffer));
+  if (options.out) writeWhole(resolve(options.out), encodePng(toBytes(pixels), camera.width, camera.height));
+  if (options.float) writeWhole(resolve(options.float), new Uint8Array(pixels.buffer));
   const { width, height } = camera;
   console.log(
     `${options.scene}: ${cloud.count} splats, SH degree ${cloud.shDegree}, ${mode}; ` +

@@ -1,9 +1,9 @@
-/** The work behind `gaussian-splat video`: frames along a camera path, as PNG files or as a video. */
-import { existsSync, mkdirSync, statSync } from 'node:fs';
-import { dirname, join, resolve } from 'node:path';
+/** Implementation of `gaussian-splat video`: draws frames along a camera path, as PNG files or as a video. */
+import { existsSync, mkdirSync, readdirSync, statSync } from 'node:fs';
+import { join, resolve } from 'node:path';
 import { boundsOf } from '@gaussian-splat/core';
 import { camerasAlong } from '@gaussian-splat/element/camera-path.js';
-import { from, parseSceneOptions, runCommand, sayWarnings, UsageError } from './lib/command.mjs';
+import { parseSceneOptions, runCommand, sayWarnings, UsageError } from './lib/command.mjs';
 import {
   DRAW_OPTIONS,
   encodePng,
@@ -14,7 +14,7 @@ import {
 } from './lib/draw-scene.mjs';
 import { checkVideo, isVideo, keepsAlpha, openVideo } from './lib/ffmpeg.mjs';
 import { readJson } from './lib/input-file.mjs';
-import { isSameFile, obstacleTo, writeWhole } from './lib/output-file.mjs';
+import { checkOutput, obstacleToFolder, writeWhole } from './lib/output-file.mjs';
 
 const USAGE = `usage: gaussian-splat video SCENE (--path VIEWS.json | --turntable) --out FOLDER|FILE.mp4|FILE.webm [options]
 
@@ -34,9 +34,9 @@ const USAGE = `usage: gaussian-splat video SCENE (--path VIEWS.json | --turntabl
                        as those of "gaussian-splat render"
 `;
 
-/** Frames of one video. */
+/** Maximum number of frames of a video. */
 const MAX_FRAMES = 100_000;
-/** Pixels of a side. */
+/** Maximum width and height of a frame in pixels. */
 const MAX_PIXELS = 16_384;
 
 function parseOptions(args) {
@@ -93,40 +93,52 @@ function readNumber(name, text, min, max, isWhole = false) {
 
 function readViews(path) {
   try {
-    return readJson(resolve(from, path));
+    return readJson(resolve(path));
   } catch (error) {
     throw new UsageError(`--path: cannot read ${path} as JSON: ${error.message}`);
   }
 }
 
-/** Everything that can be said of files before the work. */
+/** Checks before the work that outputs can be written, and that they differ from inputs. */
 function checkFiles({ scene, path, out, width, height }) {
-  const target = resolve(from, out);
-  for (const read of [scene, path])
-    if (read !== undefined && isSameFile(target, resolve(from, read)))
-      throw new UsageError(`--out: expected another file than ${read}, which is never changed`);
+  const target = resolve(out);
+  const inputs = { [scene]: scene, [path]: path };
   if (isVideo(out)) {
-    const obstacle = obstacleTo(target);
-    if (obstacle) throw new UsageError(`--out: ${obstacle}`);
+    checkOutput('out', target, inputs);
     return checkVideo(target, width, height);
   }
   if (existsSync(target) && !statSync(target).isDirectory())
     throw new UsageError(`--out: expected a folder, or a file that ends in .mp4 or .webm; ${out} is a file`);
-  if (!existsSync(dirname(target))) throw new UsageError(`--out: the folder ${dirname(target)} does not exist`);
+  checkOutput('out', target, inputs, obstacleToFolder);
 }
 
-/** A folder of numbered PNG files, with the methods of a video. */
+const frameName = (frame, digits) => `frame-${String(frame).padStart(digits, '0')}.png`;
+
+/** Refuses a folder with frames of an earlier run that this run would not replace, because they would mix. */
+function checkFrames(folder, frames) {
+  const digits = digitsOf(frames);
+  const own = new Set(Array.from({ length: frames }, (_, frame) => frameName(frame, digits)));
+  const other =
+    existsSync(folder) && readdirSync(folder).find((name) => /^frame-\d+\.png$/.test(name) && !own.has(name));
+  if (other)
+    throw new UsageError(
+      `--out: ${folder} has frames of another run, such as ${other}: remove them, or name another folder`,
+    );
+}
+
+const digitsOf = (frames) => Math.max(4, String(frames - 1).length);
+
+/** Opens a folder for numbered PNG files. The result has the methods of `openVideo`. */
 function openFolder(folder, { width, height, frames }) {
   mkdirSync(folder, { recursive: true });
-  const digits = Math.max(4, String(frames - 1).length);
+  const digits = digitsOf(frames);
   let frame = 0;
   return {
     async write(bytes) {
-      const name = `frame-${String(frame++).padStart(digits, '0')}.png`;
-      writeWhole(join(folder, name), encodePng(bytes, width, height));
+      writeWhole(join(folder, frameName(frame++, digits)), encodePng(bytes, width, height));
     },
     async finish() {},
-    abort() {},
+    async abort() {},
   };
 }
 
@@ -139,8 +151,9 @@ async function video(options) {
   const cameras = camerasAlong({ ...options, views, bounds: { ...boundsOf(cloud), up: cloud.hints?.up } });
   if (cameras.length > MAX_FRAMES)
     throw new UsageError(`--seconds: expected at most ${MAX_FRAMES} frames, found ${cameras.length}`);
+  const target = resolve(options.out);
+  if (!isVideo(target)) checkFrames(target, cameras.length);
   const renderer = await openSceneRenderer(cloud, options.drawing);
-  const target = resolve(from, options.out);
   const open = isVideo(target) ? openVideo : openFolder;
   const isOpaque = options.drawing.background[3] === 1;
   const output = open(target, { width, height, frameRate, isOpaque, frames: cameras.length });
@@ -148,7 +161,7 @@ async function video(options) {
     for (const camera of cameras) await output.write(toBytes(await renderer.draw(camera)));
     await output.finish();
   } catch (error) {
-    output.abort();
+    await output.abort();
     throw error;
   }
   console.log(

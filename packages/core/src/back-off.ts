@@ -1,15 +1,15 @@
 export interface BackOffOptions {
   /** Milliseconds of the pause after the first failure. */
   readonly firstMs: number;
-  /** Growth factor of the pauses. */
+  /** Factor from each pause to the next. */
   readonly factor: number;
   /** Number of consecutive failures after which no more attempts follow. */
   readonly maxTries: number;
-  /** Milliseconds from any origin. Default: `performance.now`. */
+  /** Returns the current time in milliseconds, from any origin. Default: `performance.now`. */
   readonly now?: (() => number) | undefined;
 }
 
-/** Counts consecutive failures, and delays the next attempt. */
+/** Counts the consecutive failures of each key, and delays its next attempt by a pause that grows with them. */
 export class BackOff<K> {
   readonly #options: BackOffOptions;
   readonly #failures = new Map<K, { times: number; until: number; isTaken: boolean }>();
@@ -18,7 +18,7 @@ export class BackOff<K> {
     this.#options = options;
   }
 
-  /** @returns Number of consecutive failures. */
+  /** Records a failure of a key, and starts its pause. Returns the number of its consecutive failures. */
   fail(key: K): number {
     const { firstMs, factor, maxTries } = this.#options;
     const times = (this.#failures.get(key)?.times ?? 0) + 1;
@@ -31,12 +31,12 @@ export class BackOff<K> {
     this.#failures.delete(key);
   }
 
-  /** Whether the next attempt must wait. */
+  /** Whether the pause of a key has not ended; true forever after `maxTries` consecutive failures. */
   isPaused(key: K): boolean {
     return this.#now() < (this.#failures.get(key)?.until ?? -Infinity);
   }
 
-  /** Returns the keys whose pause has ended since the last call, and whether others are still pausing. */
+  /** Returns the keys whose pause has ended since the last call. `isMore`: whether pauses of other keys will end. */
   takeDue(): { readonly due: K[]; readonly isMore: boolean } {
     const due: K[] = [];
     let isMore = false;

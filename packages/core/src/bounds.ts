@@ -9,34 +9,38 @@ export interface Ball {
 
 /** Bounds of the splats of a cloud, in world units. */
 export interface Bounds {
-  /** Axis-aligned box of the centers. */
+  /** Lower corner of the axis-aligned box of the centers. */
   readonly min: Vector3;
+  /** Upper corner of the axis-aligned box of the centers. */
   readonly max: Vector3;
-  /** Center of the subject: per-axis median of the opaque centers, which is robust to outliers. */
+  /** Center of the subject: the median of the opaque centers on each axis, which is robust to outliers. */
   readonly center: Vector3;
-  /** Distance from {@link center} that contains 90 % of the opaque centers. */
+  /** Radius of the sphere around {@link center} that contains 90 % of the opaque centers. */
   readonly radius: number;
   /**
-   * Sphere around an isolated subject, such as a capture with its background removed, or an avatar: it contains 99.9 %
-   * of the opaque centers. Missing if the density of the surroundings decreases gradually.
+   * Sphere around an isolated subject, such as an avatar or a capture with its background removed. It contains 99.9 %
+   * of the opaque centers. Undefined if the density of the surroundings decreases gradually.
    */
   readonly subject?: Ball;
 }
 
 /**
- * Maximum number of centers that are sampled for medians, because sorting millions would delay loading without visible
- * benefit.
+ * Maximum number of centers that are sampled for medians. Sorting millions of centers would delay loading without
+ * visible benefit.
  */
 const SAMPLE_LIMIT = 65_536;
-/** Fraction of the opaque centers that belong to a subject; the rest are specks that removing a background leaves. */
+/**
+ * Fraction of the opaque centers that belong to a subject. The rest are specks that remain after the removal of a
+ * background.
+ */
 const OF_SUBJECT = 0.999;
 /**
- * Maximum ratio of the distances that contain all centers and 99 % of them, for an isolated subject. It is 1 to 1.3 in
- * six such captures, and 2.9 in a capture with surroundings.
+ * Maximum ratio of two distances for an isolated subject: one contains all centers of the subject, the other 99 % of
+ * them. It is 1 to 1.3 in six such captures, and 2.9 in a capture with surroundings.
  */
 const ENDS_WITHIN = 1.5;
 
-/** Returns the bounds of a cloud; for an empty one, a unit sphere at its origin. */
+/** Returns the bounds of a cloud; for an empty cloud, a unit sphere at its origin. */
 export function boundsOf(cloud: Pick<GaussianCloud, 'count' | 'positions' | 'opacities' | 'origin'>): Bounds {
   const { count, positions, opacities, origin } = cloud;
   if (count === 0) return { min: origin, max: origin, center: origin, radius: 1 };
@@ -59,7 +63,7 @@ export function boundsOf(cloud: Pick<GaussianCloud, 'count' | 'positions' | 'opa
 const distance = (a: ArrayLike<number>, b: ArrayLike<number>): number =>
   Math.hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]);
 
-/** Minimum and maximum coordinates over rows of three. */
+/** Returns the minimum and the maximum of each coordinate over [N, 3] positions. */
 function boxOf(positions: Float32Array): [number[], number[]] {
   const [min, max] = [
     [Infinity, Infinity, Infinity],
@@ -78,7 +82,7 @@ function boxOf(positions: Float32Array): [number[], number[]] {
   return [min, max];
 }
 
-/** A sphere around the center of the points' box. */
+/** Returns the smallest sphere around the points whose center is that of their box. */
 function ballAround(places: readonly Float32Array[]): { center: number[]; radius: number } {
   const center = [0, 1, 2].map((axis) => {
     const [min, max] = places.reduce(
@@ -90,7 +94,10 @@ function ballAround(places: readonly Float32Array[]): { center: number[]; radius
   return { center, radius: places.reduce((max, place) => Math.max(max, distance(place, center)), 0) };
 }
 
-/** Evenly spaced splats of opacity 0.1 or more; all splats if none is that opaque. */
+/**
+ * Returns the indices of evenly spaced splats with an opacity of 0.1 or more; of all sampled splats if none is that
+ * opaque.
+ */
 function sampleOpaque(opacities: Float32Array, count: number): number[] {
   const step = Math.max(1, Math.floor(count / SAMPLE_LIMIT));
   const all = Array.from({ length: Math.ceil(count / step) }, (_, k) => k * step);

@@ -6,49 +6,56 @@ import { cross, dot, eyeOf, normalize, subtract, type Matrix4, type Vector3 } fr
  * to the pixel (fx·x/z + cx, fy·y/z + cy) with (x, y, z) = worldToCamera · p.
  */
 export interface Camera {
-  /** Image size in pixels. */
+  /** Width of the image in pixels. */
   readonly width: number;
+  /** Height of the image in pixels. */
   readonly height: number;
-  /** Focal lengths in pixels. */
+  /** Horizontal focal length in pixels. */
   readonly fx: number;
+  /** Vertical focal length in pixels. */
   readonly fy: number;
-  /** Principal point in pixels. */
+  /** Distance of the principal point from the left edge of the image in pixels. */
   readonly cx: number;
+  /** Distance of the principal point from the top edge of the image in pixels. */
   readonly cy: number;
-  /** World to camera, row-major 4x4, last row (0, 0, 0, 1), float64. */
+  /** Matrix from world to camera coordinates: row-major 4x4, last row (0, 0, 0, 1), float64. */
   readonly worldToCamera: Matrix4;
-  /** Centers nearer than this, in world units along z, are not drawn. */
+  /** Minimum z, in world units, of the centers of drawn splats. */
   readonly near: number;
-  /** Centers farther than this, in world units along z, are not drawn. */
+  /** Maximum z, in world units, of the centers of drawn splats. */
   readonly far: number;
   /**
-   * Whether all rays are parallel to the optical axis: a world point then projects to (fx·x + cx, fy·y + cy), and focal
+   * Whether all rays are parallel to the optical axis. A world point then projects to (fx·x + cx, fy·y + cy), and focal
    * lengths are in pixels per world unit. Default: false.
    */
   readonly orthographic?: boolean | undefined;
 }
 
-/** Near plane of INRIA's rasterizer, used in training, in world units. */
+/** Near plane of INRIA's rasterizer, which is used in training, in world units. */
 export const DEFAULT_NEAR = 0.2;
 /** Far plane of gsplat, in world units. */
 export const DEFAULT_FAR = 1e10;
 
 /** A camera in the layout of calibration files, for example one view of a `cameras.json`. */
 export interface CalibratedView {
-  /** Pixels. */
+  /** Width of the image in pixels. */
   readonly width: number;
+  /** Height of the image in pixels. */
   readonly height: number;
   /** 3x3 intrinsics [[fx, 0, cx], [0, fy, cy], [0, 0, 1]] in pixels. */
   readonly K: readonly (readonly number[])[];
-  /** 4x4 world to camera, row-major, OpenCV axes. */
+  /** 4x4 matrix from world to camera coordinates, row-major, OpenCV axes. */
   readonly worldToCamera: readonly (readonly number[])[];
-  /** World units; default {@link DEFAULT_NEAR}. */
+  /** Near plane in world units; default {@link DEFAULT_NEAR}. */
   readonly near?: number;
-  /** World units; default {@link DEFAULT_FAR}. */
+  /** Far plane in world units; default {@link DEFAULT_FAR}. */
   readonly far?: number;
 }
 
-/** Reads a calibrated view and validates every field; throws `argument/camera`. `where` names its source in the error. */
+/**
+ * Returns the camera of a calibrated view. Throws `argument/camera` if a field is invalid; `where` is the name of the
+ * view in the error.
+ */
 export function cameraFromCalibration(view: CalibratedView, where = 'camera'): Camera {
   const { width, height, K, worldToCamera } = view ?? {};
   const isMatrix = (m: unknown, size: number): boolean =>
@@ -69,7 +76,8 @@ export function cameraFromCalibration(view: CalibratedView, where = 'camera'): C
   };
   validateCamera(camera, where);
   if (K[0][1] !== 0) failCamera(`${where}.K[0][1]`, '0 (no skew)', describeCamera(K[0][1]));
-  // Column-major or scaled matrices would be misread as another principal point or other focal lengths.
+  // The last row is checked, because a column-major or scaled matrix would give another principal point or focal
+  // length.
   for (const [row, column, value] of [
     [2, 0, 0],
     [2, 1, 0],
@@ -83,7 +91,7 @@ export function cameraFromCalibration(view: CalibratedView, where = 'camera'): C
   return camera;
 }
 
-/** Tolerance of the last row of a matrix against 0, 0, 0, 1. */
+/** Tolerance of the entries of a matrix that must be 0 or 1. */
 const AFFINE_ROUNDING = 1e-6;
 
 /** Throws `argument/camera` if a field of the camera is out of its documented range. */
@@ -130,7 +138,7 @@ export function lookAt(eye: Vector3, target: Vector3, up: Vector3): Float64Array
   return Float64Array.from([...row(right), ...row(down), ...row(forward), 0, 0, 0, 1]);
 }
 
-/** A value in an error. @internal */
+/** Describes a value in an error, in up to 80 characters of JSON. @internal */
 export function describeCamera(value: unknown): string {
   const text = JSON.stringify(value);
   return text === undefined ? 'nothing' : text.length > 80 ? `${text.slice(0, 77)}...` : text;

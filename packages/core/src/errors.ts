@@ -1,4 +1,4 @@
-/** Errors for users state the expected value, the found one, the place, and a remedy, with a stable code. */
+/** Errors for users. Each one has a stable code, the expected and the found value, the place, and a remedy. */
 
 /** Stable codes. The part before the slash is the family that `<gaussian-splat>` reports as `error.code`. */
 export type ErrorCode =
@@ -14,7 +14,7 @@ export type ErrorCode =
   | 'decode/header'
   /** The file ends before the data that its header declares. */
   | 'decode/truncated'
-  /** The body contradicts the header, or a compressed stream is damaged. */
+  /** The data after the header contradict it, or a compressed stream is damaged. */
   | 'decode/corrupt'
   /** A known format, in a version or variant that this reader does not support. */
   | 'decode/unsupported'
@@ -31,10 +31,13 @@ export type ErrorCode =
   | 'network/interrupted'
   /** The URL cannot be parsed. */
   | 'network/url'
-  /** The page cannot use WebGPU: no API, insecure context, no adapter, or a limit too low. */
+  /** The page is not in a secure context, so that WebGPU is unavailable. */
   | 'unsupported/insecure-context'
+  /** The browser has no WebGPU. */
   | 'unsupported/no-webgpu'
+  /** The browser provides no GPU adapter. */
   | 'unsupported/no-adapter'
+  /** A limit or feature of the GPU device is insufficient. */
   | 'unsupported/limits'
   /** A script of the page has replaced a built-in function of JavaScript. */
   | 'unsupported/page'
@@ -44,9 +47,11 @@ export type ErrorCode =
   | 'unsupported/webgl'
   /** A VR or AR session is unavailable: no device, no browser support, or no permission. */
   | 'unsupported/xr'
-  /** The scene needs more GPU memory than a buffer or the device may hold. */
+  /** The scene needs a buffer that is larger than the GPU device allows. */
   | 'out-of-memory/buffer-limit'
+  /** The scene needs more GPU memory than its budget, or than the rest of the device's budget. */
   | 'out-of-memory/budget'
+  /** The GPU device failed to allocate memory. */
   | 'out-of-memory/allocation'
   /** The GPU device was lost and could not be recovered. */
   | 'device-lost/unrecoverable'
@@ -55,15 +60,17 @@ export type ErrorCode =
    * code.
    */
   | ContractErrorCode
-  /** A caller's argument violates the documented contract of a function. */
+  /** The camera that a caller passed is invalid. */
   | 'argument/camera'
+  /** The arrays of a cloud that a caller passed do not match its count and degree. */
   | 'argument/cloud'
-  /** A scene has more cuts than one scene can have. */
+  /** A scene has more cuts than one scene may have. */
   | 'argument/splat-cut'
-  /** A page's hook for splats is not WGSL that compiles. */
+  /** The splat shader of a page does not compile as WGSL, or is not allowed. */
   | 'argument/splat-shader'
   /** A method was called outside of a user activation. */
   | 'argument/activation'
+  /** A value that a caller passed violates the documented contract of a function. */
   | 'argument/value';
 
 /** Stable codes of all faults of an ONNX file, its contract and its output. */
@@ -84,13 +91,13 @@ export type ContractErrorCode =
   | 'contract/shape'
   /** The element type of a tensor does not match its role, or the type that the contract declares. */
   | 'contract/dtype'
-  /** Outputs disagree on the number of Gaussians, or it is above `nMax`, or symbolic without `nMax`. */
+  /** Outputs have different numbers of Gaussians; or the number is above `nMax`, or symbolic without `nMax`. */
   | 'contract/rows'
-  /** The shape does not match a degree of spherical harmonics, or not the declared one. */
+  /** The shape of a tensor matches no degree of spherical harmonics, or not the declared degree. */
   | 'contract/sh-degree'
   /**
-   * The axis of a model of several instances is misplaced, or the results of an instance differ between one run and
-   * several.
+   * The axis of instances violates its rules, or an instance has other results in a run of several instances than
+   * alone.
    */
   | 'contract/instances'
   /** Fields of one contract contradict each other. */
@@ -113,29 +120,31 @@ export type ContractErrorCode =
   | 'contract/count'
   /** The same inputs gave different outputs although no input is a seed. */
   | 'contract/not-deterministic'
-  /** Models of a chain do not match one another, or are in an invalid position. */
+  /** Two models of a chain do not match, or a model is in an invalid position. */
   | 'contract/chain';
 
-/** Information for fixing the fault. Every field is a full phrase without a trailing full stop. */
+/** Information for correcting the error. Each field is a phrase without a full stop at its end. */
 export interface ErrorDetails {
-  /** The expected value. */
+  /** Allowed value or content, for example `a number from 0 to 1`. */
   readonly expected: string;
-  /** The found value. */
+  /** Value or content that was found instead, for example `1.5`. */
   readonly found: string;
-  /** File, element, byte or property in question. */
+  /** File, element, byte or property that the error is about. */
   readonly where: string;
   /** Suggested correction. */
   readonly remedy: string;
-  /** The lower-level error, if one caused this. */
+  /** Error of a lower level that caused this error; undefined for none. */
   readonly cause?: unknown;
 }
 
-/** A `GaussianSplatError` as plain data, because structured clone (workers) drops class and fields of errors. */
+/**
+ * A `GaussianSplatError` as plain data, because structured clone (workers) drops the class and the fields of errors.
+ */
 export interface ErrorData extends Omit<ErrorDetails, 'cause'> {
   readonly code: ErrorCode;
 }
 
-/** The one error class of all packages. */
+/** The error class of all packages. */
 export class GaussianSplatError extends Error implements ErrorDetails {
   override readonly name: string = 'GaussianSplatError';
   readonly code: ErrorCode;
@@ -146,8 +155,8 @@ export class GaussianSplatError extends Error implements ErrorDetails {
 
   constructor(code: ErrorCode, details: ErrorDetails) {
     const { expected, found, where, remedy, cause } = details;
-    // Messages of browsers, which may be the found value, end with their own full stop.
-    super(`${where}: expected ${expected}, found ${found.replace(/\.$/, '')}. ${capitalise(remedy)}. [${code}]`, {
+    // Removes the full stop of a found value, because messages of browsers end with one.
+    super(`${where}: expected ${expected}, found ${found.replace(/\.$/, '')}. ${capitalize(remedy)}. [${code}]`, {
       cause,
     });
     this.code = code;
@@ -162,7 +171,7 @@ export class GaussianSplatError extends Error implements ErrorDetails {
     return this.code.slice(0, this.code.indexOf('/'));
   }
 
-  /** Plain data that survives `postMessage`; {@link GaussianSplatError.fromData} restores it. */
+  /** Returns plain data for `postMessage`, without the cause. {@link GaussianSplatError.fromData} restores the error. */
   toData(): ErrorData {
     const { code, expected, found, where, remedy } = this;
     return { code, expected, found, where, remedy };
@@ -173,6 +182,6 @@ export class GaussianSplatError extends Error implements ErrorDetails {
   }
 }
 
-function capitalise(text: string): string {
+function capitalize(text: string): string {
   return text.charAt(0).toUpperCase() + text.slice(1);
 }

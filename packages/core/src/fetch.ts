@@ -1,8 +1,5 @@
-/**
- * Fetching with retries and time-outs, shared between callers, under the rules of origins: for packages that load
- * files.
- */
+/** Tools for packages that fetch files: retries, time-outs, reads that callers share, and rules for other origins. */
 export * from './back-off.js';
-export * from './part-request.js';
+export * from './file-request.js';
 export * from './patient-fetch.js';
 export * from './shared-reads.js';

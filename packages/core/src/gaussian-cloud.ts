@@ -4,19 +4,19 @@ import type { Vector3 } from './vector.js';
 /** Degree of the spherical harmonics of a cloud. Degree d has (d + 1)² coefficients for each color channel. */
 export type ShDegree = 0 | 1 | 2 | 3;
 
-/** Number of spherical-harmonics coefficients for each color channel: (d + 1)². */
+/** Returns the number of spherical-harmonics coefficients for each color channel: (d + 1)². */
 export function shCoefficientCount(degree: ShDegree): 1 | 4 | 9 | 16 {
   return ((degree + 1) * (degree + 1)) as 1 | 4 | 9 | 16;
 }
 
 /**
- * The screen-space low-pass filter of a scene's training: `classic` adds 0.3 px² to the variance of each splat,
- * `antialiased` also compensates its opacity for that (the options of that name in gsplat and INRIA's code), and `mip`
- * adds 0.1 px² and compensates (Mip-Splatting, Brush's mip mode).
+ * Screen-space low-pass filter in the training of a scene. `classic` adds 0.3 px² to the variance of each splat.
+ * `antialiased` also compensates its opacity for the added variance (options of this name in gsplat and INRIA's code).
+ * `mip` adds 0.1 px² and compensates (Mip-Splatting, Brush's mip mode).
  */
 export type SplatFilter = 'classic' | 'antialiased' | 'mip';
 
-/** Parameters of a filter. */
+/** Parameters of a low-pass filter. */
 export interface FilterRule {
   /** Whether opacities are compensated for the added variance. */
   readonly antialiased: boolean;
@@ -24,13 +24,16 @@ export interface FilterRule {
   readonly filterVariance?: number | undefined;
 }
 
+/** Parameters of each {@link SplatFilter}. */
 export const SPLAT_FILTERS: Readonly<Record<SplatFilter, FilterRule>> = {
   classic: { antialiased: false, filterVariance: undefined },
   antialiased: { antialiased: true, filterVariance: undefined },
   mip: { antialiased: true, filterVariance: 0.1 },
 };
 
-/** Splats `first` to `first + count` of a cloud: one level of detail of a node of the scene; level 0 is the finest. */
+/**
+ * A level of detail of one node of the scene: splats `first` to `first + count - 1` of a cloud. Level 0 is the finest.
+ */
 export interface LevelRun {
   readonly first: number;
   readonly count: number;
@@ -38,80 +41,91 @@ export interface LevelRun {
   readonly level: number;
 }
 
-/** Metadata of a file. */
+/** Metadata that a file declares, beside its Gaussians. */
 export interface CloudHints {
-  /** Unit vector that points up in the coordinates of the cloud. */
+  /** Unit vector that points up, in the coordinates of the cloud. */
   readonly up?: Vector3 | undefined;
-  /** Whether the file declares no coordinate system, so that up was inferred from its writer. */
+  /**
+   * Whether {@link up} was inferred from the program that wrote the file, because the file declares no coordinate
+   * system.
+   */
   readonly isUpAssumed?: boolean;
-  /** The tool that wrote the file, as the file names it. */
+  /** Name of the program that wrote the file, as stated in the file. */
   readonly generator?: string;
-  /** `pixel`: the scene was trained with per-pixel order, as in StopThePop. */
+  /** Sort order of splats in training. `pixel`: per-pixel order, as in StopThePop. */
   readonly order?: 'pixel';
-  /** Whether the file also has triangles, which a cloud cannot hold. */
+  /** Whether the file also contains triangles, which are not part of a cloud. */
   readonly meshes?: boolean;
+  /**
+   * Recommended limits of a camera that orbits the scene: polar angles from up in radians, 0..π, and the minimum
+   * distance to the target in world units. An undefined field sets no limit.
+   */
+  readonly orbit?: { readonly minPhi?: number; readonly maxPhi?: number; readonly minRadius?: number } | undefined;
 }
 
 /**
- * Gaussians on the CPU, activated and ready to draw; every format is read into this structure.
+ * Gaussians on the CPU, activated and ready to draw. Readers convert every format to this structure.
  *
- * Coordinates are those of the trainers and of INRIA's PLY files, which are OpenCV's for an upright capture (x right, y
- * down, z forward). Readers of formats with other coordinates convert them.
+ * Coordinates are those of the trainers and of INRIA's PLY files: OpenCV's for an upright capture (x right, y down, z
+ * forward). Readers convert formats with other coordinates.
  */
 export interface GaussianCloud {
   /** Number of Gaussians N. */
   readonly count: number;
   /** World position, in float64, of the local point (0, 0, 0) of {@link positions}. */
   readonly origin: Vector3;
-  /** [N, 3] centers in world units, relative to {@link origin}. */
+  /** [N, 3] centers in world units, relative to {@link origin} */
   readonly positions: Float32Array;
-  /** [N, 3] standard deviations along the local axes in world units, linear (not log). */
+  /** [N, 3] standard deviations along the local axes in world units, linear (not log) */
   readonly scales: Float32Array;
-  /** [N, 4] unit quaternions in the order (w, x, y, z), local axes to world. */
+  /** [N, 4] unit quaternions in the order (w, x, y, z), from local axes to world */
   readonly rotations: Float32Array;
-  /** [N] opacities in 0..1, linear (not logit). */
+  /** [N] opacities in 0..1, linear (not logit) */
   readonly opacities: Float32Array;
   /**
-   * [N, (d+1)², 3] spherical-harmonics coefficients, red, green and blue innermost. Color = 0.5 + Σ c·Y(direction),
-   * sRGB-encoded; the first coefficient is the constant one ("DC").
+   * [N, (d + 1)², 3] spherical-harmonics coefficients, with red, green and blue innermost. Color = 0.5 + Σ
+   * c·Y(direction), sRGB-encoded. The first coefficient is the constant one ("DC").
    */
   readonly sh: Float32Array;
   readonly shDegree: ShDegree;
-  /** Whether the scene was trained with opacity compensation for the screen-space dilation (Mip-Splatting style). */
+  /** Whether training compensated opacities for the variance that the screen-space filter adds. */
   readonly antialiased: boolean;
   /**
-   * Variance in px² of the screen-space low-pass filter of training. Undefined: 0.3, as in INRIA's and gsplat's
-   * trainers, with and without compensation; Mip-Splatting and Brush's mip mode use 0.1.
+   * Variance in px² of the screen-space low-pass filter in training. Undefined: 0.3, as in INRIA's and gsplat's
+   * trainers, with and without compensation. Mip-Splatting and Brush's mip mode use 0.1.
    */
   readonly filterVariance?: number | undefined;
   /** Metadata of the file. */
   readonly hints?: CloudHints | undefined;
   /**
-   * Only for a file with its own levels of detail: all splats are in runs, and one run of each node is to be drawn.
+   * Levels of detail of a file that has its own. The runs contain every splat, and one run of each node must be drawn.
    * Undefined: all splats are drawn.
    */
   readonly levelRuns?: readonly LevelRun[];
   /** Number of splats of the source that were dropped because of an unusable value; see {@link keepUsable}. */
   readonly droppedCount: number;
   /**
-   * Counts of the splats that {@link keepUsable} dropped for a scale below 0, for a zero rotation, for no extent, and
-   * for values that are not finite or too large.
+   * Four counts of the splats that {@link keepUsable} dropped: for a scale below 0, for a zero rotation, for no extent,
+   * and for values that are not finite or too large.
    */
   readonly faults?: readonly number[] | undefined;
-  /** Messages about parts of the file that are not drawn, or may be misinterpreted. */
+  /** Messages about parts of the file that are not drawn or may be misinterpreted. */
   readonly warnings?: readonly string[] | undefined;
 }
 
 /**
- * Upper limit of the standard deviation along a splat's longest axis, in world units: squared screen sizes must fit
- * float32. Below the lower limit a splat has no extent.
+ * Upper limit of the standard deviation along a splat's longest axis, in world units, because squared screen sizes must
+ * fit float32.
  */
 export const MAX_SCALE = 1e12;
 /**
- * Upper limit of the coordinates of a drawable splat, in world units: products of two stay far below the limit of
- * float32, the type of chunk bounds.
+ * Upper limit of the coordinates of a drawable splat, in world units. Products of two coordinates are far below the
+ * limit of float32, the type of chunk bounds.
  */
 export const MAX_POSITION = 1e18;
+/**
+ * Lower limit of the standard deviation along a splat's longest axis, in world units. Smaller splats have no extent.
+ */
 export const MIN_LONGEST_SCALE = 1e-12;
 
 /** Throws `argument/cloud` unless the arrays of a cloud have the lengths that `count` and `shDegree` require. */
@@ -143,15 +157,16 @@ export function validateCloud(cloud: GaussianCloud): void {
 }
 
 /**
- * Whether splat `i` can be drawn: all numbers finite, no coordinate beyond {@link MAX_POSITION}, a non-zero rotation,
- * the longest standard deviation within {@link MIN_LONGEST_SCALE}..{@link MAX_SCALE} and none negative. Single axes may
- * be 0, as in flat discs and needles. The shader `cull.wgsl` applies the same rule to buffers that the CPU never reads.
+ * Whether splat `i` can be drawn. All its numbers must be finite, no coordinate may exceed {@link MAX_POSITION}, and
+ * the rotation must not be zero. The longest standard deviation must be within {@link MIN_LONGEST_SCALE}..{@link
+ * MAX_SCALE}, and none may be negative. Single axes may be 0, as in flat discs and needles. The shader `cull.wgsl`
+ * applies the same rule to buffers that the CPU never reads.
  */
 export function isUsable(cloud: GaussianCloud, i: number): boolean {
   const { positions, scales, rotations, opacities, sh, shDegree } = cloud;
   const shLength = 3 * shCoefficientCount(shDegree);
-  // A sum is finite only if every term is: infinities of both signs add up to NaN. sh is the longest array, so this is
-  // the inner loop of loading, and a single sum would wait for each of its additions.
+  // A sum is finite only if every term is finite: infinities of both signs add up to NaN. This is the inner loop of
+  // loading, because sh is the longest array. Three sums are faster than one, which would wait for each addition.
   let red = 0;
   let green = 0;
   let blue = 0;
@@ -173,8 +188,9 @@ export function isUsable(cloud: GaussianCloud, i: number): boolean {
 }
 
 /**
- * Normalizes rotations and drops the splats that {@link isUsable} rejects, counting them in `droppedCount`. Works in
- * place on the arrays of `cloud` (which must not be used afterwards) and keeps the order of the rest.
+ * Returns the cloud without the splats that {@link isUsable} rejects, which `droppedCount` and `faults` count.
+ * Rotations are normalized, opacities are clamped to 0..1, and the order is kept. The result overwrites and shares the
+ * arrays of `cloud`: do not use `cloud` afterwards.
  */
 export function keepUsable(cloud: GaussianCloud): GaussianCloud {
   const { count, positions, scales, rotations, opacities, sh, shDegree } = cloud;
@@ -217,7 +233,7 @@ export function keepUsable(cloud: GaussianCloud): GaussianCloud {
   };
 }
 
-/** Reason that a splat cannot be drawn, as an index of {@link GaussianCloud.faults}. */
+/** Returns the reason that a splat cannot be drawn, as an index of {@link GaussianCloud.faults}. */
 function faultOf({ scales, rotations }: GaussianCloud, i: number): number {
   const axes = scales.subarray(3 * i, 3 * i + 3);
   if (Math.min(...axes) < 0) return 0;
@@ -230,7 +246,7 @@ function normalizeQuaternion(rotations: Float32Array, at: number): void {
   for (let k = at; k < at + 4; k++) rotations[k] *= scale;
 }
 
-/** Squares of float32 numbers neither overflow nor underflow in float64. */
+/** Returns the squared norm of a quaternion. Squares of float32 numbers neither overflow nor underflow in float64. */
 function squaredNorm(rotations: Float32Array, at: number): number {
   const w = rotations[at];
   const x = rotations[at + 1];

@@ -1,7 +1,7 @@
-/** Values of all 65,536 float16 bit patterns; created on demand. */
+/** Values of all 65,536 float16 bit patterns; undefined before the first use. */
 let table: Float32Array | undefined;
 
-/** Value of the 16 bits of an IEEE 754 binary16. */
+/** Returns the value of the 16 bits of an IEEE 754 binary16. */
 export function halfToNumber(bits: number): number {
   table ??= Float32Array.from({ length: 65_536 }, (_, pattern) => decode(pattern));
   return table[bits];
@@ -18,7 +18,7 @@ function decode(bits: number): number {
 const float = new Float32Array(1);
 const bits = new Uint32Array(float.buffer);
 
-/** Bits of the float16 nearest to a number, ties to even; infinity beyond the range. */
+/** Returns the bits of the float16 nearest to a number, ties to even. Numbers beyond its range become infinity. */
 export function numberToHalf(value: number): number {
   float[0] = value;
   const sign = (bits[0] >>> 16) & 0x8000;

@@ -1,20 +1,23 @@
 import { loadModule } from './load-module.js';
 
-/** Minimum time between a failure and the next request of {@link Lazy.want}, ms. */
+/** Minimum milliseconds from a failure to the next load that {@link Lazy.want} starts. */
 const PAUSE_MS = 5_000;
 
-/** Code that few pages need, loaded at its first use. A failure is not cached: the next use loads it again. */
+/**
+ * Code that few pages need, which is loaded at its first use. A failure is not cached: the next use loads the code
+ * again.
+ */
 export class Lazy<T> {
-  /** Present once the code is loaded. */
+  /** Result of `load`; undefined until the code is loaded. */
   value: T | undefined;
   #loading: Promise<T> | undefined;
   #failedAt = -Infinity;
   readonly #load: () => Promise<T>;
 
   /**
-   * @param what Purpose of the code, as in "the code that reads PLY".
-   * @param load Imports it, and may create a value from it.
-   * @param onValue Called once the value is present.
+   * @param what Purpose of the code for error messages, as in "the code that reads PLY".
+   * @param load Imports the code, and may create a value from it.
+   * @param onValue Called when the value is loaded.
    */
   constructor(what: string, load: () => Promise<T>, onValue: () => void = ignore) {
     this.#load = async () => {
@@ -24,7 +27,7 @@ export class Lazy<T> {
     };
   }
 
-  /** @throws GaussianSplatError `network/unreachable` if it cannot be loaded. */
+  /** Resolves to the value, and loads the code if required. Rejects with `network/unreachable` if loading fails. */
   get(): Promise<T> {
     return (this.#loading ??= this.#load().catch((error: unknown) => {
       this.#loading = undefined;
@@ -34,8 +37,8 @@ export class Lazy<T> {
   }
 
   /**
-   * Returns the value if it is loaded; otherwise starts loading it. For frequent callers, such as each frame: after a
-   * failure requests pause for seconds.
+   * Returns the value if it is loaded; otherwise starts to load it and returns undefined. For frequent callers, such as
+   * each frame: after a failure, no load starts for {@link PAUSE_MS}.
    */
   want(onError: (error: Error) => void = ignore): T | undefined {
     if (this.value === undefined && !this.#loading && performance.now() - this.#failedAt >= PAUSE_MS)
@@ -43,7 +46,7 @@ export class Lazy<T> {
     return this.value;
   }
 
-  /** Resolves, and never rejects, once nothing is being loaded. */
+  /** Resolves when no load is pending; never rejects. */
   get settled(): Promise<unknown> {
     return this.#loading?.catch(ignore) ?? Promise.resolve();
   }

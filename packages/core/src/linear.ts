@@ -24,7 +24,9 @@ function inverseTransposed(m: Matrix3): number[] {
   ].map((cofactor) => cofactor / d);
 }
 
-/** The rotation or reflection nearest to a matrix: its orthogonal polar factor. */
+/**
+ * Returns the rotation or reflection nearest to an invertible matrix: its orthogonal polar factor (Newton's iteration).
+ */
 export function orthogonalFactor(m: Matrix3): number[] {
   const size = Math.cbrt(Math.abs(determinant(m)));
   let q = m.map((value) => value / size);
@@ -38,7 +40,7 @@ export function orthogonalFactor(m: Matrix3): number[] {
   return q;
 }
 
-/** Rotation matrix of a unit quaternion (w, x, y, z). */
+/** Returns the rotation matrix of a unit quaternion (w, x, y, z). */
 export function matrixOfQuaternion(w: number, x: number, y: number, z: number): number[] {
   return [
     ...[1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
@@ -47,10 +49,10 @@ export function matrixOfQuaternion(w: number, x: number, y: number, z: number): 
   ];
 }
 
-/** Unit quaternion (w, x, y, z) of a rotation matrix. */
+/** Returns the unit quaternion (w, x, y, z) of a rotation matrix. Its largest component is positive. */
 export function quaternionOfMatrix(m: Matrix3): [number, number, number, number] {
   const trace = m[0] + m[4] + m[8];
-  // The largest of the four comes from its square; the others follow from it without loss of precision.
+  // The largest component is computed from its square. The others follow from it without loss of precision.
   const squares = [1 + trace, 1 + 2 * m[0] - trace, 1 + 2 * m[4] - trace, 1 + 2 * m[8] - trace];
   const largest = squares.indexOf(Math.max(...squares));
   const [yz, zx, xy] = [m[7] - m[5], m[2] - m[6], m[3] - m[1]];
@@ -71,7 +73,10 @@ const AXIS_PAIRS = [
   [1, 2],
 ] as const;
 
-/** Eigenvalues of a symmetric matrix, and its eigenvectors as the columns of a rotation (Jacobi's method). */
+/**
+ * Returns the eigenvalues of a symmetric matrix, unsorted, and its eigenvectors as the columns of a rotation (Jacobi's
+ * method).
+ */
 export function symmetricEigen(m: Matrix3): { values: [number, number, number]; vectors: number[] } {
   const a = [...m];
   const vectors = [1, 0, 0, 0, 1, 0, 0, 0, 1];
@@ -93,7 +98,7 @@ export function symmetricEigen(m: Matrix3): { values: [number, number, number]; 
   return { values: [a[0], a[4], a[8]], vectors };
 }
 
-/** Rotates two entries, as a pair, by an angle with the given cosine and sine. */
+/** Rotates the pair of entries `p` and `q`, in place, by the angle with cosine `c` and sine `s`. */
 function turn(entries: number[], p: number, q: number, c: number, s: number): void {
   const [first, second] = [entries[p], entries[q]];
   entries[p] = c * first - s * second;

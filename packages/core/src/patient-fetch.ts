@@ -1,18 +1,20 @@
 /**
- * Milliseconds without a response after which a server is abandoned, and a connection with less than 1 KiB counts as
- * broken.
+ * Milliseconds after which a server without a response is abandoned. A connection that delivers less than {@link
+ * SILENCE_BYTES} in this time counts as broken.
  */
 export const SILENCE_MS = 30_000;
 const SILENCE_BYTES = 1024;
 
-/** A server or connection that sent too little data within {@link PATIENCE_MS}. */
+/** A server or connection that sent too little data within {@link SILENCE_MS}. */
 export class SilenceError extends Error {
   constructor() {
     super(`nothing came for ${SILENCE_MS / 1000} s`);
   }
 }
 
-/** Same as `fetch`, but also rejects with a {@link SilenceError} if no headers arrive in time. */
+/**
+ * Fetches as `fetch` does, but also rejects with a {@link SilenceError} if no headers arrive within {@link SILENCE_MS}.
+ */
 export async function fetchPatiently(url: string | URL, { signal, ...init }: RequestInit = {}): Promise<Response> {
   const silence = new AbortController();
   const timer = setTimeout(() => silence.abort(new SilenceError()), SILENCE_MS);
@@ -28,8 +30,8 @@ export async function fetchPatiently(url: string | URL, { signal, ...init }: Req
 }
 
 /**
- * Iterates over the chunks of a body. Ending the loop early closes the connection.
- * @param failed Creates the error to throw from the error of the connection or of its silence.
+ * Iterates over the chunks of a response's body. Leaving the loop early closes the connection.
+ * @param failed Creates the error to throw, from the error of the connection or a {@link SilenceError}.
  */
 export async function* chunksOf(
   { body }: Response,
@@ -54,7 +56,10 @@ export async function* chunksOf(
   }
 }
 
-/** Reads a whole body. Rejects as {@link chunksOf} throws. @param maxBytes A longer body rejects with a RangeError. */
+/**
+ * Reads the whole body of a response. Rejects with the errors that {@link chunksOf} throws. @param maxBytes Maximum
+ * length; a longer body rejects with a RangeError.
+ */
 export async function bytesOf(
   response: Response,
   failed?: (cause: unknown) => unknown,

@@ -1,19 +1,20 @@
-/** Cameras from the matrices of hosts: a separate module, because few pages have a host. */
+/** Converts the matrices of other renderers into cameras. A separate module, because few pages need it. */
 import { describeCamera as describe, failCamera as fail, validateCamera, type Camera } from './camera.js';
 import { cross, dot, type Vector3 } from './vector.js';
 
-/** Options of a host's projection. */
+/** Image size and depth range of a projection. */
 export interface ProjectionOptions {
-  /** Image size in pixels. */
+  /** Width of the image in pixels. */
   readonly width: number;
+  /** Height of the image in pixels. */
   readonly height: number;
   /** Range of depth after the division by w: `0..1` as in WebGPU, or `-1..1` as in OpenGL. Default: `0..1`. */
   readonly clipDepth?: '0..1' | '-1..1';
 }
 
 /**
- * Near plane as a fraction of the distance between the planes, for parallel rays whose near plane is at the eye or
- * behind it.
+ * Near plane of an orthographic camera that is moved back, as a fraction of the distance between the planes. The camera
+ * is moved if its near plane is at the eye or behind it, because `Camera.near` must be positive.
  */
 const MIN_NEAR = 1e-3;
 
@@ -22,12 +23,14 @@ const MIN_NEAR = 1e-3;
  * space of GPUs.
  *
  * ```ts
- * const camera = cameraFromProjection(camera3.matrixWorldInverse.elements, camera3.projectionMatrix.elements, { width, height });
+ * const camera = cameraFromProjection(camera3.matrixWorldInverse.elements, camera3.projectionMatrix.elements, { width,
+ * height });
  * ```
- * @param view World to camera, 16 numbers, column-major.
- * @param projection Perspective or orthographic, 16 numbers, column-major; may be off-center or reversed, and may have
- * no far plane.
- * @throws GaussianSplatError `argument/camera` for a projection with skew, or one that is neither.
+ * @param view Matrix from world to camera coordinates: 16 numbers, column-major.
+ * @param projection Perspective or orthographic projection: 16 numbers, column-major. It may be off-center or have
+ * reversed depth, and need not have a far plane.
+ * @throws GaussianSplatError `argument/camera` for a projection with skew, or one that is neither perspective nor
+ * orthographic.
  */
 export function cameraFromProjection(
   view: ArrayLike<number>,
@@ -43,12 +46,12 @@ export function cameraFromProjection(
   if (!orthographic && !(p[11] === -1 && p[15] === 0))
     fail('projection', 'a last row of 0, 0, -1, 0 or 0, 0, 0, 1', describe([p[3], p[7], p[11], p[15]]));
   const skew = Math.max(...[1, 2, 3, 4, 6, 7].map((k) => Math.abs(p[k])));
-  if (skew !== 0) fail('projection', 'no skew: 0 beside the diagonal and the centre', describe(Array.from(p)));
+  if (skew !== 0) fail('projection', 'no skew: 0 beside the diagonal and the center', describe(Array.from(p)));
   const [x, y] = orthographic ? [p[12], -p[13]] : [-p[8], p[9]];
   const planes = (clipDepth === '0..1' ? [0, 1] : [-1, 1]).map((depth) =>
     orthographic ? (p[14] - depth) / p[10] : p[14] / (p[10] + depth),
   );
-  // An infinite far plane divides by zero, or nearly.
+  // The distance of an infinite far plane results from a division by zero, or by nearly zero.
   const distances = planes.map((plane) => (Number.isFinite(plane) && (orthographic || plane > 0) ? plane : Infinity));
   const [nearest, far] = [Math.min(...distances), Math.max(...distances)];
   const back = orthographic && nearest <= 0 ? MIN_NEAR * (far - nearest) - nearest : 0;
@@ -73,9 +76,9 @@ export function cameraFromProjection(
 }
 
 /**
- * Returns a camera for the single matrix that maps provide: from the coordinates of a scene to clip space, perspective.
- * @param matrix 16 numbers, column-major; it may scale.
- * @throws GaussianSplatError `argument/camera` for a matrix with skew, a mirrored one, or one without perspective.
+ * Returns a camera for the perspective matrix from scene coordinates to clip space that map libraries provide.
+ * @param matrix 16 numbers, column-major. The matrix may scale.
+ * @throws GaussianSplatError `argument/camera` for a matrix that has skew, mirrors, or has no perspective.
  */
 export function cameraFromClip(
   matrix: ArrayLike<number>,
@@ -117,5 +120,5 @@ export function cameraFromClip(
   return camera;
 }
 
-/** Tolerance of the cosine between the image axes, because the matrices of maps are rounded. */
+/** Maximum cosine of the angle between the image axes. It is not 0, because map libraries round their matrices. */
 const SKEW = 1e-3;

@@ -6,38 +6,39 @@ interface Reading<T> {
   readonly controller: AbortController;
   readonly owner: unknown;
   readers: number;
-  /** Size in bytes, once it is loaded. */
+  /** Size of the result in bytes; undefined while the read is pending. */
   bytes?: number;
 }
 
 /**
- * Shares reads between callers, concurrent or subsequent: a read continues while any caller waits, and recently used
+ * Shares reads between concurrent and subsequent callers. A read continues while any caller waits for it. Recently used
  * results are cached up to a number of bytes.
  */
 export class SharedReads<T> {
   readonly #sizeOf: (result: T) => number;
   readonly #keptBytes: number;
-  /** The most recently used is last. */
+  /** Reads by key; the most recently used one is last. */
   readonly #readings = new Map<string, Reading<T>>();
 
   /**
-   * @param sizeOf Size of a result in bytes.
-   * @param keptBytes Limit of the cache; the last result is always kept.
+   * @param sizeOf Returns the size of a result in bytes.
+   * @param keptBytes Maximum size of the cache in bytes. The last result is always kept.
    */
   constructor(sizeOf: (result: T) => number, keptBytes = KEPT_BYTES) {
     this.#sizeOf = sizeOf;
     this.#keptBytes = keptBytes;
   }
 
-  /** Whether a result is cached. */
+  /** Whether the result of a key is cached. */
   has(key: string): boolean {
     return this.#readings.get(key)?.bytes !== undefined;
   }
 
   /**
-   * Rejects as `read` does, or immediately with the reason of `signal` when it is aborted.
-   * @param read Is aborted when no caller waits for it.
-   * @param owner Account of the read: results are shared by all callers, pending reads by those of one account.
+   * Returns the result of a key from the cache, from a pending read, or from a new read. Rejects as `read` does, or at
+   * once with the reason of `signal` when that aborts.
+   * @param read Reads the result; its signal aborts when no caller waits any more.
+   * @param owner Account of the caller. All callers share results; callers of one account share pending reads.
    */
   async read(
     key: string,

@@ -1,4 +1,4 @@
-/** Minimal float64 linear algebra for cameras and bounds. Matrices are row-major. */
+/** Minimal float64 linear algebra for cameras and bounds. Matrices are row-major, and act on column vectors. */
 
 export type Vector3 = readonly [x: number, y: number, z: number];
 
@@ -17,7 +17,7 @@ export const cross = (a: Vector3, b: Vector3): Vector3 => [
 export const length = (a: Vector3): number => Math.hypot(a[0], a[1], a[2]);
 export const normalize = (a: Vector3): Vector3 => scale(a, 1 / length(a));
 
-/** The product a·b of two row-major 4x4 matrices. */
+/** Returns the product a·b of two row-major 4x4 matrices. */
 export function multiply(a: Matrix4, b: Matrix4): Float64Array {
   const out = new Float64Array(16);
   for (let row = 0; row < 4; row++) {
@@ -30,13 +30,15 @@ export function multiply(a: Matrix4, b: Matrix4): Float64Array {
   return out;
 }
 
-/** Position of the eye in world units: the point that an affine world-to-camera matrix maps to the origin. */
+/**
+ * Returns the position of the eye in world units: the point that an affine world-to-camera matrix maps to the origin.
+ */
 export function eyeOf(worldToCamera: Matrix4): Vector3 {
   const m = inverse(worldToCamera);
   return [m[3], m[7], m[11]];
 }
 
-/** The inverse of an affine matrix. */
+/** Returns the inverse of an affine matrix; its entries are not finite for a singular matrix. */
 export function inverse(m: Matrix4): Float64Array {
   const rows: [Vector3, Vector3, Vector3] = [
     [m[0], m[1], m[2]],

@@ -10,94 +10,95 @@ import { cutCloud, searchRefined, type CutCloud, type Plan } from './refine/sear
 import { encodingsFor, type Encoding } from './write/index.js';
 import type { EncodeWebp } from './write/sog.js';
 
-/** Measures the time by kind of work. */
+/** Measures the duration of work of several kinds. */
 export class Stopwatch {
   readonly #seconds: Record<string, number> = {};
   #last = performance.now();
 
-  /** Adds the time since the last lap to a kind of work. */
+  /** Adds the time since the previous call, or since the construction, to a kind of work. */
   lap(work: string): void {
     const now = performance.now();
     this.#seconds[work] = (this.#seconds[work] ?? 0) + (now - this.#last) / 1000;
     this.#last = now;
   }
 
-  /** Seconds by kind of work. */
+  /** Duration in seconds of each kind of work. */
   get seconds(): Readonly<Record<string, number>> {
     return { ...this.#seconds };
   }
 }
 
 export interface EconomiseOptions {
-  /** Minimum PSNR over the covered pixels of the held-out views for the written file, dB. */
-  readonly minDecibels: number;
+  /** Minimum PSNR of the written file in dB, over the covered pixels of the held-out views. */
+  readonly minPsnr: number;
   /** Name of the output file, whose extension selects the format. */
   readonly name: string;
-  /** Evaluates the cloud: a `GpuEvaluator`, or a wrapper of one. */
+  /** Evaluator of the cloud: a `GpuEvaluator`, or a wrapper of one. */
   readonly evaluator: Evaluator;
-  /** Runs parallel parts of writing and reading back the file; default {@link inline}. */
+  /** Pool that runs parallel parts of writing and reading the file; default {@link inline}. */
   readonly pool?: TaskPool;
-  /** Encodes lossless WebP for SOG: needed only for `.sog`. */
+  /** Encoder of lossless WebP. Required for SOG only. */
   readonly encodeWebp?: EncodeWebp;
   readonly signal?: AbortSignal;
   /** Called with a description of each step. */
   readonly onStep?: (step: string) => void;
 }
 
-/** A compressed scene, and its quality. */
+/** A compressed scene file, and its measured quality. */
 export interface Economised {
   readonly bytes: Uint8Array<ArrayBuffer>;
   readonly encoding: string;
   readonly splats: { readonly before: number; readonly after: number };
-  /** Coefficients of spherical harmonics above the constant one, over all splats and channels. */
+  /** Number of coefficients of spherical harmonics above the constant one, over all splats and channels. */
   readonly coefficients: { readonly before: number; readonly after: number };
   /** Number of splats of degree 0, 1, 2 and 3. */
   readonly degrees: readonly number[];
-  /** dB over the covered pixels: of all held-out views together, and of the worst one. */
-  readonly decibels: number;
-  readonly worstDecibels: number;
+  /** PSNR of all held-out views together in dB, over the covered pixels. */
+  readonly psnr: number;
+  /** PSNR of the held-out view with the largest error in dB, over the covered pixels. */
+  readonly worstPsnr: number;
   /** Number of held-out views that show some of the scene. */
   readonly heldOutViews: number;
   readonly cut: Cut;
   /**
-   * Duration of each kind of work, s: `score`, `search`, `refine`, `fit`, `write` (and read back), `judge`; with
-   * several encodings `encode`.
+   * Duration in seconds of each kind of work: `score`, `encode` (choice of the encoding), `search`, `fit`, `refine`,
+   * `write` (including reading the file) and `judge`.
    */
   readonly seconds: Readonly<Record<string, number>>;
 }
 
-/** Maximum fraction of the error for quantization before a finer encoding is tried. */
+/** Maximum fraction of the allowed error that quantization may cause. Beyond it, a finer encoding is tried. */
 const ROUNDING_SHARE = 0.6;
 /**
- * Factor of the cut if the written file misses the target, squared in the next try and so on. The last try keeps
- * everything.
+ * Factor of the error that cuts may cause, if the written file misses the target. Retry n uses its n-th power. The last
+ * retry keeps all splats and coefficients.
  */
 const SHRINK = 0.9;
 const MAX_TRIES = 8;
 /**
- * Maximum number of enlargements of the cut, the fraction of the remaining error that each uses, and the fraction of
- * the allowed error that ends them.
+ * Maximum number of enlargements of the cut; fraction of the remaining error that each enlargement uses; fraction of the
+ * allowed error that ends them.
  */
 const [MAX_EXTRA, MORE_SHARE, ENOUGH] = [3, 0.9, 0.98];
 const WHOLE: Plan = { trades: { cutAt: () => ({}) }, filling: 0, isRefined: false };
 
 /**
- * Compresses a scene to a target PSNR: scores all splats by the error of the views without them, drops the least
- * important, removes view-dependent color that is not visible, sorts the rest from coarse to fine, and writes it. The
- * error is divided between both cuts to save the most. The PSNR is measured on the written file after reading it back,
- * in held-out views: these do not influence scores or choices, and can only make the cut smaller.
+ * Compresses a scene to a target PSNR. Scores all splats by the error of views without them, drops the least important
+ * splats, and removes view-dependent color that is not visible. The allowed error is divided between these cuts so that
+ * they save the most. The file has the remaining splats from coarse to fine. PSNR is measured on the written file in
+ * held-out views, which do not influence scores, and can only make the cut smaller.
  *
  * @throws GaussianSplatError `argument/value` if the format cannot reach the target, the extension of the file's name
  * is unknown, or no view shows the scene.
  */
 export async function economise(cloud: GaussianCloud, options: EconomiseOptions): Promise<Economised> {
-  const { minDecibels, evaluator, pool = inline, signal, onStep = () => undefined } = options;
+  const { minPsnr, evaluator, pool = inline, signal, onStep = () => undefined } = options;
   const encodings = encodingsFor(options.name, cloud, options);
   const watch = new Stopwatch();
   onStep(`scoring ${cloud.count} splats`);
   const ranking = await evaluator.rank(signal);
   watch.lap('score');
-  const target = meanSquareOf(minDecibels);
+  const target = meanSquareOf(minPsnr);
   const { encoding, rounding } = await chooseEncoding(cloud, encodings, target, options);
   watch.lap('encode');
   const budget = Math.max(0, target - rounding);
@@ -153,25 +154,28 @@ export async function economise(cloud: GaussianCloud, options: EconomiseOptions)
 }
 
 /**
- * Converts a written scene to the coordinates of its source, because formats without an up direction store it rotated.
+ * Returns a written scene in the coordinates of its source `cloud`. Formats without a direction up store rotated scenes.
  */
-function asGiven(written: GaussianCloud, cloud: GaussianCloud): GaussianCloud {
+export function asGiven(written: GaussianCloud, cloud: GaussianCloud): GaussianCloud {
   const rotation = written.hints?.up === undefined ? uprightRotation(cloud) : undefined;
   return rotation ? turned(written, transposed(rotation)) : written;
 }
 
-/** A file, read back and evaluated. */
+/** A written file with its errors, measured after reading it. */
 interface Written extends CutCloud {
   readonly encoding: Encoding;
   readonly bytes: Uint8Array;
-  /** Errors of each held-out view, and of all together. */
+  /** Mean squared error of each held-out view, peak 1. */
   readonly errors: readonly number[];
+  /** Mean squared error of all held-out views together. */
   readonly error: number;
 }
 
 /**
- * Uses the remaining error of a file, because its quantization was measured in other views, and cuts are discrete.
- * @param take Writes a file with an error that is larger by about `extra`.
+ * Writes smaller files while the error is below the allowed one, and returns the smallest file within `target`. An error
+ * may remain because quantization was measured in other views, and cuts are discrete.
+ * @param target Allowed mean squared error.
+ * @param take Writes a file whose mean squared error is larger by about `extra`.
  */
 async function takeMore(found: Written, target: number, take: (extra: number) => Promise<Written>): Promise<Written> {
   let [best, low, high] = [found, 0, Infinity];
@@ -185,8 +189,8 @@ async function takeMore(found: Written, target: number, take: (extra: number) =>
 }
 
 /**
- * Selects the smallest encoding whose quantization error leaves room for cuts. If there is only one, only the written
- * file is evaluated.
+ * Returns the smallest encoding with a quantization error of at most {@link ROUNDING_SHARE} of the target, and this error
+ * (`rounding`, a mean squared error). A single encoding without steps is not measured; its `rounding` is 0.
  */
 async function chooseEncoding(
   cloud: GaussianCloud,
@@ -219,7 +223,7 @@ async function chooseEncoding(
   throw unreachable(options, upperBound(best));
 }
 
-/** Copies shared memory, because many APIs reject shared buffers. */
+/** Returns the bytes in an ArrayBuffer: a copy if they are in shared memory, which many APIs reject. */
 function unshared(bytes: Uint8Array): Uint8Array<ArrayBuffer> {
   return bytes.buffer instanceof ArrayBuffer ? (bytes as Uint8Array<ArrayBuffer>) : new Uint8Array(bytes);
 }
@@ -237,19 +241,19 @@ function summary(
       after: keptCoefficients(degrees),
     },
     degrees: degreesOf(degrees),
-    decibels: decibels(errorTogether(found, 'heldOut')),
+    psnr: decibels(errorTogether(found, 'heldOut')),
     heldOutViews: found.length,
-    worstDecibels: decibels(Math.max(...found)),
+    worstPsnr: decibels(Math.max(...found)),
     cut,
   };
 }
 
 const upperBound = (error: number): string => `at most ${decibels(error).toFixed(1)} dB, with every splat kept`;
 
-function unreachable({ name, minDecibels }: EconomiseOptions, found: string): GaussianSplatError {
+function unreachable({ name, minPsnr }: EconomiseOptions, found: string): GaussianSplatError {
   return new GaussianSplatError('argument/value', {
     where: name,
-    expected: `${minDecibels} dB or more in the held-out views`,
+    expected: `${minPsnr} dB or more in the held-out views`,
     found,
     remedy: 'write a more precise format (.ply; .glb in place of .spz), or ask for less',
   });

@@ -1,49 +1,49 @@
 import type { GaussianCloud } from '@gaussian-splat/core';
-import type { SplatVisibility } from './pages/seen-splats.js';
+import type { SplatVisibility } from './pages/splat-visibility.js';
 import type { Cut, ReducedCloud } from './reduce.js';
 import type { Ranking } from './score.js';
 
 /**
- * Views for measuring errors: those of the search, or the held-out ones, which measure the result and whether its cut
- * is too large.
+ * Views for measurements of errors. `searched` views find the size of the cut. `heldOut` views measure the result, and
+ * whether its cut is too large.
  */
 export type EvaluationViews = 'searched' | 'heldOut';
 
-/** Statistics and errors of a cut scene. */
+/** Errors and sizes of a cut scene. */
 export interface CutFigures {
   /**
-   * Mean squared error of the colors of each image, peak 1, over the pixels that the whole scene covers; views without
-   * any are excluded.
+   * Mean squared error of the colors of each view's image, peak 1, over the pixels that the whole scene covers. Views
+   * that the scene does not cover are excluded.
    */
   readonly errors: readonly number[];
-  /** [4] number of remaining splats by the degree of spherical harmonics that they keep. */
+  /** [4] number of remaining splats of each degree of spherical harmonics, 0 to 3. */
   readonly degrees: readonly number[];
 }
 
 /**
- * Evaluates a scene: the contribution of its splats, and the error of images of a reduced scene against those of the
- * whole. {@link GpuEvaluator} does it on the GPU.
+ * Evaluator of a scene: measures the contribution of its splats, and the error of images of a reduced scene against those
+ * of the whole scene. {@link GpuEvaluator} does so on the GPU.
  */
 export interface Evaluator {
-  /** Scores the scene in the scoring views. Must be called first; it draws the scene once. */
+  /** Scores the splats in the scoring views. Call it before other methods. */
   rank(signal?: AbortSignal): Promise<Ranking>;
-  /** Visibility of the splats in the scoring views, if the evaluator provides it; call {@link rank} first. */
+  /** Returns the visibility of the splats in the scoring views, if the evaluator measures it. */
   seen?(): Promise<SplatVisibility | undefined>;
-  /** Measures a cut in images of the scene. */
+  /** Measures the errors of the scene after a cut. */
   cut(cut: Cut, views: EvaluationViews, signal?: AbortSignal): Promise<CutFigures>;
-  /** Applies a cut, for writing. */
+  /** Returns the scene after a cut, for writing. The scene is not modified. */
   reduce(cut: Cut, signal?: AbortSignal): Promise<ReducedCloud>;
-  /** Errors of another cloud that replaces the scene, as {@link CutFigures.errors}. */
+  /** Measures the errors of a cloud that replaces the scene, as {@link CutFigures.errors}. */
   compare(cloud: GaussianCloud, views: EvaluationViews, signal?: AbortSignal): Promise<readonly number[]>;
-  /** The same at the speed of {@link cut}: accurate enough for a search. */
+  /** Measures the same errors as {@link compare} in the time of {@link cut}, accurately enough for a search. */
   sketch(cloud: GaussianCloud, views: EvaluationViews, signal?: AbortSignal): Promise<readonly number[]>;
   /**
-   * Fits a cut scene to images of the whole one, if the evaluator supports it ({@link RefiningEvaluator}). The argument
-   * is not modified.
+   * Returns a cut scene after fitting it to images of the whole scene. Only {@link RefiningEvaluator} supports this. The
+   * argument is not modified.
    */
   refine?(reduced: ReducedCloud, signal?: AbortSignal): Promise<ReducedCloud>;
   /** Frees the resources of the evaluator. */
   destroy(): void;
-  /** Measured prices of merges, in ascending order; undefined for an evaluator without merging. */
+  /** Values of `Cut.mergePrice` to measure, in ascending order. Undefined for an evaluator without merging. */
   readonly mergePrices?: readonly number[];
 }

@@ -9,42 +9,49 @@ import { bestTrades, measureTrades, type TradeCurve } from './search.js';
 
 /** Fractions of splats whose removal is measured, least important first. */
 const DROPPED_SHARES = [0.01, 0.02, 0.035, 0.05, 0.07, 0.1, 0.14, 0.19, 0.25, 0.32, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9];
-/** Two scores are compared at this fraction. */
+/** Fraction of dropped splats for the comparison of two scores. */
 const TRIAL_SHARE = 0.06;
-/** Measured prices of a coefficient. */
+/** Values of `Cut.colorPrice` that are measured. */
 const PRICES = Array.from({ length: 14 }, (_, k) => 10 ** (-14.5 + 0.5 * k));
-/** Numbers of a splat besides its harmonics. */
+/** Count of numbers of a splat without its spherical harmonics. */
 const OTHER_NUMBERS = 11;
-/** Number of cuts to try in the held-out views, and the fraction of the allowed error that ends the search. */
+/** Maximum number of cuts that are tried in the held-out views. The fraction of the allowed error ends the search. */
 const FIT_TRIES = 6;
 const NEAR_ENOUGH = 0.99;
 
-/** Cuts that trade size for error. */
+/** Measured relation between the size of cuts and their error. */
 export interface Trades {
-  /** Returns the cut that saves the most numbers of the file within a mean squared error, from measurements. */
+  /** Returns the cut that saves the most numbers of the file within a mean squared error. */
   readonly cutAt: (error: number) => Cut;
 }
 
-/** Options of the search. */
+/** Options of {@link findTrades} and {@link scaleToFit}. */
 export interface FitOptions {
   /**
-   * Fraction of the error of drops and merges that remains after refinement; 1, the default, without refinement. The
-   * error of fewer bands does not change.
+   * Fraction of the error of dropped and merged splats that remains after refinement, 0..1; default 1, without refinement.
+   * Refinement does not reduce the error of removed bands.
    */
   readonly leftByRefining?: number;
-  /** Whether every splat of the file takes as many coefficients as the one with the most: see `Encoding`. */
+  /** Whether the file has the same number of coefficients for every splat; see `Encoding.hasOneDegree`. */
   readonly hasOneDegree?: boolean;
   readonly signal?: AbortSignal;
   readonly onStep?: (step: string) => void;
 }
 
-/** A candidate score for dropping, with thresholds. */
+/**
+ * Cuts that drop splats by one score. `cutAt` returns the cut for a threshold of the score. `thresholds` are those whose
+ * error is to be measured.
+ */
 interface Dropping {
   readonly thresholds: readonly number[];
   readonly cutAt: (threshold: number) => Cut;
 }
 
-/** Measures, in the search views, the separate costs of dropping splats and of dropping bands of color. */
+/**
+ * Measures, in the searched views, the error of dropping splats, of removing bands of color, and of merging splats, each
+ * for several thresholds.
+ * @param budget Allowed mean squared error, which ends each series of measurements.
+ */
 export async function findTrades(
   cloud: GaussianCloud,
   ranking: Ranking,
@@ -72,12 +79,12 @@ export async function findTrades(
   onStep('measuring what dropped splats cost');
   const dropping = await chooseDropping(ranking, evaluator, signal);
   const drop = await along(dropping.thresholds, dropping.cutAt, left);
-  onStep('measuring what fewer bands of colour cost');
+  onStep('measuring what fewer bands of color cost');
   const color = await along(cloud.shDegree > 0 ? PRICES : [], (colorPrice) => ({ colorPrice }), 1, hasOneDegree);
   const trades: Trades = {
     cutAt: (error) => {
       const [dropped, colored] = bestTrades(drop, color, error);
-      // The GPU compares in float32.
+      // Thresholds are rounded, because the GPU compares them in float32.
       const [threshold, colorPrice] = [Math.fround(dropped.threshold), Math.fround(colored.threshold)];
       return { ...dropping.cutAt(threshold), colorPrice };
     },
@@ -98,15 +105,15 @@ export async function findTrades(
 }
 
 /**
- * Number of coefficients in a file, from the count of splats of each degree. @param hasOneDegree Whether all take as
- * many as those of the highest.
+ * Returns the count of numbers in a file, from the number of splats of each degree.
+ * @param hasOneDegree Whether the file has the same number of coefficients for every splat.
  */
 export function numbersOf(degrees: readonly number[], hasOneDegree = false): number {
   if (hasOneDegree) return numbersOf(atHighest(degrees));
   return degrees.reduce((sum, splats, degree) => sum + splats * (OTHER_NUMBERS + 3 * (degree + 1) ** 2), 0);
 }
 
-/** The same number of splats, all of the highest degree that occurs. */
+/** Returns the number of splats of each degree if all splats had the highest degree that occurs. */
 function atHighest(degrees: readonly number[]): number[] {
   const count = degrees.reduce((sum, splats) => sum + splats, 0);
   const highest = degrees.findLastIndex((splats) => splats > 0);
@@ -114,9 +121,9 @@ function atHighest(degrees: readonly number[]): number[] {
 }
 
 /**
- * Selects thresholds of the better score at the trial fraction: the error of single views, or the largest weight in a
- * pixel. The former accounts for the size of a splat and the splats behind it, the latter is more careful with splats
- * that are removed together; the better one depends on the scene.
+ * Returns the score with the smaller error when {@link TRIAL_SHARE} of the splats are dropped. The removal error accounts
+ * for the size of a splat and the splats behind it. The largest weight in a pixel is safer for splats that are removed
+ * together. Which is better depends on the scene.
  */
 async function chooseDropping(
   { removalError, contribution }: Ranking,
@@ -129,7 +136,7 @@ async function chooseDropping(
   ].map(({ values, cutAt }) => {
     const places = [TRIAL_SHARE, ...DROPPED_SHARES].map((share) => Math.floor(share * (values.length - 1)));
     const [trial, ...dropped] = valuesAtPlaces(values, places);
-    // Splats without any cost are dropped first, for any budget.
+    // The first threshold drops only splats with a score of 0, which any budget allows.
     return { trial, dropped: [smallestAboveZero(values), ...dropped], cutAt };
   });
   const trials: number[] = [];
@@ -140,7 +147,7 @@ async function chooseDropping(
   return { thresholds, cutAt };
 }
 
-/** GPUs may flush smaller numbers to 0. */
+/** Smallest normal float32. GPUs may flush smaller numbers to 0. */
 const MIN_NORMAL = 2 ** -126;
 
 function smallestAboveZero(values: Float32Array): number {
@@ -150,9 +157,9 @@ function smallestAboveZero(values: Float32Array): number {
 }
 
 /**
- * Finds the fraction of the search's budget that keeps the held-out views within the error, too: they can only reduce
- * it.
- * @returns A fraction in 0..1; 0 if there is none.
+ * Finds the largest fraction of a budget that keeps the error of the held-out views within the budget, too.
+ * @param budget Allowed mean squared error.
+ * @returns A fraction, 0..1. 0 if no cut is within the budget.
  */
 export async function scaleToFit(
   { cutAt }: Trades,
@@ -168,8 +175,8 @@ export async function scaleToFit(
     if (error <= budget) fits = next;
     else fails = next;
     if (fits === 1 || (error <= budget && error > NEAR_ENOUGH * budget)) break;
-    // Errors are nearly proportional to the budget, but in steps if there are few splats: an error that did not
-    // decrease is no basis for extrapolation.
+    // Errors are nearly proportional to the budget, but change in steps if there are few splats. Therefore an error that
+    // has not changed is not extrapolated.
     const guess = (next * 0.995 * budget) / error;
     next = guess > fits && guess < fails && error !== last ? guess : (fits + Math.min(1, fails)) / 2;
     last = error;

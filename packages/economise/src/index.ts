@@ -1,4 +1,4 @@
-export { economiseWithin, FIRST_DECIBELS, type EconomisedWithin } from './within-bytes.js';
+export { economisePassing, economiseWithin, FIRST_PSNR, type EconomisedBySearch } from './search-decibels.js';
 export { economise, type Economised, type EconomiseOptions } from './economise.js';
 export type { CutFigures, Evaluator, EvaluationViews } from './evaluator.js';
 export { GpuEvaluator, type GpuEvaluatorOptions } from './gpu/gpu-evaluator.js';
@@ -16,7 +16,6 @@ export {
   splitViews,
   viewsAround,
   viewsBetween,
-  type DealtViewOptions,
   type ViewSplit,
   type ViewOptions,
 } from './views.js';

@@ -5,7 +5,8 @@ import type { EvaluationViews } from './evaluator.js';
 export type Image = Float32Array;
 
 /**
- * Mean squared difference of the three colors, peak 1, over the pixels that the reference covers; 0 if there are none.
+ * Returns the mean squared difference of red, green and blue, peak 1, over the pixels that the reference covers (alpha
+ * above 0). 0 if the reference covers none.
  */
 export function meanSquare(image: Image, reference: Image): number {
   let sum = 0;
@@ -24,9 +25,9 @@ export const mean = (values: readonly number[]): number =>
   values.reduce((sum, value) => sum + value, 0) / values.length;
 
 /**
- * The error of some views together.
- * @param errors Errors of the views that show the scene.
- * @throws GaussianSplatError `argument/value` if there are none, because a cut could not be evaluated.
+ * Returns the mean of the errors of several views.
+ * @param errors Mean squared errors of the views that show the scene.
+ * @throws GaussianSplatError `argument/value` if no view shows the scene, because no cut can then be evaluated.
  */
 export function errorTogether(errors: readonly number[], views: EvaluationViews): number {
   if (errors.length > 0) return mean(errors);

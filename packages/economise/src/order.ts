@@ -2,9 +2,9 @@ import type { GaussianCloud } from '@gaussian-splat/core';
 import { sortByKey } from '@gaussian-splat/renderer/tools';
 
 /**
- * Indices in ascending order of numbers, of equal ones the last first: reversed it is a stable descending order.
- * Numbers must not be negative: their bits then sort in the same order, and a radix sort of millions is ten times as
- * fast as comparisons.
+ * Returns the indices of values in ascending order. Of equal values the last comes first, so that the reversed order is a
+ * stable descending one. Values must not be negative, so that a radix sort of their bits has the same order. A radix sort
+ * of millions is ten times as fast as comparisons.
  */
 export function ascendingOrder(values: Float32Array): Uint32Array {
   const bits = new Uint32Array(values.buffer, values.byteOffset, values.length);
@@ -13,13 +13,13 @@ export function ascendingOrder(values: Float32Array): Uint32Array {
   return sortByKey(places, bits.slice().reverse());
 }
 
-/** Number of values of half a word. */
+/** Number of values of a half of 32 bits. */
 const HALVES = 1 << 16;
 
 /**
- * Order statistics: the numbers at some positions of the ascending order, in a tenth of the time of sorting. Numbers
- * must not be negative. A histogram of the upper halves of their bits selects candidates, a second one their lower
- * halves.
+ * Returns order statistics: the values at some positions of the ascending order, in a tenth of the time of sorting. Values
+ * must not be negative. One histogram counts the upper halves of their bits, and further ones the lower halves of
+ * candidates.
  */
 export function valuesAtPlaces(values: Float32Array, places: readonly number[]): number[] {
   const bits = new Uint32Array(values.buffer, values.byteOffset, values.length);
@@ -45,14 +45,14 @@ export function valuesAtPlaces(values: Float32Array, places: readonly number[]):
   return [...new Float32Array(words.buffer)];
 }
 
-/** Finds the bin of a histogram at a position of the order, and the position within it. */
+/** Returns the bin of a histogram at a position of the order (`half`), and the position within the bin (`rest`). */
 function countedAt(counts: Uint32Array, place: number): { half: number; rest: number } {
   let [half, rest] = [0, place];
   while (rest >= counts[half]) rest -= counts[half++];
   return { half, rest };
 }
 
-/** Sorts the splats by visibility, most visible first: contribution times the area of the splat. */
+/** Returns the indices `splats` by descending visibility, which is the contribution of a splat times its area. */
 export function coarseToFine(
   { scales }: Pick<GaussianCloud, 'scales'>,
   contribution: Float32Array,
@@ -71,7 +71,7 @@ export function coarseToFine(
   return order;
 }
 
-/** {@link coarseToFine} for all splats of a cloud, which a thread can run before the cut is known. */
+/** Returns the order of {@link coarseToFine} for all splats of a cloud. A thread can run it before the cut is known. */
 export function orderAll({ scales, contribution }: { scales: Float32Array; contribution: Float32Array }): Uint32Array {
   return coarseToFine(
     { scales },
@@ -80,7 +80,7 @@ export function orderAll({ scales, contribution }: { scales: Float32Array; contr
   );
 }
 
-/** Filters an order of all splats to the remaining ones. */
+/** Returns the indices `staying` in the order that they have in `order`, an order of all splats. */
 export function stayingInOrder(order: Uint32Array, staying: Uint32Array): Uint32Array {
   const stays = new Uint8Array(order.length);
   for (let k = 0; k < staying.length; k++) stays[staying[k]] = 1;

@@ -1,4 +1,4 @@
-/** Parallel tasks for threads: this entry point loads no renderer. */
+/** Entry point for threads that run parallel tasks. It does not load the renderer. */
 export { gatherParts } from './parts/read-in-parts.js';
 export { readBlocks, type PartRead } from './parts/read-part.js';
 export type { Part } from './parts/cloud-memory.js';

@@ -6,46 +6,46 @@ import { inline, partsOf, poolFor, type TaskPool } from './parts/task-pool.js';
 import type { Scores } from './score.js';
 import { takeSplats } from './take-splats.js';
 
-/** Thresholds for reducing a scene. */
+/** Thresholds of the parts of a scene that are dropped. Default of all: 0, which keeps everything. */
 export interface Cut {
-  /** Drops splats that contribute less than this to every pixel; 0, the default, keeps all. */
+  /** Drops splats whose weight is below this value in every pixel, 0..1. */
   readonly minContribution?: number;
-  /** Drops splats whose removal costs less than this mean squared error; 0, the default, keeps all. */
+  /** Drops splats whose removal increases the mean squared error by less than this value. */
   readonly removalPrice?: number;
-  /** Mean squared error that a coefficient is worth: those that save less are dropped; 0, the default, keeps all. */
+  /** Drops coefficients that reduce the mean squared error by less than this value each. */
   readonly colorPrice?: number;
   /**
-   * Merges pairs of similar splats up to this mean squared error, if the evaluator supports it ({@link
-   * MergingEvaluator}); 0, the default, merges none.
+   * Merges pairs of similar splats if that increases the mean squared error by at most this value. Only {@link
+   * MergingEvaluator} supports it.
    */
   readonly mergePrice?: number;
 }
 
-/** A cloud without its least important parts. */
+/** A cloud after a cut. */
 export interface ReducedCloud {
   /**
-   * Sorted by visibility, so that any prefix is a coarser image of the whole; scenes of planes keep the source's order.
-   * Coefficients above a splat's degree are 0.
+   * Remaining splats by descending visibility, so that any prefix is a coarser version of the scene. Scenes of planes
+   * keep the order of the source. Coefficients above a splat's degree are 0.
    */
   readonly cloud: GaussianCloud;
-  /** [N] degree that each splat keeps. */
+  /** [N] degree of spherical harmonics that each splat keeps. */
   readonly degrees: Uint8Array;
-  /** [N] index in the source; for a merged splat that of one of its sources. */
+  /** [N] index of each splat in the source. For a merged splat, the index of one of its sources. */
   readonly kept: Uint32Array;
 }
 
-/** The remaining splats, and their color bands. */
+/** Selection of the splats and bands of color that remain. */
 export interface Choice {
   /** Indices of the remaining splats, most visible first. */
   readonly kept: Uint32Array;
-  /** [N] degree that each of them keeps. */
+  /** [N] degree of spherical harmonics that each remaining splat keeps. */
   readonly degrees: Uint8Array;
 }
 
 /**
- * Order for writing the splats of a cloud: most visible first. Scenes of planes keep the order of the file, which
- * decides between splats of equal depth.
- * @param splats Indices of the remaining ones, ascending.
+ * Returns the order of splats in a file: the most visible first. Scenes of planes keep the order of the source,
+ * which determines the image of splats at equal depth.
+ * @param splats Indices of the remaining splats, ascending.
  */
 export function writtenOrder(
   cloud: Pick<GaussianCloud, 'scales' | 'positions'>,
@@ -55,7 +55,7 @@ export function writtenOrder(
   return isOfPlanes(cloud.positions) ? splats.slice() : coarseToFine(cloud, contribution, splats);
 }
 
-/** Applies a cut. The source is not modified. */
+/** Returns a cloud after a cut, except for merges. The source is not modified. */
 export function reduce(cloud: GaussianCloud, scores: Scores, cut: Cut): ReducedCloud {
   const { contribution, removalError, lowered } = scores;
   const { minContribution = 0, removalPrice = 0, colorPrice = 0 } = cut;
@@ -76,8 +76,7 @@ export function reduce(cloud: GaussianCloud, scores: Scores, cut: Cut): ReducedC
 }
 
 /**
- * Returns the remaining splats in order. Coefficients of splats with a reduced degree are 0, to be filled in by the
- * caller.
+ * Returns the chosen splats in their order. All coefficients of splats with a reduced degree are 0; the caller sets them.
  */
 export function reduceTo(cloud: GaussianCloud, choice: Choice): ReducedCloud {
   const reduced = roomFor(cloud, choice, inline);
@@ -85,12 +84,12 @@ export function reduceTo(cloud: GaussianCloud, choice: Choice): ReducedCloud {
   return reduced;
 }
 
-/** Returns some splats of a cloud in the given order. */
+/** Returns the splats of a cloud with the given indices, in this order. */
 export function splatsOf(cloud: GaussianCloud, numbers: Uint32Array): GaussianCloud {
   return reduceTo(cloud, { kept: numbers, degrees: new Uint8Array(numbers.length).fill(cloud.shDegree) }).cloud;
 }
 
-/** Returns the cloud without harmonics above a degree. */
+/** Returns a cloud without spherical harmonics above a degree; the same cloud if it has none. */
 export function toDegree(degree: ShDegree, cloud: GaussianCloud): GaussianCloud {
   if (cloud.shDegree <= degree) return cloud;
   const [all, kept] = [3 * shCoefficientCount(cloud.shDegree), 3 * shCoefficientCount(degree)];
@@ -99,7 +98,7 @@ export function toDegree(degree: ShDegree, cloud: GaussianCloud): GaussianCloud 
   return { ...cloud, shDegree: degree, sh };
 }
 
-/** The same in parallel. The result is in memory that the pool's tasks share. */
+/** Does the same as {@link reduceTo} by parallel tasks. The arrays of the result are in memory of the pool. */
 export async function reduceInParts(cloud: GaussianCloud, choice: Choice, pool: TaskPool): Promise<ReducedCloud> {
   const reduced = roomFor(cloud, choice, pool);
   const [from, to] = [columnsOf(cloud), columnsOf(reduced.cloud)];
@@ -111,14 +110,14 @@ export async function reduceInParts(cloud: GaussianCloud, choice: Choice, pool: 
   return reduced;
 }
 
-/** Allocates a reduced cloud of zeros. */
+/** Allocates a reduced cloud whose arrays are filled with zeros, of the highest kept degree. */
 function roomFor(cloud: GaussianCloud, { kept, degrees }: Choice, pool: TaskPool): ReducedCloud {
   const highest = degreesOf(degrees).findLastIndex((count) => count > 0);
   const columns = allocateColumns(kept.length, Math.max(0, highest) as ShDegree, pool);
   return { cloud: { ...cloud, ...columns, count: kept.length }, degrees, kept };
 }
 
-/** The degree that minimizes the error plus the price of the kept coefficients. */
+/** Returns the degree of splat `i` that minimizes its error plus the price of the kept coefficients. */
 function degreeOf(full: ShDegree, { lowered }: Scores, i: number, price: number): ShDegree {
   let best = full;
   let min = price * shCoefficientCount(full);
@@ -130,14 +129,14 @@ function degreeOf(full: ShDegree, { lowered }: Scores, i: number, price: number)
   return price > 0 ? best : full;
 }
 
-/** [4] number of splats of each degree. */
+/** Returns the number of splats of each degree, [4]. */
 export function degreesOf(degrees: Uint8Array): number[] {
   const counts = [0, 0, 0, 0];
   for (const degree of degrees) counts[degree]++;
   return counts;
 }
 
-/** Number of coefficients above the constant one in a reduced cloud, over all splats and channels. */
+/** Returns the number of coefficients above the constant one in a reduced cloud, over all splats and channels. */
 export function keptCoefficients(degrees: Uint8Array): number {
   return degreesOf(degrees).reduce((sum, count, degree) => sum + 3 * count * ((degree + 1) ** 2 - 1), 0);
 }

@@ -1,26 +1,26 @@
-/** Quantization step sizes. */
+/** Quantization step of each attribute. */
 export type Steps<K extends string> = Readonly<Record<K, number>>;
 
 export interface AllocateOptions<K extends string> {
-  /** Initial steps: large enough that the errors of all are distinguishable. */
+  /** Initial steps, which must be so large that the error of each step is measurable. */
   readonly usual: Steps<K>;
-  /** Numbers of a splat for each step. */
+  /** Count of a splat's numbers that each step quantizes. */
   readonly numbers: Partial<Steps<K>>;
-  /** Mean squared error with some steps. */
+  /** Returns the mean squared error with some steps. */
   readonly measure: (steps: Steps<K>) => Promise<number>;
   /** Allowed total mean squared error. */
   readonly target: number;
 }
 
-/** Maximum ratio between a step and the usual one. */
+/** Maximum ratio between a found step and the initial step, in both directions. */
 const FARTHEST = 8;
-/** Minimum fraction of the error of an attribute. */
+/** Minimum error of an attribute, as a fraction of the error with the initial steps. */
 const MIN_SHARE = 1e-3;
 
 /**
- * Finds steps such that an additional bit saves the same error in every attribute: the error of an attribute grows with
- * the square of its step, its bits with the logarithm, so each may have a fraction of the error in proportion to its
- * numbers. The error of each usual step is measured by doubling it.
+ * Finds steps with which an additional bit saves the same error in every attribute. The error of an attribute is
+ * proportional to the square of its step, and its bits to the logarithm. Therefore the error of each attribute is
+ * proportional to its count of numbers. The error of each initial step is measured by doubling the step.
  */
 export async function allocateSteps<K extends string>(options: AllocateOptions<K>): Promise<Steps<K>> {
   const { usual, numbers, measure, target } = options;
@@ -41,20 +41,21 @@ export interface FindStepsOptions<
   K extends string,
   Found extends { readonly error: number },
 > extends AllocateOptions<K> {
-  /** Fraction of the target for the steps, if there are other sources of error; default: all of it. */
+  /** Allowed mean squared error of the steps alone, if there are other sources of error; default `target`. */
   readonly share?: number;
   /**
-   * Measures the error of steps, and more, under the conditions of the result; default: {@link
-   * AllocateOptions.measure}.
+   * Measures steps under the conditions of the result. Its value has the mean squared error, and may have more properties.
+   * Default: {@link AllocateOptions.measure}.
    */
   readonly judge?: (steps: Steps<K>) => Promise<Found>;
-  /** The search ends at this fraction of the target; default 0.97. */
+  /** Fraction of the target that ends the search; default 0.97. */
   readonly nearEnough?: number;
 }
 
 /**
- * Finds the coarsest steps within an error: {@link allocateSteps} balances them, {@link fitSteps} scales all of them.
- * @returns The steps, and the result of `judge` for them.
+ * Finds the coarsest steps within an error. {@link allocateSteps} balances the steps, and {@link fitSteps} scales all of
+ * them.
+ * @returns The steps, and the properties that `judge` has returned for them.
  */
 export async function findSteps<K extends string, Found extends { readonly error: number }>(
   options: FindStepsOptions<K, Found>,
@@ -64,11 +65,11 @@ export async function findSteps<K extends string, Found extends { readonly error
   return fitSteps({ steps: await allocateSteps({ ...options, target: share }), measure: judge, target, nearEnough });
 }
 
-/** The same steps, times a factor. */
+/** Returns steps multiplied by a factor. */
 export const scaledSteps = <K extends string>(steps: Steps<K>, factor: number): Steps<K> =>
   Object.fromEntries(Object.entries<number>(steps).map(([name, step]) => [name, step * factor])) as Steps<K>;
 
-/** Result of a scale factor. */
+/** Measured mean squared error of steps multiplied by a scale factor. */
 interface Tried {
   readonly scale: number;
   readonly error: number;
@@ -76,19 +77,19 @@ interface Tried {
 
 export interface FitStepsOptions<K extends string, Found extends { readonly error: number }> {
   readonly steps: Steps<K>;
-  /** Measures some steps; the result contains a mean squared error. */
+  /** Measures steps. Its result has the mean squared error, and may have more properties. */
   readonly measure: (steps: Steps<K>) => Promise<Found>;
   /** Allowed mean squared error. */
   readonly target: number;
   /** Maximum number of measurements; default 6. */
   readonly tries?: number;
-  /** The search ends at this fraction of the target; default 0.97. */
+  /** Fraction of the target that ends the search; default 0.97. */
   readonly nearEnough?: number | undefined;
 }
 
 /**
- * Scales steps so that their error is near the allowed one.
- * @returns The steps, and the measurement; the finest tried steps if all exceed the limit.
+ * Scales steps so that their error is within the target, and near to it.
+ * @returns The steps, and their measurement. The steps with the smallest error if all exceed the target.
  */
 export async function fitSteps<K extends string, Found extends { readonly error: number }>(
   options: FitStepsOptions<K, Found>,
@@ -106,15 +107,18 @@ export async function fitSteps<K extends string, Found extends { readonly error:
   return tried.findLast(({ error }) => error <= target) ?? tried[0];
 }
 
-/** Maximum ratio between two consecutive scales. */
+/** Maximum ratio between consecutive scale factors. */
 const FARTHEST_SCALE = 3;
 /**
- * Lower limit of the exponent of the error as a function of the scale, which is usually 2, but may be lower between two
- * tries.
+ * Minimum exponent of the error as a function of the scale. The exponent is about 2, but may be lower between two
+ * measurements.
  */
 const MIN_SLOPE = 0.5;
 
-/** A scale between tries above and below the target, or beyond those that are all on one side of it. */
+/**
+ * Returns the next scale factor: between tried scales with errors above and below `aim`, or extrapolated if all errors are
+ * on one side.
+ */
 function nextScale(tried: readonly Tried[], aim: number): number {
   const [below, above] = tried.reduce<readonly [Tried?, Tried?]>(
     ([low, high], one) =>

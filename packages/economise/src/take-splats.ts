@@ -1,19 +1,19 @@
 import { shCoefficientCount } from '@gaussian-splat/core';
 import type { Columns } from './parts/cloud-memory.js';
 
-/** Splats to copy from a cloud. */
+/** Input of {@link takeSplats}. */
 export interface Taking {
   readonly from: Columns;
   readonly to: Columns;
   /** Indices of the splats in `from`. */
   readonly kept: Uint32Array;
-  /** Degree that each of them keeps. */
+  /** Degree of spherical harmonics that each of these splats keeps. */
   readonly degrees: Uint8Array;
-  /** Index of the first of them in `to`. */
+  /** Index in `to` of the first of these splats. */
   readonly at: number;
 }
 
-/** Copies splats in a new order. Coefficients of splats with a reduced degree stay unchanged. */
+/** Copies the splats `kept` to consecutive rows of `to`. Coefficients of splats with a reduced degree are not copied. */
 export function takeSplats({ from, to, kept, degrees, at }: Taking): void {
   takeRows(from.positions, to.positions, 3, kept, at);
   takeRows(from.scales, to.scales, 3, kept, at);

@@ -1,29 +1,39 @@
-import { cross, DEFAULT_FAR, eyeOf, lookAt, type Bounds, type Camera, type Vector3 } from '@gaussian-splat/core';
+import {
+  cross,
+  DEFAULT_FAR,
+  eyeOf,
+  lookAt,
+  multiply,
+  type Bounds,
+  type Camera,
+  type Vector3,
+} from '@gaussian-splat/core';
+import { uprightRotation } from '@gaussian-splat/formats';
 
 export interface ViewOptions {
   readonly width?: number;
   readonly height?: number;
-  /** Vertical field of view, radians. */
+  /** Vertical field of view in radians. */
   readonly fovYRadians?: number;
-  /** Another seed gives a disjoint set of views. */
+  /** Seed of the views. Different seeds give disjoint sets of views. */
   readonly seed?: number;
 }
 
-/** Distances from the center of the subject, in its radii: from close to the whole subject in view. */
+/** Distances of the eye from the center of the subject, in radii of the subject. */
 const DISTANCES = [1.5, 1.9, 2.4, 3.2];
-/** Height of the eye above the subject, radians: from slightly below to well above. */
+/** Minimum and maximum elevation of the eye above the subject, in radians. */
 const ELEVATIONS: readonly [number, number] = [-0.35, 1.1];
 
 /**
- * Views around a subject for scenes without cameras: evenly spaced around it, at several heights and distances, looking
- * at points near its center. Up is -y, as in captures.
+ * Returns views of a subject for scenes without cameras. Views are evenly spaced around the subject, at several heights
+ * and distances, and look at points near its center. Up is -y, as in captures.
  */
 export function viewsAround(bounds: Bounds, count: number, options: ViewOptions = {}): Camera[] {
   const { width = 480, height = 270, fovYRadians = 0.7, seed = 0 } = options;
   const { center, radius } = bounds;
   const f = height / (2 * Math.tan(fovYRadians / 2));
   return Array.from({ length: count }, (_, k) => {
-    // Additive sequences with irrational steps: no two sets of views share one, and every set covers the whole range.
+    // An additive sequence with an irrational step covers the whole range evenly, and does not repeat for other seeds.
     const at = (step: number): number => ((k + 0.5 + 97 * seed) * step) % 1;
     const azimuth = 2 * Math.PI * at(0.6180339887);
     const elevation = ELEVATIONS[0] + (ELEVATIONS[1] - ELEVATIONS[0]) * at(0.7548776662);
@@ -48,12 +58,12 @@ export function viewsAround(bounds: Bounds, count: number, options: ViewOptions 
   });
 }
 
-/** Distances of {@link viewsFromEverywhere}, in radii of the subject: every fifth from within it. */
+/** Distances of {@link viewsFromEverywhere} in radii of the subject. Every fifth eye is within the subject. */
 const EVERYWHERE = [...DISTANCES, 0.6];
 
 /**
- * Views of a subject from all directions, including from below and from within: parts that none of these show hardly
- * matter.
+ * Returns views of a subject from all directions, including from below and from within. Splats that none of these views
+ * shows are considered unimportant.
  */
 export function viewsFromEverywhere(bounds: Bounds, count: number, options: ViewOptions = {}): Camera[] {
   const { center, radius } = bounds;
@@ -69,16 +79,15 @@ export function viewsFromEverywhere(bounds: Bounds, count: number, options: View
 }
 
 /**
- * Distances of visitors' views, in radii: from within the subject, which enlarges its splats the most, to the whole
- * subject in view.
+ * Distances of visitors' views in radii of the subject. The smallest ones, within the subject, enlarge splats the most.
  */
 const VISITED_DISTANCES = [0.5, 0.75, 1.1, 1.6, 2.3, 3.2];
-/** Range of the element's cameras above and below a subject, radians. */
+/** Maximum elevation of the element's camera above and below a subject, in radians. */
 const VISITED_ELEVATION = 1.17;
 
 /**
- * Views that visitors may take of a subject: nearer than in captures, and also from below; looking at points near its
- * center.
+ * Returns views that visitors may take of a subject. These are nearer than captures, and also from below, and look at
+ * points near its center.
  */
 function viewsOfVisitors(bounds: Bounds, count: number, options: ViewOptions): Camera[] {
   const { center, radius } = bounds;
@@ -96,19 +105,19 @@ function viewsOfVisitors(bounds: Bounds, count: number, options: ViewOptions): C
   });
 }
 
-/** Pixels of the frames on visitors' screens. */
+/** Number of pixels of a frame on visitors' screens. */
 const FULL_PIXELS = 1920 * 1080;
-/** Errors are measured in crops of this many pixels: a whole frame takes nine times as long and gives the same result. */
+/** Number of pixels of the crops that measure errors. Whole frames take nine times as long, with the same result. */
 const EXCERPT_PIXELS = 640 * 360;
 
-/** Frame size for measuring errors of a view: at least the pixels of visitors' screens. */
+/** Returns the size of a view in pixels, enlarged to at least {@link FULL_PIXELS}. */
 function fullSizeOf({ width, height }: Pick<Camera, 'width' | 'height'>): { width: number; height: number } {
   const share = Math.max(1, Math.sqrt(FULL_PIXELS / (width * height)));
   return { width: Math.round(share * width), height: Math.round(share * height) };
 }
 
 /**
- * Crops of views at the resolution of visitors' screens, because the cost of a cut depends on the size of pixels,
+ * Returns a crop of each view at the resolution of visitors' screens. The error of a cut depends on the size of pixels,
  * especially for small splats.
  */
 export function excerptsOf(views: readonly Camera[]): Camera[] {
@@ -118,7 +127,7 @@ export function excerptsOf(views: readonly Camera[]): Camera[] {
     const share = Math.min(1, Math.sqrt(EXCERPT_PIXELS / (full.width * full.height)));
     const [width, height] = [full.width, full.height].map((side) => Math.round(share * side));
     const at = (step: number): number => ((k + 0.5) * step) % 1;
-    // Near the center more often than at the edges, which subjects may not reach.
+    // Crops are nearer to the center than to the edges, which the subject may not cover.
     const [left, top] = [0.2 + 0.6 * at(0.5545497), 0.2 + 0.6 * at(0.3085152)];
     return {
       ...view,
@@ -129,21 +138,21 @@ export function excerptsOf(views: readonly Camera[]): Camera[] {
   });
 }
 
-/** Views divided by purpose. */
+/** Views of a scene, divided by their purpose. */
 export interface ViewSplit {
   /** Views for scoring the contribution of splats. */
   readonly scored: readonly Camera[];
-  /** Views for finding the size of the cut. */
+  /** Views that find the size of the cut. */
   readonly searched: readonly Camera[];
-  /** Views used only for measuring the result. */
+  /** Views that only measure the result. */
   readonly heldOut: readonly Camera[];
 }
 
 /**
- * Views halfway between each camera and its nearest neighbor, as seen by visitors who move away from the capture
- * positions. Scores from few cameras would overfit their exact positions. Cameras in opposite directions, as in a
- * divided panorama, give none.
- * @param all All cameras that may be the neighbor; default: the same.
+ * Returns a view halfway between each camera and its nearest neighbor. Visitors see such views, and scores from only a few
+ * cameras would overfit the positions of these cameras. Cameras in opposite directions, as in a divided panorama, give no
+ * view.
+ * @param all All cameras that may be the neighbor; default `views`.
  */
 export function viewsBetween(views: readonly Camera[], all: readonly Camera[] = views): Camera[] {
   const eyes = all.map(({ worldToCamera }) => eyeOf(worldToCamera));
@@ -163,10 +172,10 @@ export function viewsBetween(views: readonly Camera[], all: readonly Camera[] = 
   });
 }
 
-/** Mean axes that are shorter, or nearly parallel, define no orientation. */
+/** Minimum length of the cross product of mean axes. Shorter or nearly parallel axes define no orientation. */
 const MIN_AXIS = 1e-3;
 
-/** A pose between two: the eye in the middle, the axes averaged and orthogonalized; undefined if they are degenerate. */
+/** Returns the pose between two cameras: mean eye, and mean axes orthogonalized. Undefined if the axes are degenerate. */
 function halfway(a: Camera, b: Camera): Camera['worldToCamera'] | undefined {
   const [eyeA, eyeB] = [eyeOf(a.worldToCamera), eyeOf(b.worldToCamera)];
   const eye = eyeA.map((value, axis) => (value + eyeB[axis]) / 2) as [number, number, number];
@@ -178,7 +187,7 @@ function halfway(a: Camera, b: Camera): Camera['worldToCamera'] | undefined {
   return lookAt(eye, target, [-down[0], -down[1], -down[2]]);
 }
 
-/** Divides views: of ten consecutive ones, one is for the search, two are held out, and the rest are for scoring. */
+/** Divides views. Of ten consecutive views, one is for the search, two are held out, and seven are for scoring. */
 export function splitViews(views: readonly Camera[]): ViewSplit {
   const of = (...places: number[]): Camera[] => views.filter((_, k) => places.includes(k % 10));
   return { scored: of(0, 1, 3, 4, 5, 6, 8), searched: of(2), heldOut: of(7, 9) };
@@ -189,27 +198,37 @@ export interface DealtViewOptions extends Omit<ViewOptions, 'seed'> {
   readonly scored?: number;
 }
 
-/** Seeds of the three kinds, far enough apart that scoring views never coincide with the others. */
+/** Seeds of the three kinds of views, with which scoring views never coincide with other views. */
 const [SEARCHED_SEED, HELD_OUT_SEED, SCORED_SEED] = [1, 2, 10];
 
 /**
- * Four views at each distance: with only six views the result depended on the selection by a decibel or two
- * (packages/economise/README.md).
+ * Number of held-out views, several at each distance. With only six views, the result depends on their selection by 1 to 2
+ * dB (packages/economise/README.md).
  */
 const HELD_OUT = 24;
 
-/** Views around a subject, all of one size: 216 for scoring, 8 for the search, 24 held out. */
+/** Returns views around a subject, all of the same size: 216 for scoring by default, 8 for the search, 24 held out. */
 export function viewSplitAround(bounds: Bounds, { scored = 216, ...options }: DealtViewOptions = {}): ViewSplit {
   return dealt(scored, (count, seed) => viewsAround(bounds, count, { ...options, seed }));
 }
 
 /**
- * Views that visitors may take of a scene without cameras: 0.5 to 3.2 radii from its center, up to 67° above and below
- * it. Errors are measured in crops of frames of 1920 x 1080.
- * @param scored Number of scoring views.
+ * Returns views that visitors may take of a scene without cameras. Their distance from its center is 0.5 to 3.2 radii, and
+ * their elevation -67° to 67°. Views that measure errors are crops of frames of 1920 x 1080 pixels.
+ * @param scored Number of scoring views; default 216.
+ * @param up Unit direction up of the scene; default (0, -1, 0).
  */
-export function dealtViewsOfVisitors(bounds: Bounds, scored = 216): ViewSplit {
-  const { searched, heldOut, ...rest } = dealt(scored, (count, seed) => viewsOfVisitors(bounds, count, { seed }));
+export function dealtViewsOfVisitors(bounds: Bounds, scored = 216, up?: Vector3): ViewSplit {
+  const rotation = uprightRotation({ hints: { up } }) ?? [1, 0, 0, 0, 1, 0, 0, 0, 1];
+  const [a, b, c, d, e, f, g, h, i] = rotation;
+  const center = [0, 3, 6].map((row) => bounds.center.reduce((sum, x, k) => sum + rotation[row + k] * x, 0));
+  const standing = { ...bounds, center: center as unknown as Vector3 };
+  const toStanding = [a, b, c, 0, d, e, f, 0, g, h, i, 0, 0, 0, 0, 1] as const;
+  const viewsOf = (count: number, seed: number): Camera[] =>
+    viewsOfVisitors(standing, count, { seed }).map((view) => {
+      return { ...view, worldToCamera: multiply(view.worldToCamera, toStanding) };
+    });
+  const { searched, heldOut, ...rest } = dealt(scored, viewsOf);
   return { ...rest, searched: excerptsOf(searched), heldOut: excerptsOf(heldOut) };
 }
 
@@ -219,12 +238,12 @@ const dealt = (scored: number, viewsOf: (count: number, seed: number) => Camera[
   heldOut: viewsOf(HELD_OUT, HELD_OUT_SEED),
 });
 
-/** Minimum pixels of scoring views, because most splats are smaller than a pixel in smaller views, and seem unneeded. */
+/** Minimum number of pixels of scoring views. In smaller views, splats smaller than a pixel would seem unimportant. */
 const MIN_SCORED_PIXELS = 480 * 270;
 
 /**
- * Divides a scene's own views ({@link splitViews}). Views between neighbors are added for scoring and for measuring
- * errors, in crops of frames at the resolution of visitors' screens.
+ * Divides the views of a scene's own cameras by {@link splitViews}, and adds views between neighbors. Views that measure
+ * errors are crops at the resolution of visitors' screens.
  */
 export function dealOwnViews(views: readonly Camera[]): ViewSplit {
   const { scored, searched, heldOut } = splitViews(views);

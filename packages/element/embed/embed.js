@@ -2,7 +2,7 @@
 import './gaussian-splat.min.js';
 
 /** Attributes that are addresses. */
-const ADDRESSES = ['src', 'poster', 'views'];
+const ADDRESSES = ['src', 'poster', 'views', 'skybox-image', 'walk-map', 'ios-src'];
 /**
  * Attributes that a link may set. Absent are those that name further models, send cookies to other servers, or put words into the page: whoever wrote the link is a
  * stranger to this page.
@@ -15,7 +15,9 @@ const ALLOWED = [
   ...['disable-zoom', 'disable-pan', 'disable-tap', 'navigation', 'auto-rotate', 'auto-rotate-delay'],
   ...['rotation-per-second', 'interaction-prompt', 'interaction-prompt-style', 'interaction-prompt-threshold'],
   ...['up', 'max-pixel-ratio', 'frame-budget', 'quality', 'renderer', 'max-sh-degree', 'filter', 'order', 'detail'],
-  ...['controls-panel', 'time', 'pose', 'crop', 'autoplay', 'loop'],
+  ...['controls-panel', 'time', 'pose', 'crop', 'autoplay', 'loop', 'orthographic', 'reveal-effect'],
+  ...['unit', 'eye-height', 'measure', 'shadow-intensity', 'shadow-softness'],
+  ...['vr', 'ar', 'ar-modes', 'ar-placement', 'ar-scale'],
 ];
 
 /** What a `<splat-scene>` has in the element's place. */

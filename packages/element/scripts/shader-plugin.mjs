@@ -16,6 +16,7 @@ export const SHADER_FILES = [
   'probe-shaders.js',
   'depth-shaders.js',
   'linear-shaders.js',
+  'rectangle-shaders.js',
   'order-shaders.js',
   'modified-shaders.js',
 ].map((file) => FOLDER + file);

@@ -43,6 +43,22 @@ function addWithImports(file, needed) {
   }
 }
 
+/** Scripts that a page fetches beside those of {@link scriptsForPly}, by purpose: docs/guide/performance.md has the sums. */
+const BESIDE = {
+  'the self-test of the GPU': ['search', 'timing', 'capture', 'sh'],
+  'camera controls': ['input-controller', 'box-points', 'corner-button', 'label-parts'],
+};
+
+/** Total gzip bytes of scripts, by the names before their hashes. */
+function bytesOf(names) {
+  const sizes = scriptSizes();
+  return names.reduce((sum, name) => {
+    const found = sizes.find(({ file }) => new RegExp(`^${name}-[^.]{8}\\.js$`).test(file));
+    if (found === undefined) throw new Error(`no script ${name} found in ${CDN}`);
+    return sum + found.gzip;
+  }, 0);
+}
+
 /** Total gzip bytes of {@link scriptsForPly}. */
 export function plyPageSize() {
   const sizes = new Map(scriptSizes().map(({ file, gzip }) => [file, gzip]));
@@ -57,6 +73,7 @@ function print() {
     console.log(`${mark} ${file.padEnd(40)}${String(raw).padStart(7)}${String(gzip).padStart(10)}`);
   }
   console.log(`* fetched for a PLY scene: ${plyPageSize()} bytes of gzip (at most ${BUDGET})`);
+  for (const [purpose, names] of Object.entries(BESIDE)) console.log(`  ${purpose}: ${bytesOf(names)} bytes of gzip`);
   console.log(`integrity of gaussian-splat.min.js: ${integrityOf(join(CDN, 'gaussian-splat.min.js'))}`);
 }
 

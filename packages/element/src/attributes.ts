@@ -19,7 +19,7 @@ import {
 } from './camera/grammar.js';
 import type { CameraSettings } from './camera/settings.js';
 import type { Numbers } from './dynamic/values.js';
-import type { A11yStrings } from './words.js';
+import type { A11yStrings } from './strings.js';
 
 /** Limits a delay in ms to the maximum of timers, which treat longer ones, even `Infinity`, as 0. */
 export const timerMs = (wait: number): number => Math.min(wait, 2 ** 31 - 1);
@@ -111,7 +111,7 @@ const detailGrammar: AttributeGrammar<DetailChoice> = {
 
 export const ATTRIBUTES = {
   /**
-   * URL of the scene: a file, a sequence, a streamed folder, or a generator. The property takes a local `File` or `Blob` as well. Put the name of a
+   * URL of the scene: a file, a sequence, a clip, a streamed folder, or a generator. The property takes a local `File` or `Blob` as well. Put the name of a
    * `.splat` behind an object URL: `URL.createObjectURL(file) + '#' + encodeURIComponent(file.name)`.
    * @example src="garden.spz"
    */
@@ -162,11 +162,12 @@ export const ATTRIBUTES = {
    * Theta, phi and radius. Angles have `deg` or `rad`. The radius has `m`, `cm`, `mm`, or `%` of the radius that frames
    * the scene: a single subject as a whole, else the central 90 % of the splats. Each may be `auto`, and trailing
    * values may be omitted. The syntax is that of `<model-viewer>`, without `calc()` and `env()`. Setting it moves the
-   * camera, also to the same value. `getCameraOrbit()` returns the current position.
-   * @default `0deg 75deg auto`
+   * camera, also to the same value. `getCameraOrbit()` returns the current position. `auto` is `0deg 75deg 100%`, within
+   * the limits that the scene's file recommends.
+   * @default `auto`
    * @example camera-orbit="30deg 75deg 120%"
    */
-  cameraOrbit: read(orbitGrammar('0deg 75deg auto')),
+  cameraOrbit: read(orbitGrammar('auto')),
   /**
    * The point that the camera looks at: x y z in meters of viewer space (y up, right-handed). `auto` is the center of
    * the scene.
@@ -377,7 +378,7 @@ export const ATTRIBUTES = {
    */
   interactionPromptStyle: keyword<InteractionPromptStyle>(['basic', 'wiggle']),
   /**
-   * Milliseconds at rest before the prompt is shown.
+   * Milliseconds without interaction before the prompt is shown.
    * @default `3000`
    * @example interaction-prompt-threshold="0"
    */
@@ -386,6 +387,7 @@ export const ATTRIBUTES = {
    * The words of the element in the language of the page: JSON or, as a property, an object. Keys: `front`, `upper-front`, `lower-front`, the same three
    * of `right`, `back` and `left`; `scene`, `role`, `interaction-prompt`, `keys-orbit`, `keys-fly`, `keys-walk`, `keys-views`; `views`, `next-view`, `previous-view`;
    * `vr`, `ar`, `exit-ar`, `ar-simplified`, `measure`, `measure-keys`, `measure-none`;
+   * `controls-panel`, `controls-reset`, `controls-time`, `controls-joint`, `controls-group`;
    * `show` (`…` stands for `alt`), `loading`, `blocked`, `reset`, `pause`, `play`, `details`; and `error-` before each `error.code`. Without it the words are
    * those of the language that `lang` names: English, German, Spanish, French, Japanese, Korean, Portuguese, Russian or Chinese.
    * @default by `lang`
@@ -394,9 +396,8 @@ export const ATTRIBUTES = {
   a11y: text<A11yStrings | string | null>(),
   /**
    * Up direction in the axes of the file: `x`, `-x`, `y`, `-y` (as in training), `z`, `-z`, or a vector such as `0.1 -1
-   * 0.2` for a tilted capture. The playground finds it from three points of the floor. The contract of a generator may
-   * declare another default.
-   * @default `-y`
+   * 0.2` for a tilted capture. The playground finds it from three points of the floor.
+   * @default that of the file or contract, else `-y`
    * @example up="y"
    */
   up: read(upGrammar),
@@ -474,9 +475,9 @@ export const ATTRIBUTES = {
   /**
    * `off`: the first run of a generator on the GPU is not compared with the same run on the CPU.
    * @default each model once on each adapter, when the page is idle
-   * @example compare="off"
+   * @example gpu-check="off"
    */
-  compare: text(),
+  gpuCheck: text(),
   /**
    * URL of a post-processor that turns each drawn frame into another image, or several URLs with spaces between them.
    * @example postprocess="style.onnx"
@@ -535,7 +536,7 @@ const attributeOf = (property: string): string => property.replace(/[A-Z]/g, (le
 export const credentialsOf = (crossorigin: Attributes['crossorigin']): RequestCredentials =>
   crossorigin === 'use-credentials' ? 'include' : 'same-origin';
 
-/** Property declarations of a table for Lit. */
+/** Returns the property declarations that Lit needs for a table of attributes, by default that of `<gaussian-splat>`. */
 export const declarations = (
   table: Readonly<Record<string, Attribute<unknown, unknown>>> = ATTRIBUTES,
 ): PropertyDeclarations =>

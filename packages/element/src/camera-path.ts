@@ -1,4 +1,7 @@
-/** Cameras of the frames of a video, for programs without a browser: those of `<gaussian-splat>` with the same attributes. */
+/**
+ * Computes the cameras of a video's frames for programs without a browser, as `<gaussian-splat>` does for the same
+ * attributes.
+ */
 import type { Camera } from '@gaussian-splat/core';
 import { readAttributes, type RawAttributes } from './attributes.js';
 import type { SceneBounds } from './camera/settings.js';
@@ -9,9 +12,9 @@ import { readViews } from './views/read-views.js';
 
 export type { SceneBounds } from './camera/settings.js';
 
-/** A path of the camera, and the frames along it. */
+/** Path of the camera, and number and size of the frames along it. */
 export interface PathRequest {
-  /** Parsed JSON of a list of views, as the attribute `views` takes it. Default: one turn around the target. */
+  /** Parsed JSON of a list of views, in the form of the attribute `views`. Default: one turn around the target. */
   readonly views?: unknown;
   /** Attributes of the element that place the camera. */
   readonly attributes?: Partial<Record<'cameraOrbit' | 'cameraTarget' | 'fieldOfView' | 'up', string>> & {
@@ -19,20 +22,20 @@ export interface PathRequest {
   };
   /** Bounds of the scene in its own frame: `boundsOf` of its cloud, with the up direction of the file. */
   readonly bounds: SceneBounds;
-  /** Pixels. */
+  /** Width of a frame, pixels. */
   readonly width: number;
   readonly height: number;
-  /** Frames in a second, above 0. */
+  /** Frames per second, above 0. Not used if `frames` is given. */
   readonly frameRate: number;
-  /** Default: what the path says. */
+  /** Duration of the video, seconds. Default: the duration of the path. */
   readonly seconds?: number;
-  /** Frames of the whole video; above `seconds`. */
+  /** Number of frames of the whole video; takes precedence over `seconds`. */
   readonly frames?: number;
 }
 
 /**
- * The camera of each frame.
- * @throws GaussianSplatError `argument/camera` for views and attributes that are malformed.
+ * Returns the camera of each frame, in order.
+ * @throws GaussianSplatError `argument/camera` for malformed views or attributes.
  */
 export function camerasAlong(request: PathRequest): Camera[] {
   const { attributes = {}, bounds, width, height, frameRate } = request;

@@ -1,7 +1,7 @@
-/** Images for scripts: any size, a background color, and the CSS filters of the element. */
+/** Takes images for scripts: of any size, with a background color and the CSS filters of the element. */
 import type { PixelSize } from './controllers/size-controller.js';
 import type { ViewController } from './controllers/view-controller.js';
-import { wasLost } from './gpu/device-failures.js';
+import type { Backend } from './gpu/backend.js';
 import type { ImageOptions } from './viewing.js';
 
 export interface ImageHost {
@@ -11,13 +11,13 @@ export interface ImageHost {
   warn(sentence: string): void;
   /** Loads again the scenes that were released out of view. */
   present(): Promise<unknown>;
-  /** Draws a frame into the element's canvas now; null if there is nothing to draw. */
+  /** Draws a frame into the element's canvas at once and returns the canvas; null if there is nothing to draw. */
   drawNow(pixels?: PixelSize, background?: Rgba): HTMLCanvasElement | null;
 }
 
 export { record, recordFrames } from './recording.js';
 
-/** Premultiplied, 0..1. */
+/** Color with premultiplied alpha, each component 0..1. */
 export type Rgba = readonly [red: number, green: number, blue: number, alpha: number];
 
 /** Message for an image whose device was lost. */
@@ -33,13 +33,22 @@ export async function takeImage(host: ImageHost, options: ImageOptions): Promise
   const blob = new Promise<Blob | null>((resolve) =>
     withFilters(host, drawn).toBlob(resolve, mimeType, qualityArgument),
   );
-  // The page still shows the earlier frame: nothing is presented before this task ends.
+  // Draws the frame again in the size of the element. Browsers present a canvas only after this task, so the image does
+  // not flash.
   if (pixels || background !== undefined) host.drawNow();
   const taken = await blob;
-  // A device that was lost before drawing leaves an empty image and reports the loss later.
+  // If the device was lost before drawing, the image is empty, and the loss is reported only later.
   if (backend && (await wasLost(backend))) throw new DOMException(LOST, 'InvalidStateError');
   if (taken === null) throw new DOMException(`The image could not be written as ${mimeType}`, 'EncodingError');
   return taken;
+}
+
+/** Waits for all submitted work, then returns whether the device is lost. */
+async function wasLost(backend: Pick<Backend, 'finished' | 'isLost'>): Promise<boolean> {
+  await backend.finished();
+  // The loss is reported in a later task.
+  await new Promise((resolve) => setTimeout(resolve));
+  return backend.isLost;
 }
 
 export const nothingToDraw = (): DOMException =>
@@ -48,7 +57,11 @@ export const nothingToDraw = (): DOMException =>
     'InvalidStateError',
   );
 
-/** One side alone keeps the aspect ratio of the element. @returns null without either */
+/**
+ * Size of the image, pixels. One side alone keeps the aspect ratio of the element.
+ * @returns null if neither side is given
+ * @throws RangeError for a size that the GPU cannot draw
+ */
 function sizeOf({ width, height }: ImageOptions, canvas: HTMLCanvasElement | null, max: number): PixelSize | null {
   if (canvas === null || (width === undefined && height === undefined)) return null;
   const aspect = canvas.width / canvas.height;
@@ -63,7 +76,7 @@ function sizeOf({ width, height }: ImageOptions, canvas: HTMLCanvasElement | nul
 
 function rgbaOf(color: string): Rgba {
   if (!CSS.supports('color', color))
-    throw new TypeError(`toBlob(): expected a CSS colour as background, found "${color}"`);
+    throw new TypeError(`toBlob(): expected a CSS color as background, found "${color}"`);
   const context = paper(1, 1);
   context.fillStyle = color;
   context.fillRect(0, 0, 1, 1);
@@ -71,7 +84,10 @@ function rgbaOf(color: string): Rgba {
   return [red * alpha, green * alpha, blue * alpha, alpha];
 }
 
-/** The canvas with the CSS filters of its element applied. */
+/**
+ * Returns a copy of the canvas with the CSS filters of canvas and element applied, or the canvas itself if there are
+ * none.
+ */
 function withFilters(host: ImageHost, drawn: HTMLCanvasElement): HTMLCanvasElement {
   const filter = [drawn, host.element]
     .map((node) => getComputedStyle(node).filter)

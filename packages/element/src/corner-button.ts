@@ -1,6 +1,6 @@
-/** A button in a corner of the frame. Loaded on demand. */
+/** Template and styles of a button in a corner of the frame. Loaded on demand. */
 import { css, html, nothing, type TemplateResult } from 'lit';
-import { languageOf, type A11yStrings } from './words.js';
+import { languageOf, type A11yStrings } from './strings.js';
 
 export const CORNER_STYLES = css`
   .corner {
@@ -18,7 +18,8 @@ export const CORNER_STYLES = css`
 `;
 
 /**
- * Visible while the pointer hovers over the scene or the keyboard focus is in it, and always on devices without hover.
+ * Returns a round button. `part` is its CSS part, `label` its accessible name, `sign` the SVG path data of its icon, in
+ * a view box of 24 x 24.
  */
 export const cornerButton = (
   part: string,

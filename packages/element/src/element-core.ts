@@ -3,7 +3,7 @@ import type { FrameTarget } from '@gaussian-splat/renderer';
 import type { ProbeAnswer, ProbePoint } from '@gaussian-splat/renderer/tools';
 import type { ReactiveControllerHost } from 'lit';
 import type { Attributes } from './attributes.js';
-import { Behaviors, type BehaviorHost } from './behaviours.js';
+import { Behaviors, type BehaviorHost } from './behaviors.js';
 import type { CameraAction } from './camera/gestures.js';
 import type { ViewerFrame } from './camera/orbit.js';
 import { frameOf } from './camera/settings.js';
@@ -36,11 +36,11 @@ import type { Services, ElementHost } from './element-host.js';
 import { statsOf, type SceneStats } from './stats.js';
 import type { TemplateModel } from './template.js';
 import type { TourHost } from './views/tour.js';
-import type { A11yStrings } from './words.js';
+import type { A11yStrings } from './strings.js';
 
 /**
- * Connects the source list, camera, size, visibility and input of an element behind its attributes and markup. It
- * implements the host interface of each controller.
+ * Core of an element, behind its attributes and markup: connects the source list, camera, size, visibility and input.
+ * Implements the host interface of each controller.
  */
 export class ElementCore
   implements SourceOwner, ViewHost, RevealHost, HotspotHost, InputHost, BehaviorHost, QueryHost, TourHost
@@ -52,21 +52,27 @@ export class ElementCore
   readonly reveal: RevealController;
   readonly behaviors: Behaviors;
   readonly size: SizeController;
-  /** The camera of the last frame, in its pixels; undefined before there is one. */
+  /** The camera of the last frame, with the size of the frame in pixels; undefined before the first frame. */
   drawnFrom: Camera | undefined;
   /** Called after each frame, in the task that has drawn it. */
   declare onFrame: (() => void) | undefined;
   readonly view: ViewController;
   readonly hasOwnClock = true;
+  /** The clock of the element. */
+  readonly playback: PlaybackController;
+  readonly live: DynamicWiring;
+  readonly services: Services;
+  readonly source: ElementHost['source'];
+  readonly warn: ElementHost['warn'];
   readonly #host: ElementHost;
   readonly #visibility: VisibilityController;
   #counts: ReadCounts | undefined;
   #children: MutationObserver | undefined;
 
-  /** The state shown in the markup has changed. */
+  /** Renders the shadow tree again after a change of state that it shows. */
   readonly #update = (): void => this.element.requestUpdate();
 
-  // Loaded on demand: few pages need these.
+  // The following code is loaded on demand, because few pages need it.
 
   /** Shows the element's children. */
   readonly #composition = new Lazy('the code that shows several scenes', async () => {
@@ -83,7 +89,7 @@ export class ElementCore
     },
     this.#update,
   );
-  /** Walks on the floor. */
+  /** Moves the camera on the floor for `navigation="walk"`. */
   readonly walk = new Lazy(
     'the code for walking',
     async () => {
@@ -113,14 +119,14 @@ export class ElementCore
     async () => new (await import('./effects/effects.js')).Effects(this as unknown as EffectsHost),
     this.#update,
   );
-  /** A session shows the scene, so the page does not draw it. */
+  /** Whether a VR or AR session shows the scene. The page does not draw meanwhile. */
   isImmersed = false;
-  /** Draws the frame for printing; fetched after the first frame. */
+  /** Draws an image before the page is printed; its code is loaded with the first frame. */
   readonly #print = new Lazy('the code for printing', async () => {
     const { PrintController } = await import('./controllers/print-controller.js');
     return new PrintController(this.element, () => this.drawNow());
   });
-  /** Labels of the page. */
+  /** Positions the hotspots: children in slots named `hotspot-…`. */
   readonly labels = new Lazy(
     'the code of labels',
     async () => {
@@ -143,12 +149,13 @@ export class ElementCore
     },
     this.#update,
   );
-  /** Set while input is enabled. */
+  /** Template of the prompt, reset button and keyboard help; undefined until the code for input is loaded. */
   handsView: TemplateModel['handsView'];
 
   constructor(element: ReactiveControllerHost & HTMLElement, host: ElementHost) {
     this.element = element;
     this.#host = host;
+    ({ services: this.services, source: this.source, warn: this.warn } = host);
     this.camera = new CameraController(host.attributes.camera, () => this.requestFrame());
     this.#visibility = new VisibilityController(element, () => this.#onVisibility());
     this.size = new SizeController(
@@ -157,7 +164,9 @@ export class ElementCore
       () => this.#onSize(),
     );
     this.view = new ViewController(this);
-    this.sources = new SourceList(this, new SourceEntry(this, this));
+    const own = new SourceEntry(this, this);
+    ({ ownClock: this.playback, live: this.live } = own);
+    this.sources = new SourceList(this, own);
     this.reveal = new RevealController(element, this);
     this.behaviors = new Behaviors(element, this);
     const onPageVisibility = (): void => this.sources.suspend();
@@ -182,14 +191,6 @@ export class ElementCore
 
   get attributes(): Attributes {
     return this.#host.attributes;
-  }
-
-  get services(): Services {
-    return this.#host.services;
-  }
-
-  get source(): ElementHost['source'] {
-    return this.#host.source;
   }
 
   get dynamicValues(): ElementHost['dynamicValues'] {
@@ -229,36 +230,26 @@ export class ElementCore
     return this.#host.part('#hotspots');
   }
 
-  warn(sentence: string): void {
-    this.#host.warn(sentence);
-  }
-
   dispatch(event: GaussianSplatEventMap[keyof GaussianSplatEventMap]): void {
     this.element.dispatchEvent(event);
   }
 
   // Interface of scripts.
 
-  /** The clock of the element. */
-  get playback(): PlaybackController {
-    return this.sources.ownEntry.ownClock;
-  }
-
-  get live(): DynamicWiring {
-    return this.sources.ownEntry.live;
-  }
-
-  /** Loads again the scenes that were released out of view. */
+  /** Loads the scenes again that were released out of view. Fulfills when all are shown. */
   present(): Promise<unknown> {
     return Promise.all(this.sources.entries.map(({ scene }) => scene.present()));
   }
 
-  /** Draws a frame now and returns its canvas, to be read within the same task; null if there is nothing to draw. */
+  /**
+   * Draws a frame at once and returns its canvas, which must be read within the same task. null if there is nothing to
+   * draw, or only a preview.
+   */
   drawNow(...image: Parameters<ViewController['drawNow']>): HTMLCanvasElement | null {
     return this.sources.ownEntry.scene.isPreview ? null : this.view.drawNow(...image);
   }
 
-  /** Frames the scene again, as after loading; the scene of a generator is measured first. */
+  /** Moves the camera to frame the scene, as after loading. The bounds of a generator's splats are measured first. */
   async updateFraming(): Promise<void> {
     const { scene } = this.sources.ownEntry.scene;
     const bounds = await this.sources.readBounds();
@@ -281,7 +272,10 @@ export class ElementCore
     });
   }
 
-  /** Reads the counts of the current image back from the GPU. */
+  /**
+   * Reads the counts of the current image back from the GPU, then returns the statistics with these counts; null
+   * without a scene.
+   */
   async updateStats(): Promise<SceneStats | null> {
     const { backend } = this.view;
     const camera = this.drawnFrom;
@@ -290,7 +284,7 @@ export class ElementCore
       const counts = await backend.readCounts(camera);
       if (this.view.backend === backend) this.#counts = counts;
     } catch (error) {
-      // The renderer was replaced meanwhile; the other statistics do not need it.
+      // If the renderer was replaced meanwhile, the counts are not updated; the other statistics do not depend on them.
       if (!(await isGone(backend))) throw error;
     }
     return this.stats;
@@ -301,63 +295,65 @@ export class ElementCore
     return [...this.sources.ownEntry.inputs, ...(this.view.backend?.filter?.inputs ?? [])];
   }
 
-  /** Seeks the clock of the displayed scene, or of the next one if the page requests another. */
+  /** Seeks to a time in seconds: of the displayed scene, or of the next scene if the page has requested another one. */
   seek(seconds: number): void {
     if (this.sources.ownEntry.isLeaving) this.playback.startNextAt(seconds);
     else this.playback.currentTime = seconds;
   }
 
-  /** Playback is requested: dismisses the poster and loads a scene that is out of view. */
+  /** Prepares playback: dismisses the poster, and loads the scene even if it is out of view. */
   prepareToPlay(): void {
     this.sources.ownEntry.needNow();
     if (!this.reveal.mayReveal) this.reveal.dismiss();
     this.element.requestUpdate();
   }
 
-  /** The element's earlier document no longer has a window. */
+  /** Replaces the canvas after the element was moved out of a document that no longer has a window. */
   leaveWindowless(): void {
     this.view.renewCanvas();
   }
 
-  /** The visible surface under a point of the page: see the element's method of this name. */
+  /** Returns the visible surface under a point of the page, in CSS pixels: see the element's method of this name. */
   async positionFromPoint(clientX: number, clientY: number): Promise<PickedPoint | null> {
     const { positionFromPoint } = await queries.get();
     return positionFromPoint(this, clientX, clientY);
   }
 
-  /** Fulfills, and never rejects, when nothing is pending, including code for attributes and children. */
+  /** Fulfills when no source is loading and no code for attributes or children is pending. Never rejects. */
   get settled(): Promise<unknown> {
     const code = [this.#print, this.#composition, this.effects, this.labels, this.#hands].map(({ settled }) => settled);
     return Promise.all(code).then(() => this.sources.settled);
   }
 
-  // Interfaces of the controllers.
+  // Properties that the controllers read.
 
   get isVisible(): boolean {
     return this.#visibility.isVisible && !this.isImmersed;
   }
 
-  /** Whether previews are of use: an eager load begins before it is known whether the element is in view. */
+  /** Whether a scene that loads may be shown in part: unless the element is known to be out of view. */
   get wantsPreviews(): boolean {
     return !this.#visibility.isKnownHidden;
   }
 
-  /** The scene would be visible. */
+  /** Whether the scene would be visible if it were loaded. */
   get isInSight(): boolean {
     return this.isVisible && this.reveal.mayReveal;
   }
 
-  /** The scene is shown, in view, and not covered by a poster. */
+  /** Whether the element is in view and no poster covers the scene. */
   get isOnShow(): boolean {
     return !this.reveal.isCovered && this.isVisible;
   }
 
-  /** Automatic motion is allowed. */
+  /**
+   * Whether automatic motion is allowed: the scene is in view, and neither visitor nor system settings forbid motion.
+   */
   get mayMove(): boolean {
     return this.isOnShow && !prefersReducedMotion() && !this.behaviors.motion.value?.isHeld;
   }
 
-  /** A touch user has moved the camera and has no Home key. */
+  /** Whether the reset button is offered: for touch users who have moved the camera, because they have no Home key. */
   get offersReset(): boolean {
     return this.input.enabled && this.isOnShow && this.#hands.value?.isTouch === true && this.camera.isTouched;
   }
@@ -382,17 +378,20 @@ export class ElementCore
     return this.sources.levels;
   }
 
-  /** The camera before the image has a size. */
+  /** The camera at the default size of an element, for a generator that runs before the image has a size. */
   get firstView(): Camera {
     return this.camera.view(...FIRST_SIZE);
   }
 
-  /** Rotation from the world, the frame of the element's own scene, to viewer space. */
+  /** Rotation from the world to viewer space. The world has the frame of the element's own scene. */
   get frame(): ViewerFrame {
     return frameOf(this.attributes, { up: this.sources.ownEntry.member?.scene.bounds.up });
   }
 
-  /** The request of a scene that has a file with a floor; null while there is none. */
+  /**
+   * Request of the displayed scene, whose file is searched for a floor; null while no scene is shown, and for one that
+   * moves.
+   */
   get walkable(): SceneRequest | null {
     const { scene } = this.sources.ownEntry;
     return scene.state === 'ready' && !scene.scene?.live ? scene.shownRequest : null;
@@ -418,7 +417,7 @@ export class ElementCore
 
   // Notifications of the controllers.
 
-  /** Requests a frame: a changed attribute may affect the image, such as its pixel ratio. */
+  /** Requests a frame. Called after each change that may affect the image, such as that of its pixel ratio. */
   requestFrame(): void {
     this.view.requestFrame();
   }
@@ -442,7 +441,7 @@ export class ElementCore
     this.dispatch(new CustomEvent('camera-change', { detail: { source } }));
   }
 
-  /** The set of drawn splats has changed. */
+  /** Requests a frame and discards the counts, because the set of drawn splats has changed. */
   splatsChanged(): void {
     this.#counts = undefined;
     this.view.requestFrame();
@@ -463,7 +462,7 @@ export class ElementCore
     await this.effects.value?.prepareFor(scene);
   }
 
-  /** Draws the world from now on. Fulfills with its first frame. */
+  /** Starts to draw the world with the renderer of a scene. Fulfills with the first frame. */
   draw(scene: Drawable): Promise<void> {
     this.#print.get().catch(this.#warnOf);
     const drawn = this.view.show(scene);
@@ -471,7 +470,7 @@ export class ElementCore
     return drawn;
   }
 
-  /** Stops drawing; the last image stays unless it is to be cleared. */
+  /** Stops drawing. `clear` also clears the canvas; otherwise the last image stays. */
   stopDrawing(clear: boolean): void {
     this.live.attachPost(null);
     if (!clear) return this.view.pause();
@@ -482,7 +481,6 @@ export class ElementCore
 
   posterDismissed(): void {
     this.dispatch(new Event('poster-dismissed'));
-    this.sources.ownEntry.hasBegun = false;
     this.sources.startPlaying();
   }
 
@@ -490,7 +488,10 @@ export class ElementCore
     return this.behaviors.act(action);
   }
 
-  /** A pick beside the scene means that the visitor has lost it. */
+  /**
+   * Sets the orbit target to the surface under a click or tap, CSS pixels. Resets the camera if there is no surface,
+   * because the visitor has then lost the scene.
+   */
   pick(clientX: number, clientY: number): void {
     // A click while walking selects a destination.
     if (this.attributes.navigation === 'walk') return;
@@ -500,7 +501,11 @@ export class ElementCore
     }, this.#warnOf);
   }
 
-  /** Toggles all motion, for the space bar. A player's controls around the element have keys of their own. */
+  /**
+   * Pauses or resumes all automatic motion, for the space bar.
+   * @returns Whether there is any; false also in slot `media`, because the player around the element has keys of its
+   * own.
+   */
   toggleMotion(): boolean {
     if (this.behaviors.motion.value?.toggle()) return true;
     if (!this.playback.canPlay || this.element.slot === 'media') return false;
@@ -511,7 +516,7 @@ export class ElementCore
 
   readonly #warnOf = (error: Error): void => this.warn(error.message);
 
-  /** Loads the code for children on demand: few pages have any. */
+  /** Loads the code for the children that the element has; few pages have any. */
   #lookAtChildren(): void {
     const has = (selector: string): boolean => this.element.querySelector(`:scope>:is(${selector})`) !== null;
     if (has('splat-scene,splat-mesh')) this.#composition.want(this.#warnOf);
@@ -546,8 +551,9 @@ export class ElementCore
   }
 
   #onSize(): void {
-    // Without a size, for example in a background tab, the aspect ratio stays.
-    if (!this.size.isEmpty) this.camera.setAspect(this.size.aspect);
+    // Without a size, for example in a background tab, the aspect ratio stays, and no frame advances the clocks.
+    if (this.size.isEmpty) this.sources.suspend();
+    else this.camera.setAspect(this.size.aspect);
     this.view.requestFrame();
   }
 }
@@ -555,7 +561,7 @@ export class ElementCore
 const queries = new Lazy('the code that finds points of the scene', () => import('./position-from-point.js'));
 
 /**
- * Width and height, in pixels, passed to a generator before the image has a size: the default size of an element
+ * Width and height, in CSS pixels, that a generator gets before the image has a size: the default size of an element
  * without style.
  */
 const FIRST_SIZE = [300, 150] as const;

@@ -1,5 +1,5 @@
 import type { Attributes } from './attributes.js';
-import type { A11yStrings } from './words.js';
+import type { A11yStrings } from './strings.js';
 import type { SharedDevice } from './gpu/shared-device.js';
 import type { DynamicState } from './dynamic/dynamic-model.js';
 import type { SceneLimits } from './loading/protocol.js';
@@ -9,27 +9,30 @@ import type { SceneLoader } from './loading/scene-loader.js';
 export interface Services {
   readonly sharedDevice: SharedDevice;
   readonly sceneLoader: SceneLoader;
-  /** How long a removed element keeps its scene, ms. */
+  /** Milliseconds after which an element that was removed from the document releases its scene. */
   readonly releaseDelay: number;
-  /** Maximum GPU memory of one scene, bytes; null for a limit that suits the device. */
+  /** Maximum GPU memory of one scene, bytes; null for a limit that depends on the device. */
   readonly memoryBudget: number | null;
   readonly sceneLimits: SceneLimits;
-  /** Folder of ONNX Runtime's files; null for the one beside the bundle. */
+  /** URL of the folder with ONNX Runtime's files; null for the folder next to the bundle. */
   readonly runtimeLocation: string | null;
   /** Rewrites the addresses of scenes before they are fetched. */
   readonly urlModifier: ((url: string) => string) | null;
 }
 
-/** The requested source according to the element's attributes. */
+/** The source that the element's attributes request. */
 export interface Source {
   readonly src: string | Blob | null;
   readonly contract: unknown;
-  /** URLs with spaces between them. */
+  /** URLs of further models, separated by spaces: each receives the Gaussians of the previous one. null for none. */
   readonly chain: string | null;
   readonly postprocess: string | null;
 }
 
-/** The current attributes of the element, and the parts of its shadow tree once rendered. */
+/**
+ * Interface of the element for its {@link ElementCore}: its attributes, and the parts of its shadow tree after the
+ * first rendering.
+ */
 export interface ElementHost {
   readonly attributes: Attributes;
   readonly services: Services;

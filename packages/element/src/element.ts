@@ -15,7 +15,7 @@ import type { ElementHost } from './element-host.js';
 import type { SceneStats } from './stats.js';
 import { template } from './template.js';
 import { ViewingMethods } from './viewing.js';
-import { readSpokenStrings, type A11yStrings } from './words.js';
+import { readSpokenStrings, type A11yStrings } from './strings.js';
 import type { SoundProperties } from './dynamic/sound-properties.js';
 import type { ImmersiveMethods } from './xr/methods.js';
 
@@ -44,12 +44,16 @@ const STATES = ['loading', 'preview', 'ready', 'playing', 'error', 'unsupported'
  * @slot error - Shown if the scene cannot be displayed.
  * @slot view - Buttons of the page for its views, each with `data-orbit`.
  * @slot sound - An `<audio>` or `<video>` element that plays along with a moving scene; its captions are shown.
+ * @slot vr-button - Replaces the button that starts VR.
+ * @slot ar-button - Replaces the button that starts AR.
+ * @slot exit-ar-button - Replaces the button that ends AR on a phone.
+ * @slot ar-prompt - Shown over the image of the camera until the scene is placed in AR.
  * @slot hotspot-* - A label of the page at the scene point in its `data-position`.
  * @csspart canvas - The frame.
  * @csspart poster - The image of the `poster` attribute.
  * @csspart poster-button - The button around it with `reveal="manual"`.
- * @csspart poster-cue - The play symbol in the center of that button.
- * @csspart prompt - The default interaction prompt.
+ * @csspart poster-icon - The play symbol in the center of that button.
+ * @csspart interaction-prompt - The default interaction prompt.
  * @csspart reset-button - Resets the camera: shown to visitors who have moved it by touch.
  * @csspart views - The bar of the views.
  * @csspart view-name - The name of the current view in that bar.
@@ -59,11 +63,19 @@ const STATES = ['loading', 'preview', 'ready', 'playing', 'error', 'unsupported'
  * @csspart progress-track - The background of the progress bar.
  * @csspart progress-bar - The progress bar.
  * @csspart controls-panel - The panel of the attribute `controls-panel`.
- * @csspart controls-scene - The group of controls of a `<splat-scene>`, a `fieldset`.
+ * @csspart controls-group - The group of controls of a `<splat-scene>`, a `fieldset`.
  * @csspart control - A control in it, with its label.
  * @csspart control-label - The label of a control.
  * @csspart control-input - The slider, field or button of a control.
  * @csspart control-value - The number beside a slider.
+ * @csspart vr-button - The button of the attribute `vr`.
+ * @csspart ar-button - The button of the attribute `ar`.
+ * @csspart exit-ar-button - The button that ends AR on a phone.
+ * @csspart ar-link - The link to the model of `ios-src`.
+ * @csspart measure-button - The button of the attribute `measure`.
+ * @csspart measure-label - The length beside the ruler.
+ * @csspart joystick - The stick of `navigation="walk"` on touch screens.
+ * @csspart scene-button - The focusable area of a child with `interactive`.
  * @csspart captions - Lines of the sound's captions.
  * @csspart fallback - The default text if neither WebGPU nor WebGL 2 can draw the scene.
  * @csspart error - The default text after an error.
@@ -80,6 +92,9 @@ const STATES = ['loading', 'preview', 'ready', 'playing', 'error', 'unsupported'
  * @cssproperty [--views-display=flex] - `none` hides the bar of the views.
  * @cssproperty [--min-hotspot-opacity=0.25] - Opacity of hotspots that are hidden.
  * @cssproperty [--max-hotspot-opacity=1] - Opacity of visible hotspots.
+ * @cssproperty --measure-background - Background of the length beside the ruler.
+ * @cssproperty --measure-color - Color of the ruler and its length.
+ * @cssproperty [--scene-focus-color=highlight] - Color of the outline of a focused child with `interactive`.
  * @cssproperty --captions-background - Background of captions.
  * @cssproperty --captions-color - Text color of captions.
  * @cssproperty --captions-font - Font of captions.
@@ -332,9 +347,7 @@ export class GaussianSplatElement extends ViewingMethods {
       get attributes() {
         return element.#attributes;
       },
-      get services() {
-        return element.constructor as typeof GaussianSplatElement;
-      },
+      services: element.constructor as typeof GaussianSplatElement,
       get strings() {
         return element.#strings;
       },

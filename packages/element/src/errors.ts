@@ -1,5 +1,5 @@
 import { GaussianSplatError, type ErrorCode } from '@gaussian-splat/core';
-import type { A11yStrings } from './words.js';
+import type { A11yStrings } from './strings.js';
 
 /** Failure families, the values of `element.error.code`. */
 export type ElementErrorCode = 'unsupported' | 'network' | 'decode' | 'contract' | 'device-lost' | 'out-of-memory';
@@ -10,7 +10,7 @@ export interface ElementError {
   readonly code: ElementErrorCode;
   /** The full, stable code, for example `network/status`. */
   readonly reason: ErrorCode;
-  /** Expected and found values, place and remedy, for the author of the page. */
+  /** For the author of the page: expected and found values, the place of the error, and the remedy. */
   readonly message: string;
   readonly cause: unknown;
 }
@@ -27,8 +27,8 @@ const FAMILIES: readonly ElementErrorCode[] = [
 /** Converts any failure to an error of the element. */
 export function toElementError(error: unknown): ElementError {
   if (error instanceof GaussianSplatError) {
-    // The families are the element's codes; an `argument/*` error means that a scene passed its reader but not the
-    // renderer.
+    // A family is also a code of the element, except `argument`: that family means that a scene passed its reader but
+    // not the renderer.
     const code = FAMILIES.find((family) => family === error.family) ?? 'decode';
     return { code, reason: error.code, message: error.message, cause: error };
   }
@@ -36,14 +36,19 @@ export function toElementError(error: unknown): ElementError {
   return { code: 'decode', reason: 'decode/corrupt', message, cause: error };
 }
 
-/** One sentence for visitors, who can fix little: the page's own, or an English one for the kind of failure. */
+/**
+ * Returns one sentence for visitors, who can fix little: the page's own text, or else the English one for the failure.
+ */
 export function visitorMessage({ code, reason }: ElementError, strings: A11yStrings): string {
   const own = strings[`error-${code}`];
   if (own !== undefined) return own;
   return visitorMessages[reason] ?? VISITOR_MESSAGES[code];
 }
 
-/** Messages of single errors; code that creates such an error adds its own. */
+/**
+ * Messages for visitors by stable code, which take precedence over those of the family. Code that creates such an error
+ * adds its message.
+ */
 export const visitorMessages: Partial<Record<ErrorCode, string>> = {
   'unsupported/wrong-image': 'This 3D scene cannot be drawn correctly here: update the browser or graphics driver.',
 };

@@ -3,8 +3,8 @@ import type { ScenePoint } from './camera/values.js';
 import type { ElementError } from './errors.js';
 
 /**
- * Source of a camera move: a visitor, the element itself (framing a scene or a new size), or the page's own code
- * (attributes and methods).
+ * Cause of a camera move: a visitor, the element itself (`automatic`: a new scene or size), or the page's attributes
+ * and methods (`none`).
  */
 export type CameraChangeSource = 'user-interaction' | 'automatic' | 'none';
 
@@ -13,9 +13,9 @@ export interface CameraChangeDetail {
 }
 
 export interface ViewChangeDetail {
-  /** The view's name. */
+  /** Name of the view. */
   readonly name: string;
-  /** Its index in the list, from 0. */
+  /** Index of the view in the list, from 0. */
   readonly index: number;
 }
 
@@ -26,21 +26,21 @@ export interface WalkReadyDetail {
 
 export interface ImmersiveStatusDetail {
   readonly status: 'not-presenting' | 'session-started' | 'object-placed' | 'failed';
-  /** Reason of a failure. */
+  /** Reason of the failure, in English; only with the status `failed`. */
   readonly reason?: string;
 }
 
 export interface MeasureDetail {
-  /** Ends of the ruler in viewer space. */
+  /** Start of the ruler in viewer space. */
   readonly from: ScenePoint;
   readonly to: ScenePoint;
   /** Length in units of the scene. */
   readonly length: number;
   /** Uncertainty of the length, in units of the scene. */
   readonly uncertainty: number;
-  /** The length in meters; null unless the attribute `unit` defines the unit. */
+  /** Length in meters; null unless the attribute `unit` defines the unit. */
   readonly meters: number | null;
-  /** Meters per unit; null if unknown. */
+  /** Meters per unit of the scene; null if unknown. */
   readonly unit: number | null;
 }
 
@@ -55,27 +55,27 @@ export interface VisibilityDetail {
 }
 
 export interface FallbackDetail {
-  /** Reason that the generator does not run on the GPU, for display. */
+  /** Reason that the generator does not run on the GPU, in English. */
   readonly reason: string;
 }
 
-/** Memory of a generator that is known before its first run. A run takes more. */
+/** Memory of a generator, as far as it is known before the first run. A run needs more. */
 export interface GeneratorMemoryDetail {
   /** Bytes of all weights and constants of its models. */
   readonly weightBytes: number;
   /**
-   * Bytes of the largest tensor that the nodes compute, among those of known size: a lower bound while `unknownTensors` is
-   * not 0. null if no size is known.
+   * Bytes of the largest computed tensor among those of known size; null if no size is known. Other tensors may be
+   * larger if `unknownTensors` is not 0.
    */
   readonly largestKnownTensorBytes: number | null;
   /** Number of computed tensors whose size only a run determines. */
   readonly unknownTensors: number;
-  /** Bytes of GPU memory of its Gaussians, which are reserved already. */
+  /** Bytes of GPU memory that is already reserved for the generator's Gaussians. */
   readonly gaussianBytes: number;
 }
 
 export interface PreviewDetail {
-  /** Splats shown. */
+  /** Number of splats that are shown. */
   readonly splats: number;
 }
 
@@ -85,7 +85,7 @@ export interface HotspotVisibilityDetail {
   readonly visible: boolean;
 }
 
-/** Events of `<gaussian-splat>`. None of them bubbles. */
+/** Events of `<gaussian-splat>`. None of these events bubbles. */
 export interface GaussianSplatEventMap {
   /** Fired when the scene's first frame is on the screen. */
   load: CustomEvent<LoadDetail>;
@@ -108,7 +108,10 @@ export interface GaussianSplatEventMap {
   'walk-ready': CustomEvent<WalkReadyDetail>;
   /** Fired when VR can be started, has started, has ended, or failed. */
   'vr-status': CustomEvent<ImmersiveStatusDetail>;
-  /** The same for AR; the object is placed in the real environment. */
+  /**
+   * Fired when AR can be started, has started, has ended or failed, and when the scene is placed in the real
+   * environment.
+   */
   'ar-status': CustomEvent<ImmersiveStatusDetail>;
   /** Fired when a visitor has measured a length. */
   measure: CustomEvent<MeasureDetail>;
@@ -118,13 +121,13 @@ export interface GaussianSplatEventMap {
   'model-visibility': CustomEvent<VisibilityDetail>;
   /** Fired when a run of the generator fails; the last good frame stays, and the next change tries again. */
   'generator-error': CustomEvent<ElementError>;
-  /** Fired when the inputs that the page may set change: see the property `inputs`. */
+  /** Fired when the list of generator inputs that the page may set changes: see the property `inputs`. */
   'inputs-change': Event;
-  /** Fired once before the first run of a generator, with the memory that is known by then. */
+  /** Fired once before the first run of a generator, with the memory that is known before it runs. */
   'generator-memory': CustomEvent<GeneratorMemoryDetail>;
   /** Fired when the generator runs on the CPU, with the reason. */
   'generator-fallback': CustomEvent<FallbackDetail>;
-  /** Loading and playback, same as on HTMLMediaElement. */
+  /** This event and the following ones of loading and playback have the same meaning as on HTMLMediaElement. */
   play: Event;
   playing: Event;
   /** Fired when a clip waits for its next frames; `playing` follows. */

@@ -1,9 +1,9 @@
-/** Content of the shadow tree for visitors who may move the camera. Loaded with the input controller. */
+/** Parts of the shadow tree for visitors who may move the camera. Loaded with the input controller. */
 import { css, html, nothing, svg, type TemplateResult } from 'lit';
 import { adoptStyles } from './styles.js';
 import { CORNER_STYLES, cornerButton } from './corner-button.js';
 import type { TemplateModel } from './template.js';
-import { languageOf, type HandWord, type A11yStrings } from './words.js';
+import { languageOf, type HandWord, type A11yStrings } from './strings.js';
 
 const WORDS: Readonly<Record<HandWord, string>> = {
   'keys-orbit':
@@ -13,7 +13,7 @@ const WORDS: Readonly<Record<HandWord, string>> = {
     'Arrow keys look around, W and S fly forward and back, A and D to the sides, E and Q up and down, with Shift faster, ' +
     'Home brings the view back.',
   'interaction-prompt': 'Drag to look around',
-  reset: 'Bring the view back',
+  reset: 'Reset view',
 };
 
 const STYLES = css`
@@ -23,14 +23,14 @@ const STYLES = css`
     justify-content: center;
     padding-block-end: 8px;
   }
-  [part='prompt'] {
+  [part='interaction-prompt'] {
     padding: 10px;
     border-radius: 50%;
     line-height: 0;
     background: var(--interaction-prompt-background, rgb(0 0 0 / 0.45));
     color: var(--interaction-prompt-color, rgb(255 255 255));
   }
-  [part='prompt'].wiggle {
+  [part='interaction-prompt'].wiggle {
     animation: wiggle 4.5s;
   }
   @keyframes wiggle {
@@ -48,18 +48,18 @@ const STYLES = css`
     inset-inline: 8px auto;
   }
   @media (prefers-reduced-motion: reduce) {
-    [part='prompt'] {
+    [part='interaction-prompt'] {
       animation: none;
     }
   }
 `;
 
-/** Four corners around the center. */
+/** SVG path of the reset icon: four corners around a square. */
 const FRAME_SIGN = 'M4 9V4h5v2H6v3zM15 4h5v5h-2V6h-3zM4 15h2v3h3v2H4zM18 15h2v5h-5v-2h3zM10 10h4v4h-4z';
 
 const word = (strings: A11yStrings, key: HandWord): string => strings[key] ?? WORDS[key];
 
-/** The keyboard help, the prompt, and the button that resets the camera. */
+/** Template of the keyboard help, the interaction prompt, and the button that resets the camera. */
 export function handsView(model: TemplateModel): TemplateResult {
   const { canMove, navigation, walkKeys, prompt: kind, onReset, strings } = model;
   const keys = walkKeys ?? word(strings, navigation === 'orbit' ? 'keys-orbit' : 'keys-fly');
@@ -70,7 +70,7 @@ export function handsView(model: TemplateModel): TemplateResult {
   ${onReset ? cornerButton('reset-button', word(strings, 'reset'), FRAME_SIGN, onReset, strings) : nothing}`;
 }
 
-/** A dragging hand. Decorative, because screen readers announce the keys when the scene has the focus. */
+/** Template of the prompt, a dragging hand. Screen readers announce the keys instead when the scene has the focus. */
 function prompt(kind: TemplateModel['prompt'], strings: A11yStrings): TemplateResult {
   const hand = svg`<path d="M9 11.24V7.5a2.5 2.5 0 0 1 5 0v3.74a4.5 4.5 0 1 0-5 0zm9.84 4.63-4.54-2.26a1 1 0 0 0-.54-.11H13v-6a1.5
     1.5 0 0 0-3 0v10.74l-3.43-.72a1 1 0 0 0-1 .33l-.57.62 4.94 4.94a1.5 1.5 0 0 0 1.06.44h6.79a1.5 1.5 0 0 0 1.48-1.29l.75-5.27a1.5
@@ -78,7 +78,7 @@ function prompt(kind: TemplateModel['prompt'], strings: A11yStrings): TemplateRe
   return html`<div class="layer prompt">
     <slot name="interaction-prompt">
       <div
-        part="prompt"
+        part="interaction-prompt"
         class=${kind}
         role="img"
         lang=${languageOf(strings) ?? nothing}

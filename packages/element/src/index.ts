@@ -11,7 +11,9 @@ export type {
   GeneratorMemoryDetail,
   GaussianSplatEventMap,
   HotspotVisibilityDetail,
+  ImmersiveStatusDetail,
   LoadDetail,
+  MeasureDetail,
   PreviewDetail,
   ViewChangeDetail,
   VisibilityDetail,
@@ -38,7 +40,7 @@ export type {
   WheelZoom,
 } from './attributes.js';
 export type { ViewName } from './camera/spoken.js';
-export type { A11yStrings } from './words.js';
+export type { A11yStrings } from './strings.js';
 export { CameraOrbit, CameraTarget, FieldOfView, ScenePoint, type PickedPoint } from './camera/values.js';
 export type { HotspotPlace } from './controllers/hotspot-controller.js';
 export type { SceneBox } from './scene-queries.js';
@@ -63,7 +65,10 @@ const CONFIGURABLE = [
 /** Static properties of the class that a page may set in `globalThis.GaussianSplatElement` before this module runs. */
 export type GaussianSplatConfiguration = Partial<Pick<typeof GaussianSplatElement, (typeof CONFIGURABLE)[number]>>;
 
-/** Script tags without a build step cannot set statics before the first element is upgraded. */
+/**
+ * Copies the statics from `globalThis.GaussianSplatElement`. Script tags without a build step cannot set them before
+ * the first element is upgraded.
+ */
 function configure(): void {
   const given = (globalThis as { GaussianSplatElement?: GaussianSplatConfiguration }).GaussianSplatElement;
   if (typeof given !== 'object' || given === null) return;
@@ -72,7 +77,7 @@ function configure(): void {
 
 configure();
 
-// Two copies of this module on one page, or a server without custom elements, must not fail.
+// Does not fail if the page has two copies of this module, or on a server without custom elements.
 if (globalThis.customElements && !customElements.get('gaussian-splat')) {
   customElements.define('gaussian-splat', GaussianSplatElement);
 }

@@ -1,5 +1,5 @@
-/** The words of the element in the languages of pages: fetched where that is not English. */
-import type { A11yStrings, Words } from './words.js';
+/** Texts of the element in the language of the page; loaded on demand unless it is English. */
+import type { A11yStrings, Words } from './strings.js';
 
 const LANGUAGES: Readonly<Record<string, () => Promise<{ readonly words: Words }>>> = {
   de: () => import('./languages/de.js'),
@@ -13,9 +13,8 @@ const LANGUAGES: Readonly<Record<string, () => Promise<{ readonly words: Words }
 };
 
 /**
- * The words of a language.
- * @param lang as of the attribute `lang`: a tag of BCP 47 such as `pt-BR`, of which the language counts
- * @returns none for a language that the element does not speak
+ * Returns the texts of a language; an empty object for English and languages without a translation.
+ * @param lang value of the attribute `lang`: a BCP 47 tag such as `pt-BR`, whose region is ignored
  */
 export async function wordsIn(lang: string): Promise<A11yStrings> {
   const [language] = lang.toLowerCase().split('-');

@@ -1,5 +1,5 @@
 /**
- * Runs only the latest task: a new one aborts the previous one. An aborted task must stop, and its errors are ignored.
+ * Runs one task at a time: a new task aborts the previous one. An aborted task must stop, and its errors are ignored.
  */
 export class LatestTask {
   #running = new AbortController();
@@ -9,7 +9,7 @@ export class LatestTask {
     return this.#running.signal;
   }
 
-  /** Aborts the current task. @returns The signal of the next one. */
+  /** Aborts the current task. @returns The signal of the next task. */
   renew(): AbortSignal {
     this.#running.abort();
     this.#running = new AbortController();
@@ -17,7 +17,7 @@ export class LatestTask {
   }
 
   /**
-   * Aborts the current task and runs this one; `failed` is called with its error, unless another task has started
+   * Aborts the current task and runs `work`. Calls `failed` with the error of `work`, unless another task has started
    * meanwhile.
    */
   run(work: (signal: AbortSignal) => Promise<void>, failed: (error: unknown) => void): void {

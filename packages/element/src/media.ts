@@ -6,16 +6,16 @@ import { SceneTimeRanges } from './time-ranges.js';
 import type { LitElement } from 'lit';
 
 /**
- * The properties that a page may set, for the typings of frameworks: those of the attributes, and of playback
- * `currentTime` and `playbackRate`. Methods and read-only properties (`error`, `duration`, ...) are excluded, because a
- * framework that sets them throws.
+ * Properties that a page may set, for the typings of frameworks: those of the attributes, `currentTime` and
+ * `playbackRate`. Methods and read-only properties (`error`, `duration`, ...) are excluded, because a framework that
+ * sets them throws.
  */
 export type SettableProperties = Partial<
   Pick<SplatProperties, Exclude<keyof SplatProperties, keyof LitElement>> &
     Pick<MediaProperties, 'currentTime' | 'playbackRate'>
 >;
 
-/** Values of HTMLMediaElement.readyState for a scene: no data, only the current frame, or enough to play. */
+/** Values of HTMLMediaElement.readyState: no data, only the current frame, and enough data to play. */
 const HAVE_NOTHING = 0;
 const HAVE_CURRENT_DATA = 2;
 const HAVE_ENOUGH_DATA = 4;
@@ -26,12 +26,12 @@ const isSaid = (value: number | null | undefined): boolean => value !== null && 
 export abstract class MediaProperties extends SplatProperties {
   /** @internal */
   protected abstract readonly core: ElementCore;
-  /** Resolves when nothing is pending. */
+  /** Fulfills when the scene is shown or nothing is pending. */
   abstract get ready(): Promise<void>;
 
   /**
-   * Playback position in seconds; setting it seeks. Set before a scene is loaded, or just after another `src`, it is
-   * the start position of that scene.
+   * Playback position in seconds. Setting it seeks. If it is set before a scene is loaded, or just after another `src`,
+   * it is the start position of that scene.
    */
   get currentTime(): number {
     const { playback } = this.core;
@@ -58,7 +58,7 @@ export abstract class MediaProperties extends SplatProperties {
     return this.core.playback.ended;
   }
 
-  /** Whether the frame at the last set time is not shown yet. */
+  /** Whether the scene is seeking: the frame of the last set time is not shown yet. */
   get seeking(): boolean {
     return this.core.playback.seeking;
   }
@@ -72,7 +72,10 @@ export abstract class MediaProperties extends SplatProperties {
     this.core.playback.playbackRate = isSaid(rate) ? rate : 1;
   }
 
-  /** Same as on HTMLMediaElement: 0 without a scene, 4 once it is shown, 2 while a clip waits for its next frames. */
+  /**
+   * State of loading as on HTMLMediaElement: 0 without a scene, 4 when a scene is shown, 2 while a clip waits for its
+   * next frames.
+   */
   get readyState(): number {
     if (this.core.sources.state !== 'ready') return HAVE_NOTHING;
     return (this.#live?.loadedUntil?.(this.currentTime) as number) <= this.currentTime
@@ -80,12 +83,12 @@ export abstract class MediaProperties extends SplatProperties {
       : HAVE_ENOUGH_DATA;
   }
 
-  /** Seekable times: the whole of a scene with an end, none of others. */
+  /** Times that can be sought: the whole duration of a scene with an end; empty for other scenes. */
   get seekable(): SceneTimeRanges {
     return new SceneTimeRanges(this.duration);
   }
 
-  /** Times that need no more bytes: the same, except for a clip, whose groups are loaded and discarded. */
+  /** Times that need no further download: the whole duration, but only the loaded groups of frames of a clip. */
   get buffered(): SceneTimeRanges {
     return new SceneTimeRanges(this.duration, this.#live?.buffered);
   }
@@ -100,19 +103,21 @@ export abstract class MediaProperties extends SplatProperties {
   }
 
   /**
-   * Starts playback, once the scene is loaded. Frames are drawn at the page's rate; the generator follows as fast as it
-   * can. Dismisses a manual poster and loads a lazy scene that is off-screen.
+   * Starts playback when the scene is loaded. Dismisses a manual poster, and loads a lazy scene that is out of view.
+   * The page draws frames at its own rate; a generator runs as often as it can.
    * @returns Rejects with a `NotSupportedError` if there is no animated scene, and with an `AbortError` if `pause()` or
    * another `src` intervenes.
    */
   async play(): Promise<void> {
     const { playback } = this.core;
     const { pauses } = playback;
-    // A scene that was just set is requested first: the removal of the previous one is no reason to reject.
+    // Waits until a `src` that was just set is requested, so that the removal of the previous scene does not reject the
+    // promise.
     await this.updateComplete;
     if (playback.pauses !== pauses) throw notPlayed();
     this.core.prepareToPlay();
-    await playback.waitFor(this.ready);
+    // A scene that is shown plays, also while a child loads.
+    if (!playback.canPlay) await playback.waitFor(this.ready);
     if (!playback.canPlay) throw new DOMException('There is no scene that moves', 'NotSupportedError');
     playback.play();
   }

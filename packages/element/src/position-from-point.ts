@@ -18,20 +18,20 @@ export interface QueryHost {
     readonly meshes: { readonly value: Pick<Meshes, 'hit'> | undefined };
   };
   readonly camera: Pick<CameraController, 'viewerFrame'>;
-  /** Reads surface positions of the last frame. Rejects if the frame is gone. */
+  /** Reads the surface positions of the last frame at points of the image. Rejects if the frame is released. */
   probe(points: readonly ProbePoint[]): Promise<readonly ProbeAnswer[]>;
   readonly view: Pick<ViewController, 'backend'>;
-  /** The camera of the last frame, in its pixels; undefined before there is one. */
+  /** The camera of the last frame, with the size of the frame in pixels; undefined before the first frame. */
   readonly drawnFrom: Camera | undefined;
-  /** Element that the frame covers, once it is rendered. */
+  /** Element of the shadow tree that the image fills; null before the first rendering. */
   readonly surface: HTMLElement | null;
 }
 
 /**
- * The visible surface under a point of the page, and the element that it belongs to, read back from the GPU
- * asynchronously.
- * @param clientX CSS pixels, like that of a MouseEvent.
- * @returns null outside the scene, on parts less than half opaque, or if the frame is gone meanwhile
+ * Returns the visible surface under a point of the page and the element that contains the surface. Reads back from the
+ * GPU asynchronously.
+ * @param clientX CSS pixels, same as in a MouseEvent
+ * @returns null outside the scene, on parts less than half opaque, and if the frame is released meanwhile
  */
 export async function positionFromPoint(
   host: QueryHost,
@@ -47,7 +47,7 @@ export async function positionFromPoint(
   try {
     const [answer] = await host.probe([{ x, y }]);
     if (!answer || answer.depth === null) return null;
-    // The shadow belongs to no element.
+    // The splats of the shadow belong to no element.
     const placement = answer.splat?.placement;
     if (placement && !host.sources.members.some((member) => member.placement === placement)) return null;
     const { near, depth, far } = answer;
@@ -57,13 +57,16 @@ export async function positionFromPoint(
     const point = new ScenePoint(...toViewer(camera.viewerFrame, place), uncertainty);
     return Object.assign(point, { distance: distance(eye, place), ...whose(host, answer, eye, place) });
   } catch (error) {
-    // A lost device is reported elsewhere.
+    // The loss of a device is reported by its scene.
     if (await isGone(backend)) return null;
     throw error;
   }
 }
 
-/** The element that a surface belongs to, and the part of it that was hit. */
+/**
+ * Returns the element that contains a surface, and the splat or the mesh and material that was hit. `eye` and `place`
+ * are in the frame of the world.
+ */
 function whose(
   { element, sources, camera }: QueryHost,
   { splat }: ProbeAnswer,

@@ -4,11 +4,12 @@ import { declarations, flags, type AttributeProperties } from './attributes.js';
 import type { GaussianSplatEventMap } from './events.js';
 import type { ControlValues } from './dynamic/values.js';
 
-/** Events of the element, plus the standard ones of every element, such as `click` and `keydown`. */
+/** Events of the element, and the standard events of every element, such as `click` and `keydown`. */
 type ElementEvents = GaussianSplatEventMap & Omit<HTMLElementEventMap, keyof GaussianSplatEventMap>;
 
-/** The properties of `<gaussian-splat>`: reflected attributes, and others declared to Lit. */
-// The interface below gives the attributes of attributes.ts and inherited methods their types: Lit makes the accessors of the first, and has the others.
+/** Properties of `<gaussian-splat>`: the attributes, and properties without an attribute that are declared to Lit. */
+// The interface below types the accessors that Lit creates for the attributes of attributes.ts, and the listeners of
+// the events.
 // eslint-disable-next-line @typescript-eslint/no-unsafe-declaration-merging
 export class SplatProperties extends LitElement {
   static override properties: PropertyDeclarations = {
@@ -16,35 +17,40 @@ export class SplatProperties extends LitElement {
     inputValues: { attribute: false },
     splatShader: { attribute: false },
     revealProgress: { attribute: false },
-    // Accessors of MediaProperties, declared here so that values set before the element is defined reach them.
+    // MediaProperties has accessors for these. The declaration applies values that were set before the element was
+    // defined.
     currentTime: { attribute: false, noAccessor: true },
     playbackRate: { attribute: false, noAccessor: true },
   };
 
   /**
-   * Controls of a generator by the names of its inputs; they override the attributes `control-NAME`. Assign a new
+   * Values of a generator's inputs by input name; they take precedence over the attributes `control-NAME`. Assign a new
    * object to change values.
    */
   declare inputValues: ControlValues | null;
 
   /**
-   * A WGSL function of the page for each splat, `{ code, uniforms, animated, moves }`; null for none. Assign a new
+   * The page's WGSL code that modifies each splat, `{ code, uniforms, animated, moves }`; null for none. Assign a new
    * object to change values; equal code is not compiled again. The event `shader-error` reports code that does not
    * compile.
    */
   declare splatShader: SplatShader | null;
 
-  /** How far the scene has appeared with `reveal-effect`, 0 to 1: for pages that drive it, by scrolling for example. null, the default: by time. */
+  /**
+   * Progress of `reveal-effect`, 0..1, for pages that control it, for example by scrolling. null, the default: progress
+   * by time.
+   */
   declare revealProgress: number | null;
 
   static {
-    // The element draws, and so learns what its template shows, after an update. Lit's development build warns of that.
+    // The element requests another update after it has drawn. Lit's development build would warn of that.
     this.disableWarning?.('change-in-update');
   }
 
   constructor() {
     super();
-    // Boolean properties start as booleans: frameworks inspect them to decide the meaning of a bare attribute.
+    // Boolean properties are false at first: frameworks inspect the type of a property to interpret an attribute
+    // without a value.
     Object.assign(this, Object.fromEntries(flags.map((name) => [name, false])));
   }
 }

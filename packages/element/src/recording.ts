@@ -1,4 +1,4 @@
-/** Videos: recorded from the screen by the browser, or frame by frame as images. */
+/** Videos: recorded by the browser in real time, or drawn frame by frame as images. */
 import type { CameraController } from './controllers/camera-controller.js';
 import type { PlaybackController } from './controllers/playback-controller.js';
 import type { Lazy } from './lazy.js';
@@ -7,31 +7,34 @@ import type { ImageOptions } from './viewing.js';
 import { frameCount, frameShares, type CameraPath, type PathName } from './views/camera-path.js';
 import type { Tour } from './views/tour.js';
 
-/** Content and duration of a video. */
+/** Path, duration and frame rate of a video. */
 interface VideoOptions {
-  /** Path of the camera: through the list of `views`, or once around its target. Default: the camera of the element. */
+  /**
+   * Path of the camera: through the list of `views`, or once around the target. Default: the camera of the element,
+   * which visitors may move.
+   */
   readonly path?: PathName;
-  /** Milliseconds. Default: what the path says. */
+  /** Duration in milliseconds. Default: the duration of the path. */
   readonly duration?: number;
-  /** Frames in a second. Default 30. */
+  /** Frames per second. Default 30. */
   readonly frameRate?: number;
 }
 
-/** A video to record. */
+/** Options of `record()`. */
 export interface RecordOptions extends VideoOptions {
-  /** Default: the best that the browser writes, WebM or MP4. */
+  /** Media type of the video. Default: the first of WebM with VP9, WebM and MP4 that the browser can write. */
   readonly mimeType?: string;
-  /** Default: what the browser chooses. */
+  /** Bit rate of the video, bits per second. Default: the browser's. */
   readonly bitsPerSecond?: number;
-  /** A CSS color behind the scene. Default: the background color of the element, else white. */
+  /** CSS color behind the scene. Default: the background color of the element, or white if that is transparent. */
   readonly background?: string;
-  /** Ends the recording: the video is what was recorded by then. */
+  /** Signal that ends the recording. The video then contains what was recorded until then. */
   readonly signal?: AbortSignal;
 }
 
-/** Frames to draw one by one. */
+/** Options of `recordFrames()`. */
 export interface FrameOptions extends VideoOptions, ImageOptions {
-  /** Number of frames, above `duration`. */
+  /** Number of frames; takes precedence over `duration`. */
   readonly frames?: number;
 }
 
@@ -50,7 +53,7 @@ const FRAME_RATE = 30;
 /** Media types in order of preference. */
 const TYPES = ['video/webm;codecs=vp9', 'video/webm', 'video/mp4'];
 
-/** See `record()` of the element. */
+/** Records a video in real time: see `record()` of the element. */
 export async function record(host: RecordingHost, options: RecordOptions): Promise<Blob> {
   const { frameRate = FRAME_RATE, bitsPerSecond, signal } = options;
   const mimeType = typeOf(options.mimeType);
@@ -61,7 +64,7 @@ export async function record(host: RecordingHost, options: RecordOptions): Promi
   const { canvas } = host;
   if (!canvas || host.drawNow() === null) throw nothingToDraw();
   const { context, copy } = paperFor(host, canvas, options.background);
-  // A stream begins with what the canvas has by then.
+  // The stream begins with the current content of its canvas.
   copy();
   const recorder = new MediaRecorder(context.canvas.captureStream(frameRate), {
     mimeType,
@@ -88,7 +91,7 @@ export async function record(host: RecordingHost, options: RecordOptions): Promi
   return new Blob(parts, { type: recorder.mimeType });
 }
 
-/** Draws frame after frame until the time is over. */
+/** Requests frames, and moves the camera along `path`, for `duration` milliseconds or until the signal is aborted. */
 function drive(host: RecordingHost, path: CameraPath | null, duration: number, signal?: AbortSignal): Promise<void> {
   return new Promise((resolve) => {
     const start = performance.now();
@@ -99,7 +102,7 @@ function drive(host: RecordingHost, path: CameraPath | null, duration: number, s
       resolve();
     };
     let isOver = false;
-    // A hidden page has no frames, and its video an end nevertheless.
+    // The end is a timer, because a hidden page has no frames.
     const timer = duration === Infinity ? undefined : setTimeout(end, duration);
     signal?.addEventListener('abort', end);
     if (signal?.aborted) end();
@@ -109,7 +112,7 @@ function drive(host: RecordingHost, path: CameraPath | null, duration: number, s
         host.behaviors.rest();
         host.camera.moveTo(path.at(Math.min(1, (performance.now() - start) / duration)));
       }
-      // Browsers record frames of a canvas that changes.
+      // Browsers add a frame to the video only if the canvas changes.
       host.requestFrame();
       requestAnimationFrame(step);
     };
@@ -117,7 +120,10 @@ function drive(host: RecordingHost, path: CameraPath | null, duration: number, s
   });
 }
 
-/** A canvas with a background that frames of the element are copied to: videos have no alpha, and one size. */
+/**
+ * Creates a canvas with a background, and a function that copies the element's image to it. Videos have no alpha and a
+ * constant size.
+ */
 function paperFor(
   host: RecordingHost,
   { width, height }: HTMLCanvasElement,
@@ -126,7 +132,7 @@ function paperFor(
   const own = getComputedStyle(host.element).backgroundColor;
   const color = background ?? (own === 'rgba(0, 0, 0, 0)' ? 'white' : own);
   if (!CSS.supports('color', color)) throw new TypeError(`record(): expected a CSS color, found "${color}"`);
-  // Encoders halve both sides.
+  // Encoders need even sides, because they store color at half resolution.
   const size = { width: width + (width % 2), height: height + (height % 2) };
   const context = Object.assign(document.createElement('canvas'), size).getContext('2d', { alpha: false })!;
   const copy = (): void => {
@@ -151,7 +157,7 @@ function typeOf(asked: string | undefined): string {
   );
 }
 
-/** See `recordFrames()` of the element. */
+/** Yields the images of a video one by one: see `recordFrames()` of the element. */
 export async function* recordFrames(host: RecordingHost, options: FrameOptions): AsyncGenerator<Blob, void> {
   const { path: name, duration, frameRate = FRAME_RATE, frames: count, ...image } = options;
   const { width, height } = image;
@@ -172,20 +178,31 @@ export async function* recordFrames(host: RecordingHost, options: FrameOptions):
     }
   } finally {
     if (path) camera.moveTo(before.goal);
-    if (playback.canPlay) playback.currentTime = before.time;
-    if (!before.isPaused) playback.play();
+    if (playback.canPlay) {
+      playback.currentTime = before.time;
+      if (!before.isPaused) playback.play();
+    }
   }
 }
 
-/** Waits until the scene of a time is drawn. */
+/** Seeks to a time in seconds, and waits until its frame is drawn. Rejects if the scene is removed or replaced. */
 async function seek({ element, playback }: RecordingHost, seconds: number): Promise<void> {
   if (playback.currentTime === seconds) return;
-  const shown = new Promise((resolve) => element.addEventListener('seeked', resolve, { once: true }));
+  const over = new AbortController();
+  const { signal } = over;
+  const shown = new Promise((resolve, reject) => {
+    element.addEventListener('seeked', resolve, { signal });
+    element.addEventListener('emptied', () => reject(nothingToDraw()), { signal });
+  });
   playback.currentTime = seconds;
-  await shown;
+  await shown.finally(() => over.abort());
 }
 
-/** null where the camera goes where it goes anyway. */
+/**
+ * Returns a path by name after the scene has loaded; null without a name.
+ * @param aspect width by height; default: that of the element
+ * @throws TypeError if the page has no views
+ */
 async function pathOf(host: RecordingHost, name: PathName | undefined, aspect?: number): Promise<CameraPath | null> {
   await host.settled;
   if (name === undefined) return null;

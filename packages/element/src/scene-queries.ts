@@ -1,23 +1,26 @@
-import { toViewer } from './camera/orbit.js';
+import type { Vector3 } from '@gaussian-splat/core';
+import type { ViewerFrame } from './camera/orbit.js';
 import type { SceneBounds } from './camera/settings.js';
 import { ScenePoint } from './camera/values.js';
-import type { CameraController } from './controllers/camera-controller.js';
 
-/** A box in viewer space, its sides along the axes. */
+/** An axis-aligned box in viewer space. */
 export interface SceneBox {
   readonly min: ScenePoint;
   readonly max: ScenePoint;
 }
 
-/** Box around nearly all of the visible splats; null if there are none. */
-export function boxOf(shown: {
-  readonly camera: Pick<CameraController, 'viewerFrame'>;
-  readonly bounds: SceneBounds | null;
-}): SceneBox | null {
-  const { camera, bounds } = shown;
+/**
+ * Returns the box around nearly all visible splats in viewer space; null if there are none. `bounds` are in the frame
+ * of the world.
+ */
+export function boxOf(frame: ViewerFrame, bounds: SceneBounds | null): SceneBox | null {
   if (bounds === null) return null;
-  const [a, b] = [toViewer(camera.viewerFrame, bounds.min), toViewer(camera.viewerFrame, bounds.max)];
+  // A rotated box is farthest along each axis at the corner with the extreme of each product.
   const corner = (pick: (p: number, q: number) => number): ScenePoint =>
-    new ScenePoint(pick(a[0], b[0]), pick(a[1], b[1]), pick(a[2], b[2]));
+    new ScenePoint(
+      ...(frame.map((row) =>
+        row.reduce((sum, value, k) => sum + pick(value * bounds.min[k], value * bounds.max[k]), 0),
+      ) as unknown as Vector3),
+    );
   return { min: corner(Math.min), max: corner(Math.max) };
 }

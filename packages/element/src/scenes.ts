@@ -1,6 +1,7 @@
 /**
- * Registers `<splat-scene>`, `<splat-mesh>` and `<splat-cut>` at once, for pages and frameworks that set their properties; without it a `<gaussian-splat>` does so when it has such a
- * child. Registers `<gaussian-splat>`, too.
+ * Registers `<splat-scene>`, `<splat-mesh>`, `<splat-cut>` and `<gaussian-splat>` immediately, for pages and frameworks
+ * that set their properties. Without this module, a `<gaussian-splat>` registers the other elements when it has such a
+ * child.
  */
 import './index.js';
 import { define } from './composition/compose.js';

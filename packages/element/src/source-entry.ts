@@ -17,23 +17,23 @@ import type { WorldEntry } from './world-entry.js';
 import type { Services, Source } from './element-host.js';
 import { costOf, type ChildStats } from './stats.js';
 
-/** Services of an entry that no longer belongs to an element. */
+/** Services of an entry that belongs to no element. */
 const NO_SERVICES = { releaseDelay: 0 } as Services;
 
-/** The interface of the element that an entry uses. */
+/** The part of the element that an entry uses. */
 export interface EntryCore {
   readonly element: ReactiveControllerHost & HTMLElement;
   readonly attributes: Attributes;
   readonly services: Services;
   readonly camera: { frame(bounds: SceneBounds): void };
-  /** The camera before the image has a size. */
+  /** The camera at the default size of an element, for a generator that runs before the image has a size. */
   readonly firstView: Camera;
-  /** Rotation from the world to viewer space. */
+  /** Rotation from the frame of the world to viewer space. */
   readonly frame: ViewerFrame;
   readonly wantsPreviews: boolean;
-  /** The scene would be visible. */
+  /** Whether the scene would be visible if it were loaded. */
   readonly isInSight: boolean;
-  /** Automatic motion is allowed. */
+  /** Whether automatic motion is allowed. */
   readonly mayMove: boolean;
   readonly memoryBudget: number | undefined;
   /** Inputs of the displayed models that the page may set. */
@@ -43,7 +43,7 @@ export interface EntryCore {
   splatsChanged(): void;
 }
 
-/** The list that it is in. */
+/** The part of {@link SourceList} that an entry uses. */
 export interface EntryList {
   readonly ownEntry: SourceEntry;
   readonly shown: readonly LoadedGaussians[];
@@ -56,6 +56,7 @@ export interface EntryList {
     enter: (member: WorldEntry) => void,
   ): Promise<void>;
   left(clear: boolean): void;
+  changed(): void;
   settledOne(): void;
   contextChanged(type: 'contextlost' | 'contextrestored', entry: SourceEntry): void;
 }
@@ -65,15 +66,15 @@ export interface SourceOwner {
   readonly element: ReactiveControllerHost & HTMLElement;
   readonly source: Source;
   readonly dynamicValues: DynamicHost['dynamicValues'];
-  /** False if it follows the clock of its parent element. */
+  /** False if the source follows the clock of its parent element. */
   readonly hasOwnClock: boolean;
-  /** Attributes that differ from those of the element. */
+  /** Attributes of a child, which take precedence over those of the element. */
   readonly overrides?: Partial<Attributes>;
-  /** Opens sources other than splats. */
+  /** Opens a source that contains no splats, such as a mesh; undefined for splats. */
   readonly open?: SceneHost['open'];
-  /** Sets its transform; absent if its frame is the world's. */
+  /** Sets the transform of the source; absent if its frame is that of the world. */
   place?(member: WorldEntry, core: EntryCore): void;
-  /** A camera of the world in its own coordinates. */
+  /** Converts a camera from the frame of the world to that of the source; absent if the frames are equal. */
   seenFrom?(camera: Camera, member: WorldEntry | undefined, core: EntryCore): Camera;
   warn(sentence: string): void;
 }
@@ -84,11 +85,15 @@ export interface SourceOwner {
  */
 export class SourceEntry implements SceneHost, SourceHost, PlaybackHost, DynamicHost, DetailHost {
   readonly owner: SourceOwner;
+  readonly element: HTMLElement;
   readonly scene: SceneController;
   readonly ownClock: PlaybackController;
   readonly live: DynamicWiring;
   readonly #source: SourceController;
-  /** Only scenes with the attribute `detail`, and those too slow to draw in full during motion, need it. */
+  /**
+   * Levels of detail. Needed only by scenes with the attribute `detail`, and by scenes too slow to be drawn in full
+   * during motion.
+   */
   readonly #detail = new Lazy(
     'the code of levels of detail',
     async () => {
@@ -97,20 +102,21 @@ export class SourceEntry implements SceneHost, SourceHost, PlaybackHost, Dynamic
     },
     () => this.#updateDetail(),
   );
-  /** The element that it belongs to, or belonged to last. */
+  /** The element that the entry belongs to, or belonged to last. */
   #core: EntryCore | undefined;
   #isIn = false;
-  /** Its member of the world. */
+  /** The loaded source in the world; undefined while it is not shown. */
   member: WorldEntry | undefined;
   /** Loading progress, 0..1; null while unknown. */
   progress: number | null = null;
-  /** It has played or was paused, so it no longer starts automatically. */
+  /** Whether the source has played or was paused, after which it does not start automatically. */
   hasBegun = false;
-  /** Bytes received, and bytes in total. */
+  /** Bytes received and bytes in total; the total is undefined while unknown. */
   #bytes: [loaded: number, total: number | undefined] = [0, undefined];
 
   constructor(owner: SourceOwner, core?: EntryCore) {
     this.owner = owner;
+    this.element = owner.element;
     this.#core = core;
     this.#isIn = core !== undefined;
     this.ownClock = new PlaybackController(this);
@@ -119,7 +125,7 @@ export class SourceEntry implements SceneHost, SourceHost, PlaybackHost, Dynamic
     this.#source = new SourceController(this);
   }
 
-  // Interface of the stage.
+  // Interface for the element and for children.
 
   get state(): SceneState {
     return this.scene.state;
@@ -129,22 +135,22 @@ export class SourceEntry implements SceneHost, SourceHost, PlaybackHost, Dynamic
     return this.scene.error;
   }
 
-  /** The clock that it follows. */
+  /** The clock of the source: its own, or that of the parent element. */
   get playback(): PlaybackController {
     return this.owner.hasOwnClock || !this.#core ? this.ownClock : this.#core.sources.ownEntry.ownClock;
   }
 
-  /** Seconds that it moves for; NaN for what does not. */
+  /** Duration of the animation in seconds; NaN for a source that does not move. */
   get duration(): number {
     return this.scene.scene?.live?.duration ?? NaN;
   }
 
-  /** There is something of it to see. */
+  /** Whether the source is shown in full or as a preview. */
   get isShown(): boolean {
     return this.member !== undefined && (this.state === 'ready' || this.scene.isPreview);
   }
 
-  /** Fulfills, and never rejects, once nothing is left to wait for. */
+  /** Fulfills when the source and its levels of detail are neither loading nor pending. Never rejects. */
   get settled(): Promise<unknown> {
     return this.scene.settled.then(() => this.#detail.settled);
   }
@@ -158,7 +164,7 @@ export class SourceEntry implements SceneHost, SourceHost, PlaybackHost, Dynamic
     return { element: this.owner.element, state, error, ...costOf(scene) };
   }
 
-  /** Moves the entry to this element, or to none, together with its loaded scene. */
+  /** Moves the entry with its loaded scene to another element; null removes it from its element. */
   attach(core: EntryCore | null): void {
     if (this.#isIn && core === this.#core) return this.update();
     if (this.#isIn) this.#core!.sources.remove(this);
@@ -171,12 +177,12 @@ export class SourceEntry implements SceneHost, SourceHost, PlaybackHost, Dynamic
     if (scene && !scene.isLost) void this.show(scene, 'again').catch((error: unknown) => this.scene.fail(error));
   }
 
-  /** The element that it belongs to; null for none. */
+  /** The element that the entry belongs to; null if there is none. */
   get parent(): Element | null {
     return this.#isIn ? this.#core!.element : null;
   }
 
-  /** Reads the attributes again: its owner, or the parent element, may request another source. */
+  /** Reads the attributes of its owner and of the parent element again, which may request another source. */
   update(): void {
     if (!this.#isIn) return;
     this.#source.set(this.owner.source);
@@ -185,14 +191,14 @@ export class SourceEntry implements SceneHost, SourceHost, PlaybackHost, Dynamic
     this.startPlaying();
   }
 
-  /** Loads and plays if that is allowed now. */
+  /** Loads and plays the source if the attributes and the visibility allow that. */
   request(): void {
     if (!this.#isIn) return;
     this.#source.request();
     this.startPlaying();
   }
 
-  /** Loads the source even if it is not visible, until another one is requested. */
+  /** Allows the source to load while it is not visible, from the next update until another source is requested. */
   needNow(): void {
     this.#source.needNow(true);
   }
@@ -203,7 +209,7 @@ export class SourceEntry implements SceneHost, SourceHost, PlaybackHost, Dynamic
     this.owner.element.requestUpdate();
   }
 
-  /** Its owner requests another source than the displayed or loading one. */
+  /** Whether its owner requests another source than the one that is displayed or loading. */
   get isLeaving(): boolean {
     return this.#source.isOther(this.owner.source);
   }
@@ -212,25 +218,39 @@ export class SourceEntry implements SceneHost, SourceHost, PlaybackHost, Dynamic
     return this.#source.postprocess;
   }
 
-  /** The clock of a source that plays automatically. */
+  /** The clock of the source if it plays automatically, else undefined. */
   get player(): PlaybackController | undefined {
     return this.#core && this.attributes.autoplay ? this.ownClock : undefined;
   }
 
-  /** Starts automatic playback if that is allowed. */
+  /** Starts automatic playback if it is allowed, and if the source has neither played nor been paused before. */
   startPlaying(): void {
     if (!this.hasBegun && this.#core?.mayMove && this.player?.canPlay) this.ownClock.play();
   }
 
-  /** Sets its transform before a frame. */
+  /** Sets the transform of the source in the world. Called before each frame. */
   place(): void {
-    // Reading a member's count may replace its splats in the world.
+    // The getter `placement` may replace the splats of a member in the world.
     if (this.member?.placement && this.#isIn) this.owner.place?.(this.member, this.#core!);
   }
 
-  /** Advances its motion to the time of a frame. The last frame of a scene about to be replaced stays unchanged. */
-  advance(camera: Camera, now: number): void {
-    if (this.member && !this.scene.isOutgoing) this.live.advance(this.member.scene, this.#seenFrom(camera), now);
+  /**
+   * Returns the first time in seconds, from that of a clock on, whose frame is not loaded. Infinity if the clock need
+   * not wait for this source.
+   */
+  loadedUntil(clock: PlaybackController): number {
+    const live = this.playback === clock ? this.#advancing?.live : undefined;
+    return live?.loadedUntil?.(clock.currentTime) ?? Infinity;
+  }
+
+  /** Requests the frame at the time of the clock. */
+  advance(camera: Camera): void {
+    if (this.#advancing) this.live.advance(this.#advancing, this.#seenFrom(camera));
+  }
+
+  /** The shown scene. Undefined for a scene that is about to be replaced, which keeps its last frame. */
+  get #advancing(): LoadedGaussians | undefined {
+    return this.scene.isOutgoing ? undefined : this.member?.scene;
   }
 
   reportMotionFrame(isWhole: boolean): void {
@@ -238,15 +258,11 @@ export class SourceEntry implements SceneHost, SourceHost, PlaybackHost, Dynamic
     this.#detail.value?.reportMotionFrame(isWhole);
   }
 
-  // Interfaces of the controllers.
-
-  get element(): HTMLElement {
-    return this.owner.element;
-  }
+  // Properties that the controllers read.
 
   get attributes(): Attributes {
     const { overrides } = this.owner;
-    // A child has its own attributes before it belongs to an element.
+    // A child has attributes before it belongs to an element.
     return overrides ? { ...(this.#core?.attributes as Attributes), ...overrides } : this.#core!.attributes;
   }
 
@@ -267,7 +283,7 @@ export class SourceEntry implements SceneHost, SourceHost, PlaybackHost, Dynamic
   }
 
   get memoryBudget(): number | undefined {
-    return this.#core!.memoryBudget;
+    return this.#core?.memoryBudget;
   }
 
   get open(): SceneHost['open'] {
@@ -321,7 +337,7 @@ export class SourceEntry implements SceneHost, SourceHost, PlaybackHost, Dynamic
     this.dispatch(new Event(type));
     if (type !== 'play' && type !== 'pause') return;
     this.hasBegun ||= type === 'play';
-    // Custom states and the pause button depend on them, too.
+    // Custom states and the pause button of the element depend on the state of playback.
     this.#core?.element.requestUpdate();
   }
 
@@ -338,13 +354,19 @@ export class SourceEntry implements SceneHost, SourceHost, PlaybackHost, Dynamic
 
   hide(clear: boolean): void {
     this.leave();
-    this.ownClock.suspend();
-    if (clear) this.ownClock.empty();
+    if (clear) {
+      this.ownClock.empty();
+      this.live.notifyInputs([]);
+    }
     if (this.#isIn) this.#core!.sources.left(clear);
   }
 
-  /** Leaves the world: its splats are about to be freed, or to be shown in another element. */
+  /**
+   * Removes the source from the world, before its splats are freed or shown in another element. Its clock stops until it
+   * is shown again.
+   */
   leave(): void {
+    this.ownClock.suspend();
     this.member?.remove();
     this.member = undefined;
   }
@@ -387,14 +409,15 @@ export class SourceEntry implements SceneHost, SourceHost, PlaybackHost, Dynamic
     this.ownClock.empty();
     this.ownClock.stopWaits();
     this.dispatch(new Event('emptied'));
-    // The other sources are restored; the loss of this one is reported by the scene that replaces it.
-    if (!this.#isOwn) this.contextChanged('contextrestored');
+    // The other sources count as restored: the scene that replaces this one reports its own loss.
+    if (!this.#isOwn || this.state === 'empty') this.contextChanged('contextrestored');
+    // The others may move without this one.
+    this.#core?.sources.changed();
   }
 
   failed(error: ElementError): void {
     this.progress = null;
     this.notifyFailed(error);
-    if (!this.#isOwn) this.contextChanged('contextrestored');
     this.#core?.sources.settledOne();
   }
 

@@ -12,27 +12,30 @@ import type { LodSettings, Drawable } from './gpu/backend.js';
 import { WorldEntry } from './world-entry.js';
 import type { EntryList, SourceEntry } from './source-entry.js';
 
-/** States by priority for the combined state of several entries. */
+/** States by descending priority: the element has the first of these that any of its sources has. */
 const STATES: readonly SceneState[] = ['ready', 'loading', 'waiting', 'failed'];
 
-/** The interface of the element that the list uses. */
+/** The part of the element that the list uses. */
 export interface ListCore {
-  readonly camera: Pick<CameraController, 'frame' | 'refine'>;
+  readonly camera: Pick<CameraController, 'frame' | 'refine' | 'isTouched'>;
   readonly frame: ViewerFrame;
   requestFrame(): void;
   splatsChanged(): void;
   prepareFor(scene: LoadedGaussians): Promise<void>;
-  /** Draws the world from now on. Fulfills with its first frame. */
+  /** Starts to draw the world with the renderer of a scene. Fulfills with the first frame. */
   draw(scene: Drawable): Promise<void>;
-  /** Stops drawing; the last image stays unless it is to be cleared. */
+  /** Stops drawing. `clear` also clears the canvas; otherwise the last image stays. */
   stopDrawing(clear: boolean): void;
   warn(sentence: string): void;
   dispatch(event: Event): void;
 }
 
-/** All sources of an element, its own first, then those of its children, and their shared state. */
+/**
+ * All sources of an element, and the state that they have together. The first is the element's own source, the others
+ * belong to its children.
+ */
 export class SourceList implements EntryList {
-  /** All that is drawn. */
+  /** The world with the splats of all shown sources. */
   readonly world = new World();
   readonly ownEntry: SourceEntry;
   readonly meshes = new Lazy('the code that shows meshes', async () => {
@@ -41,7 +44,10 @@ export class SourceList implements EntryList {
   });
   readonly #core: ListCore;
   readonly #all: SourceEntry[];
-  /** Sources are shown one after the other, so that a failure can be attributed. */
+  /**
+   * Settles when the sources that have arrived are shown. They are shown in sequence, so that a failure can be
+   * attributed to one of them.
+   */
   #arrivals: Promise<void> | undefined;
   #latest: SourceEntry | undefined;
   #isFramed = false;
@@ -89,9 +95,9 @@ export class SourceList implements EntryList {
   // Showing and hiding.
 
   /**
-   * Shows an entry's loaded scene after the earlier ones are drawn. Fulfills when it is shown or no longer needed;
-   * rejects with GaussianSplatError `out-of-memory/*`.
-   * @param enter adds it to the world
+   * Shows an entry's loaded scene after those that arrived before it. Fulfills when the scene is shown or not needed
+   * anymore. Rejects with GaussianSplatError `out-of-memory/*`.
+   * @param enter called with the new member of the world
    */
   show(
     entry: SourceEntry,
@@ -122,7 +128,10 @@ export class SourceList implements EntryList {
     return shown;
   }
 
-  /** Draws the remaining sources after one is hidden. */
+  /**
+   * Draws the remaining sources after one was hidden. `clear` clears the canvas if none remains; otherwise the last
+   * image stays.
+   */
   left(clear: boolean): void {
     this.#core.splatsChanged();
     if (this.#isEmpty) {
@@ -132,7 +141,10 @@ export class SourceList implements EntryList {
     this.meshes.value?.forget();
   }
 
-  /** Removes the source that came last, and tries the remaining ones again. */
+  /**
+   * Reports a failure of drawing to the source that was shown last, which is then removed. The remaining sources are
+   * drawn again.
+   */
   fail(error: unknown): void {
     const entered = this.#all.filter(({ member }) => member !== undefined);
     const latest = entered.find((entry) => entry === this.#latest);
@@ -140,26 +152,35 @@ export class SourceList implements EntryList {
     (latest ?? (this.ownEntry.member ? this.ownEntry : (entered.at(-1) ?? this.ownEntry))).scene.fail(error);
   }
 
-  /** Frames all sources. */
+  /**
+   * Moves the camera to frame all sources for the first one, which may come from another element, and for a new scene of
+   * the element itself; otherwise adapts it to the new bounds.
+   */
   frame(entrance: Entrance, entry?: SourceEntry): void {
     const { bounds } = this;
-    if (entrance === 'again' || bounds === null) return;
     const { camera } = this.#core;
-    if (!this.#isFramed || (entry === this.ownEntry && entrance === 'new')) camera.frame(bounds);
+    const isAgain = entrance === 'again';
+    if ((isAgain && this.#isFramed) || bounds === null) return;
+    // A visitor who has moved the camera finds a scene that returns where it was.
+    const isFirst = !this.#isFramed && !(isAgain && camera.isTouched);
+    if (isFirst || (entry === this.ownEntry && entrance === 'new')) camera.frame(bounds);
     else camera.refine(bounds);
     this.#isFramed = true;
   }
 
-  /** The drawn splats or their duration have changed. */
+  /** Updates the duration and requests a frame, after the drawn splats or their duration have changed. */
   changed(): void {
     this.#setDuration();
     this.#core.splatsChanged();
   }
 
-  /** One source is shown or has failed. */
+  /**
+   * Call when a source is shown or has failed. Updates the duration, and may fire `load` or `error` for an element without
+   * a source of its own.
+   */
   settledOne(): void {
     this.changed();
-    // The events of an element without a scene of its own are those of its children together.
+    // An element without a source of its own fires `load` or `error` when all children are shown or have failed.
     const isOver = this.#all.every(({ state }) => state !== 'loading' && state !== 'waiting');
     if (this.ownEntry.state !== 'empty' || !isOver || this.#isLoadReported) return;
     const shown = this.#all.find(({ state }) => state === 'ready');
@@ -168,7 +189,10 @@ export class SourceList implements EntryList {
     else if (this.error) this.ownEntry.notifyFailed(this.error);
   }
 
-  /** Reports to the page that a device was lost, or that all sources are restored. */
+  /**
+   * Fires `contextlost` for the first source that loses its device, and `contextrestored` when all sources are
+   * restored.
+   */
   contextChanged(type: 'contextlost' | 'contextrestored', entry: SourceEntry): void {
     const before = this.#lost.size;
     if (type === 'contextlost') this.#lost.add(entry);
@@ -177,7 +201,10 @@ export class SourceList implements EntryList {
       this.#core.dispatch(new Event(type));
   }
 
-  /** Meshes of a file that also has splats load after the splats; their failure leaves the splats visible. */
+  /**
+   * Loads the meshes of a file that also has splats, after the splats. If it fails, the splats stay visible, with a
+   * warning.
+   */
   async #addMeshes(entry: SourceEntry, scene: LoadedGaussians): Promise<void> {
     try {
       await (await this.meshes.get()).add(entry, scene);
@@ -199,19 +226,22 @@ export class SourceList implements EntryList {
     return STATES.find((each) => this.#all.some((entry) => entry.state === each)) ?? state;
   }
 
-  /** Reason that nothing is shown. */
+  /**
+   * Reason that nothing is shown: the error of the element's own source, or else of the first child with an error; null
+   * if there is none.
+   */
   get error(): ElementError | null {
     const { error, state } = this.ownEntry;
     if (error || state !== 'empty' || this.state !== 'failed') return error;
     return this.#all.find((entry) => entry.error)?.error ?? null;
   }
 
-  /** Fulfills, and never rejects, when nothing is pending. */
+  /** Fulfills when no source is loading or pending. Never rejects. */
   get settled(): Promise<unknown> {
     return Promise.all(this.#all.map(({ settled }) => settled));
   }
 
-  /** Loading progress, 0..1; null while unknown. */
+  /** Mean loading progress of all sources, 0..1; null while it is unknown. */
   get progress(): number | null {
     const wanted = this.#all.filter(({ state }) => state !== 'empty' && state !== 'failed');
     const shares = wanted.map(({ state, progress }) => (state === 'ready' ? 1 : progress));
@@ -233,16 +263,17 @@ export class SourceList implements EntryList {
     return { detail: max(({ detail }) => detail), splatBudget: max(({ splatBudget }) => splatBudget) };
   }
 
-  /** Bounds of all sources in the frame of the element's own scene; null while nothing is shown. */
+  /** Bounds of all sources in the frame of the world; null while nothing is shown. */
   get bounds(): SceneBounds | null {
     this.place();
     const bounds = boundsOfWorld(this.world);
-    if (bounds) this.#bounds = { ...bounds, up: this.ownEntry.member?.scene.bounds.up };
-    // Scenes released out of view, or with their device, keep their bounds.
+    const { up, orbit } = this.ownEntry.member?.scene.bounds ?? ({} as Partial<SceneBounds>);
+    if (bounds) this.#bounds = { ...bounds, up, orbit };
+    // Scenes that were released out of view, or lost with their device, keep their bounds.
     return bounds || this.hasImage ? this.#bounds : null;
   }
 
-  /** The same, measured again for generators, which may have moved. */
+  /** Returns {@link bounds} after the bounds of generators, whose splats may have moved, were measured again. */
   async readBounds(): Promise<SceneBounds | null> {
     await Promise.all(
       this.members.map(async (member) => {
@@ -253,7 +284,7 @@ export class SourceList implements EntryList {
     return this.bounds;
   }
 
-  /** Clock of automatic motion. */
+  /** Plays and pauses all sources that play automatically; undefined if there are none. */
   get player(): MotionHost['player'] {
     const clocks = this.#all.flatMap(({ player }) => player ?? []);
     if (clocks.length === 0) return undefined;
@@ -279,9 +310,11 @@ export class SourceList implements EntryList {
   }
 
   advance(camera: Camera, now: number): void {
-    // Its own scene may stand still while others follow the element's clock.
-    this.ownEntry.ownClock.tick(now);
-    for (const entry of this.#all) entry.advance(camera, now);
+    // Each clock advances once, to the first frame that any of its sources lacks. The element's clock may advance
+    // children even if its own scene does not move.
+    for (const clock of new Set([this.ownEntry.ownClock, ...this.#all.map(({ playback }) => playback)]))
+      clock.tick(now, Math.min(...this.#all.map((entry) => entry.loadedUntil(clock))));
+    for (const entry of this.#all) entry.advance(camera);
   }
 
   suspend(): void {
@@ -296,23 +329,27 @@ export class SourceList implements EntryList {
     for (const entry of this.#all) entry.reportMotionFrame(isWhole);
   }
 
-  /** Loads and plays the sources if that is allowed now. */
+  /** Loads and plays the sources if the attributes and the visibility allow that. */
   request(): void {
     for (const entry of this.#all) entry.request();
   }
 
-  /** The element's clock has the duration of its own scene, or else of the sources that follow it. */
+  /**
+   * Sets the duration of the element's clock: that of its own scene, or else the longest of the sources that follow
+   * this clock.
+   */
   #setDuration(): void {
     const { ownEntry } = this;
-    if (ownEntry.member === undefined && (ownEntry.state === 'waiting' || ownEntry.state === 'loading')) return;
-    // Sources that were lost with a device return, and their time continues.
+    // A scene that is about to be replaced is still shown, but its clock is that of the next scene.
+    if (ownEntry.scene.isOutgoing && (ownEntry.state === 'waiting' || ownEntry.state === 'loading')) return;
+    // Sources that were lost with a device will be restored, and their playback then continues.
     if (this.#lost.size > 0) return;
     const clock = ownEntry.ownClock;
     const couldPlay = clock.canPlay;
     const followed = this.#all.flatMap((entry) => (entry.owner.hasOwnClock ? [] : [entry.duration]));
     const moving = followed.filter((seconds) => !Number.isNaN(seconds));
     clock.setDuration(Number.isNaN(ownEntry.duration) && moving.length > 0 ? Math.max(...moving) : ownEntry.duration);
-    // Sources that follow the clock may start after the poster is dismissed.
+    // Sources that follow this clock may start here after the poster is dismissed.
     if (!couldPlay && clock.canPlay) ownEntry.startPlaying();
   }
 }

@@ -1,14 +1,14 @@
-/** Addresses and requests from an element's attributes. */
+/** Converts the attributes of an element to absolute URLs and to requests for the loader. */
 import { credentialsOf, type Attributes } from './attributes.js';
 import type { SceneRequest } from './loading/protocol.js';
 import type { Source } from './element-host.js';
 
-/** The page's rewriting of every address; null or undefined for none. */
+/** Function of the page that rewrites each address; null or undefined for none. */
 export type UrlModifier = ((url: string) => string) | null | undefined;
 
 /**
- * Address of a named resource, resolved once per attribute value, like that of `<img>`: the page's URL may change
- * later, and signatures may differ each time.
+ * URLs of one attribute. They are resolved once per value, like that of `<img>`: the page's URL may change later, and a
+ * modifier may sign each call differently.
  */
 class Named {
   #values: readonly (string | Blob)[] = [];
@@ -26,13 +26,13 @@ class Named {
   }
 }
 
-/** Resolved addresses of one element. */
+/** Resolved URLs of all attributes of one element. */
 export class Addresses {
   readonly #src = new Named();
   readonly #chain = new Named();
   readonly #postprocess = new Named();
 
-  /** The requested scene; null for none. */
+  /** Returns the request for the element's scene; null if `src` is missing or empty. */
   request(
     { src, contract, chain }: Source,
     { crossorigin, quality, detail, renderer }: Pick<Attributes, 'crossorigin' | 'quality' | 'detail' | 'renderer'>,
@@ -57,23 +57,39 @@ export class Addresses {
   }
 }
 
-/** A property may have been given a list of them. */
+/** Splits a list of URLs at white space. A property may also have been set to an array of URLs. */
 const listed = (urls: string | null): readonly string[] => [urls].flat().join(' ').split(/\s+/).filter(Boolean);
 
-/** Also true for a file of another window, such as an iframe, which is no instance of this window's `Blob`. */
+/**
+ * Whether a source is a file. Does not use `instanceof`, because a file of another window, such as an iframe, is no
+ * instance of this window's `Blob`.
+ */
 const isFile = (source: unknown): source is Blob => 'arrayBuffer' in Object(source);
 
-/** Object URLs of files that were given instead of addresses. */
+/** Object URLs of the files that pages have set as `src`. */
 const fileUrls = new WeakMap<Blob, string>();
+/** Revokes the URL of a file that no element and no script refers to: the browser would keep its bytes. */
+const unused = new FinalizationRegistry<string>((url) => URL.revokeObjectURL(url));
 
-/** Same URL for the same file, followed by its name: the extension is all that identifies a `.splat`. */
+/**
+ * Returns the object URL of a file, equal for each call, with the file name as its fragment. The extension is all that
+ * identifies a `.splat`.
+ */
 function fileUrl(file: Blob): string {
-  const url = fileUrls.get(file) ?? `${URL.createObjectURL(file)}#${encodeURIComponent((file as File).name ?? '')}`;
-  fileUrls.set(file, url);
+  let url = fileUrls.get(file);
+  if (url === undefined) {
+    url = URL.createObjectURL(file);
+    unused.register(file, url);
+    url += `#${encodeURIComponent((file as File).name ?? '')}`;
+    fileUrls.set(file, url);
+  }
   return url;
 }
 
-/** Absolute, because the worker has a base URL of its own. A string that is no URL stays as it is and fails there. */
+/**
+ * Returns an absolute URL, because the worker has another base URL. Returns a string that is no URL unchanged; the
+ * worker reports it.
+ */
 const absolute = (url: string): string =>
   URL.canParse(url, document.baseURI) ? new URL(url, document.baseURI).href : url;
 
@@ -81,10 +97,10 @@ function addressOf(source: string | Blob, modifier: UrlModifier): string {
   if (isFile(source)) return fileUrl(source);
   const url = absolute(source);
   try {
-    // Converts any result to a string: if the element is given a promise, its error shows `[object Promise]`.
+    // Converts any result of the page's function to a string. For a promise, the error shows `[object Promise]`.
     return absolute(String(modifier?.(url) ?? url));
   } catch (error) {
-    // An error of the page's function must not break the element; it is reported like that of an event listener.
+    // An error of the page's function is reported like that of an event listener, and the address stays unchanged.
     reportError(error);
     return url;
   }

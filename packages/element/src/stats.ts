@@ -1,4 +1,5 @@
 import type { Vector3 } from '@gaussian-splat/core';
+import type { StreamProgress } from '@gaussian-splat/renderer';
 import { faultsOf } from '@gaussian-splat/renderer/tools';
 import type { QualityChoice } from './attributes.js';
 import type { DynamicQualityReport } from './controllers/dynamic-quality-controller.js';
@@ -9,69 +10,78 @@ import type { ReadCounts } from './gpu/backend.js';
 
 /** Counts of modeled, drawn and visible splats of a scene, its memory, and the reasons for reductions. */
 export interface SceneStats {
-  /** What draws. */
+  /** API that draws the scene. */
   readonly renderer: 'webgpu' | 'webgl';
-  /** Splats that the file has, or a generator writes at most. */
-  readonly modelled: number;
-  /** The preview of a scene that is still loading is shown; all counts are those of the preview. */
+  /** Number of splats in the file, or maximum number that the generator writes. */
+  readonly total: number;
+  /** Whether a preview is shown while the scene loads. All counts are then those of the preview. */
   readonly isPreview: boolean;
-  /** Splats of the file that were left out because a value was not usable. */
+  /** Number of splats of the file that were left out because they have invalid values. */
   readonly dropped: number;
-  /** Splats on the GPU: the current frame of a sequence; the capacity of a streamed scene. */
+  /** Number of splats on the GPU: those of the current frame for a sequence, and the capacity for a streamed scene. */
   readonly splats: number;
-  /** Splats on the GPU including levels of detail; the capacity of a streamed scene. */
-  readonly inMemory: number;
+  /** Number of splats on the GPU with those of levels of detail; the capacity for a streamed scene. */
+  readonly resident: number;
   /**
-   * Levels of detail: merged splats on the GPU besides the scene's own, and the allowed error of frames at rest in
-   * pixels. 0 splats for a streamed scene, which contains its own levels.
+   * Levels of detail. `splats` is the number of merged splats on the GPU besides the scene's own: 0 for a streamed
+   * scene, whose file contains its levels. `pixels` is the allowed error of frames at rest, pixels.
    */
   readonly detail: { readonly splats: number; readonly pixels: number };
   /**
-   * Splats that the last `updateStats()` found drawn: in front of the camera, opaque enough, and covering a pixel. null
-   * before.
+   * Number of splats that the last `updateStats()` found to be drawn: in front of the camera, opaque enough, and
+   * covering a pixel. null before the first call.
    */
   readonly drawn: number | null;
-  /** Splats that change some pixel by half a step of 255 or more, at the last `updateStats()`. null before. */
-  readonly contributed: number | null;
-  /** Bytes of GPU memory: of the splats, and of what frames are drawn with. */
+  /**
+   * Number of splats that change any pixel by at least half of 1/255, at the last `updateStats()`. null before the
+   * first call.
+   */
+  readonly contributing: number | null;
+  /** Bytes of GPU memory of the splats and meshes (`scene`), and of the renderer that draws frames (`frames`). */
   readonly bytes: { readonly scene: number; readonly frames: number };
   /** The attribute `quality`. */
   readonly quality: QualityChoice;
-  /** Settings of frames at rest and in motion. */
+  /** Settings for frames at rest and in motion. */
   readonly dynamicQuality: DynamicQualityReport;
   /**
-   * Up direction in the scene's frame according to its file, of length 1; null if the file has none. The first scene
-   * counts.
+   * Up direction in the scene's frame according to its file, a unit vector; null if the file has none. With several
+   * scenes, that of the first.
    */
   readonly up: Vector3 | null;
   /**
-   * Features of the files that are not drawn or may be drawn differently than intended, in English; also in the
-   * console.
+   * Features of the files that are not drawn, or may be drawn differently than intended, in English. They are also
+   * written to the console.
    */
   readonly warnings: readonly string[];
-  /** The element's own scene, then its children, separately; empty for an element without children. */
+  /**
+   * For each streamed scene the pages on the GPU and all pages, their splats and bytes, the largest error of a missing
+   * page in pixels, and the limit (`transit`, `memory`, `failure` or null): what a view at rest rests at. `reasons` has
+   * the same in a sentence.
+   */
+  readonly streamed: readonly StreamProgress[];
+  /** State of the element's own scene, then of each child; empty for an element without children. */
   readonly scenes: readonly ChildStats[];
-  /** Reductions of the scene to save time or memory, in English; empty without reductions. */
-  readonly why: readonly string[];
+  /** Reasons for reductions of the scene to save time or memory, in English; empty without reductions. */
+  readonly reasons: readonly string[];
 }
 
 /** State and memory of one child of the element. */
 export interface ChildStats {
-  /** The child; the element itself for its own scene. */
+  /** The child, or the element itself for its own scene. */
   readonly element: HTMLElement;
   readonly state: SceneState;
   readonly error: ElementError | null;
-  /** Splats on the GPU; of a mesh 0. */
+  /** Number of splats on the GPU; 0 for a mesh. */
   readonly splats: number;
-  /** Triangles; of a scene 0. */
+  /** Number of triangles; 0 for a scene of splats. */
   readonly triangles: number;
-  /** Splats of the file that were left out because a value was not usable. */
+  /** Number of splats of the file that were left out because they have invalid values. */
   readonly dropped: number;
   /** Bytes of GPU memory. */
   readonly bytes: number;
 }
 
-/** Memory and counts of a scene. */
+/** Returns counts and GPU memory of a loaded scene; all 0 for null. */
 export const costOf = (
   scene: LoadedGaussians | null,
 ): Pick<ChildStats, 'splats' | 'triangles' | 'dropped' | 'bytes'> => ({
@@ -81,22 +91,22 @@ export const costOf = (
   bytes: scene ? scene.gaussians.byteLength + (scene.levels?.byteLength ?? 0) + (scene.model?.byteLength ?? 0) : 0,
 });
 
-/** Information that does not come from the scene. */
+/** Input of {@link statsOf} that the scenes themselves do not contain. */
 export interface StatsContext {
   readonly quality: QualityChoice;
   readonly dynamicQuality: DynamicQualityReport;
   readonly counts: ReadCounts | undefined;
   readonly isPreview: boolean;
-  /** Bytes of GPU memory that frames are drawn with. */
+  /** Bytes of GPU memory of the renderer that draws frames. */
   readonly frameBytes: number;
-  /** See `Painter.pixelShare`. */
+  /** Resolution scale of each side that the overdraw limit requires, 0..1: see `Painter.pixelShare`. Default 1. */
   readonly pixelShare?: number | undefined;
   /** Allowed error of images at rest, pixels. */
   readonly pixels: number | undefined;
   readonly parts: readonly ChildStats[];
 }
 
-/** Statistics that need no readback from the GPU. */
+/** Computes statistics of the shown scenes, at least one, without a readback from the GPU. */
 export function statsOf(
   scenes: readonly LoadedGaussians[],
   { quality, dynamicQuality, counts, isPreview, frameBytes, pixelShare = 1, pixels = 0, parts }: StatsContext,
@@ -106,30 +116,30 @@ export function statsOf(
   const dropped = sum(({ gaussians }) => gaussians.droppedCount);
   const merged = sum(({ gaussians, levels }) => levels && levels.count - gaussians.count);
   const detail = { splats: merged, pixels };
+  const streamed = scenes.flatMap(({ gaussians }) => gaussians.progress ?? []);
   return {
     renderer: scenes[0].renderer,
     isPreview,
     splats: sum((scene) => costOf(scene).splats),
-    modelled: sum(({ gaussians }) => gaussians.frameCount ?? gaussians.leafCount ?? gaussians.count) + dropped,
+    total: sum(({ gaussians }) => gaussians.frameCount ?? gaussians.leafCount ?? gaussians.count) + dropped,
     dropped,
-    inMemory: sum(({ gaussians }) => gaussians.count) + merged,
+    resident: sum(({ gaussians }) => gaussians.count) + merged,
     detail,
     drawn: counts?.drawn ?? null,
-    contributed: counts?.contributed ?? null,
+    contributing: counts?.contributing ?? null,
     bytes: {
-      scene:
-        sum(({ gaussians }) => gaussians.byteLength) +
-        sum(({ levels }) => levels?.byteLength) +
-        sum(({ model }) => model?.byteLength),
+      scene: sum((scene) => costOf(scene).bytes),
       frames: frameBytes,
     },
     quality,
     dynamicQuality,
     up: scenes[0]?.bounds.up ?? null,
     warnings: scenes.flatMap(({ warnings }) => warnings),
+    streamed,
     scenes: parts,
-    why: [
+    reasons: [
       ...whyPreview(isPreview),
+      ...streamed.flatMap(({ reasons }) => reasons),
       ...whyDropped(dropped),
       ...whyDetail(quality, detail),
       ...explainQuality(quality, dynamicQuality),
@@ -154,7 +164,7 @@ function whyDropped(dropped: number): string[] {
 }
 
 function whyDetail(quality: QualityChoice, { splats, pixels }: SceneStats['detail']): string[] {
-  // Fixed qualities use them only if the page allows it.
+  // Fixed qualities use levels of detail only if the page sets an allowed error.
   if (splats === 0 || (pixels === 0 && quality !== 'auto')) return [];
   const rest = pixels > 0 ? `, by ${pixels} px at most` : ' while they move';
   return [`${splats} merged splats stand for what is too small to see: frames may be off for it${rest}.`];

@@ -3,8 +3,8 @@ import { css, type CSSResult } from 'lit';
 const stylesOf = new WeakMap<ShadowRoot, CSSResult[]>();
 
 /**
- * Adds styles to a shadow tree, in style sheets of its own document, because documents reject those of others. Without
- * arguments, recreates its style sheets for a new document. A document without a window shows nothing and gets none.
+ * Adds styles to a shadow tree. Without `more`, creates its style sheets again, for a new document: documents reject
+ * the style sheets of others. Does nothing in a document without a window, which renders nothing.
  */
 export function adoptStyles(root: ShadowRoot, ...more: CSSResult[]): void {
   const all = [...(stylesOf.get(root) ?? [styles]), ...more];
@@ -19,8 +19,8 @@ export function adoptStyles(root: ShadowRoot, ...more: CSSResult[]): void {
 }
 
 /**
- * Size and containment match those of an image; everything that a page may want to change is a custom property or a
- * part. `hidden` wins over any `display` that a page sets for the time before the script.
+ * Styles of the element. Default size and containment match those of an image. Pages can change the appearance with
+ * custom properties and parts. `hidden` overrides any `display` that a page sets for the time before the script runs.
  */
 export const styles = css`
   :host {
@@ -92,7 +92,7 @@ export const styles = css`
   .covered canvas {
     visibility: hidden;
   }
-  [part='poster-cue'] {
+  [part='poster-icon'] {
     padding: 10px;
     border-radius: 50%;
     line-height: 0;

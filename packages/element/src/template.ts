@@ -1,38 +1,38 @@
 import { html, nothing, type TemplateResult } from 'lit';
 import { visitorMessage, type ElementError } from './errors.js';
-import { languageOf, word, type A11yStrings } from './words.js';
+import { languageOf, word, type A11yStrings } from './strings.js';
 
-/** Everything that the shadow tree shows. */
+/** Data that the template of the shadow tree renders. */
 export interface TemplateModel {
-  /** Text alternative; empty for a decorative scene, null if the page gives none. */
+  /** Text alternative; an empty string for a decorative scene, null if the page sets none. */
   readonly label: string | null;
-  /** Visitors may move the camera. */
+  /** Whether visitors may move the camera. */
   readonly canMove: boolean;
   readonly navigation: 'orbit' | 'fly' | 'walk';
-  /** Help for the keys of walking, once a floor is requested. */
+  /** Help text for the keys of walking; undefined until walking is requested and its code is loaded. */
   readonly walkKeys: string | undefined;
   readonly poster: string | null;
   readonly posterLoading: 'lazy' | 'eager';
   readonly showPoster: boolean;
-  /** Dismisses a poster that waits for the visitor. */
+  /** Dismisses a poster that waits for the visitor; null without such a poster. */
   readonly onReveal: (() => void) | null;
   readonly isLoading: boolean;
   /** Loading progress, 0..1; null while unknown. */
   readonly progress: number | null;
   readonly error: ElementError | null;
-  /** There is a poster, from the attribute or the slot. */
+  /** Whether the page has a poster, in the attribute or the slot. */
   readonly hasPoster: boolean;
-  /** Hint that the scene can be moved. */
+  /** Style of the prompt that shows that the scene can be moved. */
   readonly prompt: 'none' | 'basic' | 'wiggle';
-  /** Resets the camera; null if no button is offered. */
+  /** Resets the camera; null if the reset button is not shown. */
   readonly onReset: (() => void) | null;
-  /** Words of the page in place of the English ones. */
+  /** Texts of the page that replace English texts. */
   readonly strings: A11yStrings;
-  /** Text for screen readers: the error, or else the camera. */
+  /** Text that screen readers announce when it changes: the error, or else the view of the camera. */
   readonly spoken: string;
-  /** Hints for visitors who may move the camera, after its code has loaded. */
+  /** Template of the prompt, reset button and keyboard help; undefined until its code is loaded. */
   readonly handsView: ((model: TemplateModel) => TemplateResult) | undefined;
-  /** The button that pauses all automatic motion; undefined without any. */
+  /** The button that pauses automatic motion; undefined if nothing moves automatically. */
   readonly motionView: TemplateResult | undefined;
   /** Names of the slots of the hotspots. */
   readonly hotspots: readonly string[];
@@ -40,7 +40,7 @@ export interface TemplateModel {
 
 const PLAY_SIGN = 'M8 5v14l11-7z';
 
-/** The element's shadow tree. */
+/** Returns the content of the element's shadow tree. */
 export function template(model: TemplateModel): TemplateResult {
   return html`
     ${view(model)} ${hotspots(model)} ${model.handsView?.(model)} ${model.motionView} ${poster(model)}
@@ -49,10 +49,12 @@ export function template(model: TemplateModel): TemplateResult {
   `;
 }
 
-/** The image. The canvas stays the same for all attributes, because a context cannot move between canvases. */
+/**
+ * Template of the canvas. The canvas element never changes, because a rendering context cannot be moved to another one.
+ */
 function view({ label, canMove: controls, onReveal, strings }: TemplateModel): TemplateResult {
   const role = controls ? 'application' : label === '' ? 'presentation' : 'img';
-  // The scene behind a poster that waits for the visitor is neither visible nor interactive.
+  // While a poster waits for the visitor, the scene behind it is neither visible nor interactive.
   const isWaiting = onReveal !== null;
   return html`
     <div
@@ -70,7 +72,10 @@ function view({ label, canMove: controls, onReveal, strings }: TemplateModel): T
   `;
 }
 
-/** A box per name, in order; the hotspot controller positions it. Boxes under a poster are unreachable. */
+/**
+ * Template of the hotspots: one box with a slot per name, which the hotspot controller positions. Not visible while a
+ * poster is shown.
+ */
 function hotspots({ hotspots, showPoster }: TemplateModel): TemplateResult {
   return html`<div id="hotspots" class="layer ${showPoster ? 'gone' : ''}">
     ${hotspots.map(
@@ -83,8 +88,8 @@ function hotspots({ hotspots, showPoster }: TemplateModel): TemplateResult {
 }
 
 /**
- * The poster depicts the same scene, so it needs no text of its own. One that waits for the visitor is a button around
- * the image, including a slotted one, with a play symbol.
+ * Template of the poster. Its image has no text alternative, because it shows the same scene. If the poster waits for
+ * the visitor, a button with a play symbol encloses the image or the slotted content.
  */
 function poster(model: TemplateModel): TemplateResult {
   const { poster, posterLoading, showPoster, onReveal } = model;
@@ -106,7 +111,7 @@ function revealButton(
   const lang = (label ? undefined : languageOf(strings)) ?? nothing;
   return html`<button type="button" part="poster-button" aria-label=${text} lang=${lang} @click=${onReveal}>
     ${content}
-    <span part="poster-cue">
+    <span part="poster-icon">
       <svg viewBox="0 0 24 24" width="44" height="44" aria-hidden="true" fill="currentColor">
         <path d=${PLAY_SIGN} />
       </svg>
@@ -133,9 +138,9 @@ function progressBar({ progress, strings }: TemplateModel): TemplateResult {
 }
 
 /**
- * The error: a sentence for visitors, and details for the page's author. Screen readers announce only changes of a
- * region that already exists, so the sentence is repeated there. Without WebGPU the visitor can do nothing, so only the
- * poster is shown, or the sentence at the edge.
+ * Template of the error: a sentence for visitors, and details for the page's author. `template` repeats the sentence in
+ * its status region, because screen readers announce only changes of existing regions. Without WebGPU, only the poster
+ * is shown, or the sentence at the bottom if there is none.
  */
 function message({ hasPoster, strings }: TemplateModel, error: ElementError): TemplateResult {
   const lang = languageOf(strings) ?? nothing;
@@ -144,7 +149,7 @@ function message({ hasPoster, strings }: TemplateModel, error: ElementError): Te
     return html`<div class="layer message">
       <slot name="fallback">${hasPoster ? nothing : html`<div part="fallback">${text}</div>`}</slot>
     </div>`;
-  // The details are for the page's author, and always in English.
+  // The details are always in English, because they are for the author of the page.
   return html`<div class="layer message">
     <slot name="error"
       ><div part="error">

@@ -1,10 +1,10 @@
-/** Spans of a scene's time in the shape of the platform's TimeRanges, which scripts cannot make. */
+/** Ranges of a scene's time, with the interface of TimeRanges, which scripts cannot construct. */
 export class SceneTimeRanges {
   readonly #spans: readonly (readonly [start: number, end: number])[];
 
   /**
-   * @param end seconds; NaN, 0 and Infinity make an empty list, others one span from 0
-   * @param spans replaces that span
+   * @param end Duration in seconds. NaN, 0 and Infinity give an empty list, other values one range from 0.
+   * @param spans Ranges in seconds that replace this default.
    */
   constructor(
     end: number,
@@ -17,12 +17,12 @@ export class SceneTimeRanges {
     return this.#spans.length;
   }
 
-  /** Seconds. Throws an `IndexSizeError` for an index out of range. */
+  /** Returns the start of a range, seconds. @throws DOMException `IndexSizeError` for an index out of range */
   start(index: number): number {
     return this.#at(index)[0];
   }
 
-  /** Seconds, likewise. */
+  /** Returns the end of a range, seconds. @throws DOMException `IndexSizeError` for an index out of range */
   end(index: number): number {
     return this.#at(index)[1];
   }

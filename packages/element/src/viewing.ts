@@ -8,30 +8,33 @@ import { boxOf, type SceneBox } from './scene-queries.js';
 import type { CameraView } from './views/camera-view.js';
 import type { FlightOptions, PathOptions } from './views/tour.js';
 
-/** An image to take. */
+/** Options of `toBlob()`. */
 export interface ImageOptions {
-  /** Default `image/png`. */
+  /** Media type of the image. Default `image/png`. */
   readonly mimeType?: string;
-  /** 0..1, for formats that lose some. */
+  /** Quality of lossy formats such as `image/jpeg`, 0..1. */
   readonly qualityArgument?: number;
-  /** Pixels. Default: the drawn size of the element; one of the two alone keeps the aspect ratio. */
+  /**
+   * Width of the image, pixels. Default: the drawn size of the element. If only one of `width` and `height` is set, the
+   * image keeps the aspect ratio.
+   */
   readonly width?: number;
   readonly height?: number;
   /** CSS color behind the scene. Default: transparent. */
   readonly background?: string;
 }
 
-/** Poster, camera, surface positions, and images for scripts. */
+/** Methods of the element for its poster, the camera, surface positions, and images. */
 export abstract class ViewingMethods extends MediaProperties {
-  /** Attributes apply at once for code that calls a method right after setting one. */
+  /** Applies changed attributes at once, for code that calls a method just after it has set an attribute. */
   protected abstract applyAttributes(): void;
 
-  /** True while the poster does not cover the scene. */
+  /** Whether no poster covers the scene. */
   get revealed(): boolean {
     return !this.core.reveal.isCovered;
   }
 
-  /** Shows the scene as soon as possible, and loads a lazy one: `reveal="manual"` waits for this call. */
+  /** Dismisses the poster and loads a lazy scene. With `reveal="manual"`, the scene is shown only after this call. */
   dismissPoster(): void {
     this.core.reveal.dismiss();
   }
@@ -41,22 +44,22 @@ export abstract class ViewingMethods extends MediaProperties {
     this.core.reveal.cover();
   }
 
-  /** The current position of the camera; as a string, a value for `camera-orbit`. */
+  /** Returns the current position of the camera. Its string form is a value for `camera-orbit`. */
   getCameraOrbit(): CameraOrbit {
     return this.core.camera.orbit;
   }
 
-  /** The point that the camera looks at; as a string, a value for `camera-target`. */
+  /** Returns the point that the camera looks at. Its string form is a value for `camera-target`. */
   getCameraTarget(): CameraTarget {
     return this.core.camera.target;
   }
 
-  /** The current vertical field of view; as a string, a value for `field-of-view`. */
+  /** Returns the current vertical field of view. Its string form is a value for `field-of-view`. */
   getFieldOfView(): FieldOfView {
     return this.core.camera.fieldOfView;
   }
 
-  /** Jumps to the goal of the camera's current motion. */
+  /** Ends a motion of the camera at once, at its goal. */
   jumpCameraToGoal(): void {
     this.applyAttributes();
     this.core.camera.jumpToGoal();
@@ -69,9 +72,9 @@ export abstract class ViewingMethods extends MediaProperties {
   }
 
   /**
-   * Flies to a view: a name or index (from 0) of the page's list, or any other view. Waits for the scene. Visitors who
-   * prefer reduced motion jump there at once.
-   * @returns fulfills at the end: true on arrival, false if a visitor, an attribute or another flight took over the
+   * Flies to a view after the scene has loaded. Visitors who prefer reduced motion jump there at once.
+   * @param view Name or index (from 0) of a view of the page's list, or any other view.
+   * @returns Fulfills at the end: true on arrival, false if a visitor, an attribute or another flight took over the
    * camera. Rejects with `argument/camera` for a malformed view or an unknown name.
    */
   async flyTo(view: CameraView | string | number, options?: FlightOptions): Promise<boolean> {
@@ -94,49 +97,52 @@ export abstract class ViewingMethods extends MediaProperties {
   }
 
   /**
-   * Puts the camera on that path at once, for scenes that follow the page's scrolling.
+   * Moves the camera at once to a position on the path of {@link flyPath}, for scenes that follow the page's scrolling.
    * @param share 0..1, from the first view to the last
    */
   async seekPath(share: number): Promise<void> {
     return (await this.core.tour.get()).seekPath(share);
   }
 
-  /** Shows the interaction prompt again, as if no visitor had touched the scene. */
+  /** Shows the interaction prompt again, as if no visitor had moved the scene. */
   resetInteractionPrompt(): void {
     this.core.behaviors.prompt?.reset();
   }
 
-  /** Frames the scene as after loading, for generators whose scene has grown or moved. */
+  /** Moves the camera to frame the scene, as after loading, for generators whose scene has grown or moved. */
   async updateFraming(): Promise<void> {
     this.applyAttributes();
     await this.core.updateFraming();
   }
 
-  /** Box around nearly all of the scene, in meters of viewer space; null while none is shown. */
+  /** Returns the box around nearly all splats of the scene, in meters of viewer space; null while no scene is shown. */
   getBoundingBox(): SceneBox | null {
-    return boxOf({ camera: this.core.camera, bounds: this.core.sources.bounds });
+    return boxOf(this.core.camera.viewerFrame, this.core.sources.bounds);
   }
 
   /**
-   * The visible surface of the scene under a point of the page, in the form of `data-position` and `camera-target`.
-   * Reads back from the GPU asynchronously. `uncertainty` of the point is the spread of the surface along the line of
-   * sight; `element`, `splat`, `mesh` and `material` identify the hit.
-   * @param clientX CSS pixels, like that of a MouseEvent.
+   * Returns the visible surface of the scene under a point of the page, in the form of `data-position` and
+   * `camera-target`. Reads back from the GPU asynchronously. `uncertainty` is half the extent of the surface along the
+   * line of sight; `element`, `splat`, `mesh` and `material` identify the hit.
+   * @param clientX CSS pixels, same as in a MouseEvent.
    * @returns null outside the scene, and on parts less than half opaque.
    */
   positionFromPoint(clientX: number, clientY: number): Promise<PickedPoint | null> {
     return this.core.positionFromPoint(clientX, clientY);
   }
 
-  /** The current position of the hotspot in a slot, for example `hotspot-door`; null if there is none with a position. */
+  /**
+   * Returns the current position of the hotspot in a slot, for example `hotspot-door`; null if no hotspot with a
+   * position has this name.
+   */
   queryHotspot(name: string): HotspotPlace | null {
     return this.core.labels.value?.query(name) ?? null;
   }
 
   /**
-   * The current image of the screen, drawn again, with the CSS filters of the element. A transparent image cannot hold
-   * colors that exceed their alpha: set `background` if the scene has such.
-   * @returns rejects with an `InvalidStateError` if no scene is shown or the element has no size, with a `RangeError`
+   * Draws the current image again and encodes it, with the CSS filters of the element. A transparent image cannot
+   * contain colors that exceed their alpha: set `background` if the scene has such colors.
+   * @returns Rejects with an `InvalidStateError` if no scene is shown or the element has no size, with a `RangeError`
    * for a size that the GPU cannot draw, and with a `TypeError` for an invalid background color.
    */
   async toBlob(options: ImageOptions = {}): Promise<Blob> {
@@ -144,17 +150,20 @@ export abstract class ViewingMethods extends MediaProperties {
   }
 
   /**
-   * A video of what the element shows, recorded by the browser while it happens: of the camera's `path`, for a `duration`, or until the `signal`. The camera comes back afterwards.
-   * @returns rejects with an `InvalidStateError` where no scene is shown, with a `NotSupportedError` where the browser does not record this type, and with a `TypeError` without views
-   * to follow, without an end, and for a background that is no color.
+   * Records a video of the element in real time: along the camera's `path`, for a `duration`, or until `signal` is
+   * aborted. Afterwards the camera returns to its pose.
+   * @returns Rejects with an `InvalidStateError` if no scene is shown, with a `NotSupportedError` if the browser cannot
+   * record this type, and with a `TypeError` if the page has no views to follow, if no option ends the recording, or if
+   * the background is not a color.
    */
   async record(options: RecordOptions = {}): Promise<Blob> {
     return (await this.#images()).record(this.core, options);
   }
 
   /**
-   * The same frame by frame, each drawn for its own time however long that takes: `for await (const image of element.recordFrames({ path: 'turntable' }))`. They are the frames of
-   * `gaussian-splat video`. An animated scene advances by the time of a frame, and must be visible.
+   * Yields the images of a video one by one. Each frame is drawn for its own time, however long that takes: `for await
+   * (const image of element.recordFrames({ path: 'turntable' }))`. The frames are equal to those of `gaussian-splat
+   * video`. An animated scene advances by the duration of a frame, and must be visible.
    */
   async *recordFrames(options: FrameOptions = {}): AsyncGenerator<Blob, void> {
     yield* (await this.#images()).recordFrames(this.core, options);
@@ -167,14 +176,14 @@ export abstract class ViewingMethods extends MediaProperties {
   }
 
   /**
-   * Synchronous form of {@link toBlob} as a `data:` URL, without CSS filters. Throws an `InvalidStateError` if no scene
-   * is shown or the element has no size.
+   * Synchronous form of {@link toBlob}: returns a `data:` URL, without CSS filters.
+   * @throws DOMException `InvalidStateError` if no scene is shown or the element has no size
    */
   toDataURL(mimeType = 'image/png', qualityArgument?: number): string {
     this.applyAttributes();
     const canvas = this.core.drawNow();
     if (canvas === null)
-      throw new DOMException('Expected a loaded scene in an element that has a size', 'InvalidStateError');
+      throw new DOMException('Expected a loaded scene and an element with a size', 'InvalidStateError');
     return canvas.toDataURL(mimeType, qualityArgument);
   }
 }

@@ -1,6 +1,7 @@
 /**
- * Types of `<gaussian-splat>`, `<splat-scene>`, `<splat-mesh>` and `<splat-cut>` in Vue's templates: `import type {} from '@gaussian-splat/element/vue'`. Nothing runs; tell Vue's compiler of the
- * tags with `isCustomElement: (tag) => /^(gaussian-splat|splat-)/.test(tag)`.
+ * Types of `<gaussian-splat>`, `<splat-scene>`, `<splat-mesh>` and `<splat-cut>` in Vue's templates: `import type {}
+ * from '@gaussian-splat/element/vue'`. The module contains no code. Vue's compiler needs the option `isCustomElement:
+ * (tag) => /^(gaussian-splat|splat-)/.test(tag)`.
  */
 import type { HTMLAttributes, PublicProps } from 'vue';
 import type { GaussianSplatElement } from './element.js';
@@ -16,7 +17,7 @@ import type {
   SplatSceneElement,
 } from './scenes.js';
 
-/** `camera-change` as Vue names its listeners: `onCameraChange`. */
+/** Name of a listener in Vue without `on`: `CameraChange` for `camera-change`. */
 type ListenerName<Type extends string> = Type extends `${infer Head}-${infer Tail}`
   ? `${Capitalize<Head>}${Capitalize<Tail>}`
   : Capitalize<Type>;

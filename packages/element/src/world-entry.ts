@@ -17,8 +17,8 @@ export class WorldEntry {
   }
 
   /**
-   * Its placement in the world. The drawn splats of the source may have been replaced since the last frame: by levels
-   * of detail, or by a sequence's next buffers.
+   * Placement of the source in the world. The getter replaces it if the drawn splats have changed since the last frame:
+   * by levels of detail, or by the next buffers of a sequence.
    */
   get placement(): Placement {
     const before = this.#placement;

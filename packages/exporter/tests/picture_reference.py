@@ -16,9 +16,9 @@ def convolved(x: Doubles, layer: Convolution, stride: int = 1) -> Doubles:
     result = result + layer.bias[:, None, None]
     if layer.norm is None:
         return result
-    centred = result - result.mean((1, 2), keepdims=True)
-    deviation = np.sqrt((centred**2).mean((1, 2), keepdims=True) + 1e-5)
-    normal: Doubles = centred / deviation * layer.norm[0][:, None, None] + layer.norm[1][:, None, None]
+    centerd = result - result.mean((1, 2), keepdims=True)
+    deviation = np.sqrt((centerd**2).mean((1, 2), keepdims=True) + 1e-5)
+    normal: Doubles = centerd / deviation * layer.norm[0][:, None, None] + layer.norm[1][:, None, None]
     return normal
 
 
@@ -36,7 +36,7 @@ def doubled(x: Doubles) -> Doubles:
 
 
 def smoothly_enlarged(x: Doubles, factor: int) -> Doubles:
-    """Bilinear between pixel centres: a product with one matrix of hats for rows and one for columns."""
+    """Bilinear between pixel centers: a product with one matrix of hats for rows and one for columns."""
 
     def hats(size: int) -> Doubles:
         at = np.clip((np.arange(size * factor) + 0.5) / factor - 0.5, 0, size - 1)
@@ -48,7 +48,7 @@ def smoothly_enlarged(x: Doubles, factor: int) -> Doubles:
 
 
 def looked_up(x: Doubles, column: float, row: float) -> Doubles:
-    """At a place in pixels, whose centres lie at half integers; 0 outside."""
+    """At a place in pixels, whose centers lie at half integers; 0 outside."""
     _, height, width = x.shape
     across = np.maximum(0, 1 - np.abs(np.arange(width) + 0.5 - column))
     down = np.maximum(0, 1 - np.abs(np.arange(height) + 0.5 - row))

@@ -47,22 +47,22 @@ def parts(written: dict[str, AnyArray] | AnyArray) -> dict[str, Doubles]:
         return {
             "positions": rows[:, :3],
             "covariances": rows[:, 3:9],
-            "colour": rows[:, 9:-1],
+            "color": rows[:, 9:-1],
             "opacities": rows[:, -1:],
         }
     wide = {name: np.asarray(values, np.float64).reshape(len(values), -1) for name, values in written.items()}
     covariances = wide["covariances"] if "covariances" in wide else covariance(wide["scales"], wide["rotations"])
-    colour = wide["sh"] if "sh" in wide else wide["colors"]
+    color = wide["sh"] if "sh" in wide else wide["colors"]
     return {
         "positions": wide["positions"],
         "covariances": covariances,
-        "colour": colour,
+        "color": color,
         "opacities": wide["opacities"],
     }
 
 
 def rows(written: dict[str, AnyArray]) -> Doubles:
-    """All of it as rows: position, covariance, colour, opacity."""
+    """All of it as rows: position, covariance, color, opacity."""
     return np.concatenate(list(parts(written).values()), 1)
 
 

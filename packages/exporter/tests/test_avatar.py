@@ -82,11 +82,11 @@ def reference(model: Avatar, feeds: dict[str, AnyArray]) -> dict[str, Doubles]:
     view = moved - feeds.get("camera_position", np.array([9.0, 9, 9]))
     view = np.einsum("nab,na->nb", blend[:, :3, :3], view / np.linalg.norm(view, axis=1, keepdims=True))
     view /= np.linalg.norm(view, axis=1, keepdims=True)
-    colour = np.maximum(np.einsum("nk,nkc->nc", basis(view, degree), model.sh) + 0.5, 0)
+    color = np.maximum(np.einsum("nk,nkc->nc", basis(view, degree), model.sh) + 0.5, 0)
     return {
         "positions": moved,
         "covariances": covariances[:, UPPER[0], UPPER[1]],
-        "colour": colour,
+        "color": color,
         "opacities": model.opacities.astype(np.float64),
     }
 

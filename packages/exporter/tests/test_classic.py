@@ -39,20 +39,20 @@ def test_packed_rows_hold_activated_gaussians(degree: int) -> None:
     found = parts(rows)
     assert error(found["positions"], given.positions) == 0
     assert error(found["covariances"], covariance(np.exp(np.float64(given.log_scales)), given.rotations)) < 1e-6
-    assert error(found["colour"], given.sh.reshape(500, -1)) == 0
+    assert error(found["color"], given.sh.reshape(500, -1)) == 0
     assert error(found["opacities"], 1 / (1 + np.exp(-np.float64(given.opacity_logits)))) < 1e-6
 
 
 @pytest.mark.parametrize("degree", [0, 1, 2, 3])
-def test_view_dependent_colours_match_harmonics_from_their_recurrence(degree: int) -> None:
+def test_view_dependent_colors_match_harmonics_from_their_recurrence(degree: int) -> None:
     given = cloud(degree=degree)
     camera = np.array([0.3, -2.0, 1.5])
-    model = export_classic(given, FACTS, colours="view")
+    model = export_classic(given, FACTS, colors="view")
     found = parts(run(model, {"camera_position": camera}))
     offset = given.positions - camera
     values = basis(offset / np.linalg.norm(offset, axis=1, keepdims=True), degree)
     expected = np.maximum(np.einsum("nk,nkc->nc", values, given.sh) + 0.5, 0)
-    assert error(found["colour"], expected) < 1e-5
+    assert error(found["color"], expected) < 1e-5
 
 
 def test_split_layout_writes_one_tensor_for_each_attribute() -> None:
@@ -61,7 +61,7 @@ def test_split_layout_writes_one_tensor_for_each_attribute() -> None:
     split = run(export_classic(given, FACTS, Options(layout="split")))
     assert set(split) == {"positions", "scales", "rotations", "sh", "opacities"}
     assert split["sh"].shape == (500, 16, 3)
-    assert error(split["sh"].reshape(500, -1), packed["colour"]) == 0
+    assert error(split["sh"].reshape(500, -1), packed["color"]) == 0
     assert error(parts(split)["covariances"], packed["covariances"]) < 1e-5
 
 
@@ -105,7 +105,7 @@ def test_contract_says_the_filter(filter_: Filter, antialiased: bool) -> None:
 
 
 def test_contract_says_what_the_file_holds() -> None:
-    model = export_classic(cloud(degree=2), FACTS, colours="view")
+    model = export_classic(cloud(degree=2), FACTS, colors="view")
     contract = json.loads({prop.key: prop.value for prop in model.metadata_props}[METADATA_KEY])
     assert contract["version"] == 1 and contract["nMax"] == 500 and contract["dtype"] == "float32"
     assert contract["license"] == "CC0-1.0" and contract["antialiased"] is False

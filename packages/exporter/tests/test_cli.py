@@ -1,12 +1,24 @@
 from __future__ import annotations
 
+import json
+import subprocess
+import sys
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import onnx
 import pytest
+from onnx import TensorProto, helper, numpy_helper
 
 from gaussian_exporter.cli import main
+from gaussian_exporter.conformance import clocks_at, default_feeds
+from gaussian_exporter.errors import ExportError
+from gaussian_exporter.families.classic import export_classic
+from gaussian_exporter.outputs import Options, save
 
+from .running import FACTS as SOME_FACTS
 from .test_classic import cloud
 from .test_hexplane import write_cloud
 
@@ -17,7 +29,7 @@ FACTS = ["--license", "CC0-1.0", "--attribution", "nobody"]
 def test_a_scene_is_exported_and_checked(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     write_cloud(tmp_path / "scene.ply", cloud(50, 1))
     out = tmp_path / "scene.onnx"
-    assert main(["classic", str(tmp_path / "scene.ply"), str(out), *FACTS, "--colours", "view"]) == 0
+    assert main(["classic", str(tmp_path / "scene.ply"), str(out), *FACTS, "--colors", "view"]) == 0
     assert "writes gaussians [50, 13]" in capsys.readouterr().out
     assert main(["check", str(out)]) == 0
     printed = capsys.readouterr().out
@@ -78,3 +90,84 @@ def test_what_leaves_the_gpu_is_said_without_a_contract_too(tmp_path: Path, caps
 def test_what_pages_refuse_fails(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["check", str(FIXTURES / "generators/faulty-cast.onnx")]) == 1
     assert "cannot cast" in capsys.readouterr().err
+
+
+def test_what_cannot_be_written_is_said_before_the_work(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    write_cloud(tmp_path / "scene.ply", cloud(50, 1))
+    before = (tmp_path / "scene.ply").read_bytes()
+    for out, found in (("scene.ply", "the file that is read"), ("none/a.onnx", "no folder"), (".", "a folder")):
+        assert main(["classic", str(tmp_path / "scene.ply"), str(tmp_path / out), *FACTS]) == 1
+        assert f"found {found}" in capsys.readouterr().err
+    assert (tmp_path / "scene.ply").read_bytes() == before
+    assert main(["check", str(tmp_path)]) == 1
+    assert "Is a directory" in capsys.readouterr().err
+
+
+def test_a_file_that_pages_refuse_is_not_written(tmp_path: Path) -> None:
+    model = export_classic(cloud(20, 0), replace(SOME_FACTS, license=""))
+    with pytest.raises(ExportError, match=r"contract\.license.*\[contract/schema\]"):
+        save(model, tmp_path / "a.onnx")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_json_that_is_broken_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    model = export_classic(cloud(20, 0), SOME_FACTS)
+    for text in ("{", "[]", '{"version": 1, "instances": 5}'):
+        onnx.helper.set_model_props(model, {"gaussian_contract": text})
+        onnx.save(model, tmp_path / "a.onnx")
+        assert main(["check", str(tmp_path / "a.onnx")]) == 1
+        assert "[contract/" in capsys.readouterr().err
+
+
+def test_an_input_with_a_value_in_the_file_needs_no_other(tmp_path: Path) -> None:
+    model = export_classic(cloud(20, 0), SOME_FACTS)
+    model.graph.initializer.append(numpy_helper.from_array(np.ones(1, np.float32), "gain"))
+    model.graph.input.append(helper.make_tensor_value_info("gain", TensorProto.FLOAT, [1]))
+    onnx.save(model, tmp_path / "a.onnx")
+    assert main(["check", str(tmp_path / "a.onnx")]) == 0
+
+
+def test_inputs_without_a_default_are_what_a_page_gives() -> None:
+    inputs = {"pose": [2, 4], "turns": [1, 3, 4]}
+    values = [helper.make_tensor_value_info(name, TensorProto.FLOAT, dims) for name, dims in inputs.items()]
+    model = helper.make_model(helper.make_graph([], "g", values, []))
+    bindings = {
+        "pose": {"role": "pose", "format": "quaternion", "quaternionOrder": "xyzw"},
+        "turns": {"role": "gaussians", "attribute": "rotations", "rotationOrder": "wxyz"},
+    }
+    feeds = default_feeds(model, {"inputs": bindings})
+    assert feeds["pose"].tolist() == [[0, 0, 0, 1]] * 2
+    assert feeds["turns"].tolist() == [[[1, 0, 0, 0]] * 3]
+
+
+def test_the_package_is_a_command_too() -> None:
+    ran = subprocess.run([sys.executable, "-m", "gaussian_exporter", "--help"], capture_output=True, text=True)
+    assert ran.returncode == 0 and "gaussian-export" in ran.stdout
+
+
+def test_clocks_show_what_a_page_shows() -> None:
+    given: dict[str, Any] = {"t": np.zeros(1, np.float32), "share": np.zeros((1, 1), np.float32)}
+    given["index"] = np.zeros(1, np.int64)
+    inputs = {
+        "t": {"role": "time", "unit": "seconds"},
+        "share": {"role": "time", "unit": "normalized"},
+        "index": {"role": "frame"},
+        "gain": {"role": "control"},
+    }
+    contract = {"inputs": inputs, "duration": 2.0, "fps": 25}
+    for seconds, frame in ((0, 0), (29 / 25, 29), (2.0, 49)):
+        found = clocks_at(seconds, contract, given)
+        assert found["index"].dtype == np.int64 and found["index"].tolist() == [frame]
+        assert found["t"] == np.float32(seconds) and found["share"] == np.float32(seconds / 2)
+    assert clocks_at(3, {"inputs": inputs}, {"index": given["index"]})["index"].tolist() == [0]
+
+
+@pytest.mark.parametrize("layout", ["split", "packed"])
+def test_a_wrong_degree_is_named(layout: Any, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    model = export_classic(cloud(20, 2), SOME_FACTS, Options(layout))
+    [prop] = model.metadata_props
+    for degree, status in ((2, 0), (1, 1)):
+        prop.value = json.dumps({**json.loads(prop.value), "shDegree": degree})
+        onnx.save(model, tmp_path / "a.onnx")
+        assert main(["check", str(tmp_path / "a.onnx")]) == status
+    assert "[contract/sh-degree]" in capsys.readouterr().err

@@ -64,6 +64,11 @@ def test_unknown_sizes_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture
     model.graph.node[1].op_type, model.graph.node[1].domain = "Mystery", "com.nobody"
     with pytest.raises(ExportError, match=r"\[graph/invalid\]"):
         cost_of(model)
+    model = graph(instances=True)[1]
+    for value in [*model.graph.input, *model.graph.output]:
+        value.type.tensor_type.shape.dim[0].dim_param = "rows"
+    with pytest.raises(ExportError, match="fixed shapes"):
+        cost_of(model)
     onnx.save(graph()[1], tmp_path / "a.onnx")
     assert main(["cost", str(tmp_path / "a.onnx"), "--rows", "1"]) == 0
     printed = capsys.readouterr().out

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import onnx
 import pytest
+from onnx import helper, numpy_helper
 
 from gaussian_exporter.checkpoints.moving import gaussian4d_of
 from gaussian_exporter.cli import main
@@ -63,18 +64,46 @@ def test_frames_are_what_the_generator_writes(family: str, layout: Any, tmp_path
         opacities = 1 / (1 + np.exp(-found["opacity"]))
         assert np.abs(opacities - expected["opacities"][:, 0]).max() < 2e-6
         first = np.stack([found[f"f_dc_{k}"] for k in range(3)], 1)
-        colour = expected["colour"]
-        given = (colour - 0.5) / SH_C0 if colour.shape[1] == 3 and "f_rest_0" not in found and is_rgb(model) else colour
+        color = expected["color"]
+        given = (color - 0.5) / SH_C0 if color.shape[1] == 3 and "f_rest_0" not in found and is_rgb(model) else color
         assert error(first, given[:, :3]) < 1e-5
-        if colour.shape[1] > 3:
-            count = colour.shape[1] // 3
+        if color.shape[1] > 3:
+            count = color.shape[1] // 3
             rest = np.stack([found[f"f_rest_{k}"] for k in range(3 * (count - 1))], 1)
-            assert error(rest, colour.reshape(-1, count, 3)[:, 1:].transpose(0, 2, 1).reshape(len(colour), -1)) < 1e-5
+            assert error(rest, color.reshape(-1, count, 3)[:, 1:].transpose(0, 2, 1).reshape(len(color), -1)) < 1e-5
 
 
 def is_rgb(model: onnx.ModelProto) -> bool:
     contract = next(json.loads(each.value) for each in model.metadata_props if "outputs" in each.value)
     return contract["outputs"].get("color") == "rgb" or "colors" in contract["outputs"]
+
+
+def test_orders_of_quaternions_and_harmonics_are_those_of_the_contract(tmp_path: Path) -> None:
+    model = FAMILIES["4dgaussians"](Options("split"))
+    (tmp_path / "b").mkdir()
+    onnx.save(model, tmp_path / "a.onnx")
+    graph, [prop] = model.graph, model.metadata_props
+    contract = json.loads(prop.value)
+    # The same Gaussians in the other orders, and the contract beside the file.
+    contract["outputs"] |= {"rotationOrder": "xyzw", "shOrder": "channel-major"}
+    graph.initializer.append(numpy_helper.from_array(np.array([1, 2, 3, 0]), "last_first"))
+    turns = helper.make_node("Gather", ["rotations_before", "last_first"], ["rotations"], axis=1)
+    harmonics = helper.make_node("Transpose", ["sh_before"], ["sh"], perm=[0, 2, 1])
+    for each in [*graph.node]:
+        for names in (each.input, each.output):
+            names[:] = [f"{name}_before" if name in ("rotations", "sh") else name for name in names]
+    graph.node.extend([turns, harmonics])
+    [value] = [value for value in graph.output if value.name == "sh"]
+    count, terms, _ = (dim.dim_value for dim in value.type.tensor_type.shape.dim)
+    value.CopyFrom(helper.make_tensor_value_info("sh", 1, [count, 3, terms]))
+    del model.metadata_props[:]
+    onnx.save(model, tmp_path / "b.onnx")
+    (tmp_path / "b.contract.json").write_text(json.dumps(contract))
+    for name in ("a", "b"):
+        assert main(["frames", str(tmp_path / f"{name}.onnx"), str(tmp_path / name), "--fps", "1"]) == 0
+    first, second = (read_ply(tmp_path / name / "frame-0002.ply") for name in ("a", "b"))
+    assert first.keys() == second.keys()
+    assert all(np.array_equal(first[name], second[name]) for name in first)
 
 
 def test_what_does_not_move_has_no_frames(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

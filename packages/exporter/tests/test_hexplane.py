@@ -65,7 +65,7 @@ def sequential(network: Any, x: Doubles) -> Doubles:
 
 def reference(given: Cloud, model: Deformation, time: float) -> dict[str, Doubles]:
     high, low = model.box.astype(np.float64)
-    rows: dict[str, list[Doubles]] = {"positions": [], "scales": [], "rotations": [], "opacities": [], "colour": []}
+    rows: dict[str, list[Doubles]] = {"positions": [], "scales": [], "rotations": [], "opacities": [], "color": []}
     for i in range(len(given.positions)):
         at = [*((given.positions[i].astype(np.float64) - high) * (2 / (low - high)) - 1), time]
         features: list[float] = []
@@ -85,7 +85,7 @@ def reference(given: Cloud, model: Deformation, time: float) -> dict[str, Double
         rows["scales"].append(np.exp(moved(given.log_scales[i], delta["scale"], mask)))
         rows["rotations"].append(moved(given.rotations[i], delta["rotation"], np.ones(1)))
         rows["opacities"].append(1 / (1 + np.exp(-moved(given.opacity_logits[i], delta["opacity"], mask))))
-        rows["colour"].append(moved(given.sh[i], delta["sh"], mask))
+        rows["color"].append(moved(given.sh[i], delta["sh"], mask))
     found = {name: np.stack(values) for name, values in rows.items()}
     found["covariances"] = covariance(found.pop("scales"), found.pop("rotations"))
     return found

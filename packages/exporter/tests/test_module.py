@@ -17,6 +17,7 @@ from gaussian_exporter.arrays import rotation_matrices
 from gaussian_exporter.conformance import check_outputs
 from gaussian_exporter.contract import Coordinates
 from gaussian_exporter.errors import ExportError
+from gaussian_exporter.module.capture import widened
 
 from .running import run
 
@@ -42,9 +43,9 @@ class Ball(torch.nn.Module):  # type: ignore[misc]
         angle = twist * self.points[:, 1:2] * math.pi
         x, y, z = self.points.split(1, -1)
         turned = torch.cat([angle.cos() * x - angle.sin() * z, y, angle.sin() * x + angle.cos() * z], -1)
-        colours = torch.cat([self.points * 0.5 + 0.5, torch.ones(COUNT, 1)], -1)
+        colors = torch.cat([self.points * 0.5 + 0.5, torch.ones(COUNT, 1)], -1)
         rest = torch.tensor([1.0, 0, 0, 0]).repeat(COUNT, 1)
-        return (turned * (1 + 0.3 * t.sin()))[None], torch.full((COUNT,), 0.05), rest, colours, torch.ones(1, COUNT, 1)
+        return (turned * (1 + 0.3 * t.sin()))[None], torch.full((COUNT,), 0.05), rest, colors, torch.ones(1, COUNT, 1)
 
 
 INPUTS = {"t": gs.time(duration=6.2832), "twist": gs.control(-1, 1, label="Twist")}
@@ -320,7 +321,50 @@ def test_a_module_that_goes_on_from_what_it_wrote(tmp_path: Path) -> None:
     assert bound == {"role": "state", "default": 2.0, "output": "next_heights"}
 
 
+def test_the_module_stays_in_training(tmp_path: Path) -> None:
+    module = torch.nn.Sequential(Ball(), torch.nn.Dropout()).train()
+    module[1].eval()
+    with pytest.raises(ExportError, match="a role for each argument"):
+        gs.export_module(module, {"t": gs.time(), "a": gs.time(), "b": gs.time()}, out=tmp_path / "x.onnx")
+    assert [part.training for part in module] == [True, False] and module.training
+
+
+def test_a_module_elsewhere_is_copied_to_the_cpu() -> None:
+    from torch._subclasses.fake_tensor import FakeTensorMode
+
+    with FakeTensorMode(allow_non_fake_inputs=True):
+        module = torch.nn.Module()
+        module.register_buffer("points", torch.ones(2, device="cuda"))
+        own, narrow = widened(module, torch)
+    assert [each.points.device.type for each in (own, module)] == ["cpu", "cuda"] and narrow == []
+
+
+def test_what_frames_reach_has_no_known_bounds(tmp_path: Path) -> None:
+    class Rising(torch.nn.Module):  # type: ignore[misc]
+        def forward(self, frame: Any) -> Any:
+            up = frame.float().expand(COUNT)
+            return torch.stack([up, up, up], -1), torch.full((COUNT, 6), 0.01), torch.full((COUNT, 3), 0.5), up * 0 + 1
+
+    layout = gs.split("positions", "covariances", "colors", "opacities")
+    report = gs.export_module(Rising(), {"frame": gs.frame()}, layout, out=tmp_path / "r.onnx", fps=2, quiet=True)
+    assert "bounds" not in report.contract
+
+
+def test_a_state_of_one_number(tmp_path: Path) -> None:
+    class Counting(torch.nn.Module):  # type: ignore[misc]
+        def forward(self, runs: Any) -> Any:
+            places = torch.linspace(-1, 1, COUNT)[:, None].repeat(1, 3) * (runs + 1)
+            return places, torch.full((COUNT, 6), 0.01), torch.full((COUNT, 3), 0.5), torch.ones(COUNT, 1), runs + 1
+
+    layout = gs.split("positions", "covariances", "colors", "opacities")
+    report = gs.export_module(Counting(), {"runs": gs.state(())}, layout, out=tmp_path / "c.onnx", quiet=True)
+    [given] = onnx.load(report.path).graph.input
+    assert len(given.type.tensor_type.shape.dim) == 0 and max(report.errors.values()) < 1e-5
+
+
 def test_what_does_not_fit_is_named(tmp_path: Path) -> None:
+    with pytest.raises(ExportError, match=r"found no folder .*none"):
+        gs.export_module(Ball(), INPUTS, out=tmp_path / "none" / "x.onnx")
     with pytest.raises(ExportError, match=r"a role for each argument.*found t"):
         gs.export_module(Ball(), {"t": gs.time()}, out=tmp_path / "x.onnx")
     with pytest.raises(ExportError, match=r"expected 4 tensors .* found 5"):

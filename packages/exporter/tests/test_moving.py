@@ -49,20 +49,20 @@ def spacetime() -> Spacetime:
 
     return Spacetime(
         positions=draw(3),
-        centres=rng.uniform(0, 1, (COUNT, 1)).astype(np.float32),
+        centers=rng.uniform(0, 1, (COUNT, 1)).astype(np.float32),
         widths=draw(1, 0.5, -1),
         motion=draw(9, 0.5),
         rotations=draw(4),
         turns=draw(4, 0.3),
         log_scales=draw(3, 0.5, -3),
         opacity_logits=draw(1, 2),
-        colours=rng.uniform(0, 1, (COUNT, 3)).astype(np.float32),
+        colors=rng.uniform(0, 1, (COUNT, 3)).astype(np.float32),
     )
 
 
 def reference_of_spacetime(model: Spacetime, time: float) -> dict[str, Doubles]:
     """thirdparty/gaussian_splatting/renderer, train_ours_lite, with its basic function exp(-x^2)."""
-    t = time - np.float64(model.centres)
+    t = time - np.float64(model.centers)
     motion: Any = np.float64(model.motion)
     at = model.positions + motion[:, 0:3] * t + motion[:, 3:6] * t * t + motion[:, 6:9] * t * t * t
     gate = np.exp(-((t / np.exp(np.float64(model.widths))) ** 2))
@@ -70,7 +70,7 @@ def reference_of_spacetime(model: Spacetime, time: float) -> dict[str, Doubles]:
         "positions": at,
         "covariances": covariance(np.exp(np.float64(model.log_scales)), model.rotations + t * model.turns),
         "opacities": gate / (1 + np.exp(-np.float64(model.opacity_logits))),
-        "colour": np.float64(model.colours),
+        "color": np.float64(model.colors),
     }
 
 
@@ -137,7 +137,7 @@ def reference_of_deform(model: Deform, time: float) -> dict[str, Doubles]:
         "positions": given.positions + layer(model.position, x),
         "covariances": (half @ half.transpose(0, 2, 1))[:, UPPER[0], UPPER[1]],
         "opacities": 1 / (1 + np.exp(-np.float64(given.opacity_logits))),
-        "colour": np.float64(given.sh).reshape(COUNT, -1),
+        "color": np.float64(given.sh).reshape(COUNT, -1),
     }
 
 
@@ -171,7 +171,7 @@ def captured(turned: bool = True, degree_t: int = 2) -> list[Any]:
 def reference_of_4d(model: Gaussian4D, time: float) -> dict[str, Doubles]:
     """cuda_rasterizer/forward.cu: computeCov3D_conditional and computeColorFromSH_4D, a Gaussian at a time."""
     now = model.start + time * (model.end - model.start)
-    rows: dict[str, list[Any]] = {"positions": [], "covariances": [], "opacities": [], "colour": []}
+    rows: dict[str, list[Any]] = {"positions": [], "covariances": [], "opacities": [], "color": []}
     for i in range(len(model.positions)):
         dt = now - float(model.times[i, 0])
         scale, scale_t = np.exp(np.float64(model.log_scales[i])), float(np.exp(np.float64(model.log_scales_t[i, 0])))
@@ -197,7 +197,7 @@ def reference_of_4d(model: Gaussian4D, time: float) -> dict[str, Doubles]:
         rows["positions"].append(model.positions[i] + moved)
         rows["covariances"].append(cut)
         rows["opacities"].append([share / (1 + np.exp(-np.float64(model.opacity_logits[i, 0]))) * (share > 0.05)])
-        rows["colour"].append(np.ravel(sh))
+        rows["color"].append(np.ravel(sh))
     return {name: np.array(values) for name, values in rows.items()}
 
 
@@ -249,10 +249,10 @@ def test_all_of_them_stay_on_the_gpu_and_are_recorded() -> None:
 def write_spacetime(folder: Path) -> Path:
     model = spacetime()
     columns = {axis: model.positions[:, i] for i, axis in enumerate("xyz")}
-    columns |= {"trbf_center": model.centres[:, 0], "trbf_scale": model.widths[:, 0]}
+    columns |= {"trbf_center": model.centers[:, 0], "trbf_scale": model.widths[:, 0]}
     for prefix, values in (
         ("motion", model.motion),
-        ("f_dc", model.colours),
+        ("f_dc", model.colors),
         ("opacity", model.opacity_logits),
         ("scale", model.log_scales),
         ("rot", model.rotations),
@@ -283,10 +283,10 @@ def test_a_property_that_nobody_knows_is_not_passed_over(tmp_path: Path) -> None
     with pytest.raises(ExportError, match=r"properties wobble.*--ignore wobble"):
         read_cloud(path)
     assert len(read_cloud(path, ["wobble"]).positions) == 5
-    for neighbour, family in (("deform", "Deformable-3D"), ("mlp_ckpt", "GauHuman")):
-        folder = tmp_path / neighbour
+    for neighbor, family in (("deform", "Deformable-3D"), ("mlp_ckpt", "GauHuman")):
+        folder = tmp_path / neighbor
         write_ply(folder / "point_cloud" / "iteration_7" / "point_cloud.ply", columns)
-        (folder / neighbour).mkdir()
+        (folder / neighbor).mkdir()
         with pytest.raises(ExportError, match=family):
             read_cloud(folder)
 
@@ -319,7 +319,7 @@ def test_a_4dgaussians_training_without_cfg_args_is_refused(tmp_path: Path) -> N
         read_hexplane(tmp_path / "point_cloud" / "iteration_3")
 
 
-def gsplat_splats(torch: Any, colours: bool = False) -> dict[str, Any]:
+def gsplat_splats(torch: Any, colors: bool = False) -> dict[str, Any]:
     given = cloud(COUNT, 3)
     own = {"means": given.positions, "scales": given.log_scales, "quats": given.rotations}
     own |= {"opacities": given.opacity_logits[:, 0], "sh0": given.sh[:, :1], "shN": given.sh[:, 1:]}
@@ -354,7 +354,7 @@ def test_files_of_gsplat_and_nerfstudio(tmp_path: Path) -> None:
     torch.save({"step": 29999, "pipeline": {**state, **metrics}, **extra}, file)
     same_cloud(tmp_path / "run")
     assert main(["classic", str(file), str(tmp_path / "x.onnx"), "--license", "MIT", "--attribution", "A"]) == 0
-    # Without harmonics, colours are a sigmoid: what the page then shows of 0.5 + c Y is the same.
+    # Without harmonics, colors are a sigmoid: what the page then shows of 0.5 + c Y is the same.
     state["_model.gauss_params.features_rest"] = torch.zeros(COUNT, 0, 3)
     torch.save({"pipeline": state}, file)
     shown: Any = 0.5 + 0.28209479177387814 * np.float64(read_cloud(file).sh[:, 0])

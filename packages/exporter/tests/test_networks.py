@@ -145,7 +145,7 @@ def reference(model: FeedForward, feeds: dict[str, AnyArray]) -> dict[str, Doubl
     there = feeds["relative_pose"].astype(np.float64) if model.views == 2 else np.eye(4)
     back: Doubles = np.linalg.inv(there).astype(np.float64)
     poses = [there, back]
-    columns: dict[str, list[Doubles]] = {"positions": [], "covariances": [], "colour": [], "opacities": []}
+    columns: dict[str, list[Doubles]] = {"positions": [], "covariances": [], "color": [], "opacities": []}
     for view, picture in enumerate(pictures):
         fine, coarse = encoded[view]
         even = [(each - each.mean(0)) / np.sqrt(each.var(0) + 1e-5) for _, each in encoded]
@@ -162,10 +162,10 @@ def reference(model: FeedForward, feeds: dict[str, AnyArray]) -> dict[str, Doubl
         for index, each in enumerate(model.head):
             x = convolved(relu(x) if index else x, each)
         depth = 1 / np.clip(guess[0] * np.exp(0.2 * np.tanh(x[0])), 1 / model.far, 1 / model.near)
-        colours = np.clip(picture + 0.5 * np.tanh(x[9:]), 0, 1)
-        wide = np.pad(colours, ((0, 0), (1, 1), (1, 1)), "edge")
-        bend = wide[:, :-2, 1:-1] + wide[:, 2:, 1:-1] + wide[:, 1:-1, :-2] + wide[:, 1:-1, 2:] - 4 * colours
-        colours = np.clip(colours - SHARPENING * model.widened * bend, 0, 1)
+        colors = np.clip(picture + 0.5 * np.tanh(x[9:]), 0, 1)
+        wide = np.pad(colors, ((0, 0), (1, 1), (1, 1)), "edge")
+        bend = wide[:, :-2, 1:-1] + wide[:, 2:, 1:-1] + wide[:, 1:-1, :-2] + wide[:, 1:-1, 2:] - 4 * colors
+        colors = np.clip(colors - SHARPENING * model.widened * bend, 0, 1)
         for row in range(HEIGHT):
             for column in range(WIDTH):
                 z, pixel = depth[row, column], x[:, row, column]
@@ -176,7 +176,7 @@ def reference(model: FeedForward, feeds: dict[str, AnyArray]) -> dict[str, Doubl
                 full = turn[:3, :3] @ upper[[0, 1, 2, 1, 3, 4, 2, 4, 5]].reshape(3, 3) @ turn[:3, :3].T
                 columns["positions"].append(turn[:3, :3] @ point + turn[:3, 3])
                 columns["covariances"].append(full[np.triu_indices(3)])
-                columns["colour"].append(colours[:, row, column])
+                columns["color"].append(colors[:, row, column])
                 drawn = ((0.2 + 4 * sigmoid(pixel[2:5])) ** 2).mean() + 0.3
                 columns["opacities"].append(sigmoid(pixel[1:2]) * drawn / (drawn + model.widened))
     return {name: np.stack(values) for name, values in columns.items()}

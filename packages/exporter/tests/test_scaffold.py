@@ -37,7 +37,7 @@ def scaffold(count: int = 60, k: int = 5, width: int = 8, distance: tuple[str, .
 
     def inputs(name: str) -> int:
         fed = "levels" in more and more["levels"].fed_to_networks
-        own = len(more["appearance"]) if name == "colour" and "appearance" in more else 0
+        own = len(more["appearance"]) if name == "color" and "appearance" in more else 0
         return width + 3 + (name in distance) + fed + own
 
     return Scaffold(
@@ -46,7 +46,7 @@ def scaffold(count: int = 60, k: int = 5, width: int = 8, distance: tuple[str, .
         features=rng.normal(size=(count, width)).astype(np.float32),
         scales=np.exp(rng.normal(-2, 0.5, size=(count, 6))).astype(np.float32),
         opacity=layers(rng, inputs("opacity"), width, k),
-        colour=layers(rng, inputs("colour"), width, 3 * k),
+        color=layers(rng, inputs("color"), width, 3 * k),
         covariance=layers(rng, inputs("covariance"), width, 7 * k),
         uses_distance=distance,
         **more,
@@ -59,10 +59,10 @@ def apply(network: Any, x: Doubles) -> Doubles:
     return x
 
 
-def shown(levels: Levels, anchor: int, centre: Doubles, camera: Doubles, resolution: float) -> float:
+def shown(levels: Levels, anchor: int, center: Doubles, camera: Doubles, resolution: float) -> float:
     """How present one anchor is, by the steps of the trainer's code: distance, level, rounding, comparison."""
     own, extra = float(levels.levels[anchor, 0]), float(levels.extra_levels[anchor, 0])
-    at = centre + levels.voxel_size / 2 / levels.fork**own
+    at = center + levels.voxel_size / 2 / levels.fork**own
     distance = np.linalg.norm(at - camera) * resolution
     level = np.log2(levels.standard_distance / distance) / np.log2(levels.fork) + extra
     top = float(levels.levels.max() - levels.levels.min())
@@ -76,14 +76,14 @@ def shown(levels: Levels, anchor: int, centre: Doubles, camera: Doubles, resolut
 
 def network(model: Scaffold, name: str, seen: tuple[list[float], float, list[float]]) -> Doubles:
     near, distance, level = seen
-    appearance = [] if model.appearance is None or name != "colour" else model.appearance.tolist()
+    appearance = [] if model.appearance is None or name != "color" else model.appearance.tolist()
     return apply(
         getattr(model, name), np.array([*near, *([distance] * (name in model.uses_distance)), *level, *appearance])
     )
 
 
 def reference(model: Scaffold, camera: Doubles, resolution: float = 1) -> dict[str, Doubles]:
-    rows: dict[str, list[AnyArray]] = {"positions": [], "scales": [], "rotations": [], "opacities": [], "colour": []}
+    rows: dict[str, list[AnyArray]] = {"positions": [], "scales": [], "rotations": [], "opacities": [], "color": []}
     for i, anchor in enumerate(model.anchors.astype(np.float64)):
         offset = anchor - camera
         distance = float(np.linalg.norm(offset))
@@ -104,7 +104,7 @@ def reference(model: Scaffold, camera: Doubles, resolution: float = 1) -> dict[s
         rows["scales"].append(np.float64(model.scales[i, 3:]) / (1 + np.exp(-shape[:, :3])))
         rows["rotations"].append(shape[:, 3:])
         rows["opacities"].append(np.maximum(np.tanh(network(model, "opacity", near)) * present, 0)[:, None])
-        rows["colour"].append(1 / (1 + np.exp(-network(model, "colour", near).reshape(-1, 3))))
+        rows["color"].append(1 / (1 + np.exp(-network(model, "color", near).reshape(-1, 3))))
     found = {name: np.concatenate(values) for name, values in rows.items()}
     found["covariances"] = covariance(found.pop("scales"), found.pop("rotations"))
     return found
@@ -127,7 +127,7 @@ def test_gaussians_of_anchors() -> None:
     assert 0.2 < dead.mean() < 0.8
 
 
-@pytest.mark.parametrize("distance", [("opacity",), ("colour", "covariance"), ("opacity", "colour", "covariance")])
+@pytest.mark.parametrize("distance", [("opacity",), ("color", "covariance"), ("opacity", "color", "covariance")])
 def test_networks_that_know_the_distance(distance: tuple[str, ...]) -> None:
     assert_matches(scaffold(distance=distance))
 
@@ -174,7 +174,7 @@ def test_a_camera_inside_an_anchor_gives_finite_numbers() -> None:
 def test_networks_that_do_not_fit_are_refused() -> None:
     with pytest.raises(ExportError, match=r"11 inputs and 15 outputs .* found 11 and 12.*\[checkpoint/mismatch\]"):
         model = scaffold()
-        export_scaffold(replace(model, colour=layers(np.random.default_rng(0), 11, 8, 12)), FACTS)
+        export_scaffold(replace(model, color=layers(np.random.default_rng(0), 11, 8, 12)), FACTS)
 
 
 def write_checkpoint(folder: Path, model: Scaffold, networks: Path, settings: str) -> None:
@@ -211,7 +211,7 @@ def octree(shared: Path, count: int) -> Scaffold:
         features=(rng.normal(size=(count, 32)) * 0.5).astype(np.float32),
         scales=np.concatenate([sigma, sigma], 1),
         opacity=read_weights(folder / "opacity_mlp.pt").linears(),
-        colour=read_weights(folder / "color_mlp.pt").linears(),
+        color=read_weights(folder / "color_mlp.pt").linears(),
         covariance=read_weights(folder / "cov_mlp.pt").linears(),
         levels=Levels(
             column("levels", 1), column("extra_levels", 1), float(voxel), float(standard), 2.0, "progressive"

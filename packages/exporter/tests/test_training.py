@@ -347,6 +347,6 @@ def test_the_nearest_point_of_a_painted_surface_is_seen(tmp_path: Path) -> None:
     assert 0.01 < drawn[3].mean() < 0.9 and (drawn[:3] <= drawn[3:] + 1e-6).all()
     k = torch.tensor([[20.0, 0, 4], [0, 20, 4], [0, 0, 1]])
     truth.corners = torch.zeros(2, 3, dtype=torch.long) + torch.tensor([[0], [1]])
-    truth.share, truth.colour = torch.full((2, 3), 1 / 3), torch.tensor([[1.0, 0, 0], [0, 1, 0]])
+    truth.share, truth.color = torch.full((2, 3), 1 / 3), torch.tensor([[1.0, 0, 0], [0, 1, 0]])
     found = truth(torch.tensor([[0.0, 0, 3], [0, 0, 2]]), rasterizer.Camera(torch.eye(4), k, 8, 8))
     assert found[1].sum() > 0 and found[0].sum() == 0

@@ -36,7 +36,7 @@ def every_family() -> dict[str, Case]:
     body = test_avatar.feeds(camera_position=np.array([0.5, 1.0, -4.0]))
     cases: dict[str, Case] = {
         "classic": (export_classic(test_classic.cloud(), FACTS), {}),
-        "classic-view": (export_classic(test_classic.cloud(), FACTS, colours="view"), camera),
+        "classic-view": (export_classic(test_classic.cloud(), FACTS, colors="view"), camera),
         "scaffold": (export_scaffold(bank, FACTS), camera),
         "hexplane": (export_hexplane(test_hexplane.small(), moving, FACTS), {"time": np.array([0.3], np.float32)}),
         "avatar": (export_avatar(test_avatar.avatar(degree=1), FACTS), body),
@@ -71,7 +71,7 @@ def halves() -> dict[str, onnx.ModelProto]:
     octree = test_scaffold.scaffold(levels=test_scaffold.levels(60, "round"))
     return {
         "classic": export_classic(test_classic.cloud(), FACTS, half),
-        "classic-view": export_classic(test_classic.cloud(), FACTS, half, colours="view"),
+        "classic-view": export_classic(test_classic.cloud(), FACTS, half, colors="view"),
         "scaffold": export_scaffold(test_scaffold.scaffold(), FACTS, half),
         "octree-round": export_scaffold(octree, FACTS, half),
         "hexplane": export_hexplane(test_hexplane.small(), test_hexplane.deformation(), FACTS, half),

@@ -50,7 +50,7 @@ class Classic:
         self.info: dict[str, Any] = {}
 
     def draw(self, camera: Camera, degree: int) -> Tensor:
-        """Premultiplied colour and alpha (4,H,W), with harmonics up to a degree."""
+        """Premultiplied color and alpha (4,H,W), with harmonics up to a degree."""
         p = self.parameters
         if not p["means"].is_cuda:
             full = covariances(torch.exp(p["scales"]), p["quats"])
@@ -58,7 +58,7 @@ class Classic:
             return picture(Splats(p["means"], full, colors, torch.sigmoid(p["opacities"])), camera)
         from gsplat import rasterization
 
-        colour, alpha, self.info = rasterization(
+        color, alpha, self.info = rasterization(
             means=p["means"],
             quats=p["quats"],
             scales=torch.exp(p["scales"]),
@@ -72,7 +72,7 @@ class Classic:
             near_plane=NEAR,
             packed=False,
         )
-        return torch.cat([colour[0], alpha[0]], -1).permute(2, 0, 1)
+        return torch.cat([color[0], alpha[0]], -1).permute(2, 0, 1)
 
     def save(self, folder: Path) -> None:
         """INRIA's PLY."""

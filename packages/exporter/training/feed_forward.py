@@ -112,7 +112,7 @@ class Generator(nn.Module):
         return (x if fine is None else fine), x
 
     def rays(self, k: Tensor, width: int, height: int) -> Tensor:
-        """Directions with z = 1 through pixel centres (H*W,3); k: fx, fy, cx, cy as shares of width and height."""
+        """Directions with z = 1 through pixel centers (H*W,3); k: fx, fy, cx, cy as shares of width and height."""
         v, u = torch.meshgrid(
             (torch.arange(height, device=k.device) + 0.5) / height,
             (torch.arange(width, device=k.device) + 0.5) / width,
@@ -134,8 +134,8 @@ class Generator(nn.Module):
 
     def costs(self, coarse: Tensor, k: Tensor, pose: Tensor) -> Tensor:
         """(2,D,h,w): the sweep of each picture against the other."""
-        centred = coarse - coarse.mean(1, keepdim=True)
-        even = centred / (centred.square().mean(1, keepdim=True) + EPSILON).sqrt()
+        centerd = coarse - coarse.mean(1, keepdim=True)
+        even = centerd / (centerd.square().mean(1, keepdim=True) + EPSILON).sqrt()
         poses = (pose, torch.linalg.inv(pose))
         return torch.cat([self.sweep(even[i : i + 1], even[1 - i :][:1], k, poses[i]) for i in range(2)])
 
@@ -271,8 +271,8 @@ def tinted(shot: Shot, rng: np.random.Generator) -> Shot:
     """Channels in another order, each a little brighter or darker."""
     order = [*rng.permutation(3).tolist(), 3]
     gains = torch.tensor([*rng.uniform(0.7, 1.2, 3), 1.0], dtype=torch.float32, device=shot.pictures.device)
-    recoloured = (shot.pictures[:, order] * gains[:, None, None]).clamp(max=1)
-    return Shot(recoloured, shot.depths, shot.views, shot.intrinsics)
+    recolored = (shot.pictures[:, order] * gains[:, None, None]).clamp(max=1)
+    return Shot(recolored, shot.depths, shot.views, shot.intrinsics)
 
 
 @torch.no_grad()

@@ -52,7 +52,7 @@ def loss_of(found: Tensor, wanted: Tensor) -> Tensor:
 
 @dataclass
 class Photograph:
-    """picture (4,H,W): colours of the object and, where it is dark and nobody can tell object from room (doubtful),
+    """picture (4,H,W): colors of the object and, where it is dark and nobody can tell object from room (doubtful),
     those of the photograph; coverage. valid (1,H,W): 0 where something else is in the way. doubtful (1,H,W)."""
 
     picture: Tensor

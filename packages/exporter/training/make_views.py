@@ -5,7 +5,7 @@
     python make_views.py sway SCENE.ply OUT [--count 200]        the same, bending to and fro as time goes
     python make_views.py wind SCENE.ply OUT [--count 400]        a potted plant whose leaves the wind moves
 
-OUT.npz holds pictures and cameras, OUT.npy points on the surface to start from. Drawn scenes have plain colours
+OUT.npz holds pictures and cameras, OUT.npy points on the surface to start from. Drawn scenes have plain colors
 (harmonics of degree 0), and are moved to the origin and scaled to a radius of 1.
 """
 
@@ -34,7 +34,7 @@ HEART, POT, LIMBER, GUST = (0.05, 0.05, 0.0), 0.34, 0.6, 0.32
 
 
 def scene_of(path: Path, where: str) -> Splats:
-    """A PLY file's Gaussians, centred and scaled by the 5th to the 95th percentile of their places."""
+    """A PLY file's Gaussians, centerd and scaled by the 5th to the 95th percentile of their places."""
     cloud = usable(read_cloud(path))
     low, high = np.percentile(cloud.positions, [5, 95], axis=0)
     scale = 2 / np.linalg.norm(high - low)
@@ -64,7 +64,7 @@ def swayed(scene: Splats, time: float) -> Splats:
 
 
 def blown(scene: Splats, time: float) -> Splats:
-    """Leaves turn about the plant's heart, the more the farther out they are, neighbours nearly together; the pot and
+    """Leaves turn about the plant's heart, the more the farther out they are, neighbors nearly together; the pot and
     the trunk stand still. Time 1 is time 0 again."""
     heart = torch.tensor(HEART, device=scene.positions.device)
     away = scene.positions - heart

@@ -13,13 +13,13 @@ import numpy as np
 # Vertices of the body itself and of the eyeballs, first and one past the last; the rest are helpers for hair, clothes
 # and joints.
 PARTS = {"skin": [(0, 13380)], "eye": [(14598, 14670), (14670, 14742)]}
-# Units of the files are decimetres, y up; the trainers' frame is metres, y down, facing -z (OpenCV's camera at -z).
+# Units of the files are decimeters, y up; the trainers' frame is meters, y down, facing -z (OpenCV's camera at -z).
 TO_METRES = np.array([0.1, -0.1, -0.1])
 
 
 @dataclass
 class Body:
-    """vertices (V,3) metres, y down; triangles (T,3); weights (V,J); joints (J,3); parents first; directions (V,3,B)
+    """vertices (V,3) meters, y down; triangles (T,3); weights (V,J); joints (J,3); parents first; directions (V,3,B)
     and joint_directions (J,3,B) of the targets; parts (V): which of PARTS a vertex belongs to, as an index."""
 
     vertices: np.ndarray
@@ -94,7 +94,7 @@ def parents_first(bones: dict[str, dict[str, Any]]) -> list[str]:
 
 
 def read_target(path: Path, count: int) -> np.ndarray:
-    """Offsets of vertices (count,3), metres."""
+    """Offsets of vertices (count,3), meters."""
     moves = np.zeros((count, 3))
     for line in gzip.decompress(path.read_bytes()).decode().splitlines():
         fields = line.split()

@@ -1,6 +1,6 @@
 """Pictures of a mesh that is dressed and lit by rule: what the avatar learns from, as there are no photographs of it.
 
-Millions of points on the surface, each with its colour, fall into pixels; the nearest stays.
+Millions of points on the surface, each with its color, fall into pixels; the nearest stays.
 """
 
 from __future__ import annotations
@@ -58,13 +58,13 @@ def normals_of(body: Body) -> np.ndarray:
 
 
 def ripple(at: np.ndarray, waves: float, rng: np.random.Generator) -> np.ndarray:
-    """Smooth noise (N), about -1 to 1, of so many waves to the metre."""
+    """Smooth noise (N), about -1 to 1, of so many waves to the meter."""
     directions = rng.normal(size=(6, 3)) * waves * 2 * np.pi
     return np.sin(at @ directions.T + rng.uniform(0, 2 * np.pi, 6)).mean(1) * 1.6
 
 
-def coloured(body: Body, at: np.ndarray, weights: np.ndarray, part: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """Colours (N,3) before light of points at rest (N,3), by the bones that carry them (N,J) and their part (N)."""
+def colored(body: Body, at: np.ndarray, weights: np.ndarray, part: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """Colors (N,3) before light of points at rest (N,3), by the bones that carry them (N,J) and their part (N)."""
     names = list(PARTS)
     share = [weights[:, [n.startswith(begin) for n in body.names]].sum(1) for begin in DRESSED.values()]
     garment = np.where(np.max(share, 0) > 0.5, np.argmax(share, 0), -1)
@@ -85,7 +85,7 @@ def coloured(body: Body, at: np.ndarray, weights: np.ndarray, part: np.ndarray, 
 
 
 def headed(at: np.ndarray, eye: np.ndarray, skin: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """Colours (N,3) of points of the head: short hair, brows and lips, measured in metres from the eyes."""
+    """Colors (N,3) of points of the head: short hair, brows and lips, measured in meters from the eyes."""
     x, y, z = (at - [0, eye[:, 1].mean(), eye[:, 2].min()]).T
     x = np.abs(x)
     wave = 0.006 * ripple(at, 40, rng)
@@ -99,16 +99,16 @@ def headed(at: np.ndarray, eye: np.ndarray, skin: np.ndarray, rng: np.random.Gen
 
 def eyes(at: np.ndarray, eye: np.ndarray) -> np.ndarray:
     """White, iris and pupil (N,3) of points, `eye` of which lie on an eyeball. The body looks towards -z."""
-    colour = np.ones((len(at), 3)) * 0.93
+    color = np.ones((len(at), 3)) * 0.93
     for side in (-1, 1):
         mine = eye & (np.sign(at[:, 0]) == side)
         if mine.any():
             middle = (at[mine].min(0) + at[mine].max(0)) / 2
             away = at - middle
             ahead = -away[:, 2] / np.maximum(np.linalg.norm(away, axis=1), 1e-9)
-            colour[mine & (ahead > np.cos(0.50))] = (0.25, 0.38, 0.42)
-            colour[mine & (ahead > np.cos(0.22))] = 0.03
-    return colour
+            color[mine & (ahead > np.cos(0.50))] = (0.25, 0.38, 0.42)
+            color[mine & (ahead > np.cos(0.22))] = 0.03
+    return color
 
 
 class Painted(nn.Module):
@@ -121,16 +121,16 @@ class Painted(nn.Module):
         at = interpolated(body, body.vertices, chosen, share)
         normals = interpolated(body, normals_of(body), chosen, share)
         weights = interpolated(body, body.weights, chosen, share)
-        colour = coloured(body, at, weights, body.parts[body.triangles[chosen, 0]], rng)
+        color = colored(body, at, weights, body.parts[body.triangles[chosen, 0]], rng)
         facing = normals @ (LIGHT / np.linalg.norm(LIGHT))
         light = 0.55 + 0.50 * np.clip(facing, 0, 1) + 0.10 * np.clip(-facing, 0, 1)
         self.register_buffer("corners", torch.tensor(body.triangles[chosen]))
         self.register_buffer("share", torch.tensor(share, dtype=torch.float32))
-        self.register_buffer("colour", torch.tensor(np.clip(colour * light[:, None], 0, 1), dtype=torch.float32))
+        self.register_buffer("color", torch.tensor(np.clip(color * light[:, None], 0, 1), dtype=torch.float32))
 
     @torch.no_grad()
     def forward(self, vertices: Tensor, camera: Camera) -> Tensor:
-        """Premultiplied colour and alpha (4,H,W) of the body with its vertices (V,3) where they are now."""
+        """Premultiplied color and alpha (4,H,W) of the body with its vertices (V,3) where they are now."""
         points = sum(self.share[:, [k]] * vertices[self.corners[:, k]] for k in range(3))
         at = points @ camera.view[:3, :3].T + camera.view[:3, 3]
         flat = at @ camera.intrinsics.T
@@ -144,5 +144,5 @@ class Painted(nn.Module):
         nearest.scatter_reduce_(0, row[number] * width + column[number], key, "amin")
         covered = nearest < torch.iinfo(torch.int64).max
         full = torch.zeros(height * width, 4, device=key.device)
-        full[covered] = torch.cat([self.colour, torch.ones_like(self.colour[:, :1])], 1)[nearest[covered] & 0xFFFFFFFF]
+        full[covered] = torch.cat([self.color, torch.ones_like(self.color[:, :1])], 1)[nearest[covered] & 0xFFFFFFFF]
         return nn.functional.avg_pool2d(full.T.reshape(1, 4, height, width), SUPERSAMPLING)[0]

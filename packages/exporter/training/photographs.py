@@ -19,7 +19,7 @@ class Exposures(nn.Module):
         self.log_gains = nn.Parameter(torch.zeros(count, 3))
 
     def exposed(self, picture: Tensor, index: int) -> Tensor:
-        """The picture (4,H,W) as brightly as the photograph. Gains and colours could trade a common factor: the mean
+        """The picture (4,H,W) as brightly as the photograph. Gains and colors could trade a common factor: the mean
         gain is 1."""
         gain = torch.exp(self.log_gains[index] - self.log_gains.mean(0))
         return torch.cat([picture[:3] * gain[:, None, None], picture[3:]])

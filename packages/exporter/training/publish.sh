@@ -19,7 +19,7 @@ one skull scaffold scaffold "$out/scaffold" "$to/skull/model.onnx" --weights com
 one plant hexplane hexplane "$out/hexplane" "$to/plant/model.onnx" --weights compact --name 'Plant in the wind, 4DGS' \
   --duration 6 --license MIT --attribution 'Plant captured in schwa/MetalSprocketsGaussianSplats, MIT; the wind is ours'
 one walker avatar avatar "$out/avatar/avatar.npz" "$to/walker/model.onnx" --weights compact --instances 32 --name 'Walker, avatar' \
-  --metres-per-unit 1 --license CC0-1.0 --attribution 'Body and rig of MakeHuman, CC0'
+  --meters-per-unit 1 --license CC0-1.0 --attribution 'Body and rig of MakeHuman, CC0'
 one oil oil image-filter "$out/oil" "$to/oil/model.onnx" --name 'Oil painting' \
   --license CC-BY-4.0 --attribution 'Trained on photographs by alansartlog, CC BY 4.0, and renders of a plant (MIT)'
 one statue feed-forward feed-forward "$out/feed-forward" "$to/statue/model.onnx" --weights compact --name 'Two pictures, feed-forward' \

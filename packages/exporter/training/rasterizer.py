@@ -55,7 +55,7 @@ def covariances(scales: Tensor, quaternions: Tensor) -> Tensor:
 
 
 def picture(splats: Splats, camera: Camera) -> Tensor:
-    """Premultiplied colour and alpha (4,H,W)."""
+    """Premultiplied color and alpha (4,H,W)."""
     return pictures(splats, [camera])[0]
 
 
@@ -73,12 +73,12 @@ def pictures_with_depth(splats: Splats, cameras: Sequence[Camera]) -> tuple[Tens
         both = with_gsplat(splats, cameras, "RGB+D")
     else:
         both = torch.stack([listed(splats, camera, with_z(splats, camera)) for camera in cameras])
-    colour, depth, alpha = both.split((3, 1, 1), 1)
-    return torch.cat([colour, alpha], 1), depth / alpha.clamp(min=LEAST_ALPHA)
+    color, depth, alpha = both.split((3, 1, 1), 1)
+    return torch.cat([color, alpha], 1), depth / alpha.clamp(min=LEAST_ALPHA)
 
 
 def with_z(splats: Splats, camera: Camera) -> Tensor:
-    """Colours and the depth from a camera (N,4)."""
+    """Colors and the depth from a camera (N,4)."""
     z = splats.positions @ camera.view[2, :3] + camera.view[2, 3]
     return torch.cat([splats.colors, z[:, None]], 1)
 
@@ -87,7 +87,7 @@ def with_gsplat(splats: Splats, cameras: Sequence[Camera], mode: str) -> Tensor:
     """By gsplat's CUDA rasterizer; alpha is the last channel."""
     from gsplat import rasterization
 
-    colour, alpha, _ = rasterization(
+    color, alpha, _ = rasterization(
         means=splats.positions,
         quats=None,
         scales=None,
@@ -102,15 +102,15 @@ def with_gsplat(splats: Splats, cameras: Sequence[Camera], mode: str) -> Tensor:
         packed=False,
         render_mode=mode,
     )
-    return torch.cat([colour, alpha], -1).permute(0, 3, 1, 2)
+    return torch.cat([color, alpha], -1).permute(0, 3, 1, 2)
 
 
 @dataclass
 class Ellipses:
-    """Gaussians on the picture, near to far: centres (N,2) in pixels, covariances (N,3) xx, xy, yy, opacities (N), and
+    """Gaussians on the picture, near to far: centers (N,2) in pixels, covariances (N,3) xx, xy, yy, opacities (N), and
     numbers of the Gaussians that they are of (N)."""
 
-    centres: Tensor
+    centers: Tensor
     covariances: Tensor
     opacities: Tensor
     numbers: Tensor
@@ -128,8 +128,8 @@ def projected(splats: Splats, camera: Camera) -> Ellipses:
     jacobian = torch.stack([fx / z, zero, -fx * x / z**2, zero, fy / z, -fy * y / z**2], 1).reshape(-1, 2, 3) @ turn
     flat = jacobian @ splats.covariances[order] @ jacobian.transpose(1, 2)
     entries = torch.stack([flat[:, 0, 0] + DILATION, flat[:, 0, 1], flat[:, 1, 1] + DILATION], 1)
-    centres = torch.stack([fx * x / z + camera.intrinsics[0, 2], fy * y / z + camera.intrinsics[1, 2]], 1)
-    return Ellipses(centres, entries, splats.opacities[order], order)
+    centers = torch.stack([fx * x / z + camera.intrinsics[0, 2], fy * y / z + camera.intrinsics[1, 2]], 1)
+    return Ellipses(centers, entries, splats.opacities[order], order)
 
 
 @torch.no_grad()
@@ -137,8 +137,8 @@ def touched(ellipses: Ellipses, width: int, height: int) -> tuple[Tensor, Tensor
     """Which ellipse may reach which pixel: numbers of ellipses, columns and rows of pixels, a pair to an entry."""
     reach = (2 * torch.log(ellipses.opacities / LEAST_ALPHA)).sqrt()[:, None] * ellipses.covariances[:, ::2].sqrt()
     most = torch.tensor([width, height])
-    low = (ellipses.centres - reach - 0.5).ceil().long().clamp(min=0)
-    size = ((ellipses.centres + reach - 0.5).floor().long() + 1).minimum(most).sub(low).clamp(min=0)
+    low = (ellipses.centers - reach - 0.5).ceil().long().clamp(min=0)
+    size = ((ellipses.centers + reach - 0.5).floor().long() + 1).minimum(most).sub(low).clamp(min=0)
     counts = size[:, 0] * size[:, 1]
     which = torch.repeat_interleave(counts)
     at = torch.arange(len(which)) - (counts.cumsum(0) - counts)[which]
@@ -150,7 +150,7 @@ def listed(splats: Splats, camera: Camera, values: Tensor) -> Tensor:
     """Values (N,K) of the Gaussians, blended, and alpha (K+1,H,W): all pairs of Gaussian and pixel in one list."""
     ellipses = projected(splats, camera)
     which, column, row = touched(ellipses, camera.width, camera.height)
-    dx, dy = (torch.stack([column, row], 1) + 0.5 - ellipses.centres[which]).unbind(1)
+    dx, dy = (torch.stack([column, row], 1) + 0.5 - ellipses.centers[which]).unbind(1)
     xx, xy, yy = ellipses.covariances[which].unbind(1)
     falloff = torch.exp(-0.5 * (yy * dx * dx - 2 * xy * dx * dy + xx * dy * dy) / (xx * yy - xy * xy))
     alpha = (ellipses.opacities[which] * falloff).clamp(max=MOST_ALPHA)

@@ -83,7 +83,7 @@ class Scaffold(nn.Module):
 
 
 def voxels(points: np.ndarray, count: int) -> tuple[Tensor, float]:
-    """Centres of occupied voxels (M,3), M at most count, and how wide the voxels are."""
+    """Centers of occupied voxels (M,3), M at most count, and how wide the voxels are."""
     width = float(np.ptp(points, 0).max()) / 512
     while len(cells := np.unique(np.round(points / width), axis=0)) > count:
         width *= 1.1

@@ -1,6 +1,6 @@
 """Reads captured scenes in SOG version 2 (PlayCanvas), and writes them as PLY: python sog.py SCENE.sog OUT.ply
 
-Plain colours only. Needs OpenCV, for WebP.
+Plain colors only. Needs OpenCV, for WebP.
 """
 
 from __future__ import annotations

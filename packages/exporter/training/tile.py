@@ -65,7 +65,7 @@ def random_scaffold() -> Scaffold:
         features=normal(rng, ANCHORS, FEATURES),
         scales=np.exp(normal(rng, ANCHORS, 6, by=0.5) - 4),
         opacity=network(rng, into, FEATURES, OFFSETS),
-        colour=network(rng, into, FEATURES, 3 * OFFSETS),
+        color=network(rng, into, FEATURES, 3 * OFFSETS),
         covariance=network(rng, into, FEATURES, 7 * OFFSETS),
     )
 
@@ -98,7 +98,7 @@ def main(argv: Sequence[str] | None = None) -> None:
     parser.add_argument("family", choices=("scaffold", "hexplane"))
     parser.add_argument("checkpoint", type=Path)
     parser.add_argument("count", type=int)
-    parser.add_argument("out")
+    parser.add_argument("out", type=Path)
     given = parser.parse_args(argv)
     count, is_random = given.count, given.checkpoint == Path("random")
     if given.family == "scaffold":

@@ -1,5 +1,5 @@
 /**
- * Any scene file that this project reads, as a PLY of plain colours for make_views.py: node to_ply.mjs SCENE OUT.ply [--turn]
+ * Any scene file that this project reads, as a PLY of plain colors for make_views.py: node to_ply.mjs SCENE OUT.ply [--turn]
  * `--turn` turns it by 180 degrees about z. Needs `npm run build`.
  */
 import { readFileSync, writeFileSync } from 'node:fs';

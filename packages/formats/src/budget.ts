@@ -1,7 +1,10 @@
 import { GaussianSplatError, shCoefficientCount, type ShDegree } from '@gaussian-splat/core';
 import { grouped } from './bytes.js';
 
-/** Upper limits of one load. Missing limits default to the bound by the file's own bytes: see SECURITY.md. */
+/**
+ * Upper limits of one load. Without `maxBytes`, only the downloaded bytes bound the memory; SECURITY.md describes this
+ * bound. Without `maxSplats` or `maxSeconds`, there is no limit of that kind.
+ */
 export interface LoadLimits {
   /** Maximum number of splats, over all levels of detail. */
   readonly maxSplats?: number;
@@ -11,18 +14,18 @@ export interface LoadLimits {
   readonly maxSeconds?: number;
 }
 
-/** Bytes that every load may allocate, independent of its size, */
+/** Bytes that every load may allocate in addition to {@link BYTES_PER_BYTE} for each downloaded byte. */
 const FREE_BYTES = 2 ** 26;
 /**
- * plus this number for each downloaded byte. Real scenes need 1 to 100: a splat of SOG has 3 bytes or more, and takes
- * up to 500 during decoding.
+ * Bytes that a load may allocate for each downloaded byte. Real scenes need 1 to 100: a splat of SOG has 3 bytes or
+ * more in its file, and takes up to 500 bytes during decoding.
  */
 const BYTES_PER_BYTE = 256;
 
 /**
- * Account of one load and its limits. Everything that a file can repeat or declare is charged to it before it is
- * allocated. Nothing is refunded, which bounds work as well as memory. Loops without allocations charge their steps as
- * bytes.
+ * Account of the bytes of one load, with its limits. Readers charge each allocation before they make it, if its size
+ * depends on the file. Charges are never refunded, so that they bound work as well as memory. Loops without allocations
+ * charge each step as a byte.
  */
 export class LoadBudget {
   readonly #limits: LoadLimits;
@@ -30,37 +33,38 @@ export class LoadBudget {
   #arrived: number;
   #taken = 0;
 
-  /** @param arrived Bytes of the scene's own file. */
+  /** @param arrived Size of the scene's own file in bytes. */
   constructor(arrived: number, limits: LoadLimits = {}) {
     this.#arrived = arrived;
     this.#limits = limits;
   }
 
-  /** Downloaded bytes over all files. */
+  /** Number of downloaded bytes, of all files of the scene. */
   get arrived(): number {
     return this.#arrived;
   }
 
-  /** Charged bytes. */
+  /** Number of bytes that have been charged. */
   get taken(): number {
     return this.#taken;
   }
 
-  /** Maximum total of charged bytes. */
+  /** Maximum of {@link taken}, in bytes. It grows with {@link arrived}. */
   get allowed(): number {
     const left = (this.#limits.maxBytes ?? Infinity) - this.#arrived;
     return Math.max(0, Math.min(FREE_BYTES + BYTES_PER_BYTE * this.#arrived, left));
   }
 
-  /** Adds another file of the scene, which raises the limit. */
+  /** Adds the size of another downloaded file of the scene, in bytes, which raises {@link allowed}. */
   arrive(bytes: number): void {
     this.#arrived += bytes;
   }
 
   /**
-   * Charges bytes before they are allocated.
+   * Charges bytes before they are allocated, and checks the time limit.
    * @param where Name of the file in error messages.
-   * @throws GaussianSplatError `out-of-memory/budget`
+   * @throws GaussianSplatError `out-of-memory/budget` if the total exceeds {@link allowed}, or the load takes longer than
+   * `maxSeconds`.
    */
   take(bytes: number, where: string): void {
     this.#taken += bytes;
@@ -75,7 +79,11 @@ export class LoadBudget {
     if (performance.now() - this.#start > 1000 * maxSeconds) refuse(where, `at most ${maxSeconds} s`, 'more');
   }
 
-  /** Charges the arrays of a cloud. Throws as {@link take} does. */
+  /**
+   * Charges the arrays of a cloud of `count` splats.
+   * @param where Name of the file in error messages.
+   * @throws GaussianSplatError `out-of-memory/budget` if `count` exceeds `maxSplats`, or as {@link take} does.
+   */
   takeSplats(count: number, degree: ShDegree, where: string): void {
     const { maxSplats = Infinity } = this.#limits;
     if (count > maxSplats) refuse(where, `at most ${grouped(maxSplats)} splats`, grouped(count));
@@ -83,7 +91,12 @@ export class LoadBudget {
   }
 }
 
-/** Throws the error for an exceeded limit. */
+/**
+ * Throws `out-of-memory/budget` for an exceeded limit.
+ * @param where Name of the file in error messages.
+ * @param expected The limit, for example `at most 5 s`.
+ * @param found The value that exceeds the limit.
+ */
 export function refuse(where: string, expected: string, found: string, cause?: unknown): never {
   throw new GaussianSplatError('out-of-memory/budget', {
     where,

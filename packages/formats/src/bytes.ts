@@ -3,37 +3,42 @@ import { GaussianSplatError } from '@gaussian-splat/core';
 
 const latin1 = new TextDecoder('latin1');
 
-/** Bytes `start` to `end` (negative: counted from the end) as text, one character for each byte; only ASCII characters are meaningful. */
+/**
+ * Decodes bytes `start` to `end`, excluding `end`, as one character each. Negative offsets count from the end of the
+ * bytes. Only ASCII characters are reliable.
+ */
 export function asciiOf(bytes: Uint8Array, start = 0, end = bytes.length): string {
   return latin1.decode(bytes.subarray(start, end));
 }
 
-/** Whether the file begins with these bytes, or with these ASCII characters. */
+/** Whether `bytes` contains a signature at offset `at`. Each character of a string stands for the byte of its code. */
 export function startsWith(bytes: Uint8Array, signature: readonly number[] | string, at = 0): boolean {
   const expected = typeof signature === 'string' ? Array.from(signature, (c) => c.charCodeAt(0)) : signature;
   return bytes.length >= at + expected.length && expected.every((byte, i) => bytes[at + i] === byte);
 }
 
-/** Whether the file begins like a JSON object, after an optional byte-order mark and whitespace. */
+/** Whether the first character is `{`, after an optional byte-order mark and whitespace. Examines the first 64 bytes. */
 export function isJsonObject(bytes: Uint8Array): boolean {
   return /^(\u00ef\u00bb\u00bf)?\s*\{/.test(asciiOf(bytes, 0, 64));
 }
 
-/** Returns a DataView of the same bytes. */
+/** Returns a DataView of the same range of memory. */
 export function viewOf(bytes: Uint8Array): DataView {
   return new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
 }
 
-/** A file as its bytes: what `Response.arrayBuffer()` gives, or any view of memory. */
+/** Bytes of a file: an ArrayBuffer, as `Response.arrayBuffer()` returns, or any view of one. */
 export type FileBytes = ArrayBuffer | ArrayBufferView<ArrayBufferLike>;
 
 /**
- * Returns the same memory as a plain Uint8Array, also for Node's Buffers, because some of their methods share memory
- * that those of a Uint8Array copy.
+ * Returns a Uint8Array of the same memory as a file. A Buffer of Node is converted, too, because its `slice` does not
+ * copy, unlike that of a Uint8Array.
+ * @param name Name of the file in error messages.
+ * @throws GaussianSplatError `argument/value` if `file` is neither an ArrayBuffer nor a view.
  */
 export function plainBytes(file: FileBytes, name: string): Uint8Array {
   if (ArrayBuffer.isView(file)) return new Uint8Array(file.buffer, file.byteOffset, file.byteLength);
-  // Tested by its tag, because an ArrayBuffer of another realm is not an instance of this class.
+  // `instanceof` fails for an ArrayBuffer of another realm, for example of an iframe.
   if (Object.prototype.toString.call(file) === '[object ArrayBuffer]') return new Uint8Array(file);
   throw new GaussianSplatError('argument/value', {
     where: name,
@@ -43,33 +48,33 @@ export function plainBytes(file: FileBytes, name: string): Uint8Array {
   });
 }
 
-/** Describes the type of a value, for error messages. */
+/** Returns the type of a value for error messages: `null`, the result of `typeof`, or the name of its class. */
 function kindOf(value: unknown): string {
   if (value === null || typeof value !== 'object') return value === null ? 'null' : typeof value;
   return value.constructor?.name || 'an object';
 }
 
-/** Returns the bytes at an address that is a multiple of 4, as typed-array views require: the same memory, or a copy. */
+/** Returns `bytes` if their offset is a multiple of 4, as views of 32-bit numbers require; otherwise a copy. */
 export function alignedTo4(bytes: Uint8Array): Uint8Array {
   return bytes.byteOffset % 4 === 0 ? bytes : new Uint8Array(bytes);
 }
 
-/** Whether typed arrays can read little-endian files directly: true on every platform with a browser today. */
+/** Whether typed arrays use the byte order of little-endian files. All platforms with current browsers do. */
 export const hostIsLittleEndian = new Uint8Array(new Uint16Array([1]).buffer)[0] === 1;
 
-/** Text in quotes, cut to `limit` characters, with unprintable characters escaped, for error messages. */
+/** Quotes text for error messages: at most `limit` characters of it, with unprintable characters escaped. */
 export function quote(text: string, limit = 60): string {
   return JSON.stringify(text.length > limit ? `${text.slice(0, limit)}...` : text);
 }
 
-/** Formats a number with grouped digits: 1,234,567. */
+/** Formats an integer with grouped digits, for example `1,234,567`. */
 export function grouped(value: number): string {
   return String(value).replace(/\B(?=(\d{3})+$)/g, ',');
 }
 
-/** Maximum number of bytes to reserve at once; longer files grow. */
+/** Maximum number of bytes that the constructor of {@link GrowingBytes} reserves. */
 const MAX_RESERVED = 2 ** 28;
-/** Maximum growth factor of the reservation over the received bytes, towards the expected size. */
+/** Maximum ratio of the reserved to the received bytes, up to the expected size. */
 const MAX_GROWTH = 8;
 
 /** A byte buffer that grows as chunks arrive. */
@@ -78,7 +83,7 @@ export class GrowingBytes {
   #bytes: Uint8Array<ArrayBuffer>;
   #length = 0;
 
-  /** @param expected Expected number of bytes; may be wrong either way. */
+  /** @param expected Expected number of bytes. The actual number may be smaller or larger. */
   constructor(expected: number) {
     this.#expected = expected;
     this.#bytes = new Uint8Array(Math.min(expected, MAX_RESERVED));
@@ -100,7 +105,7 @@ export class GrowingBytes {
     this.#length = needed;
   }
 
-  /** Returns the received bytes, without copying. */
+  /** Returns the received bytes. The array shares memory with the buffer until `append` enlarges the buffer. */
   view(): Uint8Array<ArrayBuffer> {
     return this.#bytes.subarray(0, this.#length);
   }

@@ -1,54 +1,47 @@
-/** Clips: animated scenes in one file that is read by byte ranges. docs/sequences.md describes it. */
+/** Reader of clips (.gsv): animated scenes in one file, read by byte ranges. docs/sequences.md describes the format. */
 import { keepUsable, type Bounds, type GaussianCloud, type ShDegree, type Vector3 } from '@gaussian-splat/core';
 import { LoadBudget, type LoadLimits } from './budget.js';
 import { grouped, startsWith, viewOf } from './bytes.js';
 import { damaged } from './faults.js';
 import { isObject, parseJson, show, type Json } from './json.js';
 import { mergeClouds } from './merge-clouds.js';
-import {
-  MOTION_VERSION,
-  applyMotion,
-  ANIMATED_ATTRIBUTES,
-  ANIMATED_ATTRIBUTE_NAMES,
-  readMotion,
-  type Motion,
-} from './motion.js';
+import { applyMotion, ANIMATED_ATTRIBUTES, ANIMATED_ATTRIBUTE_NAMES, readMotion, type Motion } from './motion.js';
 import { readScene } from './read-scene.js';
 
 const MAGIC = 'GSV\n';
 const VERSION = 1;
-/** Magic, version, and bytes of the index that follows. */
+/** Size of the head in bytes: the magic number, the version, and the size of the index, each of 4 bytes. */
 export const CLIP_HEAD_BYTES = 12;
 export const MAX_CLIP_INDEX_BYTES = 1 << 24;
 const MAX_GROUP_FRAMES = 4096;
 const MAX_PARTS = 8;
 const MAX_GROUPS = 1_000_000;
-/** Maximum number of code planes of a splat for each frame of its group. */
+/** Maximum number of code planes for each frame of a group: one for each animated number of a splat. */
 const PLANES_PER_FRAME = ANIMATED_ATTRIBUTE_NAMES.reduce((sum, name) => sum + ANIMATED_ATTRIBUTES[name], 0);
 
-/** Some of the splats of a group, and their motion: two contiguous sections of the file. */
+/** Some of the splats of a group: their scene file and their motion, which are adjacent in the clip. */
 export interface ClipPart {
-  /** Byte offset of its scene in the file; its motion follows. */
+  /** Byte offset of the part's scene in the clip file. The part's motion follows the scene. */
   readonly start: number;
-  /** Bytes of the splats, a scene file of any format. */
+  /** Size in bytes of the part's scene, a scene file of any format. */
   readonly sceneBytes: number;
-  /** Bytes of their motion. */
+  /** Size in bytes of the part's motion, which `readMotion` reads. */
   readonly motionBytes: number;
   readonly splats: number;
-  /** Planes of codes in the motion. */
+  /** Number of code planes in the motion. A plane has one Int16 for each splat. */
   readonly planes: number;
 }
 
-/** Consecutive frames that are independent of other groups. */
+/** Consecutive frames of a clip that are decoded without other groups. */
 export interface ClipGroup {
-  /** Index of its first frame in the clip. */
+  /** Index in the clip of the group's first frame. */
   readonly first: number;
   readonly frames: number;
-  /** The first part is a coarse version of the group; all parts together contain all splats. */
+  /** Parts of the group, 1 to 8, each with different splats. The first part alone is a coarse version of the scene. */
   readonly parts: readonly ClipPart[];
 }
 
-/** Index at the beginning of the file. */
+/** Index at the beginning of a clip file: properties of all frames, and the groups of frames. */
 export interface ClipIndex {
   readonly framesPerSecond: number;
   readonly frameCount: number;
@@ -58,14 +51,14 @@ export interface ClipIndex {
   readonly bounds: Bounds & { readonly up?: Vector3 | undefined };
   readonly antialiased: boolean;
   readonly filterVariance?: number | undefined;
-  /** Factor that enlarges the splats of the first part while the others are missing. */
+  /** Factor of the scales of the first part's splats while other parts of its group are missing, 1 to 8. */
   readonly grow: number;
   readonly groups: readonly ClipGroup[];
-  /** Bytes of the whole file. */
+  /** Size of the whole file in bytes. */
   readonly byteLength: number;
 }
 
-/** Input of {@link writeClipHead}; offsets follow from lengths. */
+/** Input of {@link writeClipHead}: an index without the properties that follow from its lengths. */
 export interface ClipHead extends Omit<ClipIndex, 'groups' | 'byteLength' | 'frameCount' | 'durationSeconds'> {
   readonly groups: readonly {
     readonly frames: number;
@@ -73,7 +66,11 @@ export interface ClipHead extends Omit<ClipIndex, 'groups' | 'byteLength' | 'fra
   }[];
 }
 
-/** Bytes of the index that follows the head. @throws GaussianSplatError `decode/header`, `decode/truncated`, `decode/unsupported` */
+/**
+ * Returns the size in bytes of the index, which follows the head.
+ * @param head Beginning of the file, at least {@link CLIP_HEAD_BYTES}.
+ * @throws GaussianSplatError `decode/header`, `decode/truncated`, `decode/unsupported`
+ */
 export function clipIndexBytes(head: Uint8Array, name: string): number {
   if (head.length < CLIP_HEAD_BYTES)
     throw damaged(name, `a head of ${CLIP_HEAD_BYTES} bytes`, grouped(head.length), 'decode/truncated');
@@ -88,7 +85,7 @@ export function clipIndexBytes(head: Uint8Array, name: string): number {
 }
 
 /**
- * Parses head and index.
+ * Parses the head and the index of a clip.
  * @param bytes Beginning of the file, at least up to the end of the index.
  * @throws GaussianSplatError `decode/header`, `decode/truncated`, `decode/corrupt`, `decode/unsupported`,
  * `out-of-memory/budget`
@@ -102,7 +99,7 @@ export function parseClip(bytes: Uint8Array, name: string, limits: LoadLimits = 
   return new IndexReader(json, name).read(CLIP_HEAD_BYTES + length);
 }
 
-/** Validates an index. */
+/** Validates the JSON of an index, and converts it to a {@link ClipIndex}. */
 class IndexReader {
   readonly #json: Json;
   readonly #name: string;
@@ -139,7 +136,7 @@ class IndexReader {
     };
   }
 
-  /** `[frames, [splats, planes, bytes of the scene, bytes of the motion], ...]` */
+  /** Reads the row of a group: `[frames, [splats, planes, bytes of the scene, bytes of the motion], ...]`. */
   #group(path: string, group: unknown, first: number, start: number): ClipGroup {
     if (!Array.isArray(group) || group.length < 2 || group.length > 1 + MAX_PARTS)
       this.#fail(path, `frames, and 1 to ${MAX_PARTS} parts`, group);
@@ -196,7 +193,7 @@ class IndexReader {
   }
 }
 
-/** Writes head and index of a file; the content of the parts follows, in their order. */
+/** Returns the bytes of head and index. In the file, the scene and the motion of each part follow in order. */
 export function writeClipHead({ groups, ...facts }: ClipHead): Uint8Array<ArrayBuffer> {
   const rows = groups.map(({ frames, parts }) => [
     frames,
@@ -212,7 +209,7 @@ export function writeClipHead({ groups, ...facts }: ClipHead): Uint8Array<ArrayB
   return bytes;
 }
 
-/** Index of the group that contains a frame. */
+/** Returns the index of the group that contains a frame. The frame index counts from 0 and must be within the clip. */
 export function clipGroupAt({ groups }: Pick<ClipIndex, 'groups'>, frame: number): number {
   let [low, high] = [0, groups.length - 1];
   while (low < high) {
@@ -223,6 +220,13 @@ export function clipGroupAt({ groups }: Pick<ClipIndex, 'groups'>, frame: number
   return low;
 }
 
+/** Bytes of a decoded splat without its codes: attributes, coefficients of degree 0 and fades. */
+const SPLAT_BYTES = 60;
+
+/** Returns the size in bytes of a decoded part for the GPU, without curves and coefficients above degree 0. */
+export const clipPartBytes = ({ splats, planes }: Pick<ClipPart, 'splats' | 'planes'>): number =>
+  splats * (SPLAT_BYTES + 2 * planes);
+
 /** Decoded content of a part. */
 export interface ClipPartContent {
   readonly cloud: GaussianCloud;
@@ -230,7 +234,7 @@ export interface ClipPartContent {
 }
 
 export interface ClipPartSource {
-  /** The part's scene and motion. */
+  /** Exactly the bytes of the part's scene and motion. */
   readonly bytes: Uint8Array;
   readonly part: ClipPart;
   readonly frames: number;
@@ -239,8 +243,8 @@ export interface ClipPartSource {
 }
 
 /**
- * Reads a part of a group.
- * @throws GaussianSplatError as `readScene` and `readMotion` do, and `decode/header` if it contradicts the index.
+ * Reads the scene and the motion of a part.
+ * @throws GaussianSplatError as `readScene` and `readMotion` do, and `decode/header` if the part contradicts the index.
  */
 export async function readClipPart({ bytes, part, frames, name, limits }: ClipPartSource): Promise<ClipPartContent> {
   const { sceneBytes, motionBytes, splats, planes } = part;
@@ -253,7 +257,7 @@ export async function readClipPart({ bytes, part, frames, name, limits }: ClipPa
     throw damaged(name, `${grouped(splats)} splats, as the index says`, grouped(cloud.count), 'decode/header');
   const motion = await readMotion({
     ...{ bytes: bytes.subarray(sceneBytes), name, splats, frames, budget },
-    version: MOTION_VERSION.lives,
+    hasLives: true,
   });
   const found = ANIMATED_ATTRIBUTE_NAMES.reduce(
     (sum, each) => sum + ANIMATED_ATTRIBUTES[each] * motion.parts[each].rank,
@@ -264,8 +268,8 @@ export async function readClipPart({ bytes, part, frames, name, limits }: ClipPa
 }
 
 /**
- * Returns the live splats of a frame.
- * @param frame Index within the group.
+ * Returns the splats that exist at a frame, from all given parts of one group.
+ * @param frame Index within the group; 0 is the group's first frame.
  * @throws GaussianSplatError `decode/empty`, `out-of-memory/budget`
  */
 export function clipFrame(

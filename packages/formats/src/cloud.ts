@@ -4,12 +4,15 @@ import type { SceneSource } from './scene-format.js';
 /** Value of the constant spherical harmonic, 1/(2·sqrt(pi)): color = 0.5 + SH_C0·f_dc. */
 export const SH_C0 = 0.28209479177387814;
 
-/** A cloud whose arrays a reader is filling. */
+/** A cloud that a reader is still filling: its properties are writable. */
 export type DraftCloud = {
   -readonly [K in keyof GaussianCloud]: GaussianCloud[K];
 };
 
-/** Allocates a cloud of zeros. Throws `out-of-memory/budget` if the load may not allocate as much. */
+/**
+ * Allocates a cloud whose arrays are filled with zeros, and charges it to the budget.
+ * @throws GaussianSplatError `out-of-memory/budget`
+ */
 export function allocateCloud(
   count: number,
   shDegree: ShDegree,
@@ -40,7 +43,7 @@ export function expInPlace(values: Float32Array): void {
   for (let i = 0; i < values.length; i++) values[i] = Math.exp(values[i]);
 }
 
-/** The degree of spherical harmonics with this many coefficients above the constant one, for each color channel. */
+/** Degree of spherical harmonics, by the number of coefficients above the constant one in each color channel. */
 export const DEGREE_OF_REST_COUNT: ReadonlyMap<number, ShDegree | 4> = new Map([
   [0, 0],
   [3, 1],
@@ -50,8 +53,8 @@ export const DEGREE_OF_REST_COUNT: ReadonlyMap<number, ShDegree | 4> = new Map([
 ]);
 
 /**
- * Degree that is kept of a file's degree. Degree 4 is truncated to 3, the maximum of a cloud: spherical harmonics are
- * orthogonal, so dropping the last band gives the nearest colors of degree 3.
+ * Returns the degree of the cloud for the degree of a file. Degree 4 is truncated to 3, the maximum of a cloud. Because
+ * spherical harmonics are orthogonal, the remaining bands are the best approximation of degree 3.
  */
 export function keptDegree(degree: ShDegree | 4): ShDegree {
   return degree === 4 ? 3 : degree;

@@ -4,9 +4,10 @@ import type { SceneFormat, SceneFormatName } from './scene-format.js';
 import { looksLikeSplats } from './splat/plausible.js';
 
 /**
- * Detects the format of a scene file: first by its content; second by the extension of `name`, for formats without a
- * signature; third by the media type; and finally by whether its numbers resemble those of a `.splat` file.
+ * Detects the format of a scene file. Signatures in the content come first. For formats without one, the extension of
+ * `name` is tested, and then the media type. Finally the numbers are tested for those of a `.splat` file.
  *
+ * @param bytes The whole file, or its beginning.
  * @param name File name or URL; a query and a fragment are ignored.
  * @param contentType Media type from the server; parameters after a semicolon are ignored.
  * @returns Name of the format, or undefined if `readScene` does not support the file.
@@ -15,11 +16,11 @@ export function detectFormat(bytes: Uint8Array, name = '', contentType = ''): Sc
   return findFormat(bytes, name, contentType)?.name;
 }
 
-/** The format's entry in the registry; see {@link detectFormat}. */
+/** Returns the entry of {@link sceneFormats} for the format that {@link detectFormat} detects, or undefined. */
 export function findFormat(bytes: Uint8Array, name: string, contentType: string): SceneFormat | undefined {
   const signed = sceneFormats.find(({ hasSignature }) => hasSignature?.(bytes));
   if (signed || bytes.length === 0) return signed;
-  // A `.splat` may begin with any bytes, even with text.
+  // A `.splat` file has no header, so that its first splat may look like the signature of another file.
   const isSplat = extensionOf(name) === '.splat' && looksLikeSplats(bytes, 'all');
   if (!isSplat && foreignName(bytes)) return undefined;
   const unsigned = sceneFormats.filter(({ hasSignature, isSignatureWeak }) => !hasSignature || isSignatureWeak);
@@ -33,8 +34,8 @@ export function findFormat(bytes: Uint8Array, name: string, contentType: string)
 }
 
 /**
- * Extension of a file name or URL in lower case, with its dot; empty if there is none. Handles files such as `scene
- * #3.splat`, and addresses that end in a name.
+ * Returns the extension of a file name or URL in lower case, with its dot; an empty string if there is none. A `#` in a
+ * file name such as `scene #3.splat` does not hide its extension.
  */
 export function extensionOf(name: string): string {
   return /\.[a-z0-9]+(?=[?#]|$)/i.exec(name)?.[0].toLowerCase() ?? '';

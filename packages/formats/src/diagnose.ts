@@ -1,4 +1,4 @@
-/** Identifies files that are not scenes: loaded after one has been rejected. */
+/** Identifies files that are not scenes, for error messages. This module is loaded after a file has been rejected. */
 import { GaussianSplatError, type ErrorCode } from '@gaussian-splat/core';
 import { asciiOf, grouped, quote } from './bytes.js';
 import { foreignName, sampleText, type ForeignName } from './foreign-signatures.js';
@@ -9,7 +9,7 @@ interface ForeignKind {
   readonly code: ErrorCode;
   readonly found: string;
   readonly remedy: string;
-  /** Whether the first words help to identify the file. */
+  /** Whether the error message quotes the beginning of the file as text. */
   readonly isText?: boolean;
 }
 
@@ -28,7 +28,7 @@ const foreign = (found: string, isText = false): ForeignKind => ({
   isText,
 });
 
-/** Kinds with a signature that no scene format shares. */
+/** Kinds of files by the name of their signature. No scene format has one of these signatures. */
 const SIGNED_KINDS: Readonly<Record<ForeignName, ForeignKind>> = {
   lfsPointer: {
     code: 'decode/lfs-pointer',
@@ -72,20 +72,20 @@ const ONNX_MODEL: ForeignKind = {
   remedy: NOT_A_SCENE,
 };
 
-/** The viewer page of SuperSplat and splat-transform, which may contain the scene. */
+/** Viewer page that SuperSplat or splat-transform exports. The page may contain the scene itself. */
 const VIEWER_PAGE: ForeignKind = {
   code: 'decode/html',
   found: 'the page of a viewer (SuperSplat), not the scene that it shows',
   remedy: 'give the address of the scene file, or export the scene again as .sog, .spz or .ply',
 };
 
-/** Such pages contain their title, or the setup of their viewer, within this number of bytes. */
+/** Number of bytes at the beginning of a web page that are searched for marks of a viewer. */
 const PAGE_BYTES = 65_536;
 
 const isViewerPage = (bytes: Uint8Array): boolean =>
   /<title>\s*SuperSplat|sse-viewer|supersplat-viewer/i.test(asciiOf(bytes, 0, PAGE_BYTES));
 
-/** Kinds with a weak signature: tested only if neither content nor name indicates a scene. */
+/** Returns the kind of a file without a signature: an ONNX model, a text, or other bytes. */
 function unsignedKind(bytes: Uint8Array): ForeignKind {
   if (isOnnx(bytes)) return ONNX_MODEL;
   return /^[\t\n\r -~]+$/.test(sampleText(bytes))
@@ -93,14 +93,19 @@ function unsignedKind(bytes: Uint8Array): ForeignKind {
     : foreign(`bytes that begin with ${hexOf(bytes)}`);
 }
 
-/** Start of an ONNX file: field 1 (IR version) and then field 2 (producer) or 7 (graph) of its protobuf. */
+/** Whether a protobuf begins as ONNX does: field 1 (IR version), then field 2 (producer) or 7 (graph). */
 function isOnnx(bytes: Uint8Array): boolean {
   return bytes.length > 8 && bytes[0] === 8 && bytes[1] > 0 && bytes[1] < 32 && [0x12, 0x3a].includes(bytes[2]);
 }
 
 const A_SCENE = 'a Gaussian splat scene (PLY, compressed PLY, SPZ, SOG, .splat, .ksplat or glTF)';
 
-/** Returns the error for a file in an unknown format, identified by its signature, its name, or else its bytes. */
+/**
+ * Returns the error for a file that is not a supported scene. The error names the kind of file, which is identified by
+ * signature, extension, or first bytes.
+ * @param extension Extension of the file name in lower case, with its dot; may be empty.
+ * @param expected Content that the caller expects, for the message.
+ */
 export function diagnose(
   bytes: Uint8Array,
   name: string,
@@ -108,7 +113,7 @@ export function diagnose(
   expected: string = A_SCENE,
 ): GaussianSplatError {
   const signed = foreignName(bytes);
-  // A JSON text may be one of them; files with another signature are not.
+  // Some known kinds, such as tilesets, are JSON. None has another of the signatures.
   const known = !signed || signed === 'json' ? unreadKind(bytes, sampleText(bytes), extension) : undefined;
   if (known) return refusal(unread(known), name, undefined);
   if (signed === 'html' && isViewerPage(bytes)) return refusal(VIEWER_PAGE, name, bytes, expected);
@@ -117,13 +122,13 @@ export function diagnose(
     : refusal(unsignedKind(bytes), name, bytes, expected);
 }
 
-/** Returns the error for an archive that is recognized by a path in it; undefined for all others. */
+/** Returns the error for an archive of an unsupported kind, which one of its paths identifies; otherwise undefined. */
 export function diagnoseArchive(paths: readonly string[], name: string): GaussianSplatError | undefined {
   const known = UNREAD_KINDS.find(({ within }) => within && paths.some((path) => within.test(path)));
   return known && refusal(unread(known), name, undefined);
 }
 
-/** Describes the content of a file for an error message. */
+/** Returns a phrase that describes the content of a file for error messages, for example `a PNG image`. */
 export function describeContent(bytes: Uint8Array): string {
   if (sampleText(bytes).startsWith('ply')) return 'a PLY file';
   const signed = foreignName(bytes);

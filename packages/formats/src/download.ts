@@ -4,19 +4,19 @@ import { grouped, GrowingBytes } from './bytes.js';
 import { badStatus, forbidden, interrupted, label, unreachable } from './network-errors.js';
 import type { FetchSceneOptions } from './fetch-scene.js';
 
-/** Bytes before the interruption that are requested again and compared, because two files may have the same ETag. */
+/** Number of received bytes that are requested again and compared, because two files may have the same ETag. */
 const OVERLAP = 1024;
 
-/** The download of one file over several connections. */
+/** Download of one file. It may take several connections, if some are interrupted. */
 export class Download {
   readonly #address: URL;
   readonly #options: FetchSceneOptions;
   #response: Response | undefined;
   #body = new GrowingBytes(0);
-  /** Byte offset of the response in the file. */
+  /** Byte offset in the file of the next chunk of the response. */
   #at = 0;
   #total: number | undefined;
-  /** Validator of the file's version (ETag or date); undefined if the server or CORS hides it. */
+  /** Validator of the file's version (ETag or Last-Modified); undefined if neither header is readable. */
   #tag: string | undefined;
 
   constructor(address: URL, options: FetchSceneOptions) {
@@ -29,7 +29,11 @@ export class Download {
     return this.#body.view();
   }
 
-  /** Requests the whole file. @returns The error of a server that is temporarily unavailable. */
+  /**
+   * Requests the whole file.
+   * @returns Undefined after success; the error if the server is temporarily unavailable (429, 503).
+   * @throws GaussianSplatError `network/unreachable`, `network/status`, `out-of-memory/budget`
+   */
   async start(): Promise<Error | undefined> {
     const response = await this.#request({});
     // A partial or empty response is not the file, although its status is not an error.
@@ -57,17 +61,17 @@ export class Download {
   }
 
   /**
-   * Requests the missing range if a validator allows it, otherwise the whole file. A server that sends the whole file
-   * again is accepted.
-   * @returns False if there is no response, the server is temporarily unavailable, or the file has changed: then the
-   * whole file must be requested again.
+   * Requests the missing range if the file has a validator, otherwise the whole file. A server may respond with the whole
+   * file in each case.
+   * @returns Whether {@link read} can continue. False if there is no response or an unsuitable one; the next call then
+   * requests the whole file if this one may have changed.
    */
   async resume(): Promise<boolean> {
     const from = Math.max(0, this.#body.length - OVERLAP);
     const [total, tag] = [this.#total, this.#tag];
     const isPart = from > 0 && total !== undefined && tag !== undefined;
     const isOwn = (globalThis.location?.origin ?? this.#address.origin) === this.#address.origin;
-    // Cross-origin that header would cause a preflight request, and it does not allow weak tags.
+    // `If-Range` causes a preflight request if it is sent cross-origin, and does not allow weak tags.
     const ifRange = isPart && isOwn && !tag.startsWith('W/') ? { 'If-Range': tag } : {};
     const headers = isPart ? { Range: `bytes=${from}-`, ...ifRange } : {};
     const response = await this.#request(headers).catch(() => undefined);
@@ -91,11 +95,15 @@ export class Download {
   #isRest(response: Response, from: number): boolean {
     const range = /^bytes (\d+)-(\d+)\/(\d+)$/.exec(response.headers.get('Content-Range') ?? '');
     if (range) return Number(range[1]) === from && Number(range[3]) === this.#total;
-    // Cross-origin that header is hidden from scripts, but the length is not.
+    // Cross-origin, scripts cannot read Content-Range, but Content-Length.
     return lengthOf(response) === (this.#total ?? 0) - from;
   }
 
-  /** Reads to the end of the connection. Throws `network/interrupted` if the file is incomplete. */
+  /**
+   * Reads the response to its end, and calls `onProgress` and `onArrival` for each chunk.
+   * @throws GaussianSplatError `network/interrupted` if the file is incomplete or has changed, `out-of-memory/budget`;
+   * the reason of `signal`.
+   */
   async read(): Promise<void> {
     const { signal, onProgress, onArrival } = this.#options;
     const body = this.#body;
@@ -104,19 +112,19 @@ export class Download {
     for await (const value of this.#response ? chunksOf(this.#response, failed) : []) {
       const rest = this.#rest(value);
       if (rest === undefined) {
-        // The file has changed, so all of it is requested again.
+        // The file has changed. Without a validator, `resume` requests the whole file.
         this.#tag = undefined;
         throw broken(new Error('another file than before'));
       }
       if (rest.length === 0) continue;
       this.#requireRoom(body.length + rest.length);
       body.append(rest);
-      // Cross-origin the Content-Encoding is hidden from scripts; a body longer than declared reveals it.
+      // Cross-origin, scripts cannot read Content-Encoding. A body longer than declared shows that it is compressed.
       const total = this.#total !== undefined && body.length <= this.#total ? this.#total : undefined;
       onProgress?.(body.length, total);
       await onArrival?.(body.view(), total);
     }
-    // Some HTTP stacks end a broken connection without an error. Cross-origin the length may be that of an encoding.
+    // Some HTTP stacks end a broken connection without an error. Cross-origin, the length may be the compressed one.
     const isExact = this.#total !== undefined && this.#response?.type !== 'cors';
     if (isExact && body.length < this.#total!) throw broken(undefined);
   }
@@ -140,7 +148,10 @@ export class Download {
   }
 }
 
-/** Whether a server of another origin responds to requests whose response is opaque: then CORS headers are missing. */
+/**
+ * Whether a server of another origin responds to a request of mode `no-cors`. If it does, a failed request of mode `cors`
+ * lacked CORS headers.
+ */
 async function answersUnread(address: URL, signal: AbortSignal | undefined): Promise<boolean> {
   const page = globalThis.location?.origin;
   if (page === undefined || page === address.origin || !address.protocol.startsWith('http')) return false;
@@ -156,7 +167,7 @@ function discard({ body }: Response): Promise<void> {
   return body?.cancel().catch(() => {}) ?? Promise.resolve();
 }
 
-/** Length of the body in bytes, if the headers declare it. */
+/** Returns the length of the body in bytes, if the headers declare it and no encoding; otherwise undefined. */
 function lengthOf({ headers }: Response): number | undefined {
   const encoding = headers.get('Content-Encoding');
   const length = headers.get('Content-Length');

@@ -1,14 +1,14 @@
-/** Loaded if many splats of a file cannot be drawn. */
+/** Warning and error for dropped splats. This module is loaded if many splats of a file cannot be drawn. */
 import { GaussianSplatError, type GaussianCloud } from '@gaussian-splat/core';
 import { grouped } from './bytes.js';
 import { reasonsOf } from './scene-errors.js';
 
-/** Minimum percentage of drawable splats; with fewer, the scene is unrecognizable. */
+/** Minimum percentage of drawable splats. A scene with fewer is unrecognizable and is rejected. */
 const MIN_PERCENT = 10;
 
 /**
- * Returns the cloud with a warning about its dropped splats.
- * @throws GaussianSplatError `decode/corrupt` if almost nothing is left.
+ * Returns the cloud with an additional warning about its dropped splats.
+ * @throws GaussianSplatError `decode/corrupt` if less than {@link MIN_PERCENT} of the splats are drawable.
  */
 export function withLeftOut(cloud: GaussianCloud, name: string): GaussianCloud {
   const { count, droppedCount, faults = [], warnings = [] } = cloud;

@@ -1,13 +1,13 @@
 /**
- * Faults of a file: {@link damaged} ends the load, and {@link warn} reports parts of the scene that are not drawn. The
- * reader of plain PLY does not load this module.
+ * Reports of faults in a file. {@link damaged} creates the error that ends the load, and {@link warn} adds a warning about
+ * content that is not drawn exactly. The reader of plain PLY does not load this module.
  */
 import { GaussianSplatError } from '@gaussian-splat/core';
 import type { DraftCloud } from './cloud.js';
 
 /**
- * Returns the error for a file whose parts contradict one another. All arguments are phrases as `ErrorDetails`
- * describes.
+ * Returns the error for a damaged file or one of an unsupported variant. `where`, `expected` and `found` are phrases as
+ * `ErrorDetails` describes.
  */
 export function damaged(
   where: string,
@@ -23,15 +23,15 @@ export function damaged(
   return new GaussianSplatError(code, { where, expected, found, remedy, cause });
 }
 
-/** Warning for degree 4, which is truncated to 3. */
+/** Warning for spherical harmonics of degree 4, which are truncated to degree 3. */
 export const DEGREE_4 =
-  'Spherical harmonics of degree 4 are drawn up to degree 3; the finest changes of colour with direction are left out.';
+  'Spherical harmonics of degree 4 are drawn up to degree 3; the finest changes of color with direction are left out.';
 
 /** Warning for 2D Gaussians. */
 export const FLAT =
   'The splats are 2D Gaussians (2DGS). They are drawn as flat 3D Gaussians: edges and thin parts look a little wider and paler than 2DGS draws them.';
 
-/** Adds a warning, once. */
+/** Adds a warning to a cloud, unless the cloud has the same one. */
 export function warn(cloud: DraftCloud, sentence: string): void {
   const { warnings = [] } = cloud;
   if (!warnings.includes(sentence)) cloud.warnings = [...warnings, sentence];

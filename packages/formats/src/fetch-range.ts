@@ -4,19 +4,20 @@ import { grouped, GrowingBytes } from './bytes.js';
 import { badStatus, interrupted, label, unreachable } from './network-errors.js';
 import type { FetchSceneOptions } from './fetch-scene.js';
 
-/** A range of bytes of a file. */
+/** Result of {@link fetchRange}. */
 export interface FetchedRange {
   readonly bytes: Uint8Array<ArrayBuffer>;
-  /** False for servers that send whole files only. */
+  /** Whether the server supports range requests. If false, it sent the file from its beginning. */
   readonly isPartial: boolean;
 }
 
 const RETRY_DELAY_MS = 250;
 
 /**
- * Downloads bytes `start` to `end` of a file by a range request. If the server sends the whole file, the rest is
- * discarded. Interrupted connections, and temporarily unavailable servers, are retried.
- * @returns Fewer bytes if the file ends before.
+ * Downloads bytes `start` to `end`, excluding `end`, of a file by a range request. If the server sends the whole file,
+ * the other bytes are discarded. Interrupted connections and temporarily unavailable servers are retried.
+ * @param url Absolute URL.
+ * @returns The bytes of the range; fewer if the file ends before `end`.
  * @throws GaussianSplatError `network/unreachable`, `network/status`, `network/interrupted`, `out-of-memory/budget`;
  * the reason of `signal`.
  */
@@ -24,16 +25,21 @@ export async function fetchRange(
   url: string,
   start: number,
   end: number,
-  options: Pick<FetchSceneOptions, 'credentials' | 'signal' | 'retries' | 'maxBytes'> = {},
+  options: Pick<FetchSceneOptions, 'credentials' | 'signal' | 'retries' | 'maxBytes' | 'maxSeconds'> = {},
 ): Promise<FetchedRange> {
-  const { retries = 3, signal, maxBytes = Infinity } = options;
+  const { credentials, retries = 3, signal, maxBytes = Infinity, maxSeconds = Infinity } = options;
   const address = new URL(url);
   if (end - start > maxBytes) refuse(label(address), `at most ${grouped(maxBytes)} bytes`, grouped(end - start));
+  // Timers are limited to 2^31 ms.
+  const limit = maxSeconds < 2e6 ? AbortSignal.timeout(1000 * Math.max(0, maxSeconds)) : undefined;
+  const signals = [signal, limit].filter((each) => each !== undefined);
+  const either = signals.length > 0 ? AbortSignal.any(signals) : undefined;
   for (let tries = 0; ; tries++) {
     try {
-      return await attempt(address, start, end, options);
+      return await attempt(address, start, end, { credentials, signal: either });
     } catch (error) {
       signal?.throwIfAborted();
+      if (limit?.aborted) refuse(label(address), `at most ${maxSeconds} s`, 'more', error);
       const { code, message } = error as { code?: string; message: string };
       const isPassing =
         code === 'network/interrupted' || code === 'network/unreachable' || /status (429|5\d\d)/.test(message);

@@ -7,34 +7,35 @@ import { label } from './network-errors.js';
 import { outOfMemory } from './scene-errors.js';
 import type { OpenFile } from './scene-format.js';
 
-/** `maxBytes` and `maxSeconds` end the download with `out-of-memory/budget`. */
+/** Options of {@link fetchScene}. A download that exceeds `maxBytes` or `maxSeconds` fails: `out-of-memory/budget`. */
 export interface FetchSceneOptions extends Pick<LoadLimits, 'maxBytes' | 'maxSeconds'> {
-  /** `cors` (default) or `same-origin`; responses to `no-cors` requests cannot be read. */
+  /** Mode of the request: `cors` (default) or `same-origin`. Scripts cannot read responses to `no-cors` requests. */
   readonly mode?: 'cors' | 'same-origin';
-  /** Cookies policy; default `same-origin`. */
+  /** Whether the request sends cookies; default `same-origin`. */
   readonly credentials?: RequestCredentials;
   /** Aborts the download; the promise then rejects with the signal's reason. */
   readonly signal?: AbortSignal;
   /**
-   * Called after every chunk with the number of received bytes. The total is undefined if the server does not declare
-   * it or declares the length of a compressed transfer.
+   * Called after every chunk with the number of received bytes and the total. The total is undefined if the server does
+   * not declare it, or declares the length of a compressed transfer.
    */
   readonly onProgress?: (loadedBytes: number, totalBytes: number | undefined) => void;
   /**
-   * Called after every chunk with all received bytes, which never change, and the total as above. The download
-   * continues when the promise resolves. If a server cannot resume an interrupted download, these bytes start again.
+   * Called after every chunk with all received bytes, and the total as in `onProgress`. Later chunks do not change these
+   * bytes. The download continues when the promise resolves. If the whole file is requested again after an interruption,
+   * `bytes` starts again from the first byte.
    */
   readonly onArrival?: (bytes: Uint8Array, totalBytes: number | undefined) => void | Promise<void>;
   /**
-   * Maximum number of consecutive resumptions of an interrupted download without progress of 64 KiB; it continues at
-   * the same byte if the server supports that. Default 3.
+   * Maximum number of consecutive retries without progress of 64 KiB. A retry continues at the same byte if the server
+   * supports range requests. Default 3.
    */
   readonly retries?: number;
 }
 
-/** Pause before the first resumption, ms; it doubles each time. */
+/** Milliseconds before the first retry; each further delay is twice as long. */
 const RETRY_DELAY_MS = 250;
-/** Minimum progress in bytes, so that a file is not loaded with a connection for each byte. */
+/** Progress in bytes that resets the number of retries. Without it, each byte could take another connection. */
 const MIN_PROGRESS = 65_536;
 
 /**
@@ -43,8 +44,9 @@ const MIN_PROGRESS = 65_536;
  * otherwise the whole file is requested again. A temporarily unavailable server (429, 503; also 5xx after the first
  * bytes) is retried after a pause; one that does not respond within 30 s is abandoned.
  *
- * @param url Absolute, or relative to the page or worker script (a worker created from a blob has no base address:
- * resolve the URL before).
+ * @param url Absolute URL, or relative to the page or the worker's script. A worker created from a blob has no base URL,
+ * and requires an absolute one.
+ * @returns The whole file.
  * @throws GaussianSplatError `network/url`, `network/unreachable` (no server, offline, CORS, mixed content),
  * `network/status`, `network/interrupted`, `out-of-memory/budget` or `out-of-memory/allocation`; the reason of
  * `signal`, usually a DOMException named AbortError.
@@ -67,7 +69,7 @@ export async function fetchScene(url: string | URL, options: FetchSceneOptions =
 
 async function bring(download: Download, signal: AbortSignal | undefined, retries = 3): Promise<Uint8Array> {
   let [tries, farthest] = [0, 0];
-  /** Waits before a retry; throws the error once the retries are used up. */
+  /** Waits before a retry. Throws `error` instead if no retries are left. */
   const pause = async (error: unknown): Promise<void> => {
     if (tries >= retries) throw error;
     await delay(RETRY_DELAY_MS * 2 ** tries++, signal);
@@ -114,7 +116,7 @@ function parseUrl(url: string | URL): URL {
     : address;
 }
 
-/** Waits; rejects with the reason of the signal. */
+/** Returns a promise that resolves after `ms` milliseconds, or rejects with the signal's reason when it aborts. */
 function delay(ms: number, signal: AbortSignal | undefined): Promise<void> {
   return new Promise((resolve, reject) => {
     const give = (): void => {
@@ -130,22 +132,24 @@ function delay(ms: number, signal: AbortSignal | undefined): Promise<void> {
 }
 
 /**
- * Returns an opener for the other files of a scene, for `ReadSceneOptions.openFile`: each is fetched relative to the
- * scene with the same options, and with the scene's query unless it has its own.
+ * Returns a function for `ReadSceneOptions.openFile`, which downloads the other files of a scene. It resolves each path
+ * relative to the scene's URL, and adds the scene's query to files without a query.
  *
- * @param url Absolute address of the scene's own file.
- * @param optionsOf Options for each file, by its path.
+ * @param url Absolute URL of the scene's own file.
+ * @param optionsOf Returns the download options of a file with the given path.
  */
 export function fileOpenerFor(url: string | URL, optionsOf: (path: string) => FetchSceneOptions): OpenFile {
   return (path, query) => fetchScene(partAddress(url, path, query), optionsOf(path));
 }
 
 /**
- * Returns the address of another file of a scene. Every segment of the path is encoded, so that it cannot address
+ * Returns the URL of another file of a scene. Every segment of the path is encoded, so that a path cannot address
  * another server.
+ * @param url Absolute URL of the scene's own file.
+ * @param query Query of the file with its `?`; if empty, the scene's query applies.
  */
 export function partAddress(url: string | URL, path: string, query = ''): URL {
-  // Two slashes would start a server name.
+  // A URL that begins with two slashes would name another server.
   const encoded = path
     .replace(/^\/+/, '/')
     .split('/')

@@ -1,18 +1,19 @@
 import { asciiOf, startsWith } from './bytes.js';
-import { loadDiagnosis } from './load-parts.js';
+import { loadDiagnosis } from './load-files.js';
 
-/** Recognizes a kind of file by its bytes, or by its first words. */
+/** Whether a file is of a kind, from its bytes or from its first KiB as text. */
 type Fits = (bytes: Uint8Array, text: string) => boolean;
 
 const isJson: Fits = (_, text) => /^\s*(\{\s*("|\}|$)|\[\s*(["\d[{\]-]|$))/.test(text);
 
 /**
- * Kinds of files with a signature that no scene format shares; the first match wins. Their messages are in diagnose.ts,
- * which only failures load.
+ * Signatures of other kinds of files, which no scene format has; the first match applies. Their error messages are in
+ * diagnose.ts, which is loaded only after a failure.
  */
 const SIGNATURES = {
   lfsPointer: (_, text) => text.startsWith('version https://git-lfs.github.com/spec/'),
-  html: (_, text) => /^\s*(<!--[^]*?-->\s*)*<(!doctype\s+html|html|head|body|script|title)\b/i.test(text),
+  // A comment has no `-->` within, so that a text can be divided into comments in one way only.
+  html: (_, text) => /^\s*(<!--((?!-->)[^])*-->\s*)*<(!doctype\s+html|html|head|body|script|title)\b/i.test(text),
   xml: (_, text) => /^\s*<(\?xml\b|[a-z]+[\s>])/i.test(text),
   sequence: (bytes, text) => isJson(bytes, text) && /"gaussianSplatSequence"\s*:/.test(text),
   json: isJson,
@@ -28,7 +29,7 @@ const SIGNATURES = {
 
 export type ForeignName = keyof typeof SIGNATURES;
 
-/** Returns the kind of a file with a signature other than that of a scene; undefined for all others. */
+/** Returns the kind of file whose signature the bytes have; undefined for scenes and unknown files. */
 export function foreignName(bytes: Uint8Array): ForeignName | undefined {
   const text = sampleText(bytes);
   const names = Object.keys(SIGNATURES) as ForeignName[];
@@ -37,15 +38,15 @@ export function foreignName(bytes: Uint8Array): ForeignName | undefined {
 
 const SAMPLE_BYTES = 1024;
 
-/** The first words of a file. */
+/** Returns the first KiB of a file as text, one character for each byte, without a byte-order mark. */
 export function sampleText(bytes: Uint8Array): string {
-  // A byte-order mark takes three such characters.
+  // The 3 bytes of a UTF-8 byte-order mark are 3 characters in this encoding.
   return asciiOf(bytes, 0, SAMPLE_BYTES).replace(/^\u00ef\u00bb\u00bf/, '');
 }
 
 /**
- * Returns a file that a scene names, unless it is a server's substitute for a missing one: a web page, or the pointer
- * of a file that git LFS never downloaded.
+ * Returns the bytes of a file that a scene refers to. Throws if a server sent a substitute for a missing file: a web
+ * page, or the pointer of a file that git LFS did not download.
  * @param name Name of the file in error messages.
  * @throws GaussianSplatError `decode/html`, `decode/lfs-pointer`
  */

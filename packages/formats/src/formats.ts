@@ -2,10 +2,10 @@ import { startsWith } from './bytes.js';
 import type { SceneFormat } from './scene-format.js';
 import { isCompressedPly, isGltf, isGzip, isLodMeta, isNgsp, isPly, isSogMeta, isZip } from './signatures.js';
 
-/** A format without its names. */
+/** A scene format without its extensions and media types. */
 export type UsualFormat = Omit<SceneFormat, 'extensions' | 'mimeTypes'>;
 
-/** The formats of most pages; the first matching signature wins. Those of late-formats.ts are loaded for other files. */
+/** Formats of most pages; the first matching signature applies. The other formats, in late-formats.ts, are loaded late. */
 export const usualFormats: readonly UsualFormat[] = [
   {
     name: 'compressed-ply',
@@ -25,7 +25,7 @@ export const usualFormats: readonly UsualFormat[] = [
     name: 'spz',
     readsPrefix: true,
     title: 'SPZ (Niantic)',
-    // Versions 1 to 3 are gzip files; the reader checks their content.
+    // SPZ of versions 1 to 3 is a gzip file. The reader checks its inflated content.
     hasSignature: (bytes) => isNgsp(bytes) || isGzip(bytes),
     load: async () => (await import('./readers/spz.js')).readSpz,
   },
@@ -55,6 +55,6 @@ export const usualFormats: readonly UsualFormat[] = [
   },
 ];
 
-/** Returns the common format whose signature the first bytes have; undefined for all others. */
+/** Returns the first of {@link usualFormats} whose signature a file has; undefined for all other files. */
 export const signedFormat = (bytes: Uint8Array): UsualFormat | undefined =>
   usualFormats.find(({ hasSignature }) => hasSignature?.(bytes));

@@ -27,12 +27,15 @@ export {
   type SequenceMotion,
 } from './sequence.js';
 export {
+  FADE_NAMES,
   MOTION_MODES,
   MOTION_VERSION,
   applyMotion,
   ANIMATED_ATTRIBUTES,
   ANIMATED_ATTRIBUTE_NAMES,
+  fadeAt,
   readMotion,
+  type Fades,
   type Lives,
   type Motion,
   type MotionFile,
@@ -44,6 +47,7 @@ export {
   CLIP_HEAD_BYTES,
   clipGroupAt,
   clipIndexBytes,
+  clipPartBytes,
   MAX_CLIP_INDEX_BYTES,
   parseClip,
   readClipPart,

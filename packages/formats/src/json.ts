@@ -4,13 +4,17 @@ import type { SceneSource } from './scene-format.js';
 
 export type Json = Record<string, unknown>;
 
-/** A JSON file, or a JSON section of one. */
+/** Bytes of a JSON file, or of the JSON section of another file. */
 export type JsonSource = Pick<SceneSource, 'bytes' | 'name' | 'budget'>;
 
-/** Memory of a JSON value for each character: nested empty arrays take the most. */
+/** Maximum bytes of memory of a parsed JSON value for each byte of text. Nested empty arrays need the most. */
 const BYTES_PER_CHARACTER = 16;
 
-/** Parses the JSON of a scene. Throws `decode/corrupt` with the position that the parser reports. */
+/**
+ * Parses a JSON object of at most `maxBytes`, and charges its memory to the budget.
+ * @throws GaussianSplatError `decode/corrupt`, `decode/truncated` if the text does not end with `}`, or
+ * `out-of-memory/budget`
+ */
 export function parseJson({ bytes, name, budget }: JsonSource, maxBytes: number): Json {
   if (bytes.length > maxBytes) {
     throw damaged(name, `a description of at most ${grouped(maxBytes)} bytes`, grouped(bytes.length));
@@ -38,7 +42,7 @@ export function isObject(value: unknown): value is Json {
   return typeof value === 'object' && value !== null && !Array.isArray(value);
 }
 
-/** Formats a JSON value for error messages. */
+/** Formats a JSON value for error messages, with at most 80 characters of it. */
 export function show(value: unknown): string {
   if (value === undefined) return 'nothing';
   try {

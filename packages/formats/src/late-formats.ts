@@ -1,4 +1,4 @@
-/** Rare formats, and formats that are recognized by their names: loaded for files without a common signature. */
+/** Rare formats, and extensions and media types of all formats. Loaded for files without a common signature. */
 import { usualFormats } from './formats.js';
 import type { SceneFormat } from './scene-format.js';
 import { isRad, looksLikeKsplat } from './signatures.js';
@@ -32,7 +32,7 @@ const lateFormats: readonly SceneFormat[] = [
   },
 ];
 
-/** Names of the common formats, which are recognized by their content. */
+/** Extensions and media types of the common formats, for files whose content has no signature. */
 const NAMES: Partial<Record<SceneFormat['name'], Pick<SceneFormat, 'extensions' | 'mimeTypes'>>> = {
   'compressed-ply': { extensions: ['.compressed.ply', '.ply'], mimeTypes: [] },
   ply: { extensions: ['.ply'], mimeTypes: ['model/ply', 'application/ply', 'application/x-ply'] },
@@ -43,7 +43,7 @@ const NAMES: Partial<Record<SceneFormat['name'], Pick<SceneFormat, 'extensions' 
   gltf: { extensions: ['.glb', '.gltf'], mimeTypes: ['model/gltf-binary', 'model/gltf+json'] },
 };
 
-/** All formats of `readScene`; the first matching signature wins. */
+/** All formats that `readScene` supports; the first matching signature applies. */
 export const sceneFormats: readonly SceneFormat[] = [
   ...usualFormats.map((format) => ({ extensions: [], mimeTypes: [], ...NAMES[format.name], ...format })),
   ...lateFormats,

@@ -1,22 +1,23 @@
-/** Files with linear colors. */
+/** Conversion of scenes whose colors are linear instead of sRGB. */
 import { shCoefficientCount } from '@gaussian-splat/core';
 import { SH_C0, type DraftCloud } from './cloud.js';
 import { warn } from './faults.js';
 
-/** The sRGB transfer function, extended to negative values as an odd function. */
+/** Encodes a linear color value by the sRGB transfer function, extended to negative values as an odd function. */
 function encoded(linear: number): number {
   const size = Math.abs(linear);
   const value = size <= 0.0031308 ? 12.92 * size : 1.055 * size ** (1 / 2.4) - 0.055;
   return linear < 0 ? -value : value;
 }
 
-/** Smaller deviations use the slope of the curve itself. */
+/** Minimum deviation for the finite difference. With smaller ones, it is nearly the derivative of the curve. */
 const MIN_DEVIATION = 1e-4;
 
 /**
- * Encodes linear colors as sRGB, in place. The mean color of a splat is exact; its change with direction is multiplied
- * by the slope of the curve over the standard deviation of that change. Blending encoded instead of linear colors is an
- * approximation, as the cloud's warning states.
+ * Converts the linear colors of a cloud to sRGB, in place, and adds a warning. The mean color of each splat is exact. Its
+ * view-dependent coefficients are multiplied by the slope of the transfer function, over plus and minus their standard
+ * deviation. Blending encoded colors approximates linear blending, as the warning states.
+ * @param source Property of the file that declares linear colors, for the warning.
  */
 export function encodeLinearColors(cloud: DraftCloud, source: string): void {
   const { count, sh, shDegree } = cloud;

@@ -3,7 +3,7 @@ import { allocateCloud, type DraftCloud } from './cloud.js';
 import { warn } from './faults.js';
 import type { SceneSource } from './scene-format.js';
 
-/** Splats `first` to `first + count` of a cloud. */
+/** Splats `first` to `first + count` of a cloud, excluding the latter. */
 export interface CloudPart {
   readonly cloud: GaussianCloud;
   readonly first: number;
@@ -11,8 +11,9 @@ export interface CloudPart {
 }
 
 /**
- * Merges parts of several clouds, with the highest degree of them; lower degrees are padded with zeros. The origin is
- * that of the largest.
+ * Copies parts of several clouds into a new cloud, in order. The new cloud has the highest degree of the parts; other
+ * coefficients are padded with zeros. Its origin and hints are those of the part with the most splats.
+ * @throws GaussianSplatError `out-of-memory/budget`
  */
 export function mergeClouds(parts: readonly CloudPart[], source: Pick<SceneSource, 'budget' | 'name'>): DraftCloud {
   const count = parts.reduce((sum, part) => sum + part.count, 0);
@@ -55,10 +56,10 @@ function copyPart({ cloud, first, count }: CloudPart, to: DraftCloud, at: number
   }
 }
 
-/** Part of a cloud, with its node of the scene and its level. */
+/** Part of a cloud, with the node of the scene that contains it, and its level of detail. */
 export type NodePart = CloudPart & Pick<LevelRun, 'node' | 'level'>;
 
-/** Locations of the parts in the merged cloud. */
+/** Returns the location of each part in the cloud that {@link mergeClouds} creates from these parts. */
 export function levelRunsOf(parts: readonly NodePart[]): LevelRun[] {
   let first = 0;
   return parts.map(({ count, node, level }) => {

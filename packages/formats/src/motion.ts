@@ -1,80 +1,98 @@
 import { type GaussianSplatError, keepUsable, shCoefficientCount, type GaussianCloud } from '@gaussian-splat/core';
 import { type LoadBudget } from './budget.js';
 import { GrowingBytes, grouped, viewOf } from './bytes.js';
+import { decompressing } from './decompression.js';
 import { checkedPart } from './foreign-signatures.js';
 import { damaged } from './faults.js';
 import { noSplats } from './scene-errors.js';
 
-/** Animated attributes, in the order of files, and their numbers for each splat. */
+/** Animated attributes in the order of files, each with its count of numbers for a splat. */
 export const ANIMATED_ATTRIBUTES = { position: 3, rotation: 3, scale: 3, opacity: 1, color: 3 } as const;
 export type AnimatedAttributeName = keyof typeof ANIMATED_ATTRIBUTES;
 export const ANIMATED_ATTRIBUTE_NAMES = Object.keys(ANIMATED_ATTRIBUTES) as readonly AnimatedAttributeName[];
 
-/** Versions of files: all splats exist in every frame, or each splat has a lifetime. */
-export const MOTION_VERSION = { everywhere: 1, lives: 2 } as const;
-type MotionVersion = (typeof MOTION_VERSION)[keyof typeof MOTION_VERSION];
-/** Version, splats, frames; a rank and a step for each of {@link ANIMATED_ATTRIBUTES}. */
+/** Versions of files. `everywhere`: all splats exist in every frame. `lives`: splats have lifetimes. `fades`: they fade. */
+export const MOTION_VERSION = { everywhere: 1, lives: 2, fades: 3 } as const;
+/** Size of the header: version, splats, frames, and a rank and a step for each of {@link ANIMATED_ATTRIBUTES}. */
 const HEAD_BYTES = 4 * (3 + 2 * ANIMATED_ATTRIBUTE_NAMES.length);
-/** Compressed bytes fed in one step, see Gunzip. */
-const FEED_BYTES = 16_384;
-/** Coding of codes: plain, or as differences from the previous one. */
+/** Coding of a plane of codes: plain codes, or differences from the code of the previous splat. */
 export const MOTION_MODES = { plain: 0, differences: 1 } as const;
-/** Limit of curve values; curves have a length of about 1 for each frame. */
+/** Maximum absolute value of a curve. Normal curves have values of about 1. */
 const MAX_CURVE = 1e6;
 
-/** Motion of one attribute: at frame f it changes by step · Σ_k curves[f, k] · codes[number, k]. */
+/**
+ * Motion of one attribute. At frame f, number n of a splat's attribute changes by step · Σ_k curves[f, k] · codes[n, k].
+ * The change of scales is in natural logarithms, and that of rotations is a rotation vector in radians.
+ */
 export interface AnimatedAttribute {
-  /** Number of curves, which all splats share; 0: the attribute does not change. */
+  /** Number of curves, which all splats share. 0 if the attribute does not change. */
   readonly rank: number;
   readonly step: number;
-  /** [frames, rank] */
+  /** Values of the curves, [frames, rank]. */
   readonly curves: Float32Array;
-  /** [width, rank] of [splats]: weight of each curve for each number of a splat. */
+  /** Arrays of weights, [numbers of the attribute, rank]. Each array has the weight of one curve for each splat. */
   readonly codes: readonly Int16Array[];
 }
 
-/** Lifetime of each splat: frames from `first` on, before `end`. */
+/** Lifetime of each splat: frames from `first` to `end`, excluding `end`. Both arrays are [splats]. */
 export interface Lives {
   readonly first: Uint16Array;
   readonly end: Uint16Array;
+  /** Fades at the ends of the lifetimes. Undefined if all splats appear and disappear at once. */
+  readonly fades?: Fades | undefined;
 }
 
-/** Differences of some frames of a sequence from the first. */
+/**
+ * Fade of each splat's opacity at the ends of its lifetime, in 255ths; the arrays are [splats]. At frame f, the fraction
+ * of the opacity is min(255, begin + rise · (f − first), last + fall · (end − 1 − f)) / 255.
+ */
+export type Fades = Readonly<Record<(typeof FADE_NAMES)[number], Uint8Array>>;
+export const FADE_NAMES = ['begin', 'rise', 'last', 'fall'] as const;
+
+/** Returns the fraction of the opacity of splat `i`, 0..1, at a frame of its lifetime. */
+export function fadeAt(
+  { begin, rise, last, fall }: Fades,
+  { first, end }: Pick<Lives, 'first' | 'end'>,
+  i: number,
+  frame: number,
+): number {
+  const [since, until] = [frame - first[i], end[i] - 1 - frame];
+  return Math.min(255, begin[i] + rise[i] * since, last[i] + fall[i] * until) / 255;
+}
+
+/** Motion of all splats over some frames, relative to a cloud. */
 export interface Motion {
   readonly splats: number;
   readonly frames: number;
   readonly parts: Readonly<Record<AnimatedAttributeName, AnimatedAttribute>>;
-  /** Undefined: every splat exists in all frames. */
+  /** Lifetimes of the splats. Undefined if every splat exists in all frames. */
   readonly lives?: Lives;
 }
 
-/** A file of motion and its required dimensions: splats of the first frame, and frames according to the manifest. */
+/** A motion file, and the counts of splats and frames that its header must have. */
 export interface MotionFile {
   readonly bytes: Uint8Array;
   readonly name: string;
   readonly splats: number;
   readonly frames: number;
   readonly budget: LoadBudget;
-  /** One of {@link MOTION_VERSION}; default `everywhere`. */
-  readonly version?: MotionVersion;
+  /** Whether the file must have lifetimes of splats; default false. */
+  readonly hasLives?: boolean;
 }
 
 /**
- * Reads a file of motion: docs/sequences.md describes it.
+ * Reads a motion file, whose format docs/sequences.md describes.
  * @throws GaussianSplatError `decode/corrupt`, `decode/truncated`, `decode/unsupported`, `decode/header`, `decode/html`, `decode/lfs-pointer`, or `out-of-memory/budget`
  */
 export async function readMotion({ bytes, name, ...asked }: MotionFile): Promise<Motion> {
   return new MotionReader(await inflate(await checkedPart(bytes, name), name, asked), name, asked).read();
 }
 
-type Asked = Pick<MotionFile, 'splats' | 'frames' | 'budget' | 'version'>;
+type Asked = Pick<MotionFile, 'splats' | 'frames' | 'budget' | 'hasLives'>;
 
-/** Inflates a file, and stops at the size that its header implies. */
+/** Inflates a file. Throws if the inflated size differs from the size that its header implies. */
 async function inflate(bytes: Uint8Array, name: string, asked: Asked): Promise<Uint8Array> {
-  const { readable, writable } = new DecompressionStream('deflate-raw');
-  const reader = readable.getReader();
-  // Errors of the stream are reported by the reader.
-  feed(writable.getWriter(), bytes).catch(() => {});
+  const reader = decompressing(bytes, 'deflate-raw');
   const output = new GrowingBytes(65_536);
   let length: number | undefined;
   try {
@@ -86,7 +104,7 @@ async function inflate(bytes: Uint8Array, name: string, asked: Asked): Promise<U
       output.append(value);
       if (length === undefined && output.length >= HEAD_BYTES) {
         length = lengthFrom(output.view(), name, asked);
-        // A growing buffer exists twice while it is copied.
+        // A growing buffer needs its size twice while its content is copied to a larger one.
         asked.budget.take(2 * length, name);
       }
       if (length !== undefined && output.length > length) throw wrongLength(name, length, 'more');
@@ -98,26 +116,19 @@ async function inflate(bytes: Uint8Array, name: string, asked: Asked): Promise<U
   throw wrongLength(name, length ?? HEAD_BYTES, grouped(output.length));
 }
 
-async function feed(writer: WritableStreamDefaultWriter<BufferSource>, bytes: Uint8Array): Promise<void> {
-  for (let at = 0; at < bytes.length; at += FEED_BYTES) await writer.write(bytes.slice(at, at + FEED_BYTES));
-  await writer.close();
-}
-
 const wrongLength = (name: string, expected: number, found: string): GaussianSplatError =>
   damaged(name, `${grouped(expected)} bytes, inflated`, found, 'decode/truncated');
 
 const rankAt = (view: DataView, k: number): number => view.getUint32(12 + 8 * k, true);
 
-/** Inflated size of a file, from its header. */
-function lengthFrom(
-  head: Uint8Array,
-  name: string,
-  { splats, frames, version = MOTION_VERSION.everywhere }: Asked,
-): number {
+/** Returns the inflated size of a file in bytes, from its header, and checks the header. */
+function lengthFrom(head: Uint8Array, name: string, { splats, frames, hasLives = false }: Asked): number {
   const view = viewOf(head);
-  const [ownVersion, ownSplats, ownFrames] = [0, 4, 8].map((at) => view.getUint32(at, true));
-  if (ownVersion !== version)
-    throw damaged(name, `motion of version ${version}`, `version ${ownVersion}`, 'decode/unsupported');
+  const [version, ownSplats, ownFrames] = [0, 4, 8].map((at) => view.getUint32(at, true));
+  const { everywhere, lives, fades } = MOTION_VERSION;
+  const versions: readonly number[] = hasLives ? [lives, fades] : [everywhere];
+  if (!versions.includes(version))
+    throw damaged(name, `motion of version ${versions.join(' or ')}`, `version ${version}`, 'decode/unsupported');
   if (ownSplats !== splats || ownFrames !== frames) {
     throw damaged(
       name,
@@ -132,11 +143,9 @@ function lengthFrom(
       if (rank > frames) throw damaged(name, `at most ${frames} curves`, `${rank} for ${part}`, 'decode/header');
       return sum + 4 * frames * rank + ANIMATED_ATTRIBUTES[part] * rank * (1 + 2 * splats);
     },
-    HEAD_BYTES + (hasLives(version) ? 4 * splats : 0),
+    HEAD_BYTES + (hasLives ? 4 * splats : 0) + (version === fades ? FADE_NAMES.length * splats : 0),
   );
 }
-
-const hasLives = (version: MotionFile['version']): boolean => version === MOTION_VERSION.lives;
 
 class MotionReader {
   readonly #bytes: Uint8Array;
@@ -158,7 +167,7 @@ class MotionReader {
       ANIMATED_ATTRIBUTE_NAMES.reduce((sum, part, k) => sum + ANIMATED_ATTRIBUTES[part] * rankAt(view, k), 0),
     );
     budget.take(2 * splats * modes.length, this.#name);
-    const lives = hasLives(this.#asked.version) ? this.#lives() : undefined;
+    const lives = this.#asked.hasLives ? this.#lives(view.getUint32(0, true) === MOTION_VERSION.fades) : undefined;
     let plane = 0;
     const parts = ANIMATED_ATTRIBUTE_NAMES.map((part, k): [AnimatedAttributeName, AnimatedAttribute] => {
       const rank = rankAt(view, k);
@@ -170,11 +179,13 @@ class MotionReader {
     return { splats, frames, parts: Object.fromEntries(parts) as Motion['parts'], ...(lives && { lives }) };
   }
 
-  #lives(): Lives {
+  #lives(hasFades: boolean): Lives {
     const { splats, frames, budget } = this.#asked;
-    budget.take(4 * splats, this.#name);
+    budget.take((hasFades ? 8 : 4) * splats, this.#name);
     const [first, end] = [this.#words(), this.#words()];
-    if (first.every((begin, i) => begin < end[i] && end[i] <= frames)) return { first, end };
+    const fades = hasFades ? FADE_NAMES.map((name) => [name, this.#take(splats).slice()]) : undefined;
+    if (first.every((begin, i) => begin < end[i] && end[i] <= frames))
+      return { first, end, ...(fades && { fades: Object.fromEntries(fades) as Fades }) };
     throw damaged(this.#name, `splats that live for one of ${grouped(frames)} frames or more`, 'others');
   }
 
@@ -211,9 +222,10 @@ class MotionReader {
 }
 
 /**
- * Returns the splats of a frame. The first frame is not modified.
- * @param frame Index; 0 is the first frame of the motion.
- * @param budget Is charged for them.
+ * Returns the splats of a frame of the motion, as a new cloud.
+ * @param first Cloud to which the motion applies; it is not modified.
+ * @param frame Index of the frame in the motion, from 0.
+ * @param budget Account that is charged for the new cloud.
  * @throws GaussianSplatError `decode/empty` if no splat is drawable, `out-of-memory/budget`
  */
 export function applyMotion(
@@ -253,6 +265,7 @@ export function applyMotion(
   eachNumber('scale', (number) => {
     for (let i = 0; i < change.length; i++) cloud.scales[3 * i + number] *= Math.exp(change[i]);
   });
+  if (lives?.fades) for (let i = 0; i < first.count; i++) cloud.opacities[i] *= fadeAt(lives.fades, lives, i, frame);
   eachNumber('opacity', add(cloud.opacities, 1));
   eachNumber('color', add(cloud.sh, 3 * shCoefficientCount(first.shDegree)));
   if (parts.rotation.rank > 0) {
@@ -268,7 +281,7 @@ export function applyMotion(
 
 const isAlive = ({ first, end }: Lives, i: number, frame: number): boolean => frame >= first[i] && frame < end[i];
 
-/** Curves do not apply to splats outside their lifetime: these keep their position with opacity 0. */
+/** Sets the opacity of splat `i` to 0, and restores its position, scales and rotation: curves apply only to its lifetime. */
 function hide(cloud: GaussianCloud, first: GaussianCloud, i: number): void {
   cloud.opacities[i] = 0;
   cloud.positions.set(first.positions.subarray(3 * i, 3 * i + 3), 3 * i);
@@ -276,7 +289,7 @@ function hide(cloud: GaussianCloud, first: GaussianCloud, i: number): void {
   cloud.rotations.set(first.rotations.subarray(4 * i, 4 * i + 4), 4 * i);
 }
 
-/** Rotates quaternions by rotation vectors, whose length is the angle. */
+/** Rotates quaternions (w, x, y, z) in place by rotation vectors, [N, 3], whose length is the angle in radians. */
 function turnBy(rotations: Float32Array, turns: Float32Array): void {
   for (let i = 0; i < turns.length / 3; i++) {
     const [x, y, z] = [turns[3 * i], turns[3 * i + 1], turns[3 * i + 2]];

@@ -34,8 +34,7 @@ const REMEDIES: ReadonlyMap<number, string> = new Map([
 ]);
 
 export function badStatus(address: URL, { status, statusText }: Response): GaussianSplatError {
-  const remedy =
-    status >= 500 ? 'try again later or look into the log of the server' : 'check the address of the scene';
+  const remedy = status >= 500 ? 'try again later or check the log of the server' : 'check the address of the scene';
   return new GaussianSplatError('network/status', {
     where: label(address),
     expected: 'HTTP status 200',
@@ -59,7 +58,7 @@ export function interrupted(
   });
 }
 
-/** Formats an address for messages, truncated for data URLs. */
+/** Returns the first 200 characters of a URL for error messages; data URLs may have millions. */
 export function label({ href }: URL): string {
   return href.length > 200 ? `${href.slice(0, 200)}...` : href;
 }

@@ -1,8 +1,11 @@
 import type { GaussianCloud } from '@gaussian-splat/core';
 
-/** A preview contains one splat of this many. */
+/** Number of splats of the scene for each splat of its preview. */
 export const PREVIEW_STEP = 16;
-/** Returns every n-th splat of a cloud, without coefficients above the constant one, enlarged to represent the rest. */
+/**
+ * Returns a preview of a cloud: every {@link PREVIEW_STEP}-th splat, without view-dependent color, enlarged by
+ * {@link sparse}.
+ */
 export function samplePreview(cloud: GaussianCloud): GaussianCloud {
   const count = Math.ceil(cloud.count / PREVIEW_STEP);
   const take = (values: Float32Array, stride: number, size: number): Float32Array => {
@@ -26,11 +29,11 @@ export function samplePreview(cloud: GaussianCloud): GaussianCloud {
 }
 
 /**
- * Enlarges a selection of splats to represent the whole: each by the square root of the number that it represents, so
- * that they cover the same area. Works in place.
+ * Enlarges the splats of a preview in place, and returns the cloud. The factor is the square root of
+ * {@link PREVIEW_STEP}, so that they cover the area of all splats of the scene.
  */
-export function sparse<T extends GaussianCloud>(cloud: T, share = 1 / PREVIEW_STEP): T {
-  const factor = Math.sqrt(1 / share);
+export function sparse<T extends GaussianCloud>(cloud: T): T {
+  const factor = Math.sqrt(PREVIEW_STEP);
   for (let i = 0; i < cloud.scales.length; i++) cloud.scales[i] *= factor;
   return cloud;
 }

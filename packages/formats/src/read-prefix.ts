@@ -2,16 +2,17 @@ import { GaussianSplatError, keepUsable, type GaussianCloud } from '@gaussian-sp
 import { LoadBudget } from './budget.js';
 import { plainBytes, type FileBytes } from './bytes.js';
 import { findFormat } from './detect.js';
-import { loadReader } from './load-parts.js';
+import { loadReader } from './load-files.js';
 import type { ReadSceneOptions } from './read-scene.js';
 
 /**
- * Reads the available splats of a file that is still loading: complete splats (PLY, compressed PLY, .splat, .ksplat),
- * or all splats without their view-dependent colors once only these are missing (SPZ, compressed PLY).
+ * Reads the available splats of a file that is still loading. PLY, compressed PLY, .splat and .ksplat give all complete
+ * splats. SPZ and compressed PLY give all splats without view-dependent color, if only this color is missing.
  *
  * @param beginning The first bytes of the file.
- * @returns The splats in the order of the file, or undefined if there are none yet or the format cannot be read in
- * part. Never throws for invalid bytes: `readScene` reports them once the file is complete.
+ * @returns The splats in the order of the file; undefined if none is complete, if the bytes are invalid, or if the
+ * format cannot be read in part. `readScene` reports invalid bytes when the file is complete.
+ * @throws The reason of `signal`, or GaussianSplatError `argument/value` if `beginning` is not bytes.
  */
 export async function readPrefix(
   beginning: FileBytes,

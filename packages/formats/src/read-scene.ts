@@ -2,37 +2,38 @@ import { keepUsable, type GaussianCloud } from '@gaussian-splat/core';
 import { LoadBudget, type LoadLimits } from './budget.js';
 import { plainBytes, type FileBytes } from './bytes.js';
 import { signedFormat } from './formats.js';
-import { loadDetection, loadDiagnosis, loadLeftOut, loadPreviews, loadReader } from './load-parts.js';
+import { loadDetection, loadDiagnosis, loadLeftOut, loadPreviews, loadReader } from './load-files.js';
 import { emptyFile, noSplats, outOfMemory } from './scene-errors.js';
 import { previewWanted, type OpenFile, type SceneSource } from './scene-format.js';
 
-/** Maximum fraction of a file's splats that may be dropped without a warning. */
+/** Maximum fraction of a file's splats, 0..1, that may be dropped without a warning. */
 export const MAX_DROPPED_RATIO = 0.05;
 
 export interface ReadSceneOptions extends LoadLimits {
-  /** File name or URL: used in error messages, and its extension identifies formats without a signature. */
+  /** File name or URL for error messages. Its extension identifies formats without a signature. Default `scene`. */
   readonly name?: string;
-  /** Media type from the server. */
+  /** Media type from the server, which identifies formats without a signature or an extension. */
   readonly contentType?: string;
-  /** Aborts between the steps of reading; the promise then rejects with the signal's reason. */
+  /** Aborts the reading at its next step; the promise then rejects with the signal's reason. */
   readonly signal?: AbortSignal;
   /**
-   * Opens the other files of a scene of several files (SOG folders, streamed SOG, glTF with external buffers);
-   * `fileOpenerFor` returns one for an address. Archives need none.
+   * Opens the other files of a scene with several files: SOG folders, streamed SOG, and glTF with external buffers.
+   * `fileOpenerFor` returns this function for a URL. Archives do not need it.
    */
   readonly openFile?: OpenFile;
   /**
-   * Level of detail of a streamed scene to read, 0 (default) is the finest; `all` reads all of them, for renderers that
-   * select: see `GaussianCloud.levelRuns`.
+   * Level of detail of a streamed scene to read: 0 (default) is the finest. `all` reads all levels, for renderers that
+   * select among them; see `GaussianCloud.levelRuns`.
    */
   readonly level?: number | 'all';
   /**
-   * Upper limit of splats for streamed SOG: the finest level within it is read; if all levels have more, the coarsest.
+   * Maximum number of splats. Of a streamed SOG, the finest level within this limit is read. Scenes that exceed the limit
+   * are rejected with `out-of-memory/budget`, also streamed SOG if the coarsest level exceeds it.
    */
   readonly maxSplats?: number;
   /**
-   * Called with a preview before the whole scene is read, if it is large and its format allows: some of its splats,
-   * spread over all of it and enlarged to represent the rest. Reading continues once the promise resolves.
+   * Called with a preview of scenes with 50,000 splats or more, before reading has completed. The preview has a part of
+   * the splats from the whole scene, enlarged to represent the others. Reading continues when the promise resolves.
    */
   readonly onPreview?: (preview: GaussianCloud) => void | Promise<void>;
 }
@@ -42,7 +43,7 @@ export interface ReadSceneOptions extends LoadLimits {
  * with `KHR_gaussian_splatting`, .splat, .ksplat, or a ZIP archive of one of these; the format is detected from the
  * content. Works in windows, workers and Node; the reader of the format is loaded on demand.
  *
- * @param file The whole file. It is not changed, and the cloud does not refer to it.
+ * @param file The whole file. It is not modified, and the cloud does not share its memory.
  * @returns The splats in the structure and coordinates that `GaussianCloud` documents. Unusable splats are dropped and
  * counted in `droppedCount`; `warnings` reports other content that is not drawn.
  * @throws GaussianSplatError with a `decode/...` code that states the expected and found content, the place and a
@@ -78,8 +79,9 @@ export async function readScene(file: FileBytes, options: ReadSceneOptions = {})
     openFile &&
     (async (path: string, query = '') => {
       const part = plainBytes(await openFile(path, query || undefined), path);
-      // A repeated file is charged once.
-      if (!known.has(path + query)) budget.arrive(part.length);
+      // A file that is opened again does not raise the limit of the budget again, and a reader may keep each copy.
+      if (known.has(path + query)) budget.take(part.length, name);
+      else budget.arrive(part.length);
       known.add(path + query);
       return part;
     });
@@ -91,7 +93,7 @@ export async function readScene(file: FileBytes, options: ReadSceneOptions = {})
     throw outOfMemory(error, name) ?? error;
   });
   signal?.throwIfAborted();
-  // Validating and packing all splats takes longer than reading them, so a preview is worthwhile even now.
+  // Validation and packing of all splats take longer than reading them, so that a preview is still useful.
   if (!hasPreview && previewWanted(source, whole.count)) {
     const { samplePreview } = await loadPreviews();
     await preview(samplePreview(whole));

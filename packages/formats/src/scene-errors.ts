@@ -2,7 +2,7 @@
 import { GaussianSplatError, type GaussianCloud } from '@gaussian-splat/core';
 import { grouped } from './bytes.js';
 
-/** The error for an empty file. */
+/** Returns the error for a file of 0 bytes. */
 export function emptyFile(name: string): GaussianSplatError {
   return new GaussianSplatError('decode/empty', {
     where: `${name}, byte 0`,
@@ -12,14 +12,14 @@ export function emptyFile(name: string): GaussianSplatError {
   });
 }
 
-/** Reasons of {@link GaussianCloud.faults}, in their order. */
+/** Descriptions of the reasons that {@link GaussianCloud.faults} counts, in the same order. */
 const FAULTS = ['a scale below 0', 'no rotation', 'no extent', 'values that are not finite or too large'];
 
-/** Formats the counts of the reasons that splats of a cloud cannot be drawn. */
+/** Formats {@link GaussianCloud.faults} for messages, for example `1,000 with no extent`. */
 export const reasonsOf = (faults: readonly number[]): string =>
   FAULTS.flatMap((fault, k) => (faults[k] > 0 ? [`${grouped(faults[k])} with ${fault}`] : [])).join(', ');
 
-/** The error for a scene without drawable splats. */
+/** Returns the error for a scene without drawable splats. */
 export function noSplats(name: string, { droppedCount, faults = [] }: GaussianCloud): GaussianSplatError {
   return new GaussianSplatError('decode/empty', {
     where: name,
@@ -33,7 +33,7 @@ export function noSplats(name: string, { droppedCount, faults = [] }: GaussianCl
   });
 }
 
-/** Converts a failed allocation to an error; undefined for other errors. */
+/** Converts the RangeError of a failed allocation to `out-of-memory/allocation`. Returns undefined for other errors. */
 export function outOfMemory(error: unknown, where: string): GaussianSplatError | undefined {
   if (!(error instanceof RangeError)) return undefined;
   return new GaussianSplatError('out-of-memory/allocation', {

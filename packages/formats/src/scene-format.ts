@@ -1,7 +1,7 @@
 import type { GaussianCloud } from '@gaussian-splat/core';
 import type { LoadBudget } from './budget.js';
 
-/** Splats `first` to `end`, excluding the latter, in the order of the file. */
+/** Range of splats in the order of the file: indices from `first` to `end`, excluding `end`. */
 export interface SplatRange {
   readonly first: number;
   readonly end: number;
@@ -9,23 +9,23 @@ export interface SplatRange {
 
 /** One scene file in memory, as the input of readers. */
 export interface SceneSource {
-  /** The whole file, as downloaded or read. */
+  /** The whole file, or its beginning if {@link isPrefix} is true. */
   readonly bytes: Uint8Array;
   /** Name in error messages: the file name or URL. */
   readonly name: string;
-  /** Account of the load: charged before any allocation that is larger than the available bytes. */
+  /** Account of the load. Readers charge it before any allocation that is larger than the available bytes. */
   readonly budget: LoadBudget;
-  /** Asynchronous or long-running readers call `throwIfAborted()` between steps. */
+  /** Signal of the load. Asynchronous and long-running readers call its `throwIfAborted()` between steps. */
   readonly signal?: AbortSignal;
-  /** Whether `bytes` are only the beginning of the file: complete splats are read, missing attributes skipped. */
+  /** Whether `bytes` is only the beginning of the file. Readers then return complete splats, and skip missing attributes. */
   readonly isPrefix?: boolean;
-  /** Range of splats to read; ignored by readers without support for ranges. See `splatRanges`. */
+  /** Range of splats to read; all if absent. Only readers of the files that `splatRanges` describes support it. */
   readonly range?: SplatRange;
-  /** Whether the SPZ is embedded in a glTF: its coordinates are then those of SPZ's specification. */
+  /** Whether an SPZ is embedded in a glTF. Its axes are then those of the specification of SPZ. */
   readonly isWithinGltf?: boolean;
-  /** Opens the other files of a scene of several files; absent for a single file. */
+  /** Opens the other files of a scene. Absent if only `bytes` is available. */
   readonly openFile?: OpenFile;
-  /** Level of detail to read: 0 is the finest. `all`: all of them, in the runs of `GaussianCloud.levelRuns`. */
+  /** Level of detail to read: 0 is the finest. `all` reads all levels, which `GaussianCloud.levelRuns` locates. */
   readonly level?: number | 'all';
   /** See `ReadSceneOptions.maxSplats`. */
   readonly maxSplats?: number | undefined;
@@ -33,10 +33,10 @@ export interface SceneSource {
   readonly onPreview?: (preview: GaussianCloud) => void | Promise<void>;
 }
 
-/** Smaller scenes are read as fast as a preview. */
+/** Minimum number of splats of a scene that gets a preview. Smaller scenes are read as fast as a preview. */
 const MIN_PREVIEWED = 50_000;
 
-/** Whether a preview was requested, and a scene of `count` splats is large enough for one. */
+/** Whether a preview was requested and is useful, for a scene of `count` splats. */
 export function previewWanted({ onPreview }: SceneSource, count: number): boolean {
   return onPreview !== undefined && count >= MIN_PREVIEWED;
 }
@@ -44,37 +44,40 @@ export function previewWanted({ onPreview }: SceneSource, count: number): boolea
 /**
  * Opens another file of the same scene.
  *
- * @param path As in the scene: relative to the scene's own file, `/` between folders, not URL-encoded.
- * @param query Query that the scene appends for the server, from its `?` on; absent for none.
- * @returns The whole file.
+ * @param path Path of the file, relative to the scene's own file, with `/` between folders. It is not URL-encoded.
+ * @param query Query that the scene specifies for the file, with its `?`; absent if there is none.
+ * @returns Bytes of the whole file.
  */
 export type OpenFile = (path: string, query?: string) => Promise<Uint8Array>;
 
 /**
- * Reads one file format into a cloud. A reader checks every size against the available bytes and charges it to the
- * load's budget before it allocates, throws `GaussianSplatError` with a code of the `decode` family (or
- * `out-of-memory/budget`), and lets `readScene` drop unusable splats.
+ * Reads one file format into a cloud. Before a reader allocates memory, it checks the size against the available bytes
+ * and charges it to the budget. A reader throws GaussianSplatError `decode/...` or `out-of-memory/budget`. It does not
+ * drop unusable splats: `readScene` does.
  */
 export type SceneReader = (source: SceneSource) => GaussianCloud | Promise<GaussianCloud>;
 
 export type SceneFormatName =
   'ply' | 'compressed-ply' | 'spz' | 'splat' | 'ksplat' | 'sog' | 'lod' | 'gltf' | 'zip' | 'rad';
 
-/** A file format of `readScene`: its names, its signature, and its reader. */
+/** A file format that `readScene` supports. */
 export interface SceneFormat {
   readonly name: SceneFormatName;
-  /** Display name. */
+  /** Name of the format for people, for example `SPZ (Niantic)`. */
   readonly title: string;
-  /** File extensions in lower case, with the dot. A format may share an extension with another. */
+  /** File extensions in lower case, with the dot. Several formats may have the same extension. */
   readonly extensions: readonly string[];
-  /** Media types seen in use; none of them is registered with IANA. */
+  /** Media types that servers send for the format. Most of them are not registered with IANA. */
   readonly mimeTypes: readonly string[];
-  /** Whether the first bytes of the file prove this format. Absent if the format has no signature. */
+  /** Returns whether a file has the signature of this format. Absent if the format has no signature. */
   readonly hasSignature?: (bytes: Uint8Array) => boolean;
-  /** Whether the reader supports a file without its end: see `readPrefix`. */
+  /** Whether the reader supports files without their end; see `readPrefix`. */
   readonly readsPrefix?: boolean;
-  /** Whether the signature may be damaged while the name is right, so that the reader can report the fault. */
+  /**
+   * Whether the extension or the media type also select this format, if the signature does not match. The reader then
+   * reports the damaged signature.
+   */
   readonly isSignatureWeak?: boolean;
-  /** Loads the reader; a dynamic import, so that a page fetches only the readers it needs. */
+  /** Loads the reader by a dynamic import, so that a page downloads only the readers of its formats. */
   readonly load: () => Promise<SceneReader>;
 }

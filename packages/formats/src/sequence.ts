@@ -2,66 +2,67 @@ import { LoadBudget } from './budget.js';
 import { grouped } from './bytes.js';
 import { damaged } from './faults.js';
 import { parseJson, show, type Json } from './json.js';
+import { MAX_PATH } from './lod/meta.js';
 import { MAX_MANIFEST_BYTES } from './signatures.js';
 
 /** A sequence of scene files over time. */
 export interface SceneSequence {
   /**
-   * Paths relative to the manifest, in order, or a pattern for them. Each is a scene file of any format; with {@link
-   * motion} only the first is. See {@link framePath}.
+   * Paths of scene files of any format, relative to the manifest, or the pattern of these paths. Each frame has a scene
+   * file; with {@link motion}, only the first frame has one. See {@link framePath}.
    */
   readonly frames: readonly string[] | FramePattern;
   /**
-   * Files with the differences of later frames from the first: see {@link motionPath}. Undefined: each frame is a scene
-   * file.
+   * Motion files, which contain the differences of later frames from the first. Undefined if each frame has a scene file.
+   * See {@link motionFrame}.
    */
   readonly motion?: SequenceMotion;
-  /** Number of frames. */
   readonly frameCount: number;
   readonly framesPerSecond: number;
   /** Seconds from the first frame to the end of the last. */
   readonly durationSeconds: number;
 }
 
-/** Files of the frames after the first. */
+/** Motion files of the frames after the first. */
 export interface SequenceMotion {
-  /** Paths of the files of motion, as {@link SceneSequence.frames}. */
+  /** Paths of the motion files, relative to the manifest, or the pattern of these paths. */
   readonly frames: readonly string[] | FramePattern;
-  /** Frames in each file, except the last, which has the rest. */
+  /** Number of frames in each motion file. The last file may have fewer. */
   readonly framesPerFile: number;
 }
 
-/** Location of a frame in a file of motion. */
+/** Location of a frame in a motion file. */
 export interface MovedFrame {
-  /** Path of the file, relative to the manifest. */
+  /** Path of the motion file, relative to the manifest. */
   readonly path: string;
-  /** Index of the frame in the file, and number of frames in it. */
+  /** Index of the frame in the motion file, from 0. */
   readonly frame: number;
+  /** Number of frames in the motion file. */
   readonly frames: number;
 }
 
-/** Numbered paths. */
+/** Numbered paths: `before`, the number of the path, and `behind`. */
 export interface FramePattern {
   readonly before: string;
   readonly behind: string;
-  /** Number of the first frame. */
+  /** Number in the first path. */
   readonly first: number;
-  /** Minimum number of digits. */
+  /** Minimum number of digits; smaller numbers are padded with zeros. */
   readonly digits: number;
 }
 
 const MAX_FRAMES = 1_000_000;
-/** Maximum number of frames in a file of motion: the curves then stay small compared with the codes. */
+/** Maximum number of frames in a motion file, so that its curves are small compared with its codes. */
 const MAX_PER_FILE = 4096;
-/** Maximum number of digits, limited by exact integers. */
+/** Maximum number of digits, so that all numbers are exact integers. */
 const MAX_DIGITS = 15;
-/** `frame-{0001}.spz`: the digits define the first number and the minimum number of digits. */
+/** Matches a pattern such as `frame-{0001}.spz`. The digits are the first number, with the minimum number of digits. */
 const PATTERN = /^([^{}]*)\{(\d+)\}([^{}]*)$/;
 
 type Fail = (path: string, expected: string, found: unknown) => never;
 
 /**
- * Reads the manifest of a sequence:
+ * Parses the manifest of a sequence, which has one of these forms:
  *
  * ```json
  * { "gaussianSplatSequence": 1, "framesPerSecond": 24, "frames": ["a.spz", "b.spz"] }
@@ -96,10 +97,12 @@ export function parseSequence(bytes: Uint8Array, name: string): SceneSequence {
 }
 
 function firstOf({ first }: Json, fail: Fail): string {
-  return typeof first === 'string' && first !== '' ? first : fail('first', 'the path of a scene file', first);
+  if (typeof first !== 'string' || first === '') return fail('first', 'the path of a scene file', first);
+  requireShort([first], 'first', fail);
+  return first;
 }
 
-/** Files of all frames but the first. */
+/** Reads the properties of a manifest that describe the motion files. */
 function motionOf({ motion, framesPerFile, count }: Json, fail: Fail): SequenceMotion {
   if (!Number.isInteger(framesPerFile) || (framesPerFile as number) < 1 || (framesPerFile as number) > MAX_PER_FILE) {
     fail('framesPerFile', `1 to ${grouped(MAX_PER_FILE)}`, framesPerFile);
@@ -111,7 +114,7 @@ function motionOf({ motion, framesPerFile, count }: Json, fail: Fail): SequenceM
   return { frames: files, framesPerFile: framesPerFile as number };
 }
 
-/** Returns the location of a frame without a scene file of its own; undefined for one with it. */
+/** Returns the location of a frame in a motion file; undefined if the frame has a scene file. */
 export function motionFrame({ motion, frameCount }: SceneSequence, frame: number): MovedFrame | undefined {
   if (motion === undefined || frame === 0) return undefined;
   const { framesPerFile } = motion;
@@ -130,8 +133,8 @@ export function* sequencePaths(sequence: SceneSequence): Generator<string> {
 }
 
 /**
- * Returns the path of a frame, relative to the manifest; expanded on demand, because a short pattern may represent a
- * million paths.
+ * Returns the path of a frame, relative to the manifest. Patterns are expanded on demand, because a short one may
+ * represent a million paths.
  */
 export function framePath({ frames }: Pick<SceneSequence, 'frames'>, frame: number): string {
   if (!('digits' in frames)) return frames[frame];
@@ -139,18 +142,28 @@ export function framePath({ frames }: Pick<SceneSequence, 'frames'>, frame: numb
   return before + String(first + frame).padStart(digits, '0') + behind;
 }
 
-/** Returns the index of the frame at a time; times outside the sequence are clamped, or wrap around. */
+/**
+ * Returns the index of the frame at a time in seconds. Times outside the sequence are clamped to its first or last frame.
+ * With `loop`, they wrap around.
+ */
 export function frameAt(
   { frameCount, framesPerSecond }: Pick<SceneSequence, 'frameCount' | 'framesPerSecond'>,
   timeSeconds: number,
   loop = false,
 ): number {
-  // The small offset keeps 1/24 s times 24 from rounding down to the previous frame.
+  // The offset prevents that rounding errors, for example of 1/24 s times 24, select the previous frame.
   const frame = Math.floor(timeSeconds * framesPerSecond + 1e-6);
   return loop ? ((frame % frameCount) + frameCount) % frameCount : Math.min(frameCount - 1, Math.max(0, frame || 0));
 }
 
+/** Throws for paths that no server accepts. A player parses the path of a frame before each request. */
+function requireShort(paths: readonly string[], path: string, fail: Fail): void {
+  if (paths.some((each) => each.length > MAX_PATH))
+    fail(path, `paths of at most ${grouped(MAX_PATH)} characters`, 'longer ones');
+}
+
 function patternOf(pattern: string, path: string, fail: Fail): FramePattern {
+  requireShort([pattern], path, fail);
   const [, before, digits, behind] = PATTERN.exec(pattern) ?? fail(path, 'a path with {0001} in it', pattern);
   if (digits.length > MAX_DIGITS) fail(path, `at most ${MAX_DIGITS} digits`, `${digits.length} of them`);
   return { before, behind, first: Number(digits), digits: digits.length };
@@ -158,8 +171,10 @@ function patternOf(pattern: string, path: string, fail: Fail): FramePattern {
 
 function pathsOf(paths: unknown, path: string, fail: Fail, min = 1): readonly string[] {
   const isList = Array.isArray(paths) && paths.length >= Math.min(1, min) && paths.length <= MAX_FRAMES;
-  if (isList && paths.every((each) => typeof each === 'string' && each !== '')) return paths as string[];
-  return fail(path, `1 to ${grouped(MAX_FRAMES)} paths, or one with {0001} in it`, paths);
+  if (!isList || !paths.every((each) => typeof each === 'string' && each !== ''))
+    return fail(path, `1 to ${grouped(MAX_FRAMES)} paths, or one with {0001} in it`, paths);
+  requireShort(paths as string[], path, fail);
+  return paths as string[];
 }
 
 function countOf(count: unknown, fail: Fail): number {

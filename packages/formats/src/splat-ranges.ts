@@ -11,17 +11,21 @@ export interface SplatRanges {
   /** Number of splats, including unusable ones. */
   readonly count: number;
   readonly shDegree: ShDegree;
-  /** Location of splats of a fixed size: offset of the first, and size of one in bytes. */
+  /**
+   * Location of the splats if each has the same size: offset of the first splat in the file, and size of a splat, in
+   * bytes. Undefined for glTF.
+   */
   readonly rows?: { readonly start: number; readonly byteLength: number };
 }
 
 /**
- * Returns whether ranges of a scene's splats can be read independently, so that several threads can share the work: for
- * binary PLY with rows of one size and float32 coordinates, and for uncompressed glTF.
+ * Returns the properties of a scene if ranges of its splats can be read independently, so that several threads can
+ * share the work. Such scenes are binary PLY with rows of one size and float32 coordinates, and uncompressed glTF.
  *
  * @param file The whole file; for a PLY the first `HEADER_BYTES` are enough, and the presence of the rest is not
  * checked.
- * @returns Undefined if it must be read as a whole.
+ * @param name File name or URL.
+ * @returns Undefined if the scene must be read as a whole.
  * @throws GaussianSplatError as `readScene` does for invalid headers.
  */
 export async function splatRanges(file: FileBytes, name: string): Promise<SplatRanges | undefined> {
@@ -36,11 +40,10 @@ export async function splatRanges(file: FileBytes, name: string): Promise<SplatR
 }
 
 /**
- * Reads a range of the splats of a scene that {@link splatRanges} describes: same as `readScene`, without regard to the
- * rest of the file.
+ * Reads a range of the splats of a scene that {@link splatRanges} describes, as `readScene` does.
  *
  * @param file The whole file.
- * @returns The splats in the order of the file. Unusable ones are dropped, possibly all.
+ * @returns The splats of the range in the order of the file, without unusable splats; possibly none.
  * @throws GaussianSplatError as `readScene` does.
  */
 export async function readSplats(file: FileBytes, range: SplatRange, name: string): Promise<GaussianCloud> {

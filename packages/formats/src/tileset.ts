@@ -10,27 +10,28 @@ const MAX_DEPTH = 500;
 
 /** A file of a tile. */
 export interface TileContent {
-  /** URI as in the tileset, with its query. */
+  /** URI from the tileset, with its query. */
   readonly uri: string;
-  /** From the coordinates of its tile (z up) to those of the tileset. */
+  /** Transform from the coordinates of the tile (z up) to those of the tileset. */
   readonly toTileset: Affine;
 }
 
-/** The tile itself, or the child tiles that replace it. */
+/** A node of the tree. Its contents are drawn, or the child tiles that replace them. */
 interface Tile {
   readonly contents: readonly TileContent[];
   readonly children: readonly Tile[];
-  /** Whether it is drawn in addition to its children. */
+  /** Whether the tile's contents are drawn in addition to its children (refinement `ADD`). */
   readonly isAdded: boolean;
 }
 
 const IDENTITY: Affine = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0];
 
 /**
- * Returns the files of a tileset at a level: 0 is the finest, and each further level drops the lowest tiles of all
- * branches.
- * @param load Counts the tiles of all tilesets of a load, which share one limit.
- * @param toParent From the coordinates of the tileset to those of its parent.
+ * Returns the files of a tileset at a level of detail. Level 0 is the finest; level n omits the n lowest levels of tiles
+ * in each branch.
+ * @param load Number of tiles of all tilesets of a load, which this function increases. They share one limit.
+ * @param toParent Transform from the coordinates of the tileset to those of its parent.
+ * @throws GaussianSplatError `decode/header`, `decode/unsupported` for implicit tiling, or as `parseJson` does.
  */
 export function contentsAt(
   source: JsonSource,
@@ -60,7 +61,7 @@ export function contentsAt(
   return drawnOf(open(root, toParent, false, 'root', 0), level).contents;
 }
 
-/** Content of a tile at a level, and the height of its subtree. */
+/** Returns the contents that are drawn for a tile at a level, and the height of its subtree; a leaf has height 0. */
 function drawnOf(tile: Tile, level: number): { contents: TileContent[]; height: number } {
   const below = tile.children.map((child) => drawnOf(child, level));
   const height = below.reduce((max, child) => Math.max(max, child.height + 1), 0);
@@ -70,7 +71,7 @@ function drawnOf(tile: Tile, level: number): { contents: TileContent[]; height: 
   return { contents: tile.isAdded ? [...tile.contents, ...inner] : inner, height };
 }
 
-/** `content` for one file, `contents` for several; drafts used `url`. */
+/** Returns the URIs of a tile: `content` has one file, `contents` several. Drafts of the format use `url` for `uri`. */
 function urisOf({ content, contents }: Json): string[] {
   const all: unknown[] = Array.isArray(contents) ? contents : [content];
   return all.flatMap((one) => {
@@ -79,7 +80,7 @@ function urisOf({ content, contents }: Json): string[] {
   });
 }
 
-/** Column-major in the file. */
+/** Returns the transform of a tile, which is a column-major 4x4 matrix in the file; the identity if absent. */
 function transformOf({ transform }: Json, where: string): Affine {
   if (transform === undefined) return IDENTITY;
   const m = transform as number[];

@@ -1,6 +1,6 @@
 /**
- * Known but unsupported kinds of splat files and companion files: their signatures, and remedies. Loaded with
- * diagnose.ts after a file has been rejected.
+ * Signatures of known but unsupported splat files and companion files, and remedies for people. This module is loaded
+ * with diagnose.ts after a file has been rejected.
  */
 import { startsWith } from './bytes.js';
 
@@ -10,9 +10,9 @@ export interface UnreadKind {
   readonly remedy: string;
   /** Extensions of the file name, without the dot. */
   readonly extensions?: RegExp;
-  /** Recognizes it by its bytes, or by its first words. */
+  /** Whether a file is of this kind, from its bytes or from its first KiB as text. */
   readonly fits?: (bytes: Uint8Array, text: string) => boolean;
-  /** A path that identifies an archive of this kind. */
+  /** Matches a path that only archives of this kind contain. */
   readonly within?: RegExp;
 }
 
@@ -37,7 +37,7 @@ export const UNREAD_KINDS: readonly UnreadKind[] = [
     found: 'a .splatv scene, whose splats move',
     remedy: 'export each moment as a PLY or SPZ of its own, and show them as a sequence',
     extensions: /^splatv$/,
-    // The number 0x674b in 32 bits.
+    // Magic number of the format: 0x674b as a 32-bit little-endian integer.
     fits: (bytes) => startsWith(bytes, [0x4b, 0x67, 0, 0]),
   },
   {
@@ -85,7 +85,11 @@ export const UNREAD_KINDS: readonly UnreadKind[] = [
   },
 ];
 
-/** Returns the kind of a file; undefined for all others. */
+/**
+ * Returns the unsupported kind of a file; undefined if it is of no known kind.
+ * @param text The first KiB of the file as text.
+ * @param extension Extension of the file name in lower case, with its dot; may be empty.
+ */
 export function unreadKind(bytes: Uint8Array, text: string, extension: string): UnreadKind | undefined {
   const end = extension.slice(1);
   return (

@@ -5,10 +5,10 @@ import { elementsOf, type GpuTensor } from './input-value.js';
 import type { GeneratorState } from './state.js';
 
 /**
- * Images for the inputs with the role `image`, and the depth of the frame.
- * @param given Inputs that a previous model writes, which the state may omit.
- * @throws GaussianSplatError `argument/value` for an image that is missing, or has another size or element type than
- * the input.
+ * Returns the tensors for the inputs with the roles `image` and `depth`, by input name.
+ * @param given Names of inputs that a previous model writes, which the state may omit.
+ * @throws GaussianSplatError `argument/value` for an image that is missing, or whose size or element type differs from
+ * that of the input.
  */
 export function bindImages(
   header: OnnxHeader,
@@ -23,7 +23,7 @@ export function bindImages(
     const image = role === 'depth' ? state.depth : state.images?.[input.name];
     if (image === undefined) throw missing(input, role);
     if (!fits(image, input)) throw misfit(image, input, role);
-    // Copied, because the owner may modify it.
+    // The properties are copied, because the owner of the image may modify them.
     const { buffer, dtype, dims, version } = image;
     images[input.name] = { buffer, dtype, dims: dimsFor(input, dims), version };
   }
@@ -41,16 +41,19 @@ function fits({ buffer, dtype, dims }: GpuTensor, input: OnnxTensor): boolean {
   );
 }
 
-/** Dimensions of the input, including batches of one; open sizes are those of the image. */
+/** Returns the dimensions of the input, including leading ones. Open sizes are those of the image. */
 function dimsFor({ dims: sizes = [] }: OnnxTensor, dims: readonly number[]): number[] {
   const before = dims.length - sizes.length;
   return sizes.map((size, i) => (typeof size === 'number' ? size : dims[before + i]));
 }
 
-/** Planes of a depth, of colors, and of colors with alpha. */
+/** Numbers of planes: of a depth, of colors, and of colors with alpha. */
 const CHANNELS = [1, 3, 4] as const;
 
-/** Requirements of an input with the role `image` or `depth`: planes, number of images, and the sizes that the file fixes. */
+/**
+ * Returns the requirements of an input with the role `image` or `depth`: the number of planes and of images, and the
+ * sizes in pixels that the file fixes; undefined for an open size.
+ */
 export function imageShapeOf({ dims = [], dtype }: OnnxTensor): {
   readonly width: number | undefined;
   readonly height: number | undefined;

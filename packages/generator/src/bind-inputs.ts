@@ -13,12 +13,11 @@ import type { InputNumbers } from './input-value.js';
 import type { GeneratorState } from './state.js';
 
 /**
- * Values of a generator's inputs, in the conventions of its contract. Inputs with the roles `gaussians`, `image`,
- * `depth` and `state` are excluded: their tensors come from another generator, from an image or from the previous run.
- *
- * @param header Header of a valid file (`checkContract` found nothing); for a model of several instances that of one
- * (`oneInstance`).
- * @throws GaussianSplatError `argument/value` if the state lacks a camera, or a value has the wrong length or is not
+ * Returns the values of a generator's inputs, in the conventions of its contract. Excludes inputs with the roles
+ * `gaussians`, `image`, `depth` and `state`: their tensors come from another generator, an image or the previous run.
+ * @param header Header of a valid file (`checkContract` has found no faults); for a model of several instances, the
+ * header of one (`oneInstance`).
+ * @throws GaussianSplatError `argument/value` if the state lacks a camera, or if a value has the wrong length or is not
  * finite.
  */
 export function bindInputs(
@@ -35,7 +34,7 @@ export function bindInputs(
   return values;
 }
 
-/** Roles of inputs whose tensors are made elsewhere. */
+/** Bindings of inputs whose tensors are not made of a state's numbers. */
 type GivenInput = Extract<InputBinding, { role: 'gaussians' | 'image' | 'depth' | 'state' }>;
 
 const isGiven = (binding: InputBinding): binding is GivenInput =>
@@ -79,16 +78,16 @@ function numbersOf(
   }
 }
 
-/** Tolerance for rounding, as a fraction of a frame: 29/25 s times 25 is less than 29. */
+/** Tolerance for rounding, as a fraction of a frame: in float64, 29/25 s times 25 is less than 29. */
 const FRAME_ROUNDING = 1e-6;
 
-/** Index of the frame at a time. The end of the duration belongs to the last frame. */
+/** Returns the index of the frame at a time. The end of the duration belongs to the last frame. */
 function frameAt(timeSeconds: number, { fps = 0, duration = Infinity }: Contract): number {
   const last = Math.ceil(duration * fps - FRAME_ROUNDING) - 1;
   return Math.max(0, Math.min(Math.floor(timeSeconds * fps + FRAME_ROUNDING), fps > 0 ? last : 0));
 }
 
-/** Zeros, or the identity for quaternions and matrices. */
+/** Returns the flattened pose without rotation: zeros, or the identity for quaternions and matrices. */
 function restPose(input: OnnxTensor, { format, quaternionOrder }: InputBinding & { role: 'pose' }): number[] {
   const quaternion = quaternionOrder === 'xyzw' ? [0, 0, 0, 1] : [1, 0, 0, 0];
   const joint = { quaternion, matrix: [1, 0, 0, 0, 1, 0, 0, 0, 1], 'axis-angle': [0], parameters: [0] }[format];

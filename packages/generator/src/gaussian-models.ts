@@ -6,66 +6,68 @@ import type { ModelSource } from './runtime/open-model.js';
 import { receiveGaussians, type ThreeScene } from './scene-hosts.js';
 import type { GeneratorState } from './state.js';
 
-/** Creates the sink for the Gaussians of a model, for example `DynamicGaussians.create(device, layout)`. */
+/** Creates the sink that receives a model's Gaussians, for example `DynamicGaussians.create(device, layout)`. */
 export type MakeSink<S extends GaussianSink> = (layout: GaussianLayout, contract: Contract) => S | Promise<S>;
 
-/** A model in the scene. */
+/** A model that is added to a scene. */
 export interface GaussianModel<S extends GaussianSink = GaussianSink> {
-  /** Registered name of its generator. */
+  /** Registered name of the model's generator. */
   readonly name: string;
   readonly generator: Generator;
-  /** The drawn Gaussians. */
+  /** Sink with the model's Gaussians. */
   readonly gaussians: S;
-  /** State of this model only, in addition to that of `runGenerators`. */
+  /** State of this model only. It takes precedence over the state of `runGenerators`. */
   state: GeneratorState;
-  /** Its placement in a `World`; undefined elsewhere. */
+  /** Placement of the model in a `World`; undefined for other scenes. */
   readonly placement: Placement | undefined;
-  /** Removes it from the scene. A sink that the page created stays; one that was created for a scene is destroyed. */
+  /** Removes the model from the scene. Destroys the sink, unless the page has created it. */
   remove(): void;
 }
 
-/** Destination of a model: a world, a scene of three.js, or a factory of a sink. */
+/** Destination of a model: a world, a scene of three.js, or a function that creates a sink. */
 export type GaussianModelScene<S extends GaussianSink = GaussianSink> = World | ThreeScene | MakeSink<S>;
 
-/** Returns changed inputs of a model for the next run, or nothing to keep them. */
+/** Called before each run of a model. Returns state that overrides the given one, or undefined for no change. */
 export type FrameUpdate = (state: GeneratorState, model: GaussianModel) => GeneratorState | undefined | void;
 
 /** The Gaussians of a model, with the members that only a scene provides. */
 type Hosted = Pick<GaussianModel, 'gaussians'> & Partial<Pick<GaussianModel, 'placement' | 'remove'>>;
 
-/** A generator with its source. */
+/** A registered source; `after` is the name of the generator whose Gaussians it receives. */
 interface Registered {
   readonly source: ModelSource;
   readonly after: string | undefined;
 }
 
-/** Generators by name, and the models that use them: a registry for pages with several generators. */
+/** Registry of generators by name, with the models that use them, for pages with several generators. */
 export class GaussianModels {
   readonly #sources = new Map<string, Registered>();
   readonly #models = new Set<GaussianModel>();
   readonly #updates = new Set<FrameUpdate>();
   readonly #listeners = new Set<(model: GaussianModel, frame: GeneratedFrame) => void>();
   readonly #failures = new Set<(model: GaussianModel | undefined, error: unknown) => void>();
-  /** Generators by name, loading or loaded. */
+  /** Generators by name that are loaded or loading. */
   readonly #loaded = new Map<string, Promise<Generator>>();
   #device: GPUDevice | undefined;
   #cleared = new AbortController();
 
   /**
-   * Registers a generator. Nothing is fetched yet.
-   * @param options.after Name of the generator whose Gaussians this one receives: they run as a chain.
+   * Registers a generator under a name. Nothing is fetched yet.
+   * @param options.after Name of the generator whose Gaussians are inputs of this one; both run as a chain.
    */
   registerGaussianGenerator(name: string, source: ModelSource, options: { readonly after?: string } = {}): void {
     this.#sources.set(name, { source, after: options.after });
   }
 
   /**
-   * Fetches and checks all registered generators, for a device. Loaded or loading ones are not fetched again.
-   * @throws errors of `Generator.open` for the first that fails; ContractError `contract/chain` for a cycle of
-   * generators, GaussianSplatError `argument/value` for one that follows an unknown name; an `AbortError` if {@link
+   * Fetches and checks all registered generators for a device. Generators that are loaded or loading are not fetched
+   * again, except for another device, which replaces the first one.
+   * @throws the errors of `Generator.open` for the first that fails; ContractError `contract/chain` for a cycle of
+   * generators; GaussianSplatError `argument/value` for a generator after an unknown name; an `AbortError` if {@link
    * clear} is called meanwhile.
    */
   async loadAllGenerators(device: GPUDevice): Promise<void> {
+    if (device !== this.#device) this.#closeLoaded();
     this.#device = device;
     const { signal } = this.#cleared;
     await Promise.all(
@@ -74,7 +76,7 @@ export class GaussianModels {
         if (known) return known;
         const opening = this.#open(name, device, { signal });
         this.#loaded.set(name, opening);
-        // The next call tries again.
+        // The next call loads the generator again.
         opening.catch(() => this.#loaded.get(name) === opening && this.#loaded.delete(name));
         return opening;
       }),
@@ -90,9 +92,9 @@ export class GaussianModels {
    * await models.addGaussianModelToScene('ball', (layout) => DynamicGaussians.create(device, layout)); // a sink of your own
    * ```
    * @param placed Its placement in a world.
-   * @throws GaussianSplatError `argument/value` for a name that is not registered, before {@link loadAllGenerators}, or
-   * for a scene without a renderer; errors of `makeSink`; an `AbortError` if {@link clear} is called meanwhile: a sink
-   * from `makeSink` then stays with the caller.
+   * @throws the errors of {@link Generator.open}; GaussianSplatError `argument/value` for a name that is not registered,
+   * before {@link loadAllGenerators}, or for a scene without a renderer; errors of `makeSink`; an `AbortError`
+   * if {@link clear} is called meanwhile: a sink from `makeSink` then stays with the caller.
    */
   async addGaussianModelToScene(
     name: string,
@@ -171,8 +173,8 @@ export class GaussianModels {
   }
 
   /**
-   * Requests the Gaussians of a state from all models; results of {@link onFrame} callbacks and each model's own
-   * `state` override it. Returns at once.
+   * Requests the Gaussians of a state from all models, and returns at once. Results of {@link onFrame} callbacks and
+   * each model's own `state` take precedence.
    * @throws GaussianSplatError `argument/value` if a state does not match a contract.
    */
   runGenerators(state: GeneratorState = {}): void {
@@ -184,22 +186,26 @@ export class GaussianModels {
     }
   }
 
-  /** Removes all models and all names. */
+  /** Removes all models and all registered generators. */
   clear(): void {
     for (const model of [...this.#models]) model.remove();
     this.#cleared.abort();
     this.#cleared = new AbortController();
+    this.#closeLoaded();
+    this.#sources.clear();
+    this.#device = undefined;
+  }
+
+  #closeLoaded(): void {
     for (const opening of this.#loaded.values())
       opening.then(
         (generator) => generator.close(),
         () => undefined,
       );
     this.#loaded.clear();
-    this.#sources.clear();
-    this.#device = undefined;
   }
 
-  /** Also rejects if the generator was loaded but has been cleared meanwhile. */
+  /** Opens a generator. Also rejects if the registry was cleared after the generator was loaded. */
   async #open(
     name: string,
     device: GPUDevice,
@@ -211,7 +217,7 @@ export class GaussianModels {
     throw options.signal.reason;
   }
 
-  /** Sources from the first generator of the chain to the given one. */
+  /** Returns the sources of a chain, from its first generator to the given one. */
   #chainOf(last: string): readonly ModelSource[] {
     const names: string[] = [];
     for (let name: string | undefined = last; name !== undefined; name = this.#sources.get(name)?.after) {
@@ -223,7 +229,7 @@ export class GaussianModels {
   }
 }
 
-/** Merges controls and images by name; other fields of the second override the first. */
+/** Returns a state with the fields of `over` in place of those of `state`. Controls and images are merged by name. */
 function merged(state: GeneratorState, over: GeneratorState): GeneratorState {
   const { controls, images } = state;
   return {
@@ -234,7 +240,11 @@ function merged(state: GeneratorState, over: GeneratorState): GeneratorState {
   };
 }
 
-/** Controls of a single model must exist in it; those of all models may belong to others. */
+/**
+ * Requires that a contract of the model declares each control of its own state. Controls in the state for all models
+ * are not checked, because they may belong to other models.
+ * @throws GaussianSplatError `argument/value`
+ */
 function requireControls({ name, generator, state }: GaussianModel): void {
   if (state.controls === undefined) return;
   const known = generator.models.flatMap(({ contract }) =>
@@ -273,17 +283,17 @@ function unknownGenerator(name: string, known: readonly string[]): GaussianSplat
 /** The default registry of the page. */
 const page = new GaussianModels();
 
-/** {@link GaussianModels.registerGaussianGenerator} of the default registry. */
+/** Calls {@link GaussianModels.registerGaussianGenerator} of the page's default registry. */
 export const registerGaussianGenerator: GaussianModels['registerGaussianGenerator'] = (name, source, options) =>
   page.registerGaussianGenerator(name, source, options);
-/** {@link GaussianModels.loadAllGenerators} of the default registry. */
+/** Calls {@link GaussianModels.loadAllGenerators} of the page's default registry. */
 export const loadAllGenerators: GaussianModels['loadAllGenerators'] = (device) => page.loadAllGenerators(device);
-/** {@link GaussianModels.addGaussianModelToScene} of the default registry. */
+/** Calls {@link GaussianModels.addGaussianModelToScene} of the page's default registry. */
 export const addGaussianModelToScene: GaussianModels['addGaussianModelToScene'] =
   page.addGaussianModelToScene.bind(page);
-/** {@link GaussianModels.onFrame} of the default registry. */
+/** Calls {@link GaussianModels.onFrame} of the page's default registry. */
 export const onFrame: GaussianModels['onFrame'] = (update) => page.onFrame(update);
-/** {@link GaussianModels.onGenerated} of the default registry. */
+/** Calls {@link GaussianModels.onGenerated} of the page's default registry. */
 export const onGenerated: GaussianModels['onGenerated'] = (listener, onError) => page.onGenerated(listener, onError);
-/** {@link GaussianModels.runGenerators} of the default registry. */
+/** Calls {@link GaussianModels.runGenerators} of the page's default registry. */
 export const runGenerators: GaussianModels['runGenerators'] = (state) => page.runGenerators(state);

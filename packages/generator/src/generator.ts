@@ -10,38 +10,39 @@ import type { AcquireOptions } from './runtime/shared-sessions.js';
 import type { GeneratorState } from './state.js';
 
 /**
- * Consumes the output of runs: `DynamicGaussians` of the renderer implements it. It must submit its work before it
- * returns.
+ * Consumes the output of runs, as `DynamicGaussians` of the renderer does. An implementation must submit its GPU work
+ * before it returns.
  */
 export interface GaussianSink {
   /**
+   * Receives the output of a run.
    * @param rows Number of rows of one instance.
-   * @param instance Index of this instance in a run of several: its rows begin in each tensor at `instance * rows`, and
-   * its live count is element `instance` of that tensor.
+   * @param instance Index of this instance in a run of several. Its rows begin in each tensor at `instance * rows`, and
+   * its live count is element `instance` of the count tensor.
    */
   ingest(tensors: RunOutputs['tensors'], rows: number, instance: number): void;
 }
 
 /** A run whose Gaussians have reached the sink. */
 export interface GeneratedFrame {
-  /** The state of the run. */
+  /** State that was requested for the run. */
   readonly state: GeneratorState;
-  /** From the start of the run until its work was submitted, ms; the GPU may not have finished. */
+  /** Milliseconds from the start of the run until its work was submitted. The GPU may not have finished. */
   readonly milliseconds: number;
 }
 
 export interface GeneratorOptions extends AcquireOptions {
   /**
-   * Called with the received and total bytes of all models, and of the runtime unless it is loaded. Continues after
-   * {@link Generator.open}, until the first run has loaded the runtime; warm-up follows.
+   * Called with the received and total bytes of all models, and of the runtime unless it is loaded. The total is
+   * undefined while unknown. Calls continue after {@link Generator.open}, until the first run has loaded the runtime.
    */
   readonly onProgress?: AcquireOptions['onProgress'];
   readonly onFrame?: (frame: GeneratedFrame) => void;
-  /** Called when a run fails; the previous content remains. The next request tries again. */
+  /** Called with the error of a failed run. The previous content remains, and the next request tries again. */
   readonly onError?: (error: unknown) => void;
 }
 
-/** A model that writes Gaussians. */
+/** A validated model that writes Gaussians. */
 export type GaussianModelFile = GeneratorModel & { readonly layout: GaussianLayout };
 
 interface RunRequest {
@@ -56,8 +57,8 @@ interface InstanceRequest {
 }
 
 /**
- * One instance of a generator: runs it for the latest requested state, as fast as runs finish and never faster.
- * Instances of a model whose contract declares them run together.
+ * One instance of a generator. It runs for the latest requested state, and starts a run only when an earlier one has
+ * ended. Instances of a model whose contract declares them run together.
  *
  * ```ts
  * const generator = await Generator.open({ url: 'walker.onnx' }, device, { onFrame: requestDraw });
@@ -66,14 +67,14 @@ interface InstanceRequest {
  * ```
  */
 export class Generator {
-  /** Destination of runs; nothing runs without one. */
+  /** Destination of the output of runs. Without a sink, nothing runs. */
   sink: GaussianSink | undefined;
   readonly #chain: Chain;
   readonly #options: GeneratorOptions;
   readonly #runner: RunLoop<RunRequest> | BatchSlot<InstanceRequest>;
   #shown: RunRequest['inputs'] | undefined;
   #asked: RunRequest | undefined;
-  /** Inputs of the last run. */
+  /** Time of the last requested run, seconds. An earlier time resets the state of the models. */
   #timeSeconds = 0;
   #runs = 0;
 
@@ -85,10 +86,10 @@ export class Generator {
   }
 
   /**
-   * Fetches a generator, or a chain of generators that pass on their Gaussians, and checks them; the runtime is not
-   * fetched yet.
+   * Fetches a generator, or a chain of generators of which each receives the Gaussians of the previous one, and checks
+   * them. The runtime is not fetched yet.
    * @throws ContractError, GaussianSplatError: see `openModel`; ContractError `contract/chain` for models that do not
-   * match, or whose last one does not write Gaussians.
+   * match, or whose last one writes no Gaussians.
    */
   static async open(
     source: ModelSource | readonly ModelSource[],
@@ -110,7 +111,7 @@ export class Generator {
     }
   }
 
-  /** The model whose output is drawn: the last of a chain. */
+  /** The model whose output is drawn, which is the last of a chain. */
   get model(): GaussianModelFile {
     return this.#chain.models.at(-1) as GaussianModelFile;
   }
@@ -120,7 +121,7 @@ export class Generator {
     return this.#chain.models;
   }
 
-  /** Session kind of its slowest model; undefined before the first run. */
+  /** Slowest session kind of all models; undefined before the first run. */
   get kind(): SessionKind | undefined {
     return this.#runner instanceof RunLoop ? this.#chain.kind : this.#runner.kind;
   }
@@ -130,14 +131,14 @@ export class Generator {
     return this.#runs;
   }
 
-  /** Resolves, and never rejects, when no run is in progress. */
+  /** Fulfills when no run is in progress. Never rejects. */
   get idle(): Promise<void> {
     return this.#runner.idle;
   }
 
   /**
-   * Requests the Gaussians of a state. Returns at once; a request that has not started yet is replaced, and a state
-   * with the inputs of the current content is not run.
+   * Requests the Gaussians of a state, and returns at once. Replaces a request that has not started yet. A state whose
+   * inputs equal those of the current content is not run.
    * @throws GaussianSplatError `argument/value` if the state does not match the contract.
    */
   request(state: GeneratorState): void {
@@ -147,7 +148,7 @@ export class Generator {
     this.#askFor(this.#asked);
   }
 
-  /** A session that failed its check has written the current content. */
+  /** Requests the last state again, because a session that failed its check has written the current content. */
   #askAgain(): void {
     this.#chain.forget();
     this.#shown = undefined;
@@ -159,7 +160,7 @@ export class Generator {
     else this.#runner.request({ state, inputs: inputs[0] });
   }
 
-  /** Closes it: a run in progress has no effect any more. */
+  /** Closes the generator. A run in progress has no effect anymore. */
   close(): void {
     this.#runner.close();
     this.#chain.release(this.#runner.idle);

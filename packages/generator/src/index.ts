@@ -25,9 +25,9 @@ export {
 export { sameInputs, type GpuTensor, type InputNumbers, type Inputs, type InputValue } from './input-value.js';
 export { PostProcessor, type FinishedImage, type ImageInput, type PostProcessorOptions } from './post-processor.js';
 export { GeneratorSession } from './runtime/generator-session.js';
-export { handleCpuRun, type CpuCheckMessage, type StartWorker } from './proof/run-on-cpu.js';
-export { compareOutputs, isDifferent, type OutputDifference, type Comparison } from './proof/compare.js';
-export type { CpuCheckResult } from './proof/record.js';
+export { handleCpuRun, type CpuCheckMessage, type StartWorker } from './cpu-check/run-on-cpu.js';
+export { compareOutputs, isDifferent, type OutputDifference, type Comparison } from './cpu-check/compare.js';
+export type { CpuCheckResult } from './cpu-check/record.js';
 export type { RunOutputs, SessionKind } from './runtime/ort-session.js';
 export { isRuntimeRequested, setRunLimit, setRuntimeLocation } from './runtime/load-runtime.js';
 export { readTensors, type TensorPart } from './runtime/tensor-buffers.js';

@@ -1,4 +1,4 @@
-/** Numbers of one input, ready for a tensor. */
+/** Numbers of one input in CPU memory, in the layout of its tensor. */
 export interface InputNumbers {
   readonly dtype: 'float32' | 'int32' | 'int64';
   readonly dims: readonly number[];
@@ -7,27 +7,27 @@ export interface InputNumbers {
 
 /** A tensor on the GPU: an image, or the output of another model. */
 export interface GpuTensor {
-  /** Holds the elements without gaps, two float16 in each word; needs the usage COPY_SRC. */
+  /** Buffer with the elements without gaps, two float16 per 32-bit word. Its usage must include COPY_SRC. */
   readonly buffer: GPUBuffer;
   readonly dtype: 'float32' | 'float16' | 'int32';
   readonly dims: readonly number[];
-  /** Incremented whenever the content changes, so that a run can detect new content. */
+  /** Number that changes whenever the content changes, so that a run can detect new content. */
   readonly version: number;
 }
 
-/** The value of one input. */
+/** Value of one input. */
 export type InputValue = InputNumbers | GpuTensor;
 
-/** Values by the names of inputs. */
+/** Values of inputs by input name. */
 export type Inputs = Readonly<Record<string, InputValue>>;
 
 export const isOnGpu = (value: InputValue): value is GpuTensor => 'buffer' in value;
 
-/** Number of elements of a shape. */
+/** Returns the number of elements of a tensor with these dimensions. */
 export const elementsOf = (dims: readonly number[]): number => dims.reduce((product, dim) => product * dim, 1);
 
 /**
- * Whether two sets of values are equal, bit for bit: a generator without a seed would then write the same output again.
+ * Whether two sets of values are equal, bit for bit. A generator without a seed would then write the same output again.
  */
 export function sameInputs(a: Inputs, b: Inputs): boolean {
   const names = Object.keys(a);

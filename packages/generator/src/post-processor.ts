@@ -8,23 +8,23 @@ import type { GeneratorModel, ModelSource } from './runtime/open-model.js';
 import type { AcquireOptions } from './runtime/shared-sessions.js';
 import type { GeneratorState } from './state.js';
 
-/** The input for the image. */
+/** Name and requirements of an input for an image. */
 export type ImageInput = ReturnType<typeof imageShapeOf> & { readonly name: string };
 
-/** The output image of a model on the GPU: [1,3,H,W], planes of red, green and blue in 0..1. */
+/** Output image of a model on the GPU: [1, 3, H, W], planes of red, green and blue, 0..1. */
 export type FinishedImage = GpuTensor & { readonly dtype: 'float32' | 'float16' };
 
 export interface PostProcessorOptions extends AcquireOptions {
   /**
-   * Called with the finished image, [1,3,H,W]. It must submit its work before it returns: afterwards the runtime reuses
-   * the buffer.
+   * Called with the finished image, [1, 3, H, W]. The function must submit its GPU work before it returns, because the
+   * runtime then reuses the buffer.
    */
   readonly onImage: (image: FinishedImage) => void;
-  /** Called when a run fails. The next request tries again. */
+  /** Called with the error of a failed run. The next request tries again. */
   readonly onError?: (error: unknown) => void;
 }
 
-/** Number of runs of one image after which a filter that keeps 0.8 of its output is within 1/1000 of its limit. */
+/** Number of runs for one image, after which a filter that keeps 0.8 of its output is within 1/1000 of its limit. */
 const MAX_REPEATS = 32;
 
 interface RunRequest {
@@ -32,7 +32,7 @@ interface RunRequest {
 }
 
 /**
- * A model, or a chain of models, that processes an image (a style, a denoiser), from GPU buffer to GPU buffer.
+ * A model, or a chain of models, that processes an image from GPU buffer to GPU buffer, such as a style or a denoiser.
  *
  * ```ts
  * const post = await PostProcessor.open({ url: 'style.onnx' }, device, { onImage: paint });
@@ -40,15 +40,15 @@ interface RunRequest {
  * ```
  */
 export class PostProcessor {
-  /** The input for the image. */
+  /** The input that receives the image. It is an input of the first model of a chain. */
   readonly input: ImageInput;
-  /** The input that takes the depth of the frame; undefined if no model has one. */
+  /** The input that takes the depth of the frame; undefined if no model has such an input. */
   readonly depth: ImageInput | undefined;
   readonly #chain: Chain;
   readonly #options: PostProcessorOptions;
   readonly #loop: RunLoop<RunRequest>;
   #shown: RunRequest['inputs'] | undefined;
-  /** Number of runs with the same inputs, for models with state. */
+  /** Number of consecutive runs with the same inputs, for models with state. */
   #repeats = 0;
   #version = 0;
 
@@ -66,7 +66,7 @@ export class PostProcessor {
   }
 
   /**
-   * Fetches and checks it; the runtime is not fetched yet.
+   * Fetches and checks a post-processor. The runtime is not fetched yet.
    * @throws ContractError, GaussianSplatError: see `openModel`; ContractError `contract/chain` for models that do not
    * match, or do not convert one image to one image.
    */
@@ -77,7 +77,7 @@ export class PostProcessor {
   ): Promise<PostProcessor> {
     let post: PostProcessor | undefined;
     const onFallback = (reason: string): void => {
-      // The next image is computed again, even for the same frame.
+      // Makes the next request run even for the same frame.
       if (post) post.#forget();
       options.onFallback?.(reason);
     };
@@ -95,12 +95,12 @@ export class PostProcessor {
     return this.#chain.models;
   }
 
-  /** Session kind; undefined before the first run. */
+  /** Slowest session kind of all models; undefined before the first run. */
   get kind(): SessionKind | undefined {
     return this.#chain.kind;
   }
 
-  /** Whether the runtime is still processing: until then the input image must not change. */
+  /** Whether a run is in progress. The input image must not change meanwhile. */
   get isBusy(): boolean {
     return this.#loop.isBusy;
   }
@@ -110,21 +110,21 @@ export class PostProcessor {
     return this.#shown !== undefined && this.#keepsState && this.#repeats < MAX_REPEATS;
   }
 
-  /** From the start of the last finished run until the GPU had finished it, ms; undefined before. */
+  /** Milliseconds from the start of the last finished run until the GPU had finished it; undefined before the first. */
   get milliseconds(): number | undefined {
     return this.#loop.milliseconds;
   }
 
-  /** Resolves, and never rejects, when no run is in progress. */
+  /** Fulfills when no run is in progress. Never rejects. */
   get idle(): Promise<void> {
     return this.#loop.idle;
   }
 
   /**
-   * Requests the processed image. A request that has not started yet is replaced; one with the inputs of the last run
-   * is skipped, but models with state run it 32 times, until they converge.
-   * @param picture Image for {@link input}; its `version` identifies its content.
-   * @param state With `depth` if a model takes it: see {@link depth}.
+   * Requests the processed image, and returns at once. Replaces a request that has not started yet. A request with the
+   * inputs of the last run is skipped; models with state run it 32 times, to converge.
+   * @param image Image for {@link input}; its `version` identifies its content.
+   * @param state State of the page, with `depth` if a model takes it: see {@link depth}.
    * @throws GaussianSplatError `argument/value` if the image or the state does not match the model.
    */
   request(image: GpuTensor, state: GeneratorState = {}): void {
@@ -133,7 +133,7 @@ export class PostProcessor {
     this.#loop.request({ inputs: this.#chain.bind({ ...state, images }) });
   }
 
-  /** Closes it: a run in progress has no effect any more. */
+  /** Closes the post-processor. A run in progress has no effect anymore. */
   close(): void {
     this.#loop.close();
     this.#chain.release(this.#loop.idle);
@@ -143,7 +143,7 @@ export class PostProcessor {
     return this.#shown?.every((shown, i) => sameInputs(shown, inputs[i])) ?? false;
   }
 
-  /** Models with state give different results for one image from run to run. */
+  /** Whether any model has state, so that the result for one image may change from run to run. */
   get #keepsState(): boolean {
     return this.models.some(({ contract }) => Object.values(contract.inputs).some(({ role }) => role === 'state'));
   }
@@ -177,7 +177,10 @@ function imageInput(models: readonly GeneratorModel[]): ImageInput {
   return { name: input.name, ...imageShapeOf(input) };
 }
 
-/** The depth that models of a chain take is one tensor: all must take it in one size and element type. */
+/**
+ * Returns the input for the depth of the frame; undefined if no model has one. All models of a chain must take the
+ * depth in one size and element type.
+ */
 function depthInput(models: readonly GeneratorModel[]): ImageInput | undefined {
   const inputs = models.flatMap((model) =>
     model.header.inputs

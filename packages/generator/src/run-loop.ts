@@ -1,21 +1,27 @@
 /**
- * Maximum number of runs that the GPU may not have finished when another one starts: one executes while the next is
+ * Maximum number of runs that the GPU has not finished, including the next one: one executes while the other is
  * encoded.
  */
 const MAX_IN_FLIGHT = 2;
-/** A run that keeps the GPU for longer than this, ms, is awaited, because frames queue behind it. */
+/**
+ * GPU time of a run, milliseconds, above which the loop waits for the run to finish, because frames would be delayed by
+ * further runs.
+ */
 const SLOW_RUN_MS = 50;
 
 export interface RunLoopOptions<RunRequest> {
   readonly queue: GPUQueue;
-  /** Whether a request requires a run. */
+  /** Whether a request requires a run. False, for example, if its inputs equal those of the last run. */
   readonly isDue: (request: RunRequest) => boolean;
-  /** Resolves once the work is submitted. */
+  /** Executes a run. Fulfills when its GPU work is submitted. */
   readonly run: (request: RunRequest) => Promise<void>;
   readonly onError: (error: unknown) => void;
 }
 
-/** Runs the latest request, as fast as runs finish and never faster: neither calls nor GPU work queue up. */
+/**
+ * Runs the latest request when the previous run is submitted and the GPU is not behind, so that neither calls nor GPU
+ * work accumulate.
+ */
 export class RunLoop<RunRequest> {
   readonly #options: RunLoopOptions<RunRequest>;
   readonly #unfinished: Promise<unknown>[] = [];
@@ -37,17 +43,17 @@ export class RunLoop<RunRequest> {
     return this.#running !== undefined;
   }
 
-  /** From the start of the last finished run until the GPU had finished it, ms. */
+  /** Milliseconds from the start of the last finished run until the GPU had finished it; undefined before the first. */
   get milliseconds(): number | undefined {
     return this.#milliseconds;
   }
 
-  /** Resolves, and never rejects, when no run is in progress. */
+  /** Fulfills when no run is in progress. Never rejects. */
   get idle(): Promise<void> {
     return this.#running ?? Promise.resolve();
   }
 
-  /** Returns at once; a request that has not started yet is replaced. */
+  /** Requests a run and returns at once. Replaces a request that has not started yet. */
   request(request: RunRequest): void {
     if (this.#isClosed) return;
     this.#request = request;
@@ -60,7 +66,7 @@ export class RunLoop<RunRequest> {
   }
 
   async #work(): Promise<void> {
-    // Merges the requests of one task.
+    // Waits for a microtask, so that of several synchronous requests only the last one runs.
     await Promise.resolve();
     try {
       for (let request = this.#take(); request !== undefined; request = this.#take()) {
@@ -71,7 +77,7 @@ export class RunLoop<RunRequest> {
         }
       }
     } finally {
-      // Set synchronously: a request one microtask later needs a new loop.
+      // Reset synchronously, because a request one microtask later needs a new loop.
       this.#running = undefined;
     }
   }
@@ -88,7 +94,7 @@ export class RunLoop<RunRequest> {
     if (!this.#isClosed) await this.#waitForRoom(start);
   }
 
-  /** A lost device never finishes, and is reported by other code. */
+  /** Waits until the GPU can take another run. A lost device ends the wait; other code reports the loss. */
   async #waitForRoom(start: number): Promise<void> {
     const submitted = performance.now();
     const finished = this.#options.queue.onSubmittedWorkDone().then(

@@ -8,13 +8,13 @@ export interface PlacedGaussians extends HostedGaussians<DynamicGaussians> {
   readonly placement: Placement;
 }
 
-/** A three.js scene for `@gaussian-splat/three`. */
+/** A scene of three.js that `@gaussian-splat/three` draws. */
 export interface ThreeScene {
   readonly isObject3D: true;
   add(...objects: never[]): unknown;
 }
 
-/** Host of `@gaussian-splat/renderer`, which is loaded for the first model in a world. */
+/** Host for worlds of `@gaussian-splat/renderer`, which is loaded for the first model in a world. */
 const worldHost = {
   accepts: (scene: unknown): scene is World =>
     typeof scene === 'object' && scene !== null && 'placements' in scene && 'add' in scene && 'remove' in scene,
@@ -36,7 +36,7 @@ const worldHost = {
 };
 
 /**
- * Adds Gaussians to a scene of any registered renderer.
+ * Creates a sink for Gaussians and adds it to a scene of any registered renderer.
  * @throws GaussianSplatError `argument/value` for a scene without a renderer.
  */
 export function receiveGaussians(

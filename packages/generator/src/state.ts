@@ -1,32 +1,39 @@
 import type { Camera } from '@gaussian-splat/core';
 import type { GpuTensor } from './input-value.js';
 
-/** Inputs of a generator that a page may set, by the roles of its contract. */
+/** Inputs of a generator that a page may set, by their roles in the contract. */
 export interface GeneratorState {
-  /** Camera of the viewer; required by every role that depends on it. */
+  /** Camera of the viewer; required if an input has a role that depends on it. */
   readonly camera?: Camera;
-  /** Seconds since the beginning; default 0. The page wraps or stops it at the contract's duration. */
+  /**
+   * Seconds since the beginning. Default 0. The page is responsible for wrapping or stopping at the contract's
+   * duration.
+   */
   readonly timeSeconds?: number;
   /**
-   * Index of a frame; default: the frame at `timeSeconds` by the contract's fps, limited to the last of its duration;
-   * without fps 0.
+   * Index of a frame. Default: the frame at `timeSeconds` by the contract's fps, at most the last one of its duration;
+   * 0 if the contract declares no fps.
    */
   readonly frame?: number;
-  /** Default 0. */
+  /** Seed for random numbers. Default 0. */
   readonly seed?: number;
-  /** Flattened, in the order and format of the contract; default: the contract's, else no rotation. */
+  /** Flattened pose, in the order and format of the contract. Default: that of the contract, else no rotation. */
   readonly pose?: ArrayLike<number>;
-  /** Coefficients; default: the contract's, else zeros. */
+  /** Shape coefficients. Default: those of the contract, else zeros. */
   readonly shape?: ArrayLike<number>;
   /**
-   * Values of controls by the name of the input: one number for all elements, or all of them; default: the contract's.
+   * Values of controls by input name: one number for all elements, or a number for each. Default: those of the
+   * contract.
    */
   readonly controls?: Readonly<Record<string, number | ArrayLike<number>>>;
   /**
-   * Images [1,3,H,W] by the names of inputs with the role `image`, for example from the renderer's `ImageTensor`;
-   * required by every such input that no earlier model of a chain writes.
+   * Images [1, 3, H, W] by the names of inputs with the role `image`, for example from the renderer's `ImageTensor`.
+   * Required for every such input, unless an earlier model of a chain writes it.
    */
   readonly images?: Readonly<Record<string, GpuTensor>>;
-  /** Depth [1,1,H,W] of the frame that a post-processor takes, for example made by the renderer's `ImageTensor`; needed by inputs with the role `depth`. */
+  /**
+   * Depth [1, 1, H, W] of the frame, for example from the renderer's `ImageTensor`. Required for inputs with the role
+   * `depth` of a post-processor.
+   */
   readonly depth?: GpuTensor;
 }

@@ -1,7 +1,7 @@
 import type { GaussianSplatEventMap } from '@gaussian-splat/element';
 import type { EventName } from '@lit/react';
 
-/** Event of each handler. The handler has React's name for the event, if there is one. */
+/** Event type for each handler. A handler has React's own name for the event if there is one. */
 const EVENTS = {
   onLoad: 'load',
   onProgress: 'progress',
@@ -45,14 +45,14 @@ export type HandlerName = keyof typeof EVENTS;
 
 type EventOf<Name extends HandlerName> = GaussianSplatEventMap[(typeof EVENTS)[Name]];
 
-/** The handlers in the format of the wrapper. */
+/** Type of the handlers for `createComponent` of `@lit/react`. */
 export type Handlers = { readonly [Name in HandlerName]: EventName<EventOf<Name>> };
 
-/** The handlers in the format of apps, each with its event's own type. */
+/** Handlers as props of apps, each with the type of its event. */
 export type Listeners = { [Name in HandlerName]?: (event: EventOf<Name>) => void };
 
 /**
- * React reserves `onLoad`, `onError`, `onTimeUpdate`, `onPlay` and similar names on custom elements, but never calls
- * them; these handlers listen to the element.
+ * Handlers that listen to the element directly. React reserves `onLoad`, `onError`, `onTimeUpdate`, `onPlay` and
+ * similar names on custom elements, but never calls them.
  */
 export const HANDLERS = EVENTS as unknown as Handlers;

@@ -1,5 +1,5 @@
 'use client';
-/** `<gaussian-splat>` for React 18 and 19. */
+/** The component for `<gaussian-splat>` in React 18 and 19. */
 import '@gaussian-splat/element';
 import { GaussianSplatElement, type SettableProperties } from '@gaussian-splat/element';
 import { createComponent } from '@lit/react';
@@ -22,7 +22,8 @@ export type GaussianSplatProps = Omit<
   React.RefAttributes<GaussianSplatElement>;
 
 /**
- * The element as a component: its properties by reference, its events as handlers, its element by `ref`.
+ * Component for `<gaussian-splat>`. Props set properties of the element without conversion, handlers listen to its
+ * events, and `ref` receives the element.
  *
  * ```tsx
  * <GaussianSplat src="scene.ply" alt="A skull" cameraControls onLoad={({ detail }) => console.log(detail.url)} />
@@ -37,8 +38,11 @@ export const GaussianSplat: React.ForwardRefExoticComponent<GaussianSplatProps> 
 });
 
 export {
+  SplatCut,
   SplatMesh,
   SplatScene,
+  type SplatCutElement,
+  type SplatCutProps,
   type SplatMeshElement,
   type SplatMeshProps,
   type SplatSceneElement,

@@ -1,7 +1,7 @@
 /**
- * Types of the bare tags `<gaussian-splat>`, `<splat-scene>`, `<splat-mesh>` and `<splat-cut>` in JSX: `import type {}
- * from '@gaussian-splat/react/jsx'`. React sets properties; of the events only those with lower-case handlers work
- * (`onload`, `oncamera-change`), so only these names are declared.
+ * Types of the tags `<gaussian-splat>`, `<splat-scene>`, `<splat-mesh>` and `<splat-cut>` in JSX: `import type {} from
+ * '@gaussian-splat/react/jsx'`. React sets properties, but of the events it supports only those with lower-case
+ * handlers (`onload`, `oncamera-change`), so only these names are declared.
  */
 import type { GaussianSplatElement, GaussianSplatEventMap, SettableProperties } from '@gaussian-splat/element';
 import type * as React from 'react';
@@ -28,7 +28,7 @@ type Props<E, Settable, Events = ChildEventMap> = Omit<
   SmallListeners<Events>;
 
 declare module 'react' {
-  // Extending React's own namespace is the way to declare a tag.
+  // Tags are declared by extending React's own namespace.
   // eslint-disable-next-line @typescript-eslint/no-namespace
   namespace JSX {
     interface IntrinsicElements {

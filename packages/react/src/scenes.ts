@@ -1,5 +1,8 @@
 'use client';
-/** `<splat-scene>`, `<splat-mesh>` and `<splat-cut>` for React 18 and 19: children of {@link GaussianSplat}. Only apps that use them bundle them. */
+/**
+ * Components for `<splat-scene>`, `<splat-mesh>` and `<splat-cut>`, the children of {@link GaussianSplat}, in React 18
+ * and 19. Apps that do not import this module do not bundle it.
+ */
 import {
   SplatCutElement,
   SplatMeshElement,
@@ -19,10 +22,13 @@ const EVENTS = {
   onProgress: 'progress',
   onPreview: 'preview',
   onError: 'error',
+  onInputsChange: 'inputs-change',
+  onGeneratorMemory: 'generator-memory',
   onGeneratorError: 'generator-error',
   onGeneratorFallback: 'generator-fallback',
   onPlay: 'play',
   onPlaying: 'playing',
+  onWaiting: 'waiting',
   onPause: 'pause',
   onTimeUpdate: 'timeupdate',
   onSeeking: 'seeking',
@@ -39,7 +45,7 @@ type ChildHandler = keyof typeof EVENTS;
 type EventOf<Name extends ChildHandler> = ChildEventMap[(typeof EVENTS)[Name]];
 type ChildListeners = { [Name in ChildHandler]?: (event: EventOf<Name>) => void };
 
-/** Props of a child: its element's properties, handlers of its own events, React's common attributes, and `ref`. */
+/** Props of a child: the element's properties, handlers of its own events, React's common attributes, and `ref`. */
 type ChildProps<E, Settable> = Omit<React.HTMLAttributes<E>, ChildHandler | keyof Settable> &
   ChildListeners &
   Settable &
@@ -51,7 +57,7 @@ export type SplatMeshProps = ChildProps<SplatMeshElement, SettableMeshProperties
 const shared = { react: React, events: EVENTS as unknown as { [Name in ChildHandler]: EventName<EventOf<Name>> } };
 
 /**
- * A scene among others.
+ * Component for `<splat-scene>`, a further scene of an element.
  *
  * ```tsx
  * <GaussianSplat src="room.sog" cameraControls>
@@ -66,7 +72,7 @@ export const SplatScene: React.ForwardRefExoticComponent<SplatSceneProps> = /* @
   displayName: 'SplatScene',
 });
 
-/** A triangle mesh among scenes: `<SplatMesh src="chair.glb" autoplay loop />`. */
+/** Component for `<splat-mesh>`, a triangle mesh: `<SplatMesh src="chair.glb" autoplay loop />`. */
 export const SplatMesh: React.ForwardRefExoticComponent<SplatMeshProps> = /* @__PURE__ */ createComponent({
   ...shared,
   tagName: 'splat-mesh',
@@ -78,7 +84,10 @@ export type SplatCutProps = Omit<React.HTMLAttributes<SplatCutElement>, keyof Se
   SettableCutProperties &
   React.RefAttributes<SplatCutElement>;
 
-/** A region of space with hidden or changed splats: `<SplatCut shape="plane" position={[0, 0.8, 0]} />`. */
+/**
+ * Component for `<splat-cut>`, which hides or changes splats in a region: `<SplatCut shape="plane" position={[0, 0.8,
+ * 0]} />`.
+ */
 export const SplatCut: React.ForwardRefExoticComponent<SplatCutProps> = /* @__PURE__ */ createComponent({
   react: React,
   events: {},

@@ -3,7 +3,10 @@ import type { AccumulationFormat, Surface } from './rasterizers/rasterizer.js';
 
 const BYTES_PER_PIXEL: Record<AccumulationFormat, number> = { rgba16float: 8, rgba32float: 16 };
 
-/** The float texture that splats are accumulated in: color, with the transmittance in the alpha channel. */
+/**
+ * Float texture for the accumulation of splats: premultiplied color, and the transmittance in the alpha
+ * channel.
+ */
 export class AccumulationTexture implements Surface {
   readonly width: number;
   readonly height: number;

@@ -14,8 +14,9 @@ import { CHUNK_NUMBERS, GEOMETRY_WORDS, shWords } from './pack/words.js';
 const { CULL_GROUP } = constants;
 const PIECES = ['bases', 'sh', 'codes', 'curves'] as const;
 
-/** Largest sizes of the parts over all groups of a clip, in their order. */
+/** Size of the buffers of a clip: the largest sizes of each part over all its groups of frames. */
 export interface AnimatedRoom {
+  /** Parts of a group in their order: splats, planes of codes, and frames. */
   readonly parts: readonly { readonly rows: number; readonly planes: number; readonly frames: number }[];
   readonly shDegree: ShDegree;
   readonly antialiased: boolean;
@@ -23,30 +24,32 @@ export interface AnimatedRoom {
   readonly origin: Vector3;
   /** Factor that enlarges the splats of the first part while other parts are missing. */
   readonly grow: number;
-  /** Upper limit of its GPU memory in bytes; default: no limit but the device's. */
+  /** Upper limit of the GPU memory of the clip in bytes; default: no limit but the device's. */
   readonly memoryBudget?: number | undefined;
 }
 
-/** A part in one of the slots. */
+/** Buffers of a part in a slot, and the content that is uploaded to them. */
 interface SlotPart {
   readonly buffers: Readonly<Record<(typeof PIECES)[number], GPUBuffer>>;
   readonly uniform: GPUBuffer;
-  /** `Animate` of shaders/animate.wgsl, in the layout of the uniform. */
+  /** Values of the uniform: `Animate` of shaders/animate.wgsl. */
   readonly values: Uint32Array<ArrayBuffer>;
   readonly bindings: GPUBindGroup;
+  /** Capacity in splats: a multiple of 256. */
   readonly rowRoom: number;
-  /** The part that is being or has been uploaded, and the number of its uploaded bytes. */
+  /** Part that is being uploaded or has been uploaded; undefined if the slot is empty. */
   content: PackedAnimation | undefined;
+  /** Number of bytes of `content` that are uploaded. */
   written: number;
 }
 
-/** Number of slots: one for the group that is shown, one for the next. */
+/** Number of slots: one for the displayed group of frames, one for the next group. */
 export const ANIMATION_SLOTS = 2;
 const FIELDS = layouts.Animate.fields;
 
 /**
- * Gaussians of a clip: groups of frames are uploaded once, and each frame is evaluated on the GPU. All buffers are
- * created at the start, so that playback allocates nothing.
+ * Gaussians of a clip. Each group of frames is uploaded once, and the GPU evaluates each frame. All buffers are created
+ * at the start, so that playback allocates nothing.
  */
 export class AnimatedGaussians implements GaussianScene {
   readonly count: number;
@@ -55,7 +58,7 @@ export class AnimatedGaussians implements GaussianScene {
   readonly antialiased: boolean;
   readonly filterVariance?: number | undefined;
   readonly origin: Vector3;
-  readonly pages: readonly GaussianBlock[];
+  readonly blocks: readonly GaussianBlock[];
   readonly #device: GPUDevice;
   readonly #memory: GpuMemory;
   readonly #reservation: Reservation;
@@ -91,7 +94,7 @@ export class AnimatedGaussians implements GaussianScene {
         sh: part('sh', shWords(this.shDegree, this.shPrecision) * this.count),
         chunks: part('chunks', (CHUNK_NUMBERS * this.count) / CULL_GROUP),
       };
-      this.pages = [page];
+      this.blocks = [page];
       this.#slots = Array.from({ length: ANIMATION_SLOTS }, () => {
         let first = 0;
         return room.parts.map((own, k) => {
@@ -107,9 +110,9 @@ export class AnimatedGaussians implements GaussianScene {
   }
 
   /**
-   * Allocates room for the largest group of a clip, twice.
-   * @throws GaussianSplatError `out-of-memory/budget` before anything is allocated, `out-of-memory/buffer-limit` for a part that is larger than a binding of the device, and
-   * `out-of-memory/allocation` if the device has no room.
+   * Creates the buffers of a clip: two slots, each with capacity for the largest group.
+   * @throws GaussianSplatError `out-of-memory/budget` before anything is allocated; `out-of-memory/buffer-limit` if a
+   * part is larger than a binding of the device; `out-of-memory/allocation` if the device has too little memory.
    */
   static create(device: GPUDevice, room: AnimatedRoom): Promise<AnimatedGaussians> {
     return withMemoryCheck(device, 'a clip', () => new AnimatedGaussians(device, room));
@@ -123,27 +126,29 @@ export class AnimatedGaussians implements GaussianScene {
     return this.#memory.byteLength;
   }
 
-  /** Splats of the current group. */
+  /** Number of splats of the displayed group that were uploaded when the frame was evaluated. */
   get frameCount(): number {
     return this.#frameCount;
   }
 
-  /** Discards the content of a slot. */
+  /** Discards the content of a slot, 0 or 1. */
   clear(slot: number): void {
     for (const part of this.#slots[slot]) part.content = undefined;
   }
 
-  /** Whether a slot contains all of a part. */
+  /** Whether all bytes of a part are uploaded to a slot. */
   isWritten(slot: number, part: number): boolean {
     const { content, written } = this.#slots[slot][part];
     return content !== undefined && written === sizeOf(content);
   }
 
   /**
-   * Uploads a part into a slot, or its next bytes.
-   * @param most Upper limit of the bytes to upload now.
-   * @returns Number of bytes that were uploaded.
-   * @throws GaussianSplatError `argument/value` for a part that does not fit
+   * Uploads a part to a slot. If the last call uploaded only the beginning of the same part, the upload continues after
+   * it.
+   * @param part Index of the part in its group.
+   * @param max Upper limit of the bytes that this call uploads.
+   * @returns Number of uploaded bytes.
+   * @throws GaussianSplatError `argument/value` for a part that is larger than the buffers of the slot.
    */
   write(slot: number, part: number, content: PackedAnimation, max = Infinity): number {
     const to = this.#slots[slot][part];
@@ -170,9 +175,10 @@ export class AnimatedGaussians implements GaussianScene {
   }
 
   /**
-   * Evaluates a frame of the group in a slot, from the parts uploaded until now; subsequent submissions show it.
-   * @param frame Index within the group.
-   * @param isWhole False while parts of the group are missing: the present ones are enlarged.
+   * Evaluates a frame of the group in a slot, from the parts that are completely uploaded. Subsequent submissions draw
+   * this frame.
+   * @param frame Index of the frame in its group.
+   * @param isWhole False while parts of the group are missing: the splats of the uploaded parts are then enlarged.
    */
   show(slot: number, frame: number, isWhole: boolean): void {
     const parts = this.#slots[slot];
@@ -215,7 +221,7 @@ export class AnimatedGaussians implements GaussianScene {
       values.buffer,
     );
     const own = this.#memory.buffer('gs.animate.uniform', layouts.Animate.size, uniform | copyDestination);
-    const [{ geometry, sh, chunks }] = this.pages;
+    const [{ geometry, sh, chunks }] = this.blocks;
     const { bases, sh: base_sh, codes, curves } = buffers;
     const bindings = this.#stage.bind({ animate: own, bases, base_sh, codes, curves, gaussians: geometry, sh, chunks });
     return { buffers, uniform: own, values, bindings, rowRoom, content: undefined, written: 0 };
@@ -225,7 +231,10 @@ export class AnimatedGaussians implements GaussianScene {
 const grow = new Float32Array(1);
 const growBits = new Uint32Array(grow.buffer);
 
-/** Works in place, so that a frame allocates nothing. */
+/**
+ * Writes the uniform values of a part in place, so that a frame allocates nothing. `content` is undefined for a part
+ * that is not uploaded: its `rows` are 0.
+ */
 function setValues(values: Uint32Array, content: PackedAnimation | undefined, frame: number, factor: number): void {
   grow[0] = factor;
   values[FIELDS.rows.offset / 4] = content?.rows ?? 0;

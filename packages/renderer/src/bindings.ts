@@ -1,6 +1,6 @@
 import type { GeometryReading } from './geometry-reading.js';
 import type { PageRequests } from './gaussian-scene.js';
-import type { BlockTable } from './page-table.js';
+import type { BlockTable } from './block-table.js';
 import type { Scratch } from './scratch.js';
 import type { DetailBudget } from './stages/detail-budget.js';
 import { SortStage } from './stages/sort.js';
@@ -12,7 +12,7 @@ export interface Stages {
   readonly plan: ReturnType<typeof planStage>;
   readonly compact: ReturnType<typeof compactStage>;
   readonly sort: SortStage;
-  /** Stages that read a kind of geometry. */
+  /** Returns the stages that read a kind of geometry; default: `PackedGaussian`. */
   readonly reading: (kind?: GeometryReading) => ReadingStages;
 }
 
@@ -40,7 +40,7 @@ export function makeStages(device: GPUDevice, { threads }: Pick<Variants, 'threa
 /** Bind groups of one block. */
 interface BlockBindings {
   readonly splatCount: number;
-  /** Only for a block of a streamed scene. */
+  /** Page requests of a streamed scene, and their bind group; undefined for other scenes. */
   readonly requests?: { readonly of: PageRequests; readonly note: GPUBindGroup };
   readonly reading: ReadingStages;
   readonly cullChunks: GPUBindGroup;
@@ -49,14 +49,17 @@ interface BlockBindings {
   readonly project: GPUBindGroup;
 }
 
-/** The stages that keep a frame within a splat budget, bound to the chunks of each block and to their sums. */
+/**
+ * The stages that keep a frame within a splat budget. `count` has a bind group for each block, `threshold` reads the
+ * sums of all blocks.
+ */
 interface BudgetBindings {
   readonly stages: DetailBudget;
   readonly count: readonly GPUBindGroup[];
   readonly threshold: GPUBindGroup;
 }
 
-/** Resources for {@link FrameBindings}. */
+/** Buffers that {@link FrameBindings} binds. */
 export interface FrameBuffers {
   readonly table: BlockTable;
   readonly scratch: Scratch;
@@ -64,10 +67,10 @@ export interface FrameBuffers {
 
 /** Bind groups of all stages before the rasterizer, for one block table and one capacity. */
 export class FrameBindings {
-  readonly pages: readonly BlockBindings[];
-  /** Only with levels of detail. */
+  readonly blocks: readonly BlockBindings[];
+  /** Undefined without levels of detail. */
   readonly budget: BudgetBindings | undefined;
-  /** Plans the survivors in the order of the file. */
+  /** Bind group of `plan`, which counts the survivors of each block in the order of the file. */
   readonly plan: GPUBindGroup;
   readonly #sorts = new Map<number, ReturnType<SortStage['bind']>>();
   readonly table: BlockTable;
@@ -78,7 +81,7 @@ export class FrameBindings {
     this.#stages = stages;
     this.table = table;
     this.scratch = scratch;
-    this.pages = bindPages(stages, table, scratch);
+    this.blocks = bindBlocks(stages, table, scratch);
     this.budget = bindBudget(table, scratch);
     scratch.lay(table);
     this.plan = stages.plan.bind({
@@ -89,7 +92,7 @@ export class FrameBindings {
     });
   }
 
-  /** Bindings for sorting by keys of this many bits. */
+  /** Returns the bind groups for a sort by keys of `keyBits` bits, 16 to 32; they are created once. */
   sort(keyBits: number): ReturnType<SortStage['bind']> {
     const known = this.#sorts.get(keyBits);
     if (known) return known;
@@ -108,7 +111,7 @@ function bindBudget(
   return (
     stages && {
       stages,
-      count: table.pages.map(({ chunks, details = chunks }, i) =>
+      count: table.blocks.map(({ chunks, details = chunks }, i) =>
         stages.count.bind({ view: table.view(i), chunks, details, detail_counts }),
       ),
       threshold: stages.threshold.bind({ view: table.view(0), detail_counts, chunk_shares: chunkShares }),
@@ -116,17 +119,17 @@ function bindBudget(
   );
 }
 
-function bindPages(stages: Stages, table: BlockTable, scratch: Scratch): BlockBindings[] {
+function bindBlocks(stages: Stages, table: BlockTable, scratch: Scratch): BlockBindings[] {
   const { chunkShares, visibleBits, groupOffsets, cullStats, plan, splats, keys, order } = scratch;
-  // The sort needs its first order buffer only after `project` has read the survivors from it.
+  // The sort writes its first order buffer only after `project` has read the survivors from that buffer.
   const survivors = order[0];
-  return table.pages.map((page, i) => {
+  return table.blocks.map((page, i) => {
     const view = table.view(i);
     const gaussians = page.geometry;
     const reading = stages.reading(table.readingOf(i));
     const modifiers = table.modifiersOf(i);
     const requests = table.requestsOf(i);
-    // The binding must be filled even without levels of detail; it is then not read.
+    // A binding cannot be empty. Without levels of detail the shader does not read this one.
     const details = page.details ?? page.chunks;
     const chunk = { view, visible_bits: visibleBits };
     return {

@@ -1,50 +1,52 @@
-/** Capacity that frames have needed, as an estimate for the next ones. */
+/** Estimates the capacity that the next frames need from the need of earlier frames. */
 
-/** Capacity of the buffers between the stages. */
+/** Capacity of the buffers between the stages, or the need of a frame. */
 export interface Capacity {
-  /** Splats visible in one frame. */
+  /** Number of visible splats in one frame. */
   readonly visible: number;
-  /** Pairs of splat and bin for the tiles. */
+  /** Number of pairs of splat and bin for the rasterizer `tiles`. */
   readonly pairs: number;
 }
 
-/** Samples with excess capacity before the buffers shrink. */
+/** Number of samples with excess capacity before the buffers shrink. */
 const SAMPLES_BEFORE_SHRINK = 4;
 /**
- * Factor of that number each time the buffers had to grow again: views that alternate, such as those of an orbit, soon
- * keep the largest capacity.
+ * Factor of the number of samples before a shrink, each time the buffers grow after one. Views that alternate, such as
+ * those of an orbit, soon keep the largest capacity.
  */
 const SAMPLES_GROWTH = 4;
-/** Two samples within this time, ms, are taken to show about the same view. */
+/** Maximum milliseconds between two samples that are assumed to show about the same view. */
 const SAME_VIEW_MS = 1_000;
 /**
- * A frame's need grows with its pixels to these powers, if no measurement is available: LOD scenes show more splats,
- * and pairs grow (0.1 from far away, 0.6 close up).
+ * Exponents of the need of a frame as a power of its pixels, if no measurement is available. Scenes with levels of
+ * detail show more splats. Pairs grow with an exponent from 0.1 (far away) to 0.6 (close up).
  */
 const EXPONENTS: Capacity = { visible: 0.25, pairs: 0.5 };
-/** Upper limit of the factor that the settings of motion alone cause, beyond the ratio of pixels. */
+/** Upper limit of the factor that motion settings alone cause, beyond the ratio of pixels. */
 const MAX_MOTION_SHARE = 2;
 
 const NOTHING: Capacity = { visible: 0, pairs: 0 };
 
-/** The frame of a sample. */
+/** Size and kind of a sampled frame. */
 export interface SampledFrame {
-  /** Its pixels. */
+  /** Number of drawn pixels. */
   readonly pixels: number;
-  /** Pixels of the frame at rest. */
+  /** Number of pixels of the target at full resolution. */
   readonly wholePixels: number;
-  /** Whether it was drawn with the settings at rest. */
+  /** Whether the frame was drawn with the settings at rest. */
   readonly isWhole: boolean;
 }
 
 interface CountSample extends SampledFrame {
+  /** Visible splats and pairs of the frame, which the capacity must cover. */
   readonly used: Capacity;
+  /** Time of the sample in milliseconds, as `performance.now()` returns. */
   readonly at: number;
 }
 
 /**
- * Ratios between the frame at rest and the frame in motion: of their needs, and of their pixels when these were
- * measured.
+ * Ratios of the frame at rest to the frame in motion, from the last measurement of both: of their pixels and of their
+ * needs.
  */
 interface Ratio {
   readonly pixels: number;
@@ -52,8 +54,8 @@ interface Ratio {
 }
 
 /**
- * History of a scene's capacity: how long excess capacity is kept, and the need of the frame at rest while only frames
- * in motion are measured.
+ * History of the capacity of a scene. It determines how long excess capacity is kept, and estimates the need at rest
+ * while only frames in motion are measured.
  */
 export class CapacityHistory {
   #looks = SAMPLES_BEFORE_SHRINK;
@@ -62,23 +64,23 @@ export class CapacityHistory {
   #last: CountSample | undefined;
   #ratio: Ratio = { pixels: 1, need: { visible: 1, pairs: 1 } };
 
-  /** Samples before the buffers shrink. */
+  /** Number of samples with excess capacity before the buffers shrink. */
   get looks(): number {
     return this.#looks;
   }
 
-  /** Records that the buffers shrank. */
+  /** Records that the buffers were made smaller. */
   shrink(): void {
     this.#hasShrunk = true;
   }
 
-  /** Records that the buffers had to grow. */
+  /** Records that the buffers were made larger. */
   grow(): void {
     if (this.#hasShrunk) this.#looks *= SAMPLES_GROWTH;
     this.#hasShrunk = false;
   }
 
-  /** Records a sample. */
+  /** Records a sample. Samples of the same view at rest and in motion, at most 1 s apart, update the measured ratio. */
   note(sample: CountSample): void {
     const last = this.#last;
     this.#last = sample;
@@ -93,17 +95,17 @@ export class CapacityHistory {
     };
   }
 
-  /** Estimated need of the last sampled view at rest; undefined before the first sample. */
+  /** Estimated need at rest of the view that was sampled last; undefined before the first sample. */
   get lastNeed(): Capacity | undefined {
     return this.#last && this.wholeNeedBy(this.#last);
   }
 
-  /** Need of the last frame at rest, if it had this many pixels. */
+  /** Returns the need of the last sampled frame at rest if it had this many pixels; otherwise zeros. */
   wholeNeed(pixels: number): Capacity {
     return pixels === this.#whole.pixels ? this.#whole.need : NOTHING;
   }
 
-  /** Estimated need of the same view at rest: scaled by the ratio measured at the last change between motion and rest. */
+  /** Estimates the need of the same view at rest, by the ratio from the last change between motion and rest. */
   wholeNeedBy({ pixels, wholePixels, isWhole, used }: Omit<CountSample, 'at'>): Capacity {
     if (isWhole) return used;
     const { pixels: seen, need } = this.#ratio;

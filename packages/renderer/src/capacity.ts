@@ -4,13 +4,13 @@ import { copyCounts } from './copy-counts.js';
 import { constants } from './generated/shaders.js';
 import type { Scratch } from './scratch.js';
 
-/** Bounds of the capacity; the lower one may change, so it is read at every sample. */
+/** Bounds of the capacity. The lower bound may change, so it is read at every sample. */
 export interface CapacityBounds {
   readonly min: () => Capacity;
   readonly max: Capacity;
 }
 
-/** Scenes up to this size get capacity for all their splats at once: 64 MB. */
+/** Maximum number of splats of a scene that gets capacity for all of them at once: 64 MB. */
 const SMALL_SCENE = 1_300_000;
 const MIN_PAIRS = 1 << 16;
 /** Minimum capacity of nearly empty buffers. */
@@ -19,30 +19,39 @@ export const MIN_CAPACITY: Capacity = { visible: 1, pairs: MIN_PAIRS };
 const GENEROUS_PAIRS = 1 << 21;
 /** Factor of the capacity over the need. */
 const HEADROOM = 1.25;
-/** Usage of the capacity above which it grows, and below which it shrinks. */
+/** Usage above which the capacity grows, as a fraction of the capacity. */
 const FULL = 0.92;
+/** Usage below which the capacity shrinks, as a fraction of the capacity. */
 const SLACK = 0.7;
-/** Minimum of bytes that shrinking must free. */
+/** Minimum number of bytes that a smaller capacity must free. */
 const MIN_SAVING = 32 << 20;
 const BYTES_PER_VISIBLE = 40;
 const BYTES_PER_PAIR = 16;
 /** Frames between two samples after the first frames. */
 const INTERVAL = 16;
-/** After this time without a sample, ms, the next frame is sampled: it may be the only one of its view. */
+/**
+ * Maximum milliseconds without a sample: the next frame is then sampled, because it may be the only one of its view.
+ */
 const LONGEST_PAUSE_MS = 250;
 
-/** Pairs for each visible splat of a large scene. */
+/** Pairs of splat and bin for each visible splat of a large scene. */
 const PAIRS_PER_SPLAT = 1.5;
 /**
- * Pairs for each splat of the budget in LOD scenes with one: a fifth of its splats is never visible, and a frame that
- * uses the whole budget has small ones. Scenes of 10 and of 16 million needed 0.93.
+ * Pairs of splat and bin for each splat of a budget. A fifth of the splats is never visible, and the splats of a frame
+ * that uses the whole budget are small. Scenes of 10 and 16 million splats needed 0.93.
  */
 const PAIRS_PER_BUDGETED = 1.1;
 
-/** Visible splats, splats beyond the capacity, the same two for pairs, and the coverage. */
+/**
+ * Bytes of five u32 counts: visible splats, splats beyond the capacity, pairs, pairs beyond the capacity, and coverage.
+ */
 const COUNT_BYTES = 20;
 
-/** Capacity before the first frame. */
+/**
+ * Returns the capacity before the first frame.
+ * @param splats Number of splats of the scenes.
+ * @param isBudgeted Whether a splat budget limits streamed scenes.
+ */
 export function initialCapacity(splats: number, max: Capacity, isBudgeted = false): Capacity {
   const visible = Math.min(max.visible, splats <= SMALL_SCENE ? splats : Math.ceil(splats / 2));
   const usual = Math.ceil((isBudgeted ? PAIRS_PER_BUDGETED : PAIRS_PER_SPLAT) * visible);
@@ -50,15 +59,15 @@ export function initialCapacity(splats: number, max: Capacity, isBudgeted = fals
   return { visible, pairs: Math.min(max.pairs, pairs) };
 }
 
-/** Counts of one frame. */
+/** Counts of one frame: drawn splats and pairs, and coverage. */
 export interface FrameCounts extends Capacity {
-  /** `cull_stats[COVERED]` */
+  /** `cull_stats[COVERED]`: coverage of the frame, as a multiple of the frame times `COVERED_UNIT`. */
   readonly covered: number;
 }
 
 /**
- * Read-back buffers for the counts: one for the current monitor and one for the next, so that none is created when
- * scenes change.
+ * Read-back buffers for the counts: one for the current monitor and one for the next. No buffer is created when scenes
+ * change.
  */
 export class CountBuffers {
   readonly #device: GPUDevice;
@@ -91,8 +100,8 @@ export class CountBuffers {
 }
 
 /**
- * Monitors how full the buffers are and requests a larger or smaller capacity. Counts arrive from the GPU a frame or
- * more later, and nothing waits for them; if the capacity covers every possible frame, nothing is read.
+ * Monitors the usage of the buffers, and requests a larger or smaller capacity. Counts arrive from the GPU one frame or
+ * more later, and no frame waits for them. Nothing is read if the capacity suffices for every possible frame.
  */
 export class CapacityMonitor {
   readonly #buffers: CountBuffers;
@@ -102,9 +111,11 @@ export class CapacityMonitor {
   readonly #memory: CapacityHistory;
   #capacity: Capacity;
   #frame = 0;
-  /** The last drawn frame, the last sampled one, and the time of that sample. */
+  /** The last drawn frame. */
   #drawn: SampledFrame = { pixels: 0, wholePixels: 0, isWhole: true };
+  /** The last sampled frame. */
   #image = this.#drawn;
+  /** Time of the last sample in milliseconds, as `performance.now()` returns. */
   #sampledAt = -Infinity;
   #isReading = false;
   #isDestroyed = false;
@@ -113,8 +124,10 @@ export class CapacityMonitor {
 
   /**
    * @param buffers Read-back buffers of the counts.
+   * @param capacity Current capacity.
    * @param memory History that earlier monitors of the scene have recorded.
-   * @param onWish Called with the capacity that the next frame should have.
+   * @param onResize Called with the capacity that the next frame should have, and whether a frame lacked splats or
+   * pairs.
    */
   constructor(
     buffers: CountBuffers,
@@ -132,12 +145,11 @@ export class CapacityMonitor {
   }
 
   /**
-   * Counts a frame.
-   * @param isOpen Whether its counts matter even if all splats fit: its rasterizer makes pairs of splat and bin, or its
+   * Counts a frame, and decides whether to sample it.
+   * @param isOpen Whether counts matter even if all splats fit: the rasterizer makes pairs of splat and bin, or
    * overdraw is limited.
-   * @param picture The frame: another size needs another capacity, and no frame follows one at rest.
-   * @returns Whether to sample this frame; then {@link record} must be called before the submit and {@link read} after
-   * it.
+   * @param image The frame. A frame of another size or kind than the last sampled one is due at once.
+   * @returns Whether to sample this frame; if so, call {@link record} before the submit.
    */
   isDue(isOpen: boolean, image: SampledFrame): boolean {
     const hasRoom = this.#capacity.visible >= this.#bounds.max.visible && !isOpen;
@@ -153,20 +165,25 @@ export class CapacityMonitor {
     return true;
   }
 
-  /** Records the copy of the counts to a read-back buffer. */
+  /**
+   * Records the copy of a frame's counts to the read-back buffer, unless those of another frame are being read: a host
+   * may record several frames before the first is read.
+   * @returns Whether the copy was recorded. If so, call {@link read} after the submit.
+   */
   record(
     encoder: GPUCommandEncoder,
     { plan, cullStats }: Pick<Scratch, 'plan' | 'cullStats'>,
     pairPlan: GPUBuffer | undefined,
-  ): void {
+  ): boolean {
+    if (this.#isReading) return false;
     copyCounts(encoder, plan, pairPlan, this.#staging, 0);
     encoder.copyBufferToBuffer(cullStats, 4 * constants.COVERED, this.#staging, COUNT_BYTES - 4, 4);
-    this.#isReading = true;
+    return (this.#isReading = true);
   }
 
   /**
-   * Reads the counts when they arrive.
-   * @returns The counts; undefined if the device was lost, or this monitor destroyed meanwhile.
+   * Reads the counts after {@link record}, and evaluates them with {@link judge}.
+   * @returns The counts; undefined if the device was lost or this monitor was destroyed meanwhile.
    */
   read(): Promise<FrameCounts | undefined> {
     return this.#staging.mapAsync(0x1).then(
@@ -192,12 +209,14 @@ export class CapacityMonitor {
   }
 
   /**
-   * Evaluates the need of a sampled frame.
-   * @param picture The sampled frame.
+   * Compares the need of a sampled frame with the capacity, and requests another capacity if required.
+   * @param used Need of the frame: drawn splats and pairs, and those beyond the capacity.
+   * @param overflowed Whether the frame lacked splats or pairs.
+   * @param image The sampled frame.
    */
   judge(used: Capacity, overflowed: boolean, image = this.#drawn): void {
     this.#memory.note({ ...image, used, at: performance.now() });
-    // The frame at rest is shown before any measurement of it.
+    // Reserves the capacity of the frame at rest, which is shown before any measurement of it.
     const need = this.#memory.wholeNeedBy({ ...image, used });
     const min = this.#bounds.min();
     const grown = {
@@ -214,7 +233,7 @@ export class CapacityMonitor {
       pairs: Math.max(this.#recent.pairs, need.pairs),
     };
     if (++this.#idleSamples < this.#memory.looks) return;
-    // Estimates are low if the camera came closer meanwhile.
+    // The need of the last frame at rest is too low if the camera has come closer since then, so recent frames count, too.
     const whole = this.#memory.wholeNeed(image.wholePixels);
     const shrunk = {
       visible: shrink(Math.max(whole.visible, this.#recent.visible), this.#capacity.visible, min.visible),

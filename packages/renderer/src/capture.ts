@@ -1,15 +1,15 @@
 import { validateCamera, type Camera } from '@gaussian-splat/core';
 import { BUFFER_USAGE, TEXTURE_USAGE } from './gpu/kernel.js';
 import type { FrameSettings, FrameTarget } from './frame-target.js';
-import { requireTextureSize } from './requirements.js';
+import { requireTextureSize } from './texture-size.js';
 import { untilItHasRoom } from './until-it-has-room.js';
 import type { Viewpoint } from './viewpoint.js';
 
-/** Rows of a texture copy start at multiples of this many bytes. */
+/** Alignment of the rows of a texture copy in bytes, as WebGPU requires. */
 const ROW_ALIGNMENT = 256;
 const BYTES_PER_PIXEL = 16;
 
-/** A camera, a target without texture, and the settings. */
+/** A camera, the options of a frame without its texture, and settings; default: those of the viewpoint. */
 export interface CaptureRequest extends Omit<FrameTarget, 'target'> {
   readonly camera: Camera;
   readonly settings?: FrameSettings;
@@ -26,6 +26,8 @@ export async function capture(device: GPUDevice, viewpoint: Viewpoint, request: 
   requireTextureSize(device, request.camera);
   const { width, height } = request.camera;
   const bytesPerRow = Math.ceil((width * BYTES_PER_PIXEL) / ROW_ALIGNMENT) * ROW_ALIGNMENT;
+  // An image may be larger than a buffer of the device.
+  const rowsAtOnce = Math.min(height, Math.floor(device.limits.maxBufferSize / bytesPerRow));
   const texture = device.createTexture({
     label: 'gs.capture',
     size: [width, height],
@@ -34,7 +36,7 @@ export async function capture(device: GPUDevice, viewpoint: Viewpoint, request: 
   });
   const staging = device.createBuffer({
     label: 'gs.capture',
-    size: bytesPerRow * height,
+    size: bytesPerRow * rowsAtOnce,
     usage: BUFFER_USAGE.mapRead | BUFFER_USAGE.copyDestination,
   });
   try {
@@ -42,19 +44,21 @@ export async function capture(device: GPUDevice, viewpoint: Viewpoint, request: 
       viewpoint.draw(request.camera, { ...request, target: texture }, request.settings);
       return viewpoint.isComplete();
     });
-    const encoder = device.createCommandEncoder({ label: 'gs.capture' });
-    encoder.copyTextureToBuffer({ texture }, { buffer: staging, bytesPerRow }, [width, height]);
-    device.queue.submit([encoder.finish()]);
-    await staging.mapAsync(0x1);
-    return withoutPadding(new Float32Array(staging.getMappedRange()), bytesPerRow / 4, 4 * width, height);
+    const pixels = new Float32Array(4 * width * height);
+    for (let first = 0; first < height; first += rowsAtOnce) {
+      const rows = Math.min(rowsAtOnce, height - first);
+      const encoder = device.createCommandEncoder({ label: 'gs.capture' });
+      encoder.copyTextureToBuffer({ texture, origin: [0, first] }, { buffer: staging, bytesPerRow }, [width, rows]);
+      device.queue.submit([encoder.finish()]);
+      await staging.mapAsync(0x1);
+      const padded = new Float32Array(staging.getMappedRange());
+      for (let row = 0, at = 0; row < rows; row++, at += bytesPerRow / 4)
+        pixels.set(padded.subarray(at, at + 4 * width), 4 * width * (first + row));
+      staging.unmap();
+    }
+    return pixels;
   } finally {
     texture.destroy();
     staging.destroy();
   }
-}
-
-function withoutPadding(rows: Float32Array, stride: number, length: number, count: number): Float32Array {
-  const pixels = new Float32Array(length * count);
-  for (let row = 0; row < count; row++) pixels.set(rows.subarray(row * stride, row * stride + length), row * length);
-  return pixels;
 }

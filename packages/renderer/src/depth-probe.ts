@@ -8,52 +8,65 @@ import { readBack } from './gpu/read-back.js';
 import { Stage } from './stages/stage.js';
 import type { ProbedSplat } from './probed-splat.js';
 
-/** A point of the last drawn image. */
+/** A point of the last drawn image to probe. */
 export interface ProbePoint {
   /** Pixels from the left edge of the image; pixel centers are at +0.5. */
   readonly x: number;
-  /** Pixels from the top edge. */
+  /** Pixels from the top edge of the image. */
   readonly y: number;
-  /** Depth along the optical axis in world units, for {@link ProbeAnswer.transmittance}; default: behind everything. */
+  /**
+   * Depth along the optical axis in world units, up to which {@link ProbeAnswer.transmittance} counts splats. Default:
+   * behind all splats.
+   */
   readonly depth?: number;
 }
 
 /** Transmittance and depths of the splats along the ray of a point. */
 export interface ProbeAnswer {
-  /** 0..1: opacity of the image at the point. */
+  /** Opacity of the image at the point, 0..1. */
   readonly opacity: number;
   /**
-   * Depth of the visible surface along the optical axis, in world units: the densest depth, on the ray of the point, of
-   * the splat behind which less than half of the light is left. Null if the splats transmit more than half.
+   * Depth of the visible surface along the optical axis, in world units. The surface is the first splat behind which
+   * less than half of the light is left. Its depth is the one of its highest density on the ray. Null if the splats
+   * transmit half of the light or more.
    */
   readonly depth: number | null;
-  /** The same for 90 % of the light: the first noticeable splat. Null if more is transmitted. */
+  /**
+   * Depth of the first noticeable splat: like {@link depth}, but less than 90 % of the light is left. Null if more is
+   * transmitted.
+   */
   readonly near: number | null;
-  /** The same for 10 % of the light. Null if more is transmitted. `far - near` is the thickness of the surface. */
+  /**
+   * Depth of the back of the surface: like {@link depth}, but less than 10 % of the light is left. Null if more is
+   * transmitted. `far - near` is the thickness of the surface.
+   */
   readonly far: number | null;
-  /** 0..1: transmittance of the splats in front of the point's own depth. 1: nothing hides it. */
+  /** Transmittance, 0..1, of the splats in front of {@link ProbePoint.depth}. 1 if nothing hides this depth. */
   readonly transmittance: number;
-  /** The splat at {@link ProbeAnswer.depth}. Null if that is null, or if a mesh is nearer. */
+  /** The splat at {@link ProbeAnswer.depth}. Null if there is no such depth, or if a mesh is nearer. */
   readonly splat: ProbedSplat | null;
 }
 
-/** The frame to probe. */
+/** Stages and bindings of the frame to probe. */
 export interface ProbeSource {
   readonly stages: Stages;
   readonly bindings: FrameBindings;
 }
 
-/** Finds opacity and depth under single points of the last frame, one workgroup for each point. */
+/**
+ * Returns the stage that finds opacity and depth at single points of the last frame, with one workgroup for each point.
+ */
 export const probeDepthStage = (device: GPUDevice): Stage<typeof probeDepth> => new Stage(device, probeDepth);
 
 const { storage, copySource, copyDestination } = BUFFER_USAGE;
 const WORDS_PER_ANSWER = layouts.ProbeAnswer.size / 4;
-/** Word of an answer with the index of the splat of its middle depth. */
+/** Word of an answer that contains the index of the splat at its middle depth, plus one; 0 if there is none. */
 const STORED_AT = layouts.ProbeAnswer.fields.stored.offset / 4 + 1;
 
 /**
- * Probes the last frame, drawn by any rasterizer. Reads back from the GPU: call it for clicks and labels, not for every
- * frame.
+ * Probes points of the last frame, drawn by any rasterizer. Reads back from the GPU: call it for clicks and labels, not
+ * for every frame.
+ * @returns An answer for each point, in the order of `points`.
  */
 export async function probe(
   device: GPUDevice,
@@ -68,7 +81,7 @@ export async function probe(
     const asked = memory.buffer('gs.probe_depth.points', words.byteLength, storage, new Uint32Array(words.buffer));
     const answers = memory.buffer('gs.probe_depth.answers', bytes, storage | copySource);
     const { plan, splats, order } = source.bindings.scratch;
-    // The list of survivors, which the surfaces need, temporarily overwrites the order.
+    // The list of survivors, which `probe_surface` reads, temporarily overwrites the order.
     const kept = memory.buffer('gs.probe_depth.order', order[0].size, copySource | copyDestination);
     const stage = probeDepthStage(device);
     const encoder = device.createCommandEncoder({ label: 'gs.probe_depth' });
@@ -88,10 +101,10 @@ export async function probe(
   }
 }
 
-/** Either of the two shaders. */
+/** Shader of `probe_surface`, for any kind of geometry. */
 type SurfaceShader = ShaderDescription & Pick<typeof probeSurface, 'bindings'>;
 
-/** Replaces depths of centers by those of surfaces, block by block. */
+/** Replaces the depths of splat centers in the answers by the depths of surfaces, block by block. */
 function recordSurfaces(
   device: GPUDevice,
   pass: GPUComputePassEncoder,
@@ -99,7 +112,7 @@ function recordSurfaces(
   { points, answers, count }: { points: GPUBuffer; answers: GPUBuffer; count: number },
 ): void {
   const { order, plan } = scratch;
-  table.pages.forEach((page, i) => {
+  table.blocks.forEach((page, i) => {
     const plain = page.reading ? probeSurfaceQuantized : probeSurface;
     const kernel = kernelOf<SurfaceShader>(device, table.readingOf(i)?.probeSurface ?? plain);
     const bound = { view: table.view(i), gaussians: page.geometry, survivors: order[0], plan, points, answers };
@@ -120,6 +133,6 @@ function readAnswers(found: ArrayBuffer, points: number, splatOf: (stored: numbe
   });
 }
 
-/** WGSL compilers may assume that there are no infinities. */
+/** Largest float32 with two digits: WGSL compilers may assume that there are no infinities. */
 const MAX_FLOAT32 = 3.4e38;
 const finite = (value: number): number => Math.min(MAX_FLOAT32, Math.max(-MAX_FLOAT32, value));

@@ -1,17 +1,20 @@
 import type { Camera } from '@gaussian-splat/core';
 
-/** Meaning of `device` depth: values between the near and the far plane of a projection. */
+/** Near and far plane of the projection that defines `device` depth. */
 export interface DepthPlanes {
   /** Whether values are 1 at the near plane and 0 at the far plane. */
   readonly reversed?: boolean | undefined;
-  /** Planes of the host's projection in world units; default: those of the camera. `far` may be Infinity. */
+  /** Near plane of the host's projection in world units; default: that of the camera. */
   readonly near?: number | undefined;
+  /** Far plane of the host's projection in world units, or Infinity; default: that of the camera. */
   readonly far?: number | undefined;
 }
 
 /**
- * Conversion of stored values to camera depths: the fields of the WGSL `SceneDepth`.
- * @param range Stored values at the planes: glDepthRange.
+ * Returns the conversion of stored `device` values to camera depths, as fields of the WGSL `SceneDepth`: depth =
+ * (`inverse[0]` · value + `inverse[1]`) / (`inverse[2]` · value + `inverse[3]`). `nothing` is the stored value without
+ * a surface.
+ * The last parameter contains the stored values at the two planes (glDepthRange); default: 0 and 1.
  */
 export function deviceReading(
   { reversed = false, near, far }: DepthPlanes,
@@ -19,7 +22,7 @@ export function deviceReading(
   [low, high]: readonly [number, number] = [0, 1],
 ): { inverse: number[]; nothing: number } {
   const planes = [near ?? camera.near, far ?? camera.far];
-  // From 0 at one plane to 1 at the other.
+  // Planes at the stored values `low` and `high`.
   const [from, to] = reversed ? planes.reverse() : planes;
   const nothing = reversed ? 0 : 1;
   // Depth, or its reciprocal for perspective cameras, is linear in the stored value.

@@ -23,24 +23,24 @@ export interface DynamicGaussiansOptions {
 }
 
 const ORIGIN: Vector3 = [0, 0, 0];
-/** Sets of tensors with cached bindings: a generator cycles through a few output buffers. */
+/** Maximum number of sets of tensors with cached bindings. A generator cycles through a few output buffers. */
 const MAX_BINDINGS = 8;
 
 /** Statistics of a sample of the rows of a run. */
 export interface RowSample {
-  /** Bounds of the rows with an opacity above 0. */
+  /** Bounds of the sampled rows with an opacity above 0. */
   readonly bounds: Bounds;
-  /** Rows with an opacity above 0. */
+  /** Number of sampled rows with an opacity above 0. */
   readonly drawn: number;
-  /** Rows with unusable numbers: not finite, out of range, zero extent, or a zero rotation. */
+  /** Number of sampled rows with unusable values: not finite, out of range, zero extent, or a zero rotation. */
   readonly unusable: number;
 }
 
-/** A block with its resources for filling. */
-interface DynamicPage extends GaussianBlock {
-  /** Index of its first row among all rows. */
+/** A block, and the resources that fill it. */
+interface DynamicBlock extends GaussianBlock {
+  /** Index of the block's first row among all rows. */
   readonly first: number;
-  /** `Ingest` of shaders/ingest.wgsl. */
+  /** Uniform buffer with `Ingest` of shaders/ingest.wgsl. */
   readonly uniform: GPUBuffer;
 }
 
@@ -53,9 +53,9 @@ interface DynamicPage extends GaussianBlock {
  * viewpoint.draw(camera, { target: texture });
  * ```
  *
- * The tensors of a run are one copy of the Gaussians, the packed blocks that are drawn are the other. {@link ingest}
- * converts one to the other in a single submission, so that every frame shows exactly one run, however long the next
- * one takes.
+ * The tensors of a run are one copy of the Gaussians; the packed blocks that are drawn are another. {@link ingest}
+ * converts the tensors to the blocks in a single submission. Every frame therefore shows exactly one run, however long
+ * the next run takes.
  */
 export class DynamicGaussians implements GaussianScene {
   /** Capacity in rows. */
@@ -66,7 +66,7 @@ export class DynamicGaussians implements GaussianScene {
   /** Variance in px² of the screen-space low-pass filter of training; undefined is the classic 0.3. */
   readonly filterVariance?: number | undefined;
   readonly origin = ORIGIN;
-  readonly pages: readonly DynamicPage[];
+  readonly blocks: readonly DynamicBlock[];
   readonly layout: GaussianLayout;
   readonly #device: GPUDevice;
   readonly #stage: ReturnType<typeof ingestStage>;
@@ -77,7 +77,9 @@ export class DynamicGaussians implements GaussianScene {
   #version = 0;
   #rows = -1;
   #dropped = 0;
-  /** Rows of other scenes in front of this scene's, as the offsets in the uniforms assume. */
+  /**
+   * Rows of other scenes in front of the rows of this scene in each tensor. The offsets in the uniforms include them.
+   */
   #before = 0;
 
   private constructor(device: GPUDevice, layout: GaussianLayout, options: DynamicGaussiansOptions) {
@@ -93,19 +95,19 @@ export class DynamicGaussians implements GaussianScene {
     this.#memory = new GpuMemory(device);
     try {
       this.#places = new TensorBindings(layout, this.#memory);
-      this.pages = this.#makePages();
+      this.blocks = this.#makeBlocks();
     } catch (error) {
       this.destroy();
       throw error;
     }
-    // Nothing is visible before the first run.
+    // An empty run makes all rows invisible.
     this.ingest({}, 0);
   }
 
   /**
    * Allocates memory for the largest output of a generator.
-   * @param layout As `gaussianLayout` of core returns it.
-   * @throws GaussianSplatError `out-of-memory/budget` before anything is allocated, `out-of-memory/allocation` if the
+   * @param layout Layout that `gaussianLayout` of core returns.
+   * @throws GaussianSplatError `out-of-memory/budget` before anything is allocated; `out-of-memory/allocation` if the
    * device has too little memory.
    */
   static async create(
@@ -116,25 +118,25 @@ export class DynamicGaussians implements GaussianScene {
     return withMemoryCheck(device, whatOf(layout), () => new DynamicGaussians(device, layout, options));
   }
 
-  /** Number of ingested runs, plus one. */
+  /** Number of calls of {@link ingest} with rows, plus one. */
   get version(): number {
     return this.#version;
   }
 
-  /** Bytes of allocated GPU memory; the tensors belong to the generator. */
+  /** Bytes of allocated GPU memory, without the tensors, which belong to the generator. */
   get byteLength(): number {
     return this.#memory.byteLength;
   }
 
   /**
-   * Ingests the output of a run: encodes and submits one compute pass. Nothing is read back, and nothing is created for
-   * a set of buffers that was used before. The tensors may be overwritten by anything submitted afterwards.
+   * Ingests the output of a run: encodes and submits one compute pass. Nothing is read back. No resource is created for
+   * a set of buffers that was used before. Later submissions may overwrite the tensors.
    *
-   * Rows from the live count on, and rows with unusable numbers, are not drawn.
-   * @param tensors Storage buffers by the names of the layout's tensors; that of the count needs COPY_SRC. Sizes of
-   * float16 tensors are rounded up to 4 bytes.
-   * @param rows Number of rows that this run wrote, 0 to the layout's capacity, or its padded rows. For 0 no tensor is
-   * required.
+   * Rows from the live count on, and rows with unusable values, are not drawn.
+   * @param tensors Storage buffers, keyed by the tensor names of the layout. The buffer of the count needs COPY_SRC.
+   * Sizes of float16 tensors are rounded up to 4 bytes.
+   * @param rows Number of rows that this run wrote: 0 to the capacity of the layout, or its padded rows. For 0 no
+   * tensor is required.
    * @param instance Index of this scene in a run that wrote several scenes of `rows` rows in sequence to each tensor;
    * default 0. A live count is then element `instance` of its tensor.
    * @throws GaussianSplatError `contract/rows` if the rows exceed the capacity; `argument/value` for a missing or too
@@ -151,11 +153,11 @@ export class DynamicGaussians implements GaussianScene {
     const encoder = this.#device.createCommandEncoder({ label: 'gs.ingest' });
     if (counter) {
       const { offset } = layouts.Ingest.fields.count;
-      for (const { uniform } of this.pages)
+      for (const { uniform } of this.blocks)
         encoder.copyBufferToBuffer(counter, countBytes(this.layout) * instance, uniform, offset, 4);
     }
     const pass = encoder.beginComputePass({ label: 'gs.ingest' });
-    this.pages.forEach(({ count }, page) => this.#stage.record(pass, bindings[page], count));
+    this.blocks.forEach(({ count }, page) => this.#stage.record(pass, bindings[page], count));
     pass.end();
     this.#device.queue.submit([encoder.finish()]);
     this.#version++;
@@ -169,9 +171,9 @@ export class DynamicGaussians implements GaussianScene {
     return (await this.readSample()).bounds;
   }
 
-  /** Returns the same sample, with the numbers of its rows. */
+  /** Returns statistics of a sample of up to 65,536 splats. Reads back from the GPU, as {@link readBounds} does. */
   async readSample(): Promise<RowSample> {
-    const places = await readSamples(this.#device, this.pages);
+    const places = await readSamples(this.#device, this.blocks);
     this.#dropped = places.unusable;
     return {
       bounds: boundsOf({ ...places, origin: this.origin }),
@@ -180,7 +182,7 @@ export class DynamicGaussians implements GaussianScene {
     };
   }
 
-  /** Rows with unusable numbers in the last sample. */
+  /** Number of rows with unusable values in the last sample; 0 before the first sample. */
   get droppedCount(): number {
     return this.#dropped;
   }
@@ -191,11 +193,11 @@ export class DynamicGaussians implements GaussianScene {
     this.#memory.destroy();
   }
 
-  #makePages(): DynamicPage[] {
+  #makeBlocks(): DynamicBlock[] {
     const shStride = shWords(this.shDegree, this.shPrecision);
     const capacity = pageCapacity(this.#device, Math.max(4 * GEOMETRY_WORDS, 4 * shStride, this.#places.bytesPerRow));
     const { storage, uniform, copySource, copyDestination } = BUFFER_USAGE;
-    const pages: DynamicPage[] = [];
+    const blocks: DynamicBlock[] = [];
     for (let first = 0; first < this.count; first += capacity) {
       const count = Math.min(capacity, this.count - first);
       const part = (name: string, words: number): GPUBuffer =>
@@ -211,28 +213,31 @@ export class DynamicGaussians implements GaussianScene {
       const bytes = new ArrayBuffer(layouts.Ingest.size);
       writeStruct(layouts.Ingest, ingestValues(this.layout, first, count, 0), bytes);
       this.#device.queue.writeBuffer(page.uniform, 0, bytes);
-      pages.push(page);
+      blocks.push(page);
     }
-    return pages;
+    return blocks;
   }
 
-  /** Without a count tensor all rows are live. */
+  /** Writes the number of rows of a run to the uniforms of all blocks. Without a count tensor, all rows are live. */
   #writeRows(rows: number): void {
     if (rows === this.#rows) return;
     this.#rows = rows;
     const { count, rows: rowsField } = layouts.Ingest.fields;
     if (rowsField.offset !== count.offset + 4) throw new Error('Ingest: rows must follow count');
     const words = Uint32Array.of(rows, rows);
-    for (const { uniform } of this.pages) this.#device.queue.writeBuffer(uniform, count.offset, words);
+    for (const { uniform } of this.blocks) this.#device.queue.writeBuffer(uniform, count.offset, words);
   }
 
-  /** The device aligns the offsets of bindings; the offsets in the uniform lead from there to the rows. */
+  /**
+   * Writes the offsets of a scene's rows in the tensors. The device requires aligned offsets of bindings; the uniform
+   * contains the remaining offset from the binding to the rows.
+   */
   #writePlaces(before: number): void {
     if (before === this.#before) return;
     this.#before = before;
     const bytes = new ArrayBuffer(layouts.Ingest.size);
     const { offset } = layouts.Ingest.fields.positions;
-    for (const { uniform, first, count } of this.pages) {
+    for (const { uniform, first, count } of this.blocks) {
       writeStruct(layouts.Ingest, ingestValues(this.layout, first, count, before), bytes);
       this.#device.queue.writeBuffer(uniform, offset, bytes, offset);
     }
@@ -243,7 +248,7 @@ export class DynamicGaussians implements GaussianScene {
     let bindings = this.#bindings.get(key);
     if (bindings === undefined) {
       if (this.#bindings.size >= MAX_BINDINGS) this.#bindings.clear();
-      bindings = this.pages.map((page) =>
+      bindings = this.blocks.map((page) =>
         this.#stage.bind({
           ...this.#places.resources(tensors, page, before),
           ingest: page.uniform,

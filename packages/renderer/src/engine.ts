@@ -10,7 +10,10 @@ import { requireBlendable } from './requirements.js';
 import type { ComposeBindings } from './stages/compose.js';
 import type { Variants } from './variants.js';
 
-/** Accumulation for an image size, if the rasterizer cannot write to the target. */
+/**
+ * Accumulation texture of an image size, and the bindings that compose it over the target. Used if the rasterizer
+ * cannot write to the target.
+ */
 export interface Accumulation {
   readonly texture: AccumulationTexture;
   readonly compose: ComposeBindings;
@@ -23,7 +26,7 @@ export class Engine {
   readonly rasterizer: Rasterizer;
   readonly resources: FrameResources;
   readonly #device: GPUDevice;
-  /** Keyed by size; the most recently used is last. */
+  /** Cached textures, keyed by size; the most recently used one is last. */
   readonly #accumulations = new Map<string, Accumulation>();
 
   /** @throws GaussianSplatError `unsupported/limits` if the variant needs a feature that the device lacks. */
@@ -39,7 +42,7 @@ export class Engine {
     this.resources = new FrameResources(device, { stages: this.stages, rasterizer: this.rasterizer, ...needs });
   }
 
-  /** Whether frames with these settings can be drawn with it. */
+  /** Whether this engine can draw frames with these settings. */
   serves({ rasterizer, accumulation, threads }: Variants): boolean {
     const { settings } = this;
     return rasterizer === settings.rasterizer && accumulation === settings.accumulation && threads === settings.threads;
@@ -52,8 +55,8 @@ export class Engine {
 
   /**
    * Returns the accumulation of an image size.
-   * @param most Maximum number of cached sizes.
-   * @param bind Binds the texture of a new size.
+   * @param max Maximum number of cached sizes.
+   * @param bind Creates the bindings for the texture of a new size.
    */
   accumulationOf(
     { width, height }: Pick<Camera, 'width' | 'height'>,

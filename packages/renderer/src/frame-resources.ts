@@ -1,17 +1,23 @@
 import { FrameBindings, type Stages } from './bindings.js';
 import { CapacityHistory, type Capacity } from './capacity-history.js';
 import { CapacityMonitor, CountBuffers, initialCapacity, MIN_CAPACITY } from './capacity.js';
-import { BlockTable } from './page-table.js';
+import { BlockTable } from './block-table.js';
 import type { Rasterizer } from './rasterizers/rasterizer.js';
 import { maxPairs } from './rasterizers/pair-buffers.js';
 import { maxVisible, Scratch } from './scratch.js';
 import type { World } from './world.js';
 
-/** Capacity in pairs with which the pacer can measure their cost. */
+/** Minimum capacity in pairs that lets the pacer measure the cost of a pair. */
 const TELLING_ROOM = 1 << 18;
-/** Minimum usage of the capacity after scenes are removed; below it the capacity is released. */
+/**
+ * Minimum usage of the capacity, as a fraction, after scenes are removed. Below it the buffers are replaced by smaller
+ * ones.
+ */
 const MIN_USED = 0.5;
-/** Every frame may be divided into this many submissions: each takes the main thread a few tenths of a millisecond. */
+/**
+ * Maximum number of submissions into which every frame may be divided. Each costs a few tenths of a millisecond on the
+ * main thread.
+ */
 const FEW_SUBMISSIONS = 4;
 
 /** GPU resources between the stages for a set of scenes. */
@@ -25,13 +31,13 @@ export interface Resources {
 export interface ResourceOptions {
   readonly stages: Stages;
   readonly rasterizer: Rasterizer;
-  /** Pairs of splat and bin that are rasterized in one submission. */
+  /** Returns the number of pairs of splat and bin that are rasterized in one submission. */
   readonly pairsAtOnce: () => number;
-  /** Called after an incomplete frame, when the next one has enough capacity. */
+  /** Called after a frame that lacked splats or pairs, when the next frame has enough capacity. */
   readonly onIncomplete: () => void;
 }
 
-/** Manages the buffers between the stages for the current scenes, sized by the visible part of them. */
+/** Manages the buffers between the stages for the current scenes. Their size follows the number of visible splats. */
 export class FrameResources {
   readonly #device: GPUDevice;
   readonly #options: ResourceOptions;
@@ -39,11 +45,12 @@ export class FrameResources {
   #counts: CountBuffers | undefined;
   #capacity: Capacity | undefined;
   #memory = new CapacityHistory();
-  #hasOtherPairs = false;
-  /** The current binding of the rasterizer to the buffers that may be replaced. */
+  /** Plan buffer that the rasterizer is bound to. Another scratch or another number of blocks replaces it. */
   #boundPlan: GPUBuffer | undefined;
+  /** Capacity in pairs that the rasterizer is bound with. */
+  #boundPairs = 0;
   #hasQuickPairs = false;
-  /** Largest splat budget of any frame. */
+  /** Largest splat budget of any frame: Infinity for no limit; undefined before the first frame. */
   #maxSplats: number | undefined;
 
   constructor(device: GPUDevice, options: ResourceOptions) {
@@ -51,7 +58,7 @@ export class FrameResources {
     this.#options = options;
   }
 
-  /** Resources of the last frame; undefined before the first. */
+  /** Resources of the last frame; undefined before the first frame. */
   get current(): Resources | undefined {
     return this.#current;
   }
@@ -62,21 +69,22 @@ export class FrameResources {
   }
 
   get byteLength(): number {
-    const { table, scratch } = this.#current ?? {};
-    return [table, scratch].reduce((sum, part) => sum + (part?.byteLength ?? 0), 0);
+    const current = this.#current;
+    return current ? current.table.byteLength + current.scratch.byteLength : 0;
   }
 
   /**
-   * Returns the resources of a frame; allocates if the scenes or the requested capacity have changed.
+   * Returns the resources of a frame. Allocates if the scenes or the requested capacity have changed.
    * @param splatBudget Maximum number of splats in the frame; 0 for no limit.
    */
   fit(world: World, splatBudget: number): Resources {
     this.#roomFor(splatBudget);
     const current = this.#current;
     if (current?.table.isCurrent) {
-      // The monitor has requested another capacity.
-      const hasOtherRoom = current.scratch.capacity !== this.#capacity?.visible || this.#hasOtherPairs;
-      return hasOtherRoom ? this.#rebind(current.table) : current;
+      const { visible, pairs } = this.#capacity!;
+      // False if the monitor has requested another capacity.
+      const isBound = current.scratch.capacity === visible && this.#boundPairs === pairs;
+      return isBound ? current : this.#rebind(current.table);
     }
     if (current) return this.#layoutAgain(current);
     const table = new BlockTable(this.#device, world);
@@ -85,7 +93,10 @@ export class FrameResources {
     return this.#rebind(table);
   }
 
-  /** The set of scenes has changed: buffers that are large enough stay, the others grow by the size of the new scenes. */
+  /**
+   * Adapts the resources to another set of scenes. A capacity changes only if it is too small for these scenes, or if
+   * they need less than {@link MIN_USED} of it.
+   */
   #layoutAgain({ table }: Resources): Resources {
     const before = table.splats;
     table.lay();
@@ -101,12 +112,11 @@ export class FrameResources {
       visible: isEnough(now.visible, visible) ? now.visible : visible,
       pairs: isEnough(now.pairs, pairs) ? now.pairs : pairs,
     };
-    this.#hasOtherPairs = this.#capacity.pairs !== now.pairs;
     this.#memory = new CapacityHistory();
     return this.#rebind(table);
   }
 
-  /** Capacity in visible splats if `coming` more may become visible, including unused capacity. */
+  /** Returns the capacity in visible splats after `coming` more splats may become visible. Unused capacity counts. */
   #visibleWith(coming: number, max: Capacity): number {
     const { visible } = this.#capacity!;
     const { lastNeed } = this.#memory;
@@ -114,19 +124,17 @@ export class FrameResources {
     return Math.min(max.visible, visible + coming);
   }
 
-  /** Frees everything. */
+  /** Destroys all resources. */
   release(): void {
     const { table, scratch, monitor } = this.#current ?? {};
     table?.destroy();
     scratch?.destroy();
     monitor?.destroy();
     this.#counts?.destroy();
-    this.#counts = undefined;
-    this.#current = undefined;
-    this.#boundPlan = undefined;
+    this.#counts = this.#current = this.#boundPlan = undefined;
   }
 
-  /** A larger splat budget than before requires another capacity. */
+  /** Releases the resources if a splat budget is larger than all earlier ones, because it requires another capacity. */
   #roomFor(splatBudget: number): void {
     const max = splatBudget > 0 ? splatBudget : Infinity;
     if (this.#maxSplats !== undefined && max > this.#maxSplats) this.release();
@@ -134,8 +142,10 @@ export class FrameResources {
   }
 
   #maxFor(table: BlockTable): Capacity {
-    const budget = table.hasDetail ? (this.#maxSplats ?? Infinity) : Infinity;
-    return { visible: Math.min(table.splats, budget, maxVisible(this.#device)), pairs: maxPairs(this.#device) };
+    // A splat budget can only limit the splats of blocks with levels of detail.
+    const plain = table.blocks.reduce((sum, { count, details }) => (details ? sum : sum + count), 0);
+    const max = Math.min(table.splats, plain + (this.#maxSplats ?? Infinity), maxVisible(this.#device));
+    return { visible: max, pairs: maxPairs(this.#device) };
   }
 
   #firstFor(table: BlockTable): Capacity {
@@ -147,57 +157,49 @@ export class FrameResources {
   }
 
   /**
-   * A streamed scene with a budget keeps its initial capacity, because a flight may turn from a near wall to the whole
-   * scene within a frame. It keeps the capacity for pairs, which determines the number of submissions, once a few
-   * submissions are known to be enough.
+   * Returns the minimum capacity. A streamed scene with a budget keeps its initial capacity for splats, because a
+   * flight may turn from a near wall to the whole scene within a frame. It keeps the initial capacity for pairs once
+   * {@link FEW_SUBMISSIONS} submissions are known to be enough.
    */
   #minFor(table: BlockTable): Capacity {
     if (!this.#isBudgeted(table)) return MIN_CAPACITY;
     const { visible, pairs } = this.#firstFor(table);
-    // Never reset, because an alternating capacity would be reallocated each time.
+    // Never set back to false, because an alternating capacity would be reallocated each time.
     this.#hasQuickPairs ||= FEW_SUBMISSIONS * this.#options.pairsAtOnce() >= pairs;
     return { visible, pairs: this.#hasQuickPairs ? pairs : Math.min(pairs, TELLING_ROOM) };
   }
 
-  /** Allocates and binds the buffers between the stages, for the current capacity. */
+  /**
+   * Allocates and binds the buffers between the stages for the current capacity. Buffers of the right size are kept.
+   */
   #rebind(table: BlockTable): Resources {
-    const { stages } = this.#options;
+    const { stages, rasterizer } = this.#options;
     const capacity = this.#capacity!;
     const kept = this.#current?.scratch.capacity === capacity.visible ? this.#current.scratch : undefined;
     if (kept === undefined) this.#current?.scratch.destroy();
-    const pages = table.pages.length;
+    const pages = table.blocks.length;
     const { visible, pairs } = capacity;
-    const pingPongBytes = this.#options.rasterizer.pingPongBytes({ capacity: visible, pairCapacity: pairs });
+    const room = { capacity: visible, pairCapacity: pairs };
+    const pingPongBytes = rasterizer.pingPongBytes(room);
     kept?.fitPingPong(pingPongBytes);
     kept?.fitPages(table.groups, pages);
     const scratch = kept ?? new Scratch(this.#device, { visible, groups: table.groups, pages }, pingPongBytes);
-    const isSame = kept !== undefined && kept.plan === this.#boundPlan;
-    if (!isSame || this.#hasOtherPairs) this.#bindRasterizer(scratch, capacity);
-    this.#boundPlan = scratch.plan;
-    this.#hasOtherPairs = false;
+    const { plan, splats, order, pingPong } = scratch;
+    if (plan !== this.#boundPlan || pairs !== this.#boundPairs)
+      rasterizer.bind({ ...room, plan, splats, pingPong, order: order[0] });
+    this.#boundPlan = plan;
+    this.#boundPairs = pairs;
     const bindings = new FrameBindings(stages, { table, scratch });
     const monitor = this.#watch(table, capacity);
     this.#current = { table, scratch, bindings, monitor };
     return this.#current;
   }
 
-  #bindRasterizer({ plan, splats, order, pingPong }: Scratch, { visible, pairs }: Capacity): void {
-    this.#options.rasterizer.bind({
-      plan,
-      splats,
-      pingPong,
-      order: order[0],
-      capacity: visible,
-      pairCapacity: pairs,
-    });
-  }
-
   #watch(table: BlockTable, capacity: Capacity): CapacityMonitor {
-    const bounds = { min: () => this.#minFor(table), max: this.#maxFor(table) };
     this.#current?.monitor.destroy();
     this.#counts ??= new CountBuffers(this.#device);
+    const bounds = { min: () => this.#minFor(table), max: this.#maxFor(table) };
     return new CapacityMonitor(this.#counts, capacity, bounds, this.#memory, (requested, overflowed) => {
-      this.#hasOtherPairs = requested.pairs !== this.#capacity?.pairs;
       this.#capacity = requested;
       if (overflowed) this.#options.onIncomplete();
     });

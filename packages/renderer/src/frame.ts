@@ -6,29 +6,34 @@ import type { RenderSettings } from './render-settings.js';
 import type { PixelOrder } from './rasterizers/pixel-order.js';
 import type { Scratch } from './scratch.js';
 
-/** Inputs of the stages before the rasterizer, bound and allocated in advance. */
+/** Inputs of the stages before the rasterizer. All are allocated and bound in advance. */
 export interface Frame {
   readonly stages: Stages;
   readonly bindings: FrameBindings;
   readonly scratch: Scratch;
   readonly camera: Camera;
+  /** Writes the uniforms of a camera, for subsequent submissions. */
+  readonly look: (camera: Camera) => void;
   readonly settings: FeedbackSettings & Pick<RenderSettings, 'depthKeyBits'>;
-  /** Whether to list the indices of the visible splats by slot in {@link Scratch.survivors}, for auxiliary outputs. */
+  /**
+   * Whether to keep the indices of the visible splats, by slot, in {@link Scratch.survivors}. Auxiliary outputs need
+   * them.
+   */
   readonly keepsSurvivors: boolean;
-  /** Whether a block has levels of detail. */
+  /** Whether the world has a block with levels of detail. */
   readonly hasDetail: boolean;
   /** Whether to limit the splats to `RenderSettings.splatBudget`. */
   readonly isBudgeted: boolean;
-  /** Sorts splats for each pixel. */
+  /** Stages that sort splats for each pixel; undefined for other orders. */
   readonly order: PixelOrder | undefined;
-  /** Whether the rasterizer needs the depths of the splats, so that keys must be depths. */
+  /** Whether the rasterizer needs the depths of the splats. Sort keys must then be depths. */
   readonly keepsDepths: boolean;
   readonly timer?: FrameTimer | undefined;
 }
 
 /**
- * Records the projection of Gaussians to splats, sorted from near to far: cull, project, sort. Counts stay in `plan` on
- * the GPU; the CPU reads nothing.
+ * Records the stages from Gaussians to sorted splats: cull, project, and sort from near to far. Counts stay in `plan`
+ * on the GPU; the CPU reads nothing.
  * @returns Page requests of streamed scenes, to be copied at the end of the frame and read after the submit.
  */
 export function recordProjection(encoder: GPUCommandEncoder, frame: Frame): PageRequests[] {
@@ -37,13 +42,13 @@ export function recordProjection(encoder: GPUCommandEncoder, frame: Frame): Page
   for (const request of requests) request.begin(encoder);
   encoder.clearBuffer(scratch.cullStats);
   if (frame.isBudgeted) encoder.clearBuffer(scratch.detailCounts);
-  // Clears the threshold of an earlier budget.
+  // Clears the error threshold of an earlier frame with a budget.
   else if (frame.hasDetail) encoder.clearBuffer(scratch.chunkShares, scratch.chunkShares.size - 4);
   const pass = encoder.beginComputePass({ label: 'gs.project', timestampWrites: timer?.timestampWrites('project') });
   if (frame.isBudgeted) keepWithinBudget(pass, bindings);
   cull(pass, frame);
   listSurvivors(pass, frame);
-  for (const { reading, project, splatCount } of bindings.pages) {
+  for (const { reading, project, splatCount } of bindings.blocks) {
     reading.project.record(pass, project, Math.min(scratch.capacity, splatCount));
   }
   frame.order?.recordDepths(pass, bindings);
@@ -55,26 +60,28 @@ export function recordProjection(encoder: GPUCommandEncoder, frame: Frame): Page
   return requests;
 }
 
-/** Finds the error threshold on screen that keeps the frame within its splat budget. */
-function keepWithinBudget(pass: GPUComputePassEncoder, { pages, budget }: FrameBindings): void {
+/** Records the search for the error threshold in pixels that keeps the frame within its splat budget. */
+function keepWithinBudget(pass: GPUComputePassEncoder, { blocks, budget }: FrameBindings): void {
   if (!budget) return;
-  pages.forEach(({ splatCount }, i) => budget.stages.count.record(pass, budget.count[i], splatCount));
+  blocks.forEach(({ splatCount }, i) => budget.stages.count.record(pass, budget.count[i], splatCount));
   budget.stages.threshold.record(pass, budget.threshold);
 }
 
-/** Streamed scenes that are due to record page requests in this frame. */
+/** Returns the page requests of the streamed scenes that are due for recording in this frame. */
 function feedbackDue({ bindings, camera, settings }: Frame): PageRequests[] {
-  const all = new Set(bindings.pages.flatMap(({ requests }) => (requests ? [requests.of] : [])));
-  return [...all].filter((requests) => requests.isDue(camera, settings));
+  const all = new Set(bindings.blocks.flatMap(({ requests }) => (requests ? [requests.of] : [])));
+  return [...all].filter((requests) => requests.isDue(camera, settings, bindings.table.changes));
 }
 
 function recordFeedback(pass: GPUComputePassEncoder, { bindings }: Frame, due: readonly PageRequests[]): void {
-  for (const { requests, splatCount } of bindings.pages) {
+  for (const { requests, splatCount } of bindings.blocks) {
     if (requests && due.includes(requests.of)) requests.of.note(pass, requests.note, splatCount);
   }
 }
 
-/** Lists the visible splats of the last frame again, over their order: the list is the same as in that frame. */
+/**
+ * Lists the visible splats of the last frame again, in place of their order. The list equals that of the last frame.
+ */
 export function recordSurvivors(pass: GPUComputePassEncoder, frame: Pick<Frame, 'stages' | 'bindings'>): void {
   cull(pass, frame);
   listSurvivors(pass, frame);
@@ -82,14 +89,14 @@ export function recordSurvivors(pass: GPUComputePassEncoder, frame: Pick<Frame, 
 
 /** Finds the visible splats: culls whole chunks first, then single splats. */
 function cull(pass: GPUComputePassEncoder, { bindings }: Pick<Frame, 'bindings'>): void {
-  for (const { reading, cullChunks, splatCount } of bindings.pages)
+  for (const { reading, cullChunks, splatCount } of bindings.blocks)
     reading.cullChunks.record(pass, cullChunks, splatCount);
-  for (const { reading, cull: bound, splatCount } of bindings.pages) reading.cull.record(pass, bound, splatCount);
+  for (const { reading, cull: bound, splatCount } of bindings.blocks) reading.cull.record(pass, bound, splatCount);
 }
 
 function listSurvivors(pass: GPUComputePassEncoder, { stages, bindings }: Pick<Frame, 'stages' | 'bindings'>): void {
   stages.plan.record(pass, bindings.plan);
-  for (const { compact, splatCount } of bindings.pages) stages.compact.record(pass, compact, splatCount);
+  for (const { compact, splatCount } of bindings.blocks) stages.compact.record(pass, compact, splatCount);
 }
 
 /** Sorts the projected splats from near to far; splats of equal depth keep the order of the file. */

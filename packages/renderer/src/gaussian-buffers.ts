@@ -3,7 +3,6 @@ import type { GaussianBlock, GaussianScene } from './gaussian-scene.js';
 import { constants } from './generated/shaders.js';
 import { BUFFER_USAGE } from './gpu/kernel.js';
 import { GpuMemory, withMemoryCheck } from './gpu/memory.js';
-import { turn } from './gpu/page-thread.js';
 import { MemoryLedger, type Reservation } from './memory-ledger.js';
 import { DETAIL_NUMBERS } from './levels/chunk-detail.js';
 import type { PackedGaussians, PackedHead } from './pack/pack.js';
@@ -15,15 +14,18 @@ export interface UploadOptions {
   readonly memoryBudget?: number | undefined;
 }
 
-/** Bytes of packed Gaussians, from splat `start` on. */
+/** A portion of packed Gaussians, from splat `start` on. */
 export type PackedPortion = Partial<Pick<PackedGaussians, 'geometry' | 'sh' | 'chunks' | 'details'>> & {
-  /** Splats before them; of `chunks` and `details` a multiple of 256. */
+  /** Index of the first splat of the portion; a multiple of 256 for `chunks` and `details`. Default 0. */
   readonly start?: number;
 };
 
+/** Number of words uploaded in one step: 4 MB, a few milliseconds. Two steps may be in transit. */
+const WORDS_AT_ONCE = 1 << 20;
+
 /** Gaussians on the GPU, ready for any {@link Viewpoint} of the same device. */
 export class GaussianBuffers implements GaussianScene {
-  /** Splats over all levels of detail. */
+  /** Number of splats over all levels of detail. */
   readonly count: number;
   readonly shDegree: ShDegree;
   readonly shPrecision: ShPrecision;
@@ -33,17 +35,22 @@ export class GaussianBuffers implements GaussianScene {
   readonly filterVariance?: number | undefined;
   /** World position, in float64, of the origin of the positions on the GPU. */
   readonly origin: Vector3;
-  /** Splats of the finest level, if there are levels of detail. */
+  /** Number of splats of the finest level; undefined without levels of detail. */
   readonly leafCount: number | undefined;
-  /** Splats of the source that were dropped because of an unusable value. */
+  /** Number of splats of the source that were dropped because of an unusable value. */
   readonly droppedCount: number;
-  readonly pages: readonly GaussianBlock[];
+  readonly blocks: readonly GaussianBlock[];
   readonly version = 0;
-  /** Only with levels of detail. */
+  /** Stages that keep frames within a splat budget; undefined without levels of detail. */
   readonly detailBudget: DetailBudget | undefined;
   readonly #queue: GPUQueue;
   readonly #memory: GpuMemory;
   readonly #reservation: Reservation;
+  #isDestroyed = false;
+  /** Number of words that {@link write} may still upload in this step. */
+  #left = WORDS_AT_ONCE;
+  /** Resolves when the GPU has processed all steps before the last one. */
+  #taken: Promise<undefined> | undefined;
 
   private constructor(device: GPUDevice, packed: SceneSize, memoryBudget?: number, budget?: DetailBudget) {
     this.detailBudget = budget;
@@ -61,7 +68,7 @@ export class GaussianBuffers implements GaussianScene {
     this.#reservation = MemoryLedger.of(device).reserve(whatOf(packed), sceneBytes(packed), memoryBudget);
     this.#memory = new GpuMemory(device);
     try {
-      this.pages = makePages(device, packed, this.#memory);
+      this.blocks = makeBlocks(device, packed, this.#memory);
     } catch (error) {
       this.destroy();
       throw error;
@@ -69,8 +76,8 @@ export class GaussianBuffers implements GaussianScene {
   }
 
   /**
-   * Uploads packed Gaussians to the GPU, in as many blocks as the limits of the device require, and in portions that
-   * leave the thread time for other tasks.
+   * Uploads packed Gaussians to the GPU, in as many blocks as the limits of the device require. The upload is divided
+   * into portions, so that the thread can run other tasks between them.
    * @throws GaussianSplatError `out-of-memory/budget`, before anything is allocated, if the scene is larger than
    * `memoryBudget` or than the rest of the device's {@link MemoryLedger}; `out-of-memory/allocation` if the device has
    * too little memory; `network/unreachable` if the code for levels of detail cannot be loaded.
@@ -81,11 +88,14 @@ export class GaussianBuffers implements GaussianScene {
     options: UploadOptions = {},
   ): Promise<GaussianBuffers> {
     const made = await GaussianBuffers.allocate(device, packed, options, packed.details && (await budgetOn(device)));
-    await writeInTurns(device, made.#contentsOf(packed));
+    await made.write(packed);
     return made;
   }
 
-  /** Allocates the buffers of a scene whose bytes come in portions: see {@link write}. Rejects as {@link upload} does. */
+  /**
+   * Allocates the buffers of a scene whose content arrives in portions: see {@link write}. Rejects as {@link upload}
+   * does.
+   */
   static allocate(
     device: GPUDevice,
     packed: SceneSize,
@@ -95,13 +105,28 @@ export class GaussianBuffers implements GaussianScene {
     return withMemoryCheck(device, whatOf(packed), () => new GaussianBuffers(device, packed, memoryBudget, budget));
   }
 
-  /** Copies a portion of the scene to the GPU at once: portions of more than a few megabytes keep the thread. */
-  write(portion: PackedPortion): void {
-    for (const { buffer, offset, words } of this.#contentsOf(portion)) this.#queue.writeBuffer(buffer, offset, words);
+  /**
+   * Copies a portion of the scene to the GPU. The call waits for the GPU between steps, because a browser blocks the
+   * thread if more bytes are in transit than its transfer buffer can hold.
+   */
+  async write(portion: PackedPortion): Promise<void> {
+    for (const { buffer, offset, words } of this.#contentsOf(portion))
+      for (let first = 0; first < words.length;) {
+        if (this.#left === 0) {
+          const before = this.#taken;
+          this.#taken = this.#queue.onSubmittedWorkDone().catch(() => undefined);
+          await before;
+          if (this.#isDestroyed) return;
+          this.#left = WORDS_AT_ONCE;
+        }
+        const count = Math.min(this.#left, words.length - first);
+        this.#queue.writeBuffer(buffer, offset + 4 * first, words, first, count);
+        [first, this.#left] = [first + count, this.#left - count];
+      }
   }
 
   #contentsOf({ start = 0, geometry, sh, chunks, details }: PackedPortion): Content[] {
-    const { pages } = this;
+    const { blocks } = this;
     const shStride = shWords(this.shDegree, this.shPrecision);
     const place = (
       name: 'geometry' | 'sh' | 'chunks' | 'details',
@@ -110,11 +135,11 @@ export class GaussianBuffers implements GaussianScene {
       ofChunks: 1 | typeof constants.CULL_GROUP = 1,
     ): Content[] => {
       const contents: Content[] = [];
-      const capacity = Math.ceil((pages[0]?.count ?? 0) / ofChunks);
+      const capacity = Math.ceil((blocks[0]?.count ?? 0) / ofChunks);
       for (let at = 0, first = start / ofChunks; at < (values?.length ?? 0);) {
         const page = Math.floor(first / capacity);
         const words = wordsOf(values!, at, stride * ((page + 1) * capacity - first));
-        contents.push({ buffer: pages[page][name]!, offset: 4 * stride * (first - page * capacity), words });
+        contents.push({ buffer: blocks[page][name]!, offset: 4 * stride * (first - page * capacity), words });
         at += words.length;
         first += words.length / stride;
       }
@@ -134,12 +159,13 @@ export class GaussianBuffers implements GaussianScene {
   }
 
   destroy(): void {
+    this.#isDestroyed = true;
     this.#reservation.release();
     this.#memory.destroy();
   }
 }
 
-/** Loaded on demand, because few scenes have levels of detail. */
+/** Loads the stages for splat budgets on demand, because few scenes have levels of detail. */
 const budgetOn = (device: GPUDevice): Promise<DetailBudget> =>
   loadModule('the code for budgets of splats', async () => {
     const { detailBudgetOn } = await import('./stages/detail-budget.js');
@@ -148,15 +174,15 @@ const budgetOn = (device: GPUDevice): Promise<DetailBudget> =>
 
 const whatOf = ({ count }: PackedHead): string => `scene of ${count} splats`;
 
-/** Content to write to a part of a buffer. */
+/** Words to write to a part of a buffer. */
 interface Content {
   readonly buffer: GPUBuffer;
-  /** Bytes of the buffer before it. */
+  /** Offset in the buffer in bytes. */
   readonly offset: number;
   readonly words: Uint32Array<ArrayBuffer>;
 }
 
-/** At most `count` numbers from the `from`-th on, as words. */
+/** Returns at most `count` numbers of an array, from index `from` on, as a view of u32. */
 function wordsOf(
   { buffer, byteOffset, length }: Uint32Array | Float32Array,
   from: number,
@@ -165,26 +191,26 @@ function wordsOf(
   return new Uint32Array(buffer as ArrayBuffer, byteOffset + 4 * from, Math.min(count, length - from));
 }
 
-/** The properties that determine the bytes of a scene. */
+/** Properties that determine the size of a scene in bytes. */
 type SceneSize = PackedHead & Pick<PackedGaussians, 'details'>;
 
-/** Bytes that a scene takes on the GPU. */
+/** Returns the GPU memory of a scene in bytes. */
 export function sceneBytes({ count, shDegree, shPrecision, details }: SceneSize): number {
   const perChunk = CHUNK_NUMBERS + (details ? DETAIL_NUMBERS : 0);
   const words = GEOMETRY_WORDS + shWords(shDegree, shPrecision);
   return 4 * (words * count + perChunk * Math.ceil(count / constants.CULL_GROUP));
 }
 
-function makePages(device: GPUDevice, packed: SceneSize, memory: GpuMemory): GaussianBlock[] {
+function makeBlocks(device: GPUDevice, packed: SceneSize, memory: GpuMemory): GaussianBlock[] {
   const shStride = shWords(packed.shDegree, packed.shPrecision);
   const capacity = pageCapacity(device, 4 * Math.max(GEOMETRY_WORDS, shStride));
   const usage = BUFFER_USAGE.storage | BUFFER_USAGE.copyDestination | BUFFER_USAGE.copySource;
-  const pages: GaussianBlock[] = [];
+  const blocks: GaussianBlock[] = [];
   for (let left = packed.count; left > 0; left -= capacity) {
     const count = Math.min(capacity, left);
     const chunks = Math.ceil(count / constants.CULL_GROUP);
     const part = (label: string, words: number): GPUBuffer => memory.buffer(`gs.gaussians.${label}`, 4 * words, usage);
-    pages.push({
+    blocks.push({
       count,
       geometry: part('geometry', GEOMETRY_WORDS * count),
       sh: part('sh', shStride * count),
@@ -192,27 +218,13 @@ function makePages(device: GPUDevice, packed: SceneSize, memory: GpuMemory): Gau
       details: packed.details ? part('details', DETAIL_NUMBERS * chunks) : undefined,
     });
   }
-  return pages;
+  return blocks;
 }
 
-/** Words uploaded in one step: 4 MB, a few milliseconds. */
-const WORDS_AT_ONCE = 1 << 20;
-
-async function writeInTurns({ queue }: GPUDevice, contents: readonly Content[]): Promise<void> {
-  let left = WORDS_AT_ONCE;
-  for (const { buffer, offset, words } of contents)
-    for (let first = 0; first < words.length;) {
-      if (left === 0) {
-        await turn();
-        left = WORDS_AT_ONCE;
-      }
-      const count = Math.min(left, words.length - first);
-      queue.writeBuffer(buffer, offset + 4 * first, words, first, count);
-      [first, left] = [first + count, left - count];
-    }
-}
-
-/** Splats in a block at this many bytes each: as many whole chunks as the limits allow, with one dispatch row each. */
+/**
+ * Returns the maximum number of splats in a block: a multiple of 256 within the limits of the device, which one
+ * dispatch row can process.
+ */
 export function pageCapacity(device: GPUDevice, bytesPerSplat: number): number {
   const { maxBufferSize, maxStorageBufferBindingSize } = device.limits;
   const splats = Math.floor(Math.min(maxBufferSize, maxStorageBufferBindingSize) / bytesPerSplat);

@@ -5,39 +5,39 @@ import type { RenderSettings } from './render-settings.js';
 import type { DetailBudget } from './stages/detail-budget.js';
 import type { ShPrecision } from './pack/words.js';
 
-/** Gaussians in the largest buffers that a shader can bind on the device. */
+/** A block of Gaussians: a scene has as many as its size and the binding limits of the device require. */
 export interface GaussianBlock {
   readonly count: number;
-  /** array<PackedGaussian>, unless {@link reading} says otherwise */
+  /** array<PackedGaussian>, or the layout that {@link reading} reads */
   readonly geometry: GPUBuffer;
-  /** Only for another kind of geometry. */
+  /** Shaders that read another layout of geometry; undefined for PackedGaussian. */
   readonly reading?: GeometryReading;
   /** array<vec2u>: spherical harmonics, see pack/sh.ts */
   readonly sh: GPUBuffer;
   /** array<Chunk>: bounds of each 256 splats */
   readonly chunks: GPUBuffer;
-  /** array<ChunkDetail>, if there are levels of detail. */
+  /** array<ChunkDetail>; undefined without levels of detail. */
   readonly details?: GPUBuffer;
 }
 
-/** Inputs of {@link PageRequests}: a view, and the content of a page of the pool. */
+/** Inputs of {@link PageRequests}: a view, and the content of a page in the pool. */
 export type FeedbackInputs = Readonly<Record<'view' | 'chunks' | 'details' | 'chunk_shares', Resource>>;
 
 /** Settings that influence which pages a view requests. */
 export type FeedbackSettings = Pick<RenderSettings, 'detail' | 'detailFade' | 'splatBudget'>;
 
 /**
- * Carries the pages that a view requests from a frame to the streaming code. Streamed scenes provide it, so that it is
- * loaded only with them.
+ * Transfers the requests of a view for pages from the GPU to the streaming code. Streamed scenes provide it, so that
+ * other pages do not load its code.
  */
 export interface PageRequests {
-  /** Binds a page of the pool, for {@link PageRequests.note}. */
+  /** Returns the bind group of a page in the pool, for {@link PageRequests.note}. */
   bind(page: FeedbackInputs): GPUBindGroup;
   /**
-   * Called with the camera and the settings of each frame. Returns true if this frame should record requests; then the
-   * other four are called in turn, `note` for each page of the pool, `read` after the submit.
+   * Call this with the camera, the settings and `World.changes` of each frame. Returns whether this frame should record
+   * requests. If so, call `begin`, `note` for each page of the pool, `copy`, and after the submit `read`.
    */
-  isDue(camera: Camera, settings: FeedbackSettings): boolean;
+  isDue(camera: Camera, settings: FeedbackSettings, changes: number): boolean;
   begin(encoder: GPUCommandEncoder): void;
   note(pass: GPUComputePassEncoder, bindings: GPUBindGroup, splatCount: number): void;
   copy(encoder: GPUCommandEncoder): void;
@@ -45,11 +45,11 @@ export interface PageRequests {
 }
 
 /**
- * Gaussians on the GPU for a {@link Viewpoint}. `GaussianBuffers` holds those of a file, `DynamicGaussians` those of a
- * generator. Only the content of the buffers changes during its lifetime.
+ * Gaussians on the GPU for a {@link Viewpoint}. `GaussianBuffers` contains those of a file, `DynamicGaussians` those of
+ * a generator. Only the content of the buffers changes during the lifetime of a scene.
  */
 export interface GaussianScene {
-  /** Capacity in splats; all of them are processed, but transparent ones paint nothing. */
+  /** Capacity in splats. All of them are processed, but transparent ones are not drawn. */
   readonly count: number;
   readonly shDegree: ShDegree;
   readonly shPrecision: ShPrecision;
@@ -59,13 +59,13 @@ export interface GaussianScene {
   readonly filterVariance?: number | undefined;
   /** World position, in float64, of the origin of the positions on the GPU. */
   readonly origin: Vector3;
-  readonly pages: readonly GaussianBlock[];
+  readonly blocks: readonly GaussianBlock[];
   /**
-   * Only for a scene with levels of detail: keeps its frames within `RenderSettings.splatBudget`. Such scenes provide
-   * it, so that it is loaded only with them.
+   * Stages that keep frames within `RenderSettings.splatBudget`. Only scenes with levels of detail provide them, so
+   * that other pages do not load their code.
    */
   readonly detailBudget?: DetailBudget | undefined;
-  /** Only for a streamed scene: receives the pages that views need. */
+  /** Requests for the pages that views need; only for a streamed scene. */
   readonly pageRequests?: PageRequests;
   /** Called before each frame: a streamed scene uploads the received pages. */
   update?(): void;

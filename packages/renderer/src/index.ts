@@ -7,7 +7,10 @@ export type { GaussianScene } from './gaussian-scene.js';
 export { PassTimer, type FrameTimer, type PassTime } from './gpu/pass-timer.js';
 export { QUALITIES, type PerFrameSettings, type RenderSettings, type Quality } from './render-settings.js';
 export { LinearColors } from './linear-colors.js';
+export { Stereo, type StereoFrame, type StereoView } from './stereo.js';
+export { Rectangle, type RectangleBounds } from './rectangle.js';
 export { DetailedGaussians } from './levels/detailed-gaussians.js';
+export type { StreamProgress } from './streaming/progress.js';
 export { StreamedGaussians, type PoolOptions, type StreamOptions } from './streaming/streamed-gaussians.js';
 export type { FetchPage, PageSource, StreamedScene } from './streaming/page-source.js';
 export { checkManifest, type DetailManifest } from './streaming/manifest.js';
@@ -25,11 +28,11 @@ export {
   type TargetView,
 } from './frame-target.js';
 export { deviceDescriptor } from './requirements.js';
-export { Viewpoint, type View, type ViewpointOptions } from './viewpoint.js';
+export { Viewpoint, type ViewpointOptions } from './viewpoint.js';
 export { Placement, World, type Box, type Placed } from './world.js';
 export { SceneDepth, type HostDepth, type SceneDepthOptions } from './scene-depth.js';
 export { SequenceGaussians } from './sequence-gaussians.js';
-export type { FrameStatistics } from './statistics.js';
+export type { FrameStats } from './frame-stats.js';
 export type { Variants } from './variants.js';
 export { MemoryLedger } from './memory-ledger.js';
 export { ANIMATION_SLOTS, AnimatedGaussians, type AnimatedRoom } from './animated-gaussians.js';

@@ -4,8 +4,8 @@ import { perDevice, SHADER_STAGE, ShaderProgram, TEXTURE_USAGE, type Resource } 
 import type { Compositor, Target } from './frame-target.js';
 
 /**
- * Colors of a target that holds linear light, for example of a host with a later output pass, or of a `-srgb` format.
- * Splats are blended in encoded colors, as in training, including the content of the target.
+ * Composes splats into a target of linear light, for example of a host with a later output pass, or of a `-srgb`
+ * format. Splats are blended with the content of the target in encoded colors, as in training.
  *
  * ```ts
  * const colors = new LinearColors(device);
@@ -15,7 +15,7 @@ import type { Compositor, Target } from './frame-target.js';
 export class LinearColors implements Compositor {
   readonly #device: GPUDevice;
   readonly #program: ShaderProgram<typeof composeLinear>;
-  /** A copy of the previous content of the target. */
+  /** Copy of the previous content of the target; undefined before it is needed. */
   #content: GPUTexture | undefined;
   #bound: { readonly key: readonly Resource[]; readonly group: GPUBindGroup } | undefined;
 
@@ -25,7 +25,11 @@ export class LinearColors implements Compositor {
     this.#program = perDevice(device, composeLinear.name, () => new ShaderProgram(device, composeLinear, both));
   }
 
-  /** @throws GaussianSplatError `argument/value` if the content of the target is needed and cannot be copied. */
+  /**
+   * Records a render pass that composes accumulated splats over the content of the target, or over nothing.
+   * @param keeps Whether the content of the target is the background.
+   * @throws GaussianSplatError `argument/value` if the content of the target is needed and cannot be copied.
+   */
   compose(
     encoder: GPUCommandEncoder,
     resources: Readonly<Record<'compose' | 'accumulated', Resource>>,
@@ -58,7 +62,7 @@ export class LinearColors implements Compositor {
         where: 'FrameTarget.target',
         expected: 'a texture with the usage COPY_SRC, whose content can be read',
         found: texture ? `usage ${texture.usage}` : 'a view',
-        remedy: "give the texture itself, with COPY_SRC, or a colour in place of over: 'target'",
+        remedy: "give the texture itself, with COPY_SRC, or a color in place of background: 'load'",
       });
     const { textureBinding, copyDestination } = TEXTURE_USAGE;
     const known = this.#content;

@@ -2,35 +2,37 @@ import { GaussianSplatError, type ShDegree } from '@gaussian-splat/core';
 import { constants } from './generated/shaders.js';
 import { CHUNK_NUMBERS, GEOMETRY_WORDS, type ShPrecision, shWords } from './pack/words.js';
 
-/** GPU memory of one splat of a scene in bytes, known before the upload. */
+/** Returns the GPU memory of one splat of a scene in bytes. */
 export function bytesPerSplat(shDegree: ShDegree, shPrecision: ShPrecision): number {
   return 4 * (GEOMETRY_WORDS + shWords(shDegree, shPrecision)) + (4 * CHUNK_NUMBERS) / constants.CULL_GROUP;
 }
 
-/** Bytes that one owner holds; released once. */
+/** GPU memory that one owner has reserved. */
 export interface Reservation {
   readonly label: string;
   readonly bytes: number;
+  /** Returns the bytes to the ledger; further calls have no effect. */
   release(): void;
 }
 
 /**
- * GPU memory of the scenes on a device, and its budget. WebGPU does not report the memory of a GPU: without a budget
- * every request is granted, until the device itself fails.
+ * Ledger of the GPU memory of all scenes on a device, and its budget. WebGPU does not report the memory of a GPU.
+ * Without a budget every request is granted, until the device itself fails.
  */
 export class MemoryLedger {
   /** Upper limit of the bytes of all scenes of the device together. */
   budgetBytes = Infinity;
-  /** Upper limit of the bytes of off-screen scenes while others are loaded. */
+  /** Upper limit of the bytes of off-screen scenes when other scenes are loaded. */
   unseenBytes = Infinity;
   /**
-   * Functions that release memory that will soon be unnecessary, called in order until a request fits, with their bytes
-   * in off-screen scenes. These are also called if their sum exceeds {@link unseenBytes}.
+   * Functions that release memory of little use. The value of each is the bytes that it releases in off-screen scenes,
+   * or 0. Functions are called in order until a request fits. Those with off-screen bytes are also called if the sum of
+   * these bytes exceeds {@link unseenBytes}.
    */
   readonly releasable = new Map<() => void, number>();
   readonly #held = new Set<Reservation>();
 
-  /** Returns the ledger of a device, or of a WebGL context; all its scenes share one. */
+  /** Returns the ledger of a device or WebGL context. All its scenes share one ledger. */
   static of(device: GPUDevice | WebGL2RenderingContext): MemoryLedger {
     const known = LEDGERS.get(device);
     if (known) return known;
@@ -55,10 +57,12 @@ export class MemoryLedger {
   }
 
   /**
-   * Reserves bytes before they are allocated, because a device that runs out of memory may be lost, and the page with
-   * it.
-   * @param most Upper limit of this reservation, besides the rest of the budget; default no limit.
-   * @throws GaussianSplatError `out-of-memory/budget` if either limit is exceeded.
+   * Reserves bytes before they are allocated, because a device that runs out of memory may be lost, together with the
+   * page.
+   * @param label Name of the owner, for error messages.
+   * @param max Upper limit of this reservation in bytes, besides the rest of the budget; default no limit.
+   * @throws GaussianSplatError `out-of-memory/budget` if either limit is exceeded; `argument/value` for a negative
+   * number.
    */
   reserve(label: string, bytes: number, max = Infinity): Reservation {
     if (!(bytes >= 0))

@@ -4,9 +4,9 @@ import type { PixelOrder } from './rasterizers/pixel-order.js';
 
 /** Device resources of `order: 'pixel'`, loaded when a frame first requests it. */
 export interface PixelOrderLoader {
-  /** Undefined until it is loaded. */
+  /** The loaded resources; undefined before. */
   now?: PixelOrder;
-  /** @throws GaussianSplatError `network/unreachable` */
+  /** Loads the resources. @throws GaussianSplatError `network/unreachable` if their code cannot be loaded. */
   load(): Promise<unknown>;
 }
 

@@ -1,12 +1,12 @@
 import type { Placement } from './world.js';
 
-/** A splat of a scene. */
+/** A splat that a probe found, and its scene. */
 export interface ProbedSplat {
-  /** Its placement in the world; undefined if a single scene is drawn with WebGL. */
+  /** Placement of the splat's scene in the world; undefined if a single scene is drawn with WebGL. */
   readonly placement: Placement | undefined;
   /**
-   * Its index in its scene, in storage order: for a file, `packedOrder` maps it to a row. Null for a scene with levels
-   * of detail, whose splats represent several.
+   * Index of the splat in its scene, in storage order. For a file, `packedOrder` maps this index to a row. Null for a
+   * scene with levels of detail, because its splats represent several.
    */
   readonly index: number | null;
 }

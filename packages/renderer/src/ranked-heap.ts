@@ -13,7 +13,7 @@ export class RankedHeap {
     this.#ranks = new Float64Array(capacity);
   }
 
-  /** Items in the order of the heap. */
+  /** Items in the order of the binary heap, without the removed ones. A view of the internal array. */
   get items(): Uint32Array {
     return this.#items.subarray(0, this.#count);
   }
@@ -22,7 +22,7 @@ export class RankedHeap {
     return this.#count;
   }
 
-  /** The largest rank; -Infinity if there is none. */
+  /** The largest rank; -Infinity if the heap is empty. */
   get largest(): number {
     return this.#count === 0 ? -Infinity : this.#ranks[0];
   }
@@ -31,17 +31,18 @@ export class RankedHeap {
     this.#count = 0;
   }
 
-  /** Appends an item without ordering; {@link order} must follow before {@link pop}. */
+  /** Appends an item without ordering the heap: call {@link order} before {@link pop}. */
   add(item: number, rank: number): void {
     this.#items[this.#count] = item;
     this.#ranks[this.#count++] = rank;
   }
 
-  /** Orders all appended items. */
+  /** Orders all appended items, in linear time. */
   order(): void {
     for (let at = (this.#count >> 1) - 1; at >= 0; at--) this.#sink(at);
   }
 
+  /** Inserts an item into an ordered heap. */
   push(item: number, rank: number): void {
     let at = this.#count;
     this.add(item, rank);

@@ -11,15 +11,15 @@ const RUN_BYTES = 4 * GEOMETRY_WORDS * CULL_GROUP;
 /** Centers and opacities of splats. */
 export interface Samples {
   readonly count: number;
-  /** [N, 3] relative to the origin of the scene */
+  /** [N, 3] positions relative to the origin of the scene */
   readonly positions: Float32Array;
-  /** [N] */
+  /** [N] opacities, above 0 and at most 1 */
   readonly opacities: Float32Array;
-  /** Rows of the sample with unusable numbers, which the packing shader replaced by zeros. */
+  /** Number of sampled rows with unusable values, which the packing shader replaced by zeros. */
   readonly unusable: number;
 }
 
-/** Reads evenly spaced runs of splats over the blocks back from the GPU; splats of opacity 0 are skipped. */
+/** Reads evenly spaced runs of 256 splats over the blocks back from the GPU. Splats of opacity 0 are skipped. */
 export async function readSamples(device: GPUDevice, pages: readonly GaussianBlock[]): Promise<Samples> {
   const runs = pages.flatMap(({ geometry, count }) =>
     Array.from({ length: Math.ceil(count / CULL_GROUP) }, (_, run) => ({
@@ -75,7 +75,7 @@ function visibleSamples(words: Uint32Array): Samples {
 const float = new Float32Array(1);
 const bits = new Uint32Array(float.buffer);
 
-/** Same decoding as `unpack_gaussian` of shaders/shared/packed_gaussian.wgsl. */
+/** Returns the opacity of a splat. Same decoding as `unpack_gaussian` of shaders/shared/packed_gaussian.wgsl. */
 function opacityOf(words: Uint32Array, at: number): number {
   bits[0] = (words[at + 5] << 24) | ((words[at + 6] & 0x3ff) << 14) | ((words[at + 7] & 0x3ff) << 4);
   return float[0];

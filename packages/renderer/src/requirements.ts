@@ -28,31 +28,21 @@ export function deviceDescriptor(adapter: GPUAdapter): GPUDeviceDescriptor {
   };
 }
 
-export function requireTextureSize(device: GPUDevice, { width, height }: Camera): void {
-  const limit = device.limits.maxTextureDimension2D;
-  if (Math.max(width, height) <= limit) return;
-  throw new GaussianSplatError('argument/camera', {
-    where: 'camera.width and camera.height',
-    expected: `at most ${limit} pixels each (maxTextureDimension2D of the device)`,
-    found: `${width}x${height}`,
-    remedy: 'draw a smaller image, or several parts of it by moving cx and cy',
-  });
-}
-
-/** Required properties of a target's texture. */
+/** Properties that the texture of a target must have. */
 const TARGET: readonly (readonly [property: keyof GPUTexture, expected: unknown])[] = [
   ['sampleCount', 1],
   ['dimension', '2d'],
 ];
 
 /**
- * @param target Texture to draw into; of a view only the format is known.
- * @throws GaussianSplatError `argument/value` for a texture that cannot be drawn into, or of another size than the
+ * Checks the texture of a target.
+ * @param target Texture of the target; undefined for a view, whose only known property is its format.
+ * @throws GaussianSplatError `argument/value` for a texture that cannot be drawn to, or of another size than the
  * camera's image.
  */
 export function requireTarget(target: GPUTexture | undefined, format: string, { width, height }: Camera): void {
   if (/depth|stencil|[us]int|snorm$|^(bc|etc|eac|astc)/.test(format))
-    throw missing('target', 'a format that colours can be drawn into: rgba8unorm, bgra8unorm, rgba16float, …', format);
+    throw missing('target', 'a format that colors can be drawn into: rgba8unorm, bgra8unorm, rgba16float, …', format);
   if (target === undefined) return;
   const wrong = TARGET.find(([property, expected]) => target[property] !== expected);
   if (wrong) throw missing('target', `a texture of ${wrong[0]} ${String(wrong[1])}`, target[wrong[0]]);
@@ -88,17 +78,23 @@ export function requireBlendable(device: GPUDevice, format: AccumulationFormat):
   });
 }
 
-/** Checks the types of a frame target. @throws GaussianSplatError `argument/value` */
-export function requireFrameTarget({ target, over, colors }: Partial<FrameTarget>, settings: FrameSettings): void {
+/**
+ * Checks the types of a frame target and its settings.
+ * @throws GaussianSplatError `argument/value` for a value of another type, or for a background that requires `colors`.
+ */
+export function requireFrameTarget(
+  { target, background, colors }: Partial<FrameTarget>,
+  settings: FrameSettings,
+): void {
   if (!isObject(target)) throw missing('target', 'a texture, or { view, format } of one', target);
   if (!('createView' in target) && (typeof target.format !== 'string' || !isObject(target.view)))
     throw missing('target', 'a texture, or a view of one with its format: { view, format }', JSON.stringify(target));
   if (!isObject(settings)) throw missing('settings', 'settings(…), or undefined', settings);
-  if (over === 'target' && !colors && formatOf(target).endsWith('-srgb'))
+  if (background === 'load' && !colors && formatOf(target).endsWith('-srgb'))
     throw missing('colors', 'new LinearColors(device), to blend with what a target of linear light holds', colors);
-  if (over === undefined || over === 'target') return;
-  if (over?.length !== 4 || !Array.prototype.every.call(over, Number.isFinite))
-    throw missing('over', "'target', or four finite numbers: premultiplied red, green, blue and alpha", over);
+  if (background === undefined || background === 'load') return;
+  if (background?.length !== 4 || !Array.prototype.every.call(background, Number.isFinite))
+    throw missing('background', "'load', or four finite numbers: premultiplied red, green, blue and alpha", background);
 }
 
 const formatOf = (target: GPUTexture | { readonly format: GPUTextureFormat }): string => target.format;

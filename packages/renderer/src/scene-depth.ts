@@ -8,39 +8,40 @@ import type { AuxiliaryOutputs, PaintingDepth, QuadsWithDepth, RasterizerName } 
 import { rasterizeKernel } from './rasterizers/tile-kernels.js';
 import { BoundImages, type TilePainter } from './rasterizers/tile-painter.js';
 
-/** Depth buffer of a host, which hides splats. */
+/** Depth buffer of a host, whose surfaces hide splats behind them. */
 export interface HostDepth extends DepthPlanes {
   /**
-   * Formats: `depth32float`, `depth24plus`, `depth16unorm`, with or without stencil, or `r32float`; one sample; usage
-   * TEXTURE_BINDING; of any size: it is stretched over the image.
+   * Depth texture with one sample and the usage TEXTURE_BINDING. Formats: `depth32float`, `depth24plus`,
+   * `depth16unorm`, each with or without stencil, or `r32float`. A texture of another size is stretched over the image.
    */
   readonly texture: GPUTexture;
   /**
-   * Meaning of the values. `device`: 0 at the near plane and 1 at the far one, as GPUs write. `linear`: world units
-   * along the optical axis, 0 for no depth. Default: `linear` for `r32float`, else `device`.
+   * Meaning of the values. `device`: from 0 at the near plane to 1 at the far plane, as GPUs write. `linear`: world
+   * units along the optical axis, 0 for no surface. Default: `linear` for `r32float`, otherwise `device`.
    */
   readonly values?: 'device' | 'linear' | undefined;
   /**
-   * A layer of color at this depth, blended among the splats; without it pixels end at the depth. Premultiplied, in the
-   * encoded colors of splats; alpha is the covered fraction of the pixel, so that antialiased edges show the splats
-   * behind. Same size as {@link texture}, usage TEXTURE_BINDING.
+   * Layer of color at this depth, which is blended among the splats. Without it pixels end at the depth. Colors are
+   * premultiplied, and encoded as those of splats. Alpha is the covered fraction of the pixel, so that antialiased
+   * edges show the splats behind. Same size as {@link texture}, usage TEXTURE_BINDING.
    */
   readonly color?: GPUTexture | undefined;
   /**
-   * A second layer for transparent surfaces, in front of or behind the first at each pixel. Same kind and size as the
-   * first.
+   * Second layer for transparent surfaces, in front of or behind the first layer at each pixel. Its textures have the
+   * formats and the size of those of the first layer.
    */
   readonly second?: { readonly texture: GPUTexture; readonly color: GPUTexture } | undefined;
 }
 
-/** Depth input and output of a frame: at least one of the two. */
+/** Depth input and output of a frame. At least one of the two is required. */
 export interface SceneDepthOptions {
   /** Depth of meshes in the frame, which ends pixels of splats. */
   readonly host?: HostDepth | undefined;
   /**
-   * Receives the median depth of the splats, which halves the transmittance, in world units along the optical axis; 0
-   * if more light passes. Same size as the target, format `r32float`, usage STORAGE_BINDING. Frames of fewer
-   * pixels fill its upper left corner: {@link SceneDepth.drawn}. Requires the rasterizer `tiles`.
+   * Texture that receives the median depth of the splats, in world units along the optical axis: the depth at which
+   * their transmittance falls below one half. 0 if more light passes. Same size as the target, format `r32float`, usage
+   * STORAGE_BINDING. Frames with fewer pixels fill the upper left corner: {@link SceneDepth.drawn}. Requires the
+   * rasterizer `tiles`.
    */
   readonly out?: GPUTexture | undefined;
 }
@@ -50,21 +51,21 @@ interface Size {
   readonly height: number;
 }
 
-/** Pixels of the last frame whose depth is in a texture, whichever object wrote it. */
+/** Size in pixels of the last frame whose depth a texture contains. Several objects may write to one texture. */
 const drawnSizes = new WeakMap<GPUTexture, Size>();
 
 const FORMATS = /^(depth(32float|24plus|16unorm)(-stencil8)?|r32float)$/;
 
 /**
- * Depth input and output of a frame: reuse one object for the same textures, so that it is bound once.
+ * Depth input and output of a frame. Reuse one object for the same textures, so that they are bound once.
  *
  * ```ts
  * const depth = new SceneDepth(device, { host: { texture: depthTexture } });
  * viewpoint.draw(camera, { target, background: 'load', depth });
  * ```
  *
- * Frames with depth sort their splats by all 32 bits of it, and use 8 more bytes for each visible splat. Pages without
- * it load none of its code.
+ * Frames with depth sort their splats by all 32 bits of the depth, and use 8 more bytes for each visible splat. Pages
+ * without this class load none of its code.
  */
 export class SceneDepth implements PaintingDepth {
   readonly #outTexture: GPUTexture | undefined;
@@ -79,7 +80,10 @@ export class SceneDepth implements PaintingDepth {
   #layerBindings: GPUBindGroup | undefined;
   #quads: { readonly key: readonly unknown[]; readonly group: GPUBindGroup } | undefined;
 
-  /** @throws GaussianSplatError `argument/value` for a texture that cannot be read or written. */
+  /**
+   * @throws GaussianSplatError `argument/value` for a texture that cannot be read or written, or if both options are
+   * missing.
+   */
   constructor(device: GPUDevice, { host, out }: SceneDepthOptions) {
     if (!host && !out) throw wrong('SceneDepth', 'host, out or both', 'neither');
     if (host) requireHost(host);
@@ -99,8 +103,9 @@ export class SceneDepth implements PaintingDepth {
   }
 
   /**
-   * @throws GaussianSplatError `unsupported/limits` for median depth with quads; `argument/value` for one of another
-   * size, or combined with auxiliary outputs.
+   * Checks the textures for a frame, and writes the uniform of its camera.
+   * @throws GaussianSplatError `unsupported/limits` for a median depth with the rasterizer `quads`; `argument/value`
+   * for an output texture that is too small, or for a frame with auxiliary outputs.
    */
   prepare(
     camera: Camera,
@@ -120,12 +125,15 @@ export class SceneDepth implements PaintingDepth {
     this.#device.queue.writeBuffer(this.#uniform, 0, this.#bytes);
   }
 
-  /** Pixels of the last frame: its settings, or the device's limits, may make it smaller than its target. */
+  /**
+   * Size of the last frame in pixels; zeros before the first. The settings or the limits of the device may make it
+   * smaller than the target.
+   */
   get drawn(): Size {
     return (this.#outTexture && drawnSizes.get(this.#outTexture)) ?? { width: 0, height: 0 };
   }
 
-  /** Texture that receives the median depth. */
+  /** Texture that receives the median depth; undefined without this output. */
   get out(): GPUTexture | undefined {
     return this.#outTexture;
   }
@@ -173,7 +181,7 @@ export class SceneDepth implements PaintingDepth {
     });
   }
 
-  /** Frees its uniform. The textures belong to the host. */
+  /** Destroys the uniform buffer. The textures belong to the host. */
   destroy(): void {
     this.#uniform.destroy();
   }
@@ -195,7 +203,7 @@ export class SceneDepth implements PaintingDepth {
 const isSame = (a: readonly unknown[] | undefined, b: readonly unknown[]): boolean =>
   a?.length === b.length && a.every((value, k) => value === b[k]);
 
-/** Conversion of stored values to camera depths. */
+/** Returns the conversion of the host's values to camera depths: see `deviceReading`. */
 function readingOf(host: HostDepth | undefined, camera: Camera): { inverse: number[]; nothing: number } {
   if (host === undefined || valuesOf(host) === 'linear') return { inverse: [1, 0, 0, 1], nothing: 0 };
   return deviceReading(host, camera);
@@ -244,7 +252,11 @@ function requireOut({ format, usage }: GPUTexture): void {
     throw wrong('SceneDepth.out', 'a texture with the usage STORAGE_BINDING', `usage ${usage}`);
 }
 
-/** @param width Width of the drawn image in pixels. */
+/**
+ * Checks that the output texture can hold the depth of a frame.
+ * @param width Width of the drawn image in pixels.
+ * @param height Height of the drawn image in pixels.
+ */
 function requireRoom(out: GPUTexture, width: number, height: number, rasterizer: RasterizerName): void {
   if (rasterizer !== 'tiles')
     throw new GaussianSplatError('unsupported/limits', {

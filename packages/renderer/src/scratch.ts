@@ -1,55 +1,56 @@
 import { constants, layouts } from './generated/shaders.js';
 import { BUFFER_USAGE } from './gpu/kernel.js';
 import { GpuMemory } from './gpu/memory.js';
-import type { BlockTable } from './page-table.js';
+import type { BlockTable } from './block-table.js';
 import { scanBytes } from './stages/stage.js';
 
-/** Required capacities of the buffers between the stages. */
+/** Number of elements of the buffers between the stages. */
 export interface ScratchSize {
-  /** Splats that may be visible at once. */
+  /** Maximum number of visible splats in a frame. */
   readonly visible: number;
-  /** Cull groups over all blocks. */
+  /** Number of cull groups of all blocks; each has 256 splats. */
   readonly groups: number;
+  /** Number of blocks. */
   readonly pages: number;
 }
 
 const { size: PLAN_SIZE } = layouts.Plan;
 const { size: PAGE_PLAN_SIZE } = layouts.PagePlan;
 
-/** Buffers between the stages of a frame. Their size depends on the scene, never on the camera. */
+/** Buffers between the stages of a frame. Their size does not depend on the camera. */
 export class Scratch {
-  /** Splats that may be visible at once. Survivors beyond it are not drawn, but counted in `Plan.overflow`. */
+  /** Maximum number of visible splats in a frame. Survivors beyond it are not drawn, but counted in `Plan.overflow`. */
   readonly capacity: number;
-  /** Weight of each chunk, followed by one word for the error threshold of a budget in pixels. */
+  /** Weight of each chunk, followed by one f32: the error threshold of a budget in pixels. */
   chunkShares: GPUBuffer;
-  /** See shaders/shared/lod_counts.wgsl. */
+  /** Counts of splats for the splat budget of a frame: see shaders/shared/detail_counts.wgsl. */
   readonly detailCounts: GPUBuffer;
-  /** One bit for each splat. */
+  /** One bit for each splat: whether it survives the cull. */
   visibleBits: GPUBuffer;
-  /** Survivors of each cull group, then their exclusive prefix sums and the total. */
+  /** Number of survivors of each cull group; later their exclusive prefix sums and the total. */
   groupOffsets: GPUBuffer;
-  /** See shaders/shared/cull_stats.wgsl. */
+  /** Statistics of the cull: unusable splats, depth range and coverage. See shaders/shared/cull_stats.wgsl. */
   readonly cullStats: GPUBuffer;
   plan: GPUBuffer;
-  /** First group of each block and of the next one, [block][2]. */
+  /** [blocks, 2] first group of each block and first group of the next block */
   pageRanges: GPUBuffer;
-  /** PlanLimits of plan.wgsl. */
+  /** Buffer with `PlanLimits` of plan.wgsl. */
   readonly limits: GPUBuffer;
-  /** array<ProjectedSplat> by slot. */
+  /** array<ProjectedSplat>, by slot */
   readonly splats: GPUBuffer;
-  /** Depth keys. */
+  /** [visible] depth key of each slot. */
   readonly #keys: GPUBuffer;
-  /** Slots in the order of their keys. Before the sort it lists the survivors. */
+  /** [visible] slots in the order of their keys; before the sort the indices of the survivors */
   readonly #order: GPUBuffer;
   #pingPong: readonly [GPUBuffer, GPUBuffer];
-  /** [block][digit] */
+  /** [blocks of the sort, digits] number of keys with each digit */
   readonly digitCounts: GPUBuffer;
   readonly digitTotals: GPUBuffer;
   readonly #device: GPUDevice;
   readonly #memory: GpuMemory;
   readonly #kept = new Map<string, GPUBuffer>();
 
-  /** @param pingPongBytes Minimum size of {@link spare}. */
+  /** @param pingPongBytes Minimum size of {@link pingPong}. */
   constructor(device: GPUDevice, { visible, groups, pages }: ScratchSize, pingPongBytes: number) {
     const memory = new GpuMemory(device);
     this.#device = device;
@@ -84,25 +85,25 @@ export class Scratch {
     }
   }
 
-  /** Depth keys; the sort alternates between the two. The second is one of {@link spare}. */
+  /** Depth keys. The sort alternates between the two buffers. The second belongs to {@link pingPong}. */
   get keys(): readonly [GPUBuffer, GPUBuffer] {
     return [this.#keys, this.#pingPong[0]];
   }
 
   /**
-   * Slots in the order of their keys; the result is in the first. Before the sort it lists the survivors. The second is
-   * the other of {@link spare}.
+   * Slots in the order of their keys. The first buffer contains the result of the sort, and before the sort the indices
+   * of the survivors. The second belongs to {@link pingPong}.
    */
   get order(): readonly [GPUBuffer, GPUBuffer] {
     return [this.#order, this.#pingPong[1]];
   }
 
-  /** Unused after the sort, and then available to the rasterizer. */
+  /** Two temporary buffers of the sort. The rasterizer may use them afterwards. */
   get pingPong(): readonly [GPUBuffer, GPUBuffer] {
     return this.#pingPong;
   }
 
-  /** Resizes for other blocks; all bindings of the buffers for groups and blocks must be recreated. */
+  /** Resizes the buffers for other blocks. All bindings of the buffers of groups and blocks must be recreated. */
   fitPages(groups: number, pages: number): void {
     const { storage, copyDestination, copySource } = BUFFER_USAGE;
     const grown = (buffer: GPUBuffer, bytes: number): GPUBuffer => {
@@ -118,14 +119,14 @@ export class Scratch {
     this.pageRanges = grown(this.pageRanges, sizes.pageRanges);
   }
 
-  /** Writes the range of groups of each block for the stages. */
-  lay({ pages, firstGroups, groups }: Pick<BlockTable, 'pages' | 'firstGroups' | 'groups'>): void {
-    const ranges = pages.flatMap((_, page) => [firstGroups[page], firstGroups[page + 1]]);
+  /** Writes the range of groups of each block, and the limits of `plan`. */
+  lay({ blocks, firstGroups, groups }: Pick<BlockTable, 'blocks' | 'firstGroups' | 'groups'>): void {
+    const ranges = blocks.flatMap((_, page) => [firstGroups[page], firstGroups[page + 1]]);
     this.#device.queue.writeBuffer(this.pageRanges, 0, Uint32Array.from(ranges));
-    this.#device.queue.writeBuffer(this.limits, 0, Uint32Array.of(pages.length, this.capacity, groups));
+    this.#device.queue.writeBuffer(this.limits, 0, Uint32Array.of(blocks.length, this.capacity, groups));
   }
 
-  /** Resizes {@link spare} for a rasterizer; all its bindings must be recreated. */
+  /** Resizes {@link pingPong} for a rasterizer. All bindings of both buffers must be recreated. */
   fitPingPong(bytes: number): void {
     if (this.#pingPong[0].size === this.#pingPongSize(bytes)) return;
     for (const buffer of this.#pingPong) this.#memory.free(buffer);
@@ -133,34 +134,37 @@ export class Scratch {
   }
 
   /**
-   * Indices of the visible splats by slot, once {@link keepSurvivors} has been recorded, because the sort overwrites
-   * their list.
+   * Indices of the visible splats by slot. Valid after {@link keepSurvivors} is recorded, because the sort overwrites
+   * the original list.
    */
   get survivors(): GPUBuffer {
     return this.kept('survivors');
   }
 
-  /** Record it between `compact` and the sort. */
+  /** Records the copy to {@link survivors}: call it after `compact` and before the sort. */
   keepSurvivors(encoder: GPUCommandEncoder): void {
     encoder.copyBufferToBuffer(this.#order, 0, this.survivors, 0, 4 * this.capacity);
   }
 
-  /** Camera depths by slot, float32, once {@link keepDepths} has been recorded. */
+  /** Camera depths by slot, float32. Valid after {@link keepDepths} is recorded. */
   get depths(): GPUBuffer {
     return this.kept('depths');
   }
 
-  /** Record it between `project` and the sort, which moves the keys; the keys of the frame must be depths. */
+  /**
+   * Records the copy to {@link depths}: call it after `project` and before the sort, which moves the keys. The keys of
+   * the frame must be depths.
+   */
   keepDepths(encoder: GPUCommandEncoder): void {
     encoder.copyBufferToBuffer(this.#keys, 0, this.depths, 0, 4 * this.capacity);
   }
 
-  /** A buffer with `bytes` for each visible splat, created at the first request. */
+  /** Returns a buffer with `bytes` for each visible splat, which is created at the first request. */
   kept(name: string, bytes = 4): GPUBuffer {
     let buffer = this.#kept.get(name);
     if (buffer === undefined) {
-      const { storage, copyDestination } = BUFFER_USAGE;
-      buffer = this.#memory.buffer(`gs.${name}`, bytes * this.capacity, storage | copyDestination);
+      const { storage, copyDestination, copySource } = BUFFER_USAGE;
+      buffer = this.#memory.buffer(`gs.${name}`, bytes * this.capacity, storage | copySource | copyDestination);
       this.#kept.set(name, buffer);
     }
     return buffer;
@@ -195,7 +199,7 @@ const groupBytes = (groups: number, pages: number) => ({
   pageRanges: 8 * Math.max(1, pages),
 });
 
-/** Maximum number of projected splats in one storage buffer of the device. */
+/** Returns the maximum number of projected splats in one storage buffer of the device. */
 export function maxVisible(device: GPUDevice): number {
   const { maxBufferSize, maxStorageBufferBindingSize } = device.limits;
   return Math.floor(Math.min(maxBufferSize, maxStorageBufferBindingSize) / layouts.ProjectedSplat.size);

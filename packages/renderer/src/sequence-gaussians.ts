@@ -6,15 +6,15 @@ import { type PackedGaussians } from './pack/pack.js';
 import { CHUNK_NUMBERS, GEOMETRY_WORDS, type ShPrecision, shWords } from './pack/words.js';
 
 const { CULL_GROUP } = constants;
-/** Factor of the capacity over the first frame. */
+/** Factor of the capacity over the number of splats in the first frame. */
 const HEADROOM = 1.25;
 
-/** Rounds a number of splats up to whole chunks. */
+/** Rounds a number of splats up to whole chunks of 256, at least one. */
 const wholeChunks = (count: number): number => CULL_GROUP * Math.max(1, Math.ceil(count / CULL_GROUP));
 
 /**
- * Gaussians whose content is replaced, frame by frame, by other packed clouds: bindings stay valid, and nothing is
- * allocated while the frames fit.
+ * Gaussians whose content is replaced, frame by frame, by other packed clouds. Bindings stay valid, and nothing is
+ * allocated while the frames fit the capacity.
  */
 export class SequenceGaussians implements GaussianScene {
   readonly shDegree: ShDegree;
@@ -32,7 +32,10 @@ export class SequenceGaussians implements GaussianScene {
     this.shPrecision = frame.shPrecision;
   }
 
-  /** Creates it with the first frame, and a quarter more capacity. Rejects as {@link GaussianBuffers.upload} does. */
+  /**
+   * Creates buffers for 1.25 times the splats of the first frame, and uploads this frame. Rejects as {@link
+   * GaussianBuffers.upload} does.
+   */
   static async create(device: GPUDevice, frame: PackedGaussians, options?: UploadOptions): Promise<SequenceGaussians> {
     const room = wholeChunks(HEADROOM * frame.count);
     const buffers = await GaussianBuffers.upload(device, padded(frame, room), options);
@@ -44,7 +47,7 @@ export class SequenceGaussians implements GaussianScene {
     return this.#buffers.count;
   }
 
-  /** Splats of the current frame. */
+  /** Number of splats of the current frame. */
   get frameCount(): number {
     return this.#frame.count;
   }
@@ -65,8 +68,8 @@ export class SequenceGaussians implements GaussianScene {
     return this.#frame.origin;
   }
 
-  get pages(): readonly GaussianBlock[] {
-    return this.#buffers.pages;
+  get blocks(): readonly GaussianBlock[] {
+    return this.#buffers.blocks;
   }
 
   get version(): number {
@@ -77,7 +80,7 @@ export class SequenceGaussians implements GaussianScene {
     return this.#buffers.byteLength;
   }
 
-  /** Whether a frame fits the capacity, and its harmonics have the same layout. */
+  /** Whether a frame fits the capacity, and its spherical harmonics have the layout of the buffers. */
   fits({ count, shDegree, shPrecision }: PackedGaussians): boolean {
     return count <= this.count && shDegree === this.shDegree && shPrecision === this.shPrecision;
   }
@@ -90,7 +93,7 @@ export class SequenceGaussians implements GaussianScene {
     const stride = shWords(frame.shDegree, frame.shPrecision);
     const end = Math.max(wholeChunks(frame.count), Math.min(before, this.count));
     let first = 0;
-    for (const page of this.pages) {
+    for (const page of this.blocks) {
       const last = Math.min(end, first + page.count);
       if (last > first) {
         this.#writePart(page.geometry, frame.geometry, GEOMETRY_WORDS, first, last);
@@ -107,8 +110,9 @@ export class SequenceGaussians implements GaussianScene {
   }
 
   /**
-   * Writes items `first` to `last` of an array into a buffer that starts with the first of them; zeros beyond the end
-   * of the array.
+   * Writes elements `first` to `last` of an array to the beginning of a buffer. Elements beyond the end of the array
+   * become zeros.
+   * @param stride Number of words of an element.
    */
   #writePart(buffer: GPUBuffer, words: Uint32Array, stride: number, first: number, last: number): void {
     const { queue } = this.#device;
@@ -120,7 +124,7 @@ export class SequenceGaussians implements GaussianScene {
   }
 }
 
-/** Pads a frame with invisible splats of opacity 0. */
+/** Returns the frame with `count` splats; the added ones have opacity 0. */
 function padded(frame: PackedGaussians, count: number): PackedGaussians {
   const stride = shWords(frame.shDegree, frame.shPrecision);
   const geometry = new Uint32Array(GEOMETRY_WORDS * count);

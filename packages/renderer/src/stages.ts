@@ -1,12 +1,14 @@
 /** The individual stages, for tests and for custom pipelines. */
 export { CapacityMonitor, CountBuffers, MIN_CAPACITY } from './capacity.js';
 export { CapacityHistory, type Capacity, type SampledFrame } from './capacity-history.js';
-export { passesSelfTest, packSpheres, sphereCloud } from './autotune/self-test.js';
+export { passesSelfTest } from './autotune/self-test.js';
+export { packSpheres, sphereCloud } from './autotune/spheres.js';
 export { ROUNDS } from './autotune/search.js';
 export { probeDepthStage } from './depth-probe.js';
 export * from './generated/budget-shaders.js';
 export * from './generated/depth-shaders.js';
 export * from './generated/linear-shaders.js';
+export * from './generated/rectangle-shaders.js';
 export * from './generated/live-shaders.js';
 export * from './generated/probe-shaders.js';
 export * from './generated/quantized-shaders.js';

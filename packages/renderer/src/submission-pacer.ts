@@ -2,32 +2,32 @@ import { perDevice } from './gpu/kernel.js';
 import { QueueClock } from './gpu/queue-clock.js';
 
 /**
- * Target duration of one submission, ms. Drivers reset the device after long ones (two seconds on Windows); the margin
- * is for views whose pairs cost more than those of the last measurement.
+ * Target duration of one submission in milliseconds. Drivers reset the device after long ones (two seconds on Windows).
+ * The margin is for views whose pairs cost more than those of the last measurement.
  */
 const BUDGET_MS = 60;
-/** Assumed milliseconds for a pair of splat and bin on an unmeasured device: a slow one. */
+/** Assumed milliseconds for a pair of splat and bin on a device without a measurement: those of a slow device. */
 const UNKNOWN_COST = 0.5e-3;
-/** Below this many pairs, the frame time says little about the cost of a pair. */
-const TELLING_PAIRS = 1 << 16;
 /**
- * Minimum weight of the previous cost, so that one measurement of an easy view, or one unrelated delay, does not
- * decide.
+ * Minimum number of pairs of a frame that determines their cost. The time of a frame with fewer pairs depends little on
+ * them.
  */
+const TELLING_PAIRS = 1 << 16;
+/** Minimum factor of the previous cost in an update. One measurement of an easy view therefore has a limited effect. */
 const MEMORY = 0.5;
 /** Maximum number of submissions, because each has its own cost. */
 const MAX_SUBMITTED = 256;
 
-/** Cost of rasterization on one device, shared by all renderers. */
+/** Cost of rasterization on one device, shared by all its renderers. */
 class DeviceCost {
   /** Milliseconds for a pair of splat and bin, at the slowest place of the image. */
   perPair = UNKNOWN_COST;
 }
 
 /**
- * Determines the number of submissions of a frame so that none occupies the GPU for long. The work of a frame is
- * bounded by the capacity in pairs of splat and bin, even if the camera jumps. The cost of a pair is measured in frames
- * whose counts are read back anyway.
+ * Determines the number of submissions of a frame, so that no submission occupies the GPU for long. The capacity in
+ * pairs of splat and bin bounds the work of a frame, even if the camera jumps. The cost of a pair is measured in frames
+ * whose counts are read back for other reasons.
  */
 export class SubmissionPacer {
   readonly #clock: QueueClock;
@@ -38,27 +38,33 @@ export class SubmissionPacer {
     this.#cost = perDevice(device, 'submission cost', () => new DeviceCost());
   }
 
-  /** Number of submissions for a frame with at most this many pairs of splat and bin: 1 to 256, and 1 for fast frames. */
+  /**
+   * Returns the number of submissions for a frame with at most this many pairs of splat and bin: 1 to 256, and 1 for
+   * fast frames.
+   */
   partsFor(pairs: number): number {
     return Math.min(MAX_SUBMITTED, Math.max(1, Math.ceil((pairs * this.#cost.perPair) / BUDGET_MS)));
   }
 
-  /** Maximum number of pairs for a single submission. */
+  /** Maximum number of pairs of splat and bin in a single submission. */
   get pairsAtOnce(): number {
     return Math.floor(BUDGET_MS / this.#cost.perPair);
   }
 
-  /** Whether a frame with this capacity can measure the cost of a pair. */
+  /** Whether a frame with this capacity in pairs is expensive enough on a slow device to measure the cost of a pair. */
   wantsToKnow(pairs: number): boolean {
     return pairs * UNKNOWN_COST > BUDGET_MS;
   }
 
-  /** Times the submissions of one frame; call it before the first of them. */
+  /** Starts to time the submissions of one frame: call it before the first of them. */
   watch(): SubmissionWatch {
     return new SubmissionWatch(this.#clock);
   }
 
-  /** Updates the cost from the pair count of a watched frame. */
+  /**
+   * Updates the cost of a pair from the times of a frame and its number of pairs. Does nothing for undefined or few
+   * pairs, or if the device was lost.
+   */
   async learn(watch: SubmissionWatch, pairs: Promise<number | undefined>): Promise<void> {
     const [times, painted] = [await watch.painting(), await pairs];
     if (times.length === 0 || painted === undefined || painted < TELLING_PAIRS) return;
@@ -75,19 +81,19 @@ export class SubmissionWatch {
 
   constructor(clock: QueueClock) {
     this.#clock = clock;
-    // Work submitted before this frame.
+    // Marks the end of the work that was submitted before this frame.
     this.note();
   }
 
-  /** Call it after each submission. */
+  /** Records the time of a submission: call it after each submission of the frame. */
   note(): void {
     this.#submitted.push(performance.now());
     this.#done.push(this.#clock.done().then(({ now }) => now));
   }
 
   /**
-   * Milliseconds of each submission that rasterizes: all but the first, or the only one including the earlier stages.
-   * Empty if the device was lost meanwhile.
+   * Resolves to the milliseconds of each submission that rasterizes. The first submission, which contains the earlier
+   * stages, is omitted unless it is the only one. Empty if the device was lost meanwhile.
    */
   async painting(): Promise<number[]> {
     const done = await Promise.all(this.#done).catch(() => []);

@@ -6,7 +6,7 @@ import { BUFFER_USAGE, type Resource } from './gpu/kernel.js';
 import type { GpuMemory } from './gpu/memory.js';
 import type { StructValues } from './gpu/struct.js';
 
-/** Bindings of shaders/ingest.wgsl, and the attributes that each can hold; rotations may be missing. */
+/** Bindings of shaders/ingest.wgsl, and the attributes that each of them can contain. Rotations are optional. */
 const BINDINGS = {
   positions: ['positions'],
   shapes: ['covariances', 'scales'],
@@ -24,12 +24,12 @@ interface RowRange {
   readonly count: number;
 }
 
-/** Finds the regions of a generator's tensors for the bindings of `ingest`. */
+/** Finds the regions of a generator's tensors for the bindings of shaders/ingest.wgsl. */
 export class TensorBindings {
   readonly #layout: GaussianLayout;
   readonly #elementBytes: number;
   readonly #slices: Readonly<Record<Binding, AttributeSlice | undefined>>;
-  /** Placeholder for missing tensors. */
+  /** Placeholder buffer for missing tensors. */
   readonly #nothing: GPUBuffer;
   readonly #numbers = new WeakMap<GPUBuffer, number>();
   #lastNumber = 0;
@@ -41,12 +41,15 @@ export class TensorBindings {
     this.#nothing = memory.buffer('gs.ingest.nothing', 4, BUFFER_USAGE.storage);
   }
 
-  /** Bytes of a row of the widest tensor. */
+  /** Number of bytes of a row in the widest tensor. */
   get bytesPerRow(): number {
     return this.#elementBytes * Math.max(...this.#layout.attributes.map(({ rowStride }) => rowStride));
   }
 
-  /** @throws GaussianSplatError `argument/value` unless every tensor is present and large enough. */
+  /**
+   * Checks the tensors of a run.
+   * @throws GaussianSplatError `argument/value` unless every tensor is present and large enough.
+   */
   check(tensors: Readonly<Record<string, GPUBuffer>>, rows: number, instance: number): void {
     if (rows === 0) return;
     const all = (instance + 1) * rows;
@@ -58,7 +61,7 @@ export class TensorBindings {
       requireBytes(this.#layout.count, tensors[this.#layout.count], countBytes(this.#layout) * (instance + 1));
   }
 
-  /** A key that is equal for the same buffers. */
+  /** Returns a key of the buffers that a run binds: equal for the same buffers. */
   keyOf(tensors: Readonly<Record<string, GPUBuffer>>): string {
     let key = '';
     for (const name of BINDING_NAMES) {
@@ -70,8 +73,8 @@ export class TensorBindings {
   }
 
   /**
-   * Resources for the bindings of a block; the placeholder if the run wrote no rows for it.
-   * @param before Rows of other scenes in the same tensors, in front of the first of this one.
+   * Returns the resources for the bindings of a block. A placeholder replaces tensors without rows for it.
+   * @param before Rows of other scenes in the same tensors, in front of the rows of this scene.
    */
   resources(
     tensors: Readonly<Record<string, GPUBuffer>>,
@@ -106,19 +109,23 @@ export class TensorBindings {
   }
 }
 
-/** Bytes of a live count; int64 has its lower half first. */
+/** Returns the bytes of a live count: 8 for int64, whose lower half is first, otherwise 4. */
 export const countBytes = ({ countDtype }: GaussianLayout): number => (countDtype === 'int64' ? 8 : 4);
 
-/** Alignment of bindings in bytes: the largest that a device may require. */
+/** Alignment of the offsets of bindings in bytes: the largest that a device may require. */
 const ALIGNMENT = 256;
 
-/** Aligned offset of a binding that contains a byte, and the number of bytes in front of it. */
+/** Returns the largest aligned offset that is at most `byte`, and the number of bytes from there to `byte`. */
 function placeOf(byte: number): { readonly offset: number; readonly skipped: number } {
   const offset = Math.floor(byte / ALIGNMENT) * ALIGNMENT;
   return { offset, skipped: byte - offset };
 }
 
-/** `Ingest` of a block, before any run. @param before Rows of other scenes in front of the first of this one. */
+/**
+ * Returns the values of the `Ingest` uniform of a block before any run.
+ * @param first Index of the block's first row among all rows.
+ * @param before Rows of other scenes in the same tensors, in front of the rows of this scene.
+ */
 export function ingestValues(
   layout: GaussianLayout,
   first: number,

@@ -44,12 +44,10 @@ export { type ProbeAnswer, type ProbePoint } from './depth-probe.js';
 export { type ProbedSplat } from './probed-splat.js';
 export { type GaussianBlock, type PageRequests } from './gaussian-scene.js';
 export { QueueClock, type WorkTime } from './gpu/queue-clock.js';
-export { SpanTimer } from './gpu/span-timer.js';
 export { buildPackedLevels, packWithDetail, type PackedLevels } from './levels/packed-levels.js';
 export { packLevelRuns } from './streaming/pack-runs.js';
 export { layoutLevels, type LevelBox, type LevelPage, type LevelScene } from './streaming/level-pages.js';
 export { levelSource, packLevelPage } from './streaming/level-source.js';
-export { turn } from './gpu/page-thread.js';
 export { readPacked } from './pack/packed-scene.js';
 export type { PackedHead } from './pack/pack.js';
 export { sceneBytes, type PackedPortion } from './gaussian-buffers.js';
@@ -69,7 +67,7 @@ export {
   type ShardInfo,
   type ShareLayout,
   type SortedBlock,
-} from './pack/shares.js';
+} from './pack/shards.js';
 export { readBack, readBackWith, type ReadPart } from './gpu/read-back.js';
 export { sortByKey } from './pack/radix-sort.js';
 export { RankedHeap } from './ranked-heap.js';

@@ -3,7 +3,7 @@ import type { RenderSettings } from './render-settings.js';
 import type { AccumulationFormat, RasterizerName } from './rasterizers/rasterizer.js';
 import type { Threads } from './stages/stage.js';
 
-/** Settings that autotuning selects for a device: all of them draw the same image, at different speeds. */
+/** Settings that autotuning selects for a device. All combinations draw the same image, at different speeds. */
 export interface Variants {
   readonly rasterizer: RasterizerName;
   readonly accumulation: AccumulationFormat;
@@ -19,7 +19,7 @@ export const FALLBACK: Variants = {
 /** Variants that most GPUs prefer. */
 export const PREFERRED: Variants = { rasterizer: 'tiles', accumulation: 'rgba16float', threads: 'parallel' };
 
-/** Variants of a device, set by `autotune`. */
+/** Returns the variants of a device, which `autotune` sets. */
 const known = (device: GPUDevice): { variants: Variants } =>
   perDevice(device, 'variants', () => ({ variants: FALLBACK }));
 
@@ -27,13 +27,19 @@ export function setVariants(device: GPUDevice, variants: Variants): void {
   known(device).variants = variants;
 }
 
-/** The current variants of a device. */
+/** Returns the current variants of a device. */
 export const variantsOf = (device: GPUDevice): Variants => known(device).variants;
 
-/** Messages about failed self-tests of a device's variants, which are then not used; empty for a WebGL context. */
+/**
+ * Messages about failed self-tests of a device's variants, which are then not used. The list is empty for a WebGL
+ * context.
+ */
 export const faultsOf = (device: object): string[] => perDevice(device, 'faults', () => []);
 
-/** Replaces every `auto` of the settings by the device's variant. */
+/**
+ * Replaces every `auto` of the settings by the variant of the device. For `order: 'pixel'` the rasterizer becomes
+ * `tiles`.
+ */
 export function resolveSettings(variants: Variants, settings: RenderSettings): RenderSettings & Variants {
   const own = settings.order === 'pixel' ? 'tiles' : variants.rasterizer;
   const rasterizer = settings.rasterizer === 'auto' ? own : settings.rasterizer;

@@ -2,13 +2,19 @@ import { eyeOf, inverse, multiply, normalize, subtract, type Camera, type Vector
 import { constants, type layouts } from './generated/shaders.js';
 import type { StructValues } from './gpu/struct.js';
 
-/** Excess of the Jacobian's clamp over the image, as a fraction of the half field of view: INRIA's 1.3 is 1 + this. */
+/**
+ * Margin by which the Jacobian's clamp exceeds the image, as a fraction of the half field of view. INRIA's factor 1.3
+ * is 1 + this margin.
+ */
 const CLAMP_MARGIN = 0.3;
 
-/** WGSL allows compilers to assume that there is no infinity: an infinite far plane becomes the largest float32. */
+/**
+ * Largest float32. It replaces an infinite far plane, because WGSL allows compilers to assume that there is no
+ * infinity.
+ */
 export const MAX_FLOAT32 = 3.4028234663852886e38;
 
-/** No limit of the coverage. */
+/** `View.max_covered` without a limit. */
 const NO_LIMIT = 0xffffffff;
 
 type ViewValues = StructValues<typeof layouts.View>;
@@ -34,17 +40,18 @@ export type CameraValues = Omit<
 >;
 
 /**
- * Converts a camera to uniforms. The origin is folded into the matrix in float64, so that scenes a million units from
- * the world's origin keep their float32 digits.
- * @param variance Of the scene's low-pass filter, in px².
+ * Converts a camera to uniforms. The matrix contains the origin, combined in float64. Scenes a million units from the
+ * world's origin therefore keep their float32 digits.
+ * @param origin World position of the origin of the Gaussians.
+ * @param variance Variance of the scene's low-pass filter, in px².
  */
 export function cameraValues(camera: Camera, origin: Vector3, variance: number = constants.DILATION): CameraValues {
   const { width, height, fx, fy, cx, cy, near, far, worldToCamera, orthographic = false } = camera;
   const toOrigin = [1, 0, 0, origin[0], 0, 1, 0, origin[1], 0, 0, 1, origin[2], 0, 0, 0, 1];
   const rows = multiply(worldToCamera, toOrigin);
   const columns = Array.from({ length: 16 }, (_, i) => rows[4 * (i % 4) + Math.floor(i / 4)]);
-  // gsplat's form of the clamp: asymmetric for an off-center principal point, INRIA's ±1.3 tan(fov/2) for a centered
-  // one.
+  // The clamp has gsplat's form: asymmetric for an off-center principal point. For a centered one it equals INRIA's
+  // ±1.3 tan(fov/2).
   const marginX = (CLAMP_MARGIN * 0.5 * width) / fx;
   const marginY = (CLAMP_MARGIN * 0.5 * height) / fy;
   const eye = subtract(eyeOf(worldToCamera), origin);
@@ -67,13 +74,16 @@ export function cameraValues(camera: Camera, origin: Vector3, variance: number =
   };
 }
 
-/** Direction of a camera's depth, in the coordinates that its matrix transforms. */
+/** Returns the unit vector of a camera's depth, in the coordinates that its matrix transforms. */
 function axisOf(worldToCamera: Camera['worldToCamera']): Vector3 {
   const m = inverse(worldToCamera);
   return normalize([m[2], m[6], m[10]]);
 }
 
-/** Upper bound of the matrix's factor on the length of a vector: the square root of the largest row sum of |W Wᵀ|. */
+/**
+ * Returns an upper bound of the factor by which a matrix W lengthens vectors: the square root of the largest row sum of
+ * |W Wᵀ|.
+ */
 function stretchOf(worldToCamera: ArrayLike<number>): number {
   const dot = (a: number, b: number): number =>
     worldToCamera[4 * a] * worldToCamera[4 * b] +
@@ -83,7 +93,9 @@ function stretchOf(worldToCamera: ArrayLike<number>): number {
   return Math.sqrt(Math.max(rowSum(0), rowSum(1), rowSum(2)));
 }
 
-/** The same view with fewer pixels. */
+/**
+ * Returns a camera of the same view with fewer pixels: `scale` is a factor of width and height, and neither becomes 0.
+ */
 export function scaled(camera: Camera, scale: number): Camera {
   if (scale === 1) return camera;
   const width = Math.max(1, Math.round(camera.width * scale));

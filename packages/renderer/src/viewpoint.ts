@@ -8,6 +8,7 @@ import type { PageRequests } from './gaussian-scene.js';
 import { constants, layouts } from './generated/shaders.js';
 import { BUFFER_USAGE, TEXTURE_USAGE } from './gpu/kernel.js';
 import { GpuMemory } from './gpu/memory.js';
+import type { FrameTimer } from './gpu/pass-timer.js';
 import { writeStruct } from './gpu/struct.js';
 import { orderOn } from './pixel-order-loader.js';
 import type { RenderSettings } from './render-settings.js';
@@ -20,16 +21,10 @@ import { SubmissionPacer, type SubmissionWatch } from './submission-pacer.js';
 import type { FrameCounts } from './capacity.js';
 import { checkArguments, checkFrame, settingsOf } from './checks.js';
 import { copyCounts } from './copy-counts.js';
-import type { FrameStatistics } from './statistics.js';
+import type { FrameStats } from './frame-stats.js';
 import { resolveSettings, variantsOf, type Variants } from './variants.js';
 import { scaled } from './view.js';
 import type { World } from './world.js';
-
-/** One of several views: see {@link Viewpoint.drawAll}. */
-export interface View {
-  readonly camera: Camera;
-  readonly target: FrameTarget;
-}
 
 /** Number of submissions of a frame, and the watch that times them. */
 interface Submissions {
@@ -38,39 +33,39 @@ interface Submissions {
 }
 
 const TRANSPARENT = [0, 0, 0, 0] as const;
-/** View of a target: a render attachment has one level and one layer. */
+/** Descriptor of a target's view: a render attachment has one level and one layer. */
 const ONE_IMAGE: GPUTextureViewDescriptor = { dimension: '2d', mipLevelCount: 1, arrayLayerCount: 1 };
 
 /** Options of a {@link Viewpoint}. */
 export interface ViewpointOptions {
-  /** Default settings of frames. They determine the allocations. */
+  /** Default settings of frames. They determine the allocations of the viewpoint. */
   readonly settings?: FrameSettings;
   /**
-   * Called when a drawn frame lacked splats because of the capacity of the viewpoint's buffers. The next frame has
-   * enough: draw it.
+   * Called when a drawn frame lacked splats because of the capacity of the viewpoint's buffers, or its code had not
+   * loaded. Draw the next frame, which has enough capacity.
    */
   readonly onIncomplete?: () => void;
   /**
-   * Whether to draw fewer pixels if the splats of a frame cover it more than a thousand times, plus once for each 500
-   * splats. Its largest splats are missing until the coverage is known: see `onIncomplete`. Default: false.
+   * Whether to draw fewer pixels if the splats of a frame cover it too often: more than 1,000 times, plus once for each
+   * 500 splats. The largest splats are missing until the coverage is known: see `onIncomplete`. Default: false.
    */
   readonly limitsOverdraw?: boolean;
 }
 
-/** A frame that has been encoded. */
+/** A frame that has been encoded, and what follows after its last command. */
 interface Encoded {
-  /** Encoder for the commands that follow. */
+  /** Encoder for the commands after the frame. */
   readonly last: GPUCommandEncoder;
-  /** Whether its counts are to be read. */
+  /** Whether the counts of the frame are to be read. */
   readonly isWatched: boolean;
   readonly submissions: Submissions;
-  /** Page requests of streamed scenes that are to be read. */
+  /** Page requests of streamed scenes, which are to be read after the submit. */
   readonly requests: readonly PageRequests[];
   readonly resources: Resources;
 }
 
 /**
- * Draws a world, on your own device.
+ * Draws a world on a device of the host.
  *
  * ```ts
  * const world = new World();
@@ -79,15 +74,21 @@ interface Encoded {
  * viewpoint.draw(camera, { target: texture });
  * ```
  *
- * Memory is allocated when scenes are added, and when the image size or the fraction of visible splats changes, never
- * while only the camera or a scene moves; no frame waits for a read-back. Each frame sorts the splats that it shows.
+ * Memory is allocated when scenes are added, and when the image size or the fraction of visible splats changes. Nothing
+ * is allocated while only the camera or a scene moves. No frame waits for a read-back. Each frame sorts the splats that
+ * it shows.
  */
 export class Viewpoint {
   readonly world: World;
+  /**
+   * Number of image sizes whose buffers are kept between frames. Hosts that draw several views in turn, such as two
+   * eyes or thumbnails, need more than one.
+   */
+  maxSizes = 1;
   readonly #device: GPUDevice;
   /** Resolved settings by the settings object. */
   #known = new WeakMap<FrameSettings, RenderSettings & Variants>();
-  /** The current variants for `auto`, until the settings change: no frame changes them. */
+  /** Variants that replace `auto`. They change only with the settings, not from frame to frame. */
   #variants: Variants;
   readonly #compose: ComposeStage;
   readonly #pacer: SubmissionPacer;
@@ -99,12 +100,11 @@ export class Viewpoint {
   readonly #views = new WeakMap<GPUTexture, GPUTextureView>();
   #settings: FrameSettings;
   #engine: Engine;
-  #maxSizes = 1;
-  /** Auxiliary outputs of the last frame that had any. */
+  /** Auxiliary outputs of the last frame with such outputs. */
   #auxiliary: AuxiliaryTilePainter | undefined;
-  /** Whether the code for the last frame's order was still loading. */
+  /** Whether the last frame was drawn by `center`, because the code for `order: 'pixel'` was still loading. */
   #lacksOrder = false;
-  /** Buffers of the last frame, and its pixels for each pixel of the target; undefined before the first. */
+  /** Inputs of the last frame, and its width as a fraction of the target's; undefined before the first frame. */
   #last: (ProbeSource & { readonly scale: number }) | undefined;
 
   /** @throws GaussianSplatError `unsupported/limits` if settings need a feature that the device lacks. */
@@ -127,7 +127,7 @@ export class Viewpoint {
     this.#engine = this.#makeEngine(this.#resolve(settings));
   }
 
-  /** Default settings of frames. */
+  /** Default settings of frames. A change updates the variants that replace `auto`. */
   get settings(): FrameSettings {
     return this.#settings;
   }
@@ -141,7 +141,7 @@ export class Viewpoint {
     this.#useEngine(resolved);
   }
 
-  /** The {@link settings} with every `auto` resolved for this device. */
+  /** The {@link settings}, with every `auto` replaced by the variant of the device. */
   get resolvedSettings(): RenderSettings & Variants {
     return this.#resolve(this.#settings);
   }
@@ -156,19 +156,19 @@ export class Viewpoint {
     return this.#overdraw?.share ?? 1;
   }
 
-  /** Bytes of GPU memory allocated between frames, without scenes. */
+  /** Bytes of GPU memory that is kept between frames, without the scenes. */
   get byteLength(): number {
     return this.#memory.byteLength + this.#engine.byteLength;
   }
 
-  /** Rasterization inputs of the last frame with auxiliary outputs; undefined before the first. */
+  /** Rasterization inputs of the last frame with auxiliary outputs; undefined before the first such frame. */
   get auxiliary(): AuxiliaryFrame | undefined {
     return this.#auxiliary?.frame;
   }
 
   /**
-   * Compiles the pipelines for other settings, so that no frame has to. Their small amount of memory is allocated with
-   * the next frame.
+   * Compiles the pipelines for other settings, so that no frame compiles them. Their small amount of memory is
+   * allocated with the next frame.
    * @param targetFormat Format of the targets.
    * @throws GaussianSplatError `argument/value` for a setting out of range.
    */
@@ -189,47 +189,32 @@ export class Viewpoint {
    * `out-of-memory/buffer-limit` if the scenes need a larger buffer than the device allows.
    */
   draw(camera: Camera, frameTarget: FrameTarget, settings: FrameSettings = this.#settings): void {
-    const { timer } = frameTarget;
     const encoder = this.#device.createCommandEncoder({ label: 'gs.frame' });
     const encoded = this.#encode(encoder, camera, frameTarget, settings, true);
-    const { last, isWatched, submissions, requests, resources } = encoded;
-    timer?.endFrame?.(last);
-    for (const request of requests) request.copy(last);
-    if (isWatched) this.#watch(last, resources);
-    this.#submit(last, submissions);
-    timer?.submitted?.();
-    const counts = isWatched ? this.#read(resources) : undefined;
-    if (counts && submissions.watch) {
-      void this.#pacer.learn(
-        submissions.watch,
-        counts.then((painted) => painted?.pairs),
-      );
-    }
-    for (const request of requests) request.read();
+    this.#close(encoded.last, encoded, frameTarget.timer);
   }
 
   /**
-   * Draws several views of the world, such as both eyes or thumbnails: recurring sizes keep their buffers.
-   * @throws GaussianSplatError as {@link draw} does.
-   */
-  drawAll(views: readonly View[], settings: FrameSettings = this.#settings): void {
-    this.#maxSizes = new Set(views.map(({ camera: { width, height } }) => `${width} ${height}`)).size || 1;
-    for (const { camera, target } of views) this.draw(camera, target, settings);
-  }
-
-  /**
-   * Records one frame into a host's encoder, between its passes, and submits nothing. The host must submit within the
-   * same task, because the next frame reads the counts and page requests of this one. Record a viewpoint once for each
-   * submission: its uniforms are those of the last recorded frame. `submissions` of the settings, and `timer` of the
-   * frame, are ignored.
+   * Records one frame into a host's encoder, between passes of the host, and submits nothing. The host must submit the
+   * encoder within the same task, because the next frame reads the counts and page requests of this one. Record a
+   * viewpoint only once for each submission, because its uniforms are those of the last recorded frame. `submissions`
+   * of the settings and `timer` of the frame are ignored.
    * @throws GaussianSplatError as {@link draw} does.
    */
   record(encoder: GPUCommandEncoder, camera: Camera, frameTarget: FrameTarget, settings = this.#settings): void {
     const encoded = this.#encode(encoder, camera, { ...frameTarget, timer: undefined }, settings, false);
-    if (encoded.isWatched || encoded.requests.length > 0) setTimeout(() => this.#readLater(encoded));
+    if (!encoded.isWatched && encoded.requests.length === 0) return;
+    // The timeout runs after the host has submitted the frame in its task.
+    setTimeout(() => {
+      if (this.#engine.resources.current === encoded.resources)
+        this.#close(this.#device.createCommandEncoder({ label: 'gs.read' }), encoded);
+    });
   }
 
-  /** Records a frame. @param mayDivide Whether it may be divided into several submissions. */
+  /**
+   * Records a frame. Returns the encoder for the commands after the frame, and the data that {@link #close} needs.
+   * @param mayDivide Whether the frame may be divided into several submissions.
+   */
   #encode(
     encoder: GPUCommandEncoder,
     camera: Camera,
@@ -245,7 +230,7 @@ export class Viewpoint {
     const target = this.#targetOf(frameTarget, camera);
     const order = this.#orderOf(asked);
     this.#lacksOrder = !order && asked.order === 'pixel';
-    // Sorted exactly, so that a pixel may end at the first hidden splat.
+    // Exact keys let a pixel end at the first splat that a mesh hides.
     const isExact = (depth && !order) || asked.order === 'distance';
     const resolved = isExact
       ? { ...asked, depthKeyBits: 32 as const, ...(depth && { order: 'center' as const }) }
@@ -258,8 +243,11 @@ export class Viewpoint {
     table.update();
     timer?.startFrame();
     const pixelArea = (drawn.width * drawn.height) / (camera.width * camera.height);
-    table.look(drawn, pixelArea, resolved, frameTarget.filter, this.#overdraw?.maxFor(table.splats));
-    const requests = recordProjection(encoder, {
+    const look = (seen: Camera): void =>
+      table.look(seen, pixelArea, resolved, frameTarget.filter, this.#overdraw?.maxFor(table.splats));
+    look(drawn);
+    const requests = (frameTarget.project ?? recordProjection)(encoder, {
+      look,
       stages,
       bindings,
       scratch,
@@ -287,50 +275,58 @@ export class Viewpoint {
     return { last, isWatched, submissions, requests, resources };
   }
 
-  #watch(encoder: GPUCommandEncoder, { monitor, scratch }: Resources): void {
-    monitor.record(encoder, scratch, this.#engine.rasterizer.pairPlan);
+  /** Submits the last commands of a frame, and starts to read its counts and page requests. */
+  #close(encoder: GPUCommandEncoder, frame: Encoded, timer?: FrameTimer): void {
+    const { isWatched, submissions, requests, resources } = frame;
+    timer?.endFrame?.(encoder);
+    for (const request of requests) request.copy(encoder);
+    const isRead = isWatched && resources.monitor.record(encoder, resources.scratch, this.#engine.rasterizer.pairPlan);
+    this.#submit(encoder, submissions);
+    timer?.submitted?.();
+    const counts = isRead ? this.#read(resources) : undefined;
+    if (counts && submissions.watch) {
+      void this.#pacer.learn(
+        submissions.watch,
+        counts.then((painted) => painted?.pairs),
+      );
+    }
+    for (const request of requests) request.read();
   }
 
-  /** Reads the counts of a frame, and evaluates them. */
+  /**
+   * Reads the counts of a frame, and updates the capacity and the overdraw limit. Resolves to undefined if the device
+   * is lost.
+   */
   async #read({ monitor, table }: Resources): Promise<FrameCounts | undefined> {
     const counts = await monitor.read();
     if (counts && this.#overdraw?.note(counts.covered / constants.COVERED_UNIT, table.splats)) this.#onIncomplete();
     return counts;
   }
 
-  /** Reads the counts and requests of a frame that a host has submitted. */
-  #readLater({ resources, isWatched, requests }: Encoded): void {
-    if (this.#engine.resources.current !== resources) return;
-    const encoder = this.#device.createCommandEncoder({ label: 'gs.read' });
-    for (const request of requests) request.copy(encoder);
-    if (isWatched) this.#watch(encoder, resources);
-    this.#device.queue.submit([encoder.finish()]);
-    if (isWatched) void this.#read(resources);
-    for (const request of requests) request.read();
-  }
-
-  /** Returns the counts of the last frame. Reads back from the GPU: call it for tests and panels, not for every frame. */
-  async statistics(): Promise<FrameStatistics> {
-    const { readStatistics } = await loadModule('the code for counts', () => import('./statistics.js'));
+  /**
+   * Returns the counts of the last frame. Reads back from the GPU: call this for tests and panels, not for every frame.
+   */
+  async stats(): Promise<FrameStats> {
+    const { readFrameStats } = await loadModule('the code for counts', () => import('./frame-stats.js'));
     const { scratch } = this.#engine.resources.current ?? {};
-    return readStatistics(this.#device, scratch, this.#engine.rasterizer.pairPlan);
+    return readFrameStats(this.#device, scratch, this.#engine.rasterizer.pairPlan);
   }
 
   /**
-   * The per-pixel order of a frame; undefined if the frame has none, or it is still loading: {@link
-   * ViewpointOptions.onIncomplete} then follows.
+   * Returns the stages for `order: 'pixel'`. Undefined for other orders, and while their code is loading. {@link
+   * ViewpointOptions.onIncomplete} is then called after the load.
    */
   #orderOf({ order }: RenderSettings): PixelOrder | undefined {
     if (order !== 'pixel') return undefined;
     const lazy = orderOn(this.#device);
-    // Callers of `isComplete` receive the error.
+    // This promise ignores a failed load: `isComplete` rejects with its error.
     if (!lazy.now) lazy.load().then(this.#onIncomplete, () => undefined);
     return lazy.now;
   }
 
   /**
-   * Whether the last frame had enough capacity, and all code, for everything that it should show; if not, the next one
-   * will. Reads back from the GPU: call it for single images, not for every frame.
+   * Whether the last frame had enough capacity and all code to show everything. Otherwise the next frame will. Reads
+   * back from the GPU: call it for single images, not for every frame. Rejects if code cannot be loaded.
    */
   async isComplete(): Promise<boolean> {
     if (this.#engine.resources.current === undefined) return true;
@@ -338,23 +334,27 @@ export class Viewpoint {
       await orderOn(this.#device).load();
       return false;
     }
-    const { visible, overflow, pairs, pairOverflow, covered } = await this.statistics();
+    const { visible, overflow, pairs, pairOverflow, covered } = await this.stats();
     const hadRoom = this.hadRoom(Uint32Array.of(visible, overflow, pairs, pairOverflow));
-    const { splats } = this.#engine.resources.current!.table;
-    return this.#overdraw?.note(covered, splats) !== true && hadRoom;
+    // Undefined if the viewpoint was destroyed, or got other variants, during the read-back.
+    const { table } = this.#engine.resources.current ?? {};
+    return !(table && this.#overdraw?.note(covered, table.splats)) && hadRoom;
   }
 
   /**
-   * Copies the counts that {@link hadRoom} evaluates into 16 bytes of a buffer, for callers that draw many images
-   * before they read anything back.
-   * @param offset Bytes, a multiple of 4.
+   * Copies the counts for {@link hadRoom} into 16 bytes of a buffer, for callers that draw many images before a
+   * read-back.
+   * @param offset Offset in the buffer in bytes, a multiple of 4.
    */
   copyCounts(encoder: GPUCommandEncoder, buffer: GPUBuffer, offset: number): void {
     const { scratch } = this.#engine.resources.current ?? {};
     if (scratch) copyCounts(encoder, scratch.plan, this.#engine.rasterizer.pairPlan, buffer, offset);
   }
 
-  /** Whether the frame of these four counts had enough capacity; if not, the following ones will. */
+  /**
+   * Whether the frame with these four counts had enough capacity. Otherwise the capacity grows for the following
+   * frames.
+   */
   hadRoom([visible, overflow, pairs, pairOverflow]: Uint32Array): boolean {
     if (overflow + pairOverflow === 0) return true;
     this.#engine.resources.current?.monitor.judge({ visible: visible + overflow, pairs: pairs + pairOverflow }, false);
@@ -362,9 +362,10 @@ export class Viewpoint {
   }
 
   /**
-   * Probes single points of the last frame: opacity, depth of the surface, and what hides a given depth. Works with all
-   * rasterizers. Reads back from the GPU: call it for clicks and labels, not for every frame. Rejects if the device is
-   * lost meanwhile, and with GaussianSplatError `network/unreachable` if its code cannot be loaded.
+   * Probes points of the last frame: opacity, depth of the surface, and transmittance in front of a given depth. Works
+   * with all rasterizers. Reads back from the GPU: call it for clicks and labels, not for every frame. Rejects if the
+   * device is lost meanwhile, and with GaussianSplatError `network/unreachable` if its code cannot be loaded.
+   * @param points Points in pixels of the target.
    * @returns An answer for each point; empty before the first frame.
    */
   async probe(points: readonly ProbePoint[]): Promise<ProbeAnswer[]> {
@@ -375,7 +376,7 @@ export class Viewpoint {
     return probe(this.#device, { stages, bindings }, drawn);
   }
 
-  /** Frees all GPU memory, except that of scenes, which belong to their creators. */
+  /** Frees all GPU memory of the viewpoint. Scenes belong to their creators. */
   destroy(): void {
     this.#engine.destroy();
     this.#last = undefined;
@@ -387,11 +388,11 @@ export class Viewpoint {
     target: Target,
     camera: Camera,
     how: Pick<Painting, 'settings' | 'timer' | 'depth' | 'depths' | 'painter'>,
-    { over, colors }: FrameTarget,
+    { background: behind, colors }: FrameTarget,
     submissions: Submissions,
   ): GPUCommandEncoder {
-    const keeps = over === 'target';
-    const background = keeps ? TRANSPARENT : (over ?? TRANSPARENT);
+    const keeps = behind === 'load';
+    const background = keeps ? TRANSPARENT : (behind ?? TRANSPARENT);
     const isFullSize = camera.width === target.width && camera.height === target.height;
     const isStored = target.isStorable && !keeps && !colors && this.#engine.rasterizer.finishes(target.format);
     if (isFullSize && isStored) {
@@ -411,7 +412,7 @@ export class Viewpoint {
     return last;
   }
 
-  /** Number of submissions of this frame: enough to keep each of them short. */
+  /** Returns the number of submissions of this frame, which keeps each of them short. */
   #submissionsFor(isWatched: boolean): Submissions {
     const min = Math.ceil(this.resolvedSettings.submissions);
     if (this.#engine.rasterizer.pairPlan === undefined) return { parts: min };
@@ -425,7 +426,7 @@ export class Viewpoint {
     watch?.note();
   }
 
-  /** Variant of tile or quad rasterization for frames with depth or auxiliary outputs. */
+  /** Selects the variant of the rasterizer for frames with depth, auxiliary outputs, or an order for each pixel. */
   #wayToPaint(
     { depth, auxiliary }: FrameTarget,
     resolved: RenderSettings,
@@ -441,13 +442,15 @@ export class Viewpoint {
     return { painter };
   }
 
-  /** Records the rasterization, in several submissions if required. @returns The encoder for the commands that follow. */
+  /**
+   * Records the rasterization, in several submissions if required. @returns The encoder for the commands that follow.
+   */
   #recordParts(encoder: GPUCommandEncoder, painting: Painting, submissions: Submissions): GPUCommandEncoder {
     const { parts: count } = submissions;
     this.#engine.rasterizer.prepareFrame(encoder, painting);
     let current = encoder;
     for (let index = 0; index < count; index++) {
-      // The stages before the rasterizer are a submission of their own, too.
+      // Submits the previous part; the first one contains the stages before the rasterizer.
       if (count > 1) {
         this.#submit(current, submissions);
         current = this.#device.createCommandEncoder({ label: `gs.frame.${index}` });
@@ -457,7 +460,7 @@ export class Viewpoint {
     return current;
   }
 
-  /** Resolves settings for this device, without any `auto`. */
+  /** Resolves settings for this device: every `auto` is replaced by a variant. The result is cached. */
   #resolve(settings: FrameSettings): RenderSettings & Variants {
     const known = this.#known.get(settings);
     if (known) return known;
@@ -466,7 +469,7 @@ export class Viewpoint {
     return made;
   }
 
-  /** The engine for frames with these settings: created again if they need another rasterizer. */
+  /** Returns the engine for frames with these settings. Replaces the engine if they need other variants. */
   #useEngine(resolved: RenderSettings & Variants): Engine {
     if (this.#engine.serves(resolved)) return this.#engine;
     const engine = this.#makeEngine(resolved);
@@ -491,20 +494,23 @@ export class Viewpoint {
     return { view, texture: target, format: target.format, isStorable, width, height };
   }
 
-  /** Sized for frames of this target at the default settings: a frame with fewer pixels uses a part of it. */
+  /**
+   * Returns the accumulation for frames of this target. Its size is that of frames at the default settings; frames with
+   * fewer pixels use a part of it.
+   */
   #accumulationOf(drawn: Camera, target: Target): Accumulation {
     const share = this.resolvedSettings.resolutionScale;
     const width = Math.max(drawn.width, Math.round(target.width * share));
     const height = Math.max(drawn.height, Math.round(target.height * share));
-    return this.#engine.accumulationOf({ width, height }, this.#maxSizes, (accumulated) =>
+    return this.#engine.accumulationOf({ width, height }, this.maxSizes, (accumulated) =>
       this.#compose.bind({ compose: this.#composeUniform, accumulated }),
     );
   }
 }
 
 /**
- * Whether a frame is drawn with the full settings of rest: one with fewer pixels, or with an earlier stop, says less
- * about the required capacity.
+ * Whether a frame has at least the resolution and the accuracy of the settings at rest. Other frames say less about the
+ * required capacity.
  */
 const isWhole = (resolved: RenderSettings, base: RenderSettings): boolean =>
   resolved.resolutionScale >= base.resolutionScale && resolved.transmittanceMin <= base.transmittanceMin;

@@ -2,8 +2,8 @@ import type { Ball, Bounds, Matrix4, Vector3 } from '@gaussian-splat/core';
 import type { Box, Placed, World } from './world.js';
 
 /**
- * Returns the bounds of the visible scenes of a world, in world units, over those with known bounds; undefined if there
- * are none.
+ * Returns the bounds in world units of the visible scenes of a world whose bounds are known; undefined if there are
+ * none.
  */
 export function boundsOfWorld({ placements }: Pick<World, 'placements'>): Bounds | undefined {
   const all = placements.flatMap((placement) => {
@@ -13,7 +13,7 @@ export function boundsOfWorld({ placements }: Pick<World, 'placements'>): Bounds
   return all.length > 0 ? all.reduce(union) : undefined;
 }
 
-/** Transforms a point of a scene to the world. */
+/** Transforms a point from scene to world coordinates; `m` is undefined for the identity. */
 function inWorld(m: Matrix4 | undefined, [x, y, z]: Vector3): Vector3 {
   if (m === undefined) return [x, y, z];
   const row = (r: number): number => m[r] * x + m[r + 1] * y + m[r + 2] * z + m[r + 3];
@@ -37,7 +37,7 @@ function placedBounds(bounds: Bounds, { sceneToWorld: m, crop }: Placed): Bounds
   return { min: of(Math.min), max: of(Math.max), ...ball(cropped), ...(subject && { subject: ball(subject) }) };
 }
 
-/** Bounds of a scene after a crop. */
+/** Returns the bounds of a cropped scene, in its own coordinates. */
 function cut(bounds: Bounds, crop: Box): Bounds {
   const clamp = (p: Vector3): Vector3 => {
     const at = (axis: number): number => Math.min(crop.max[axis], Math.max(crop.min[axis], p[axis]));
@@ -46,7 +46,7 @@ function cut(bounds: Bounds, crop: Box): Bounds {
   const [min, max] = [clamp(bounds.min), clamp(bounds.max)];
   const reach = Math.hypot(max[0] - min[0], max[1] - min[1], max[2] - min[2]) / 2;
   const { center, radius } = bounds;
-  // Centers the sphere on the cropped part, so that a camera frames it.
+  // Moves the center of the sphere to the cropped part, so that a camera frames this part.
   const middle = (axis: number): number => {
     if (min[axis] === bounds.min[axis] && max[axis] === bounds.max[axis]) return center[axis];
     const from = Math.max(min[axis], Math.min(max[axis], center[axis] - radius));
@@ -56,7 +56,7 @@ function cut(bounds: Bounds, crop: Box): Bounds {
   return { min, max, center: [middle(0), middle(1), middle(2)], radius: Math.min(radius, reach) || radius };
 }
 
-/** Bounds of two scenes together. */
+/** Returns the bounds that contain both arguments. */
 function union(a: Bounds, b: Bounds): Bounds {
   const pick = (choose: (x: number, y: number) => number, p: Vector3, q: Vector3): Vector3 => [
     choose(p[0], q[0]),
@@ -68,7 +68,7 @@ function union(a: Bounds, b: Bounds): Bounds {
   return { ...boxes, ...joined(a, b), ...(subject && { subject }) };
 }
 
-/** The smallest sphere around two. */
+/** Returns the smallest sphere that contains both spheres. */
 function joined(a: Ball, b: Ball): Ball {
   const [dx, dy, dz] = [0, 1, 2].map((axis) => b.center[axis] - a.center[axis]);
   const distance = Math.hypot(dx, dy, dz);

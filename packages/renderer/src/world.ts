@@ -8,32 +8,36 @@ export interface Box {
   readonly max: Vector3;
 }
 
-/** Placement of a scene in a {@link World}. */
+/** Options of a scene in a {@link World}. */
 export interface Placed {
   readonly scene: GaussianScene;
   /**
-   * Scene to world, row-major 4x4, last row (0, 0, 0, 1), float64: any invertible affine matrix. Default: the identity.
+   * Matrix from scene to world coordinates: row-major 4x4, float64, last row (0, 0, 0, 1). Any invertible affine
+   * matrix. Default: the identity.
    */
   readonly sceneToWorld?: Matrix4 | undefined;
   /**
-   * Opacity of the scene, 0 to 1, as in CSS: that of a surface that is opaque at 1. Several surfaces hide more.
-   * Default: 1.
+   * Opacity of the scene, 0 to 1: an opaque surface of the scene gets this opacity, as in CSS. Several surfaces behind
+   * each other hide more. Default: 1.
    */
   readonly opacity?: number | undefined;
-  /** Only splats whose centers lie in this box, in the scene's own coordinates, are drawn. */
+  /** Box in the scene's own coordinates. Only splats whose centers are in it are drawn. Default: no crop. */
   readonly crop?: Box | undefined;
-  /** Default: true. */
+  /** Whether the scene is drawn. Default: true. */
   readonly visible?: boolean | undefined;
-  /** Cuts, tints, reveals or moves its splats: a `SplatModifier` of `@gaussian-splat/renderer/modifiers`. */
+  /** Cuts, tints, reveals or moves splats of the scene: a `SplatModifier` of `@gaussian-splat/renderer/modifiers`. */
   readonly modifier?: PlacementModifier | undefined;
-  /** Bounds in the scene's own coordinates, for {@link boundsOfWorld}. */
+  /** Bounds in the scene's own coordinates, for {@link boundsOfWorld}. Default: unknown. */
   readonly bounds?: Bounds | undefined;
 }
 
-/** A scene in a {@link World}. Changes apply from the next frame on. */
+/** A scene in a {@link World}. Changes apply to the next frame. */
 export class Placement implements Placed {
   readonly scene: GaussianScene;
-  /** @internal Called when a frame of the placement would change; with true if the list of visible scenes changes. */
+  /**
+   * @internal Called when a property of the placement changes. The argument is true if the bindings must change:
+   * visibility, or another modifier.
+   */
   readonly #onChange: (ofList: boolean) => void;
   #sceneToWorld: Matrix4 | undefined;
   #opacity = 1;
@@ -57,8 +61,8 @@ export class Placement implements Placed {
   }
 
   /**
-   * Scene to world; undefined for the identity. The matrix is copied.
-   * @throws GaussianSplatError `argument/value` for one that is not affine, not finite or not invertible.
+   * Matrix from scene to world coordinates; undefined for the identity. The matrix is copied.
+   * @throws GaussianSplatError `argument/value` for a matrix that is not affine, not finite or not invertible.
    */
   get sceneToWorld(): Matrix4 | undefined {
     return this.#sceneToWorld;
@@ -72,7 +76,10 @@ export class Placement implements Placed {
     this.#onChange(false);
   }
 
-  /** @throws GaussianSplatError `argument/value` for a number below 0 or above 1. */
+  /**
+   * Opacity of the scene, 0 to 1.
+   * @throws GaussianSplatError `argument/value` for a number below 0 or above 1.
+   */
   get opacity(): number {
     return this.#opacity;
   }
@@ -84,7 +91,10 @@ export class Placement implements Placed {
     this.#onChange(false);
   }
 
-  /** @throws GaussianSplatError `argument/value` for corners that are not three numbers each. */
+  /**
+   * Box in the scene's own coordinates that contains the centers of the drawn splats; undefined for no crop.
+   * @throws GaussianSplatError `argument/value` for corners that are not three numbers each.
+   */
   get crop(): Box | undefined {
     return this.#crop;
   }
@@ -107,13 +117,16 @@ export class Placement implements Placed {
     this.#onChange(true);
   }
 
-  /** Cuts, tints, reveals or moves its splats; compile its pipelines first, so that no frame has to. */
+  /**
+   * Cuts, tints, reveals or moves splats of the scene. Compile the pipelines of the modifier first, so that no frame
+   * compiles them.
+   */
   get modifier(): PlacementModifier | undefined {
     return this.#modifier;
   }
 
   set modifier(modifier: PlacementModifier | undefined) {
-    // The same modifier again: only its values have changed.
+    // If the page sets the same modifier again, only its values have changed, not the list of scenes.
     const ofList = modifier !== this.#modifier;
     this.#modifier = modifier;
     this.#onChange(ofList);
@@ -138,30 +151,30 @@ export class World {
   #layout = 0;
   #changes = 0;
 
-  /** All scenes, visible or not, in the order of their addition, which decides between equal depths. */
+  /** All placements, visible or not, in the order of their addition. This order decides between equal depths. */
   get placements(): readonly Placement[] {
     return this.#placements;
   }
 
-  /** Incremented when scenes are added, removed, shown or hidden. */
+  /** Incremented when a scene is added, removed, shown or hidden, or gets another modifier. */
   get layout(): number {
     return this.#layout;
   }
 
-  /** Incremented when a placement changes. */
+  /** Incremented when a property of a placement changes that {@link layout} does not count. */
   get changes(): number {
     return this.#changes;
   }
 
   /**
-   * Adds a scene. The same scene may have several placements.
+   * Adds a scene. One scene may have several placements.
    * @throws GaussianSplatError `argument/value` for a placement out of range.
    */
   add(placed: Placed): Placement {
-    if (typeof placed?.scene !== 'object' || !Array.isArray(placed.scene?.pages))
+    if (typeof placed?.scene !== 'object' || !Array.isArray(placed.scene?.blocks))
       throw wrong('scene', 'a GaussianScene: GaussianBuffers, DynamicGaussians, …', placed?.scene);
     const placement = new Placement(placed, (ofList) => {
-      // A removed placement changes nothing.
+      // A placement that was removed from the world changes nothing.
       if (!this.#placements.includes(placement)) return;
       if (ofList) this.#layout++;
       else this.#changes++;
@@ -171,7 +184,10 @@ export class World {
     return placement;
   }
 
-  /** Removes a scene. Its memory belongs to its creator, and stays. */
+  /**
+   * Removes a placement; does nothing if it was removed before. The memory of its scene belongs to the creator, and
+   * stays allocated.
+   */
   remove(placement: Placement): void {
     const left = this.#placements.filter((other) => other !== placement);
     if (left.length === this.#placements.length) return;

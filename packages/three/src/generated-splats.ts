@@ -19,14 +19,18 @@ import { SplatScene, type SplatSceneOptions } from './splat-scene.js';
 export class GeneratedSplats extends SplatScene {
   readonly #written: DynamicGaussians;
 
-  /** Made by {@link create}. */
+  /** Creates the object for the Gaussians of a generator. Call {@link create} instead, which also allocates them. */
   constructor(written: DynamicGaussians, options?: SplatSceneOptions) {
     super(written, options);
     this.type = 'GeneratedSplats';
     this.#written = written;
   }
 
-  /** @throws GaussianSplatError as `DynamicGaussians.create` does. */
+  /**
+   * Allocates the Gaussians of a generator, and creates the object that draws them.
+   * @param layout Layout of the generator's model.
+   * @throws the errors of `DynamicGaussians.create`
+   */
   static async create(
     device: GPUDevice,
     layout: GaussianLayout,
@@ -35,24 +39,24 @@ export class GeneratedSplats extends SplatScene {
     return new GeneratedSplats(await DynamicGaussians.create(device, layout), options);
   }
 
-  /** Takes a run of the generator in: see `DynamicGaussians.ingest`. */
+  /** Receives the output of a run: see `DynamicGaussians.ingest`. */
   ingest(...run: Parameters<DynamicGaussians['ingest']>): void {
     this.#written.ingest(...run);
   }
 
-  /** Number of runs taken in until now, and one: a frame is due when it has grown. */
+  /** Number of runs that were received, plus one. Draw a frame after each change. */
   get version(): number {
     return this.#written.version;
   }
 
-  /** Takes it out of the scene graph and frees its GPU memory. Remove the model first. */
+  /** Removes the object from the scene graph and frees its GPU memory. Remove the model first. */
   dispose(): void {
     this.removeFromParent();
     this.#written.destroy();
   }
 }
 
-/** Takes models of `@gaussian-splat/generator` into scenes of three.js. */
+/** Host that adds models of `@gaussian-splat/generator` to scenes of three.js. */
 export const generatedSplatsHost: SceneHost<Object3D, GPUDevice, GeneratedSplats> = {
   accepts: (scene: unknown): scene is Object3D => (scene as Partial<Object3D> | null)?.isObject3D === true,
   async receive(scene, device, layout): Promise<HostedGaussians<GeneratedSplats>> {

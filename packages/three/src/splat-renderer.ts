@@ -29,9 +29,12 @@ import { generatedSplatsHost } from './generated-splats.js';
 import { SplatWorld } from './splat-world.js';
 
 export interface SplatRendererOptions {
-  /** Settings of frames: `settings(…)` of `@gaussian-splat/renderer`. */
+  /** Settings of frames, as returned by `settings(…)` of `@gaussian-splat/renderer`. */
   readonly settings?: FrameSettings;
-  /** Called when a drawn frame lacked splats because of the buffers' capacity. The next frame has enough: draw it. */
+  /**
+   * Called when a drawn frame has omitted splats because of the buffers' capacity. Draw another frame, for which the
+   * capacity suffices.
+   */
   readonly onIncomplete?: () => void;
 }
 
@@ -56,19 +59,25 @@ export class SplatRenderer {
   readonly #worlds = new Map<Object3D, Map<Camera, SplatWorld>>();
   readonly #depths = new WeakMap<GPUTexture, Map<boolean, SceneDepth>>();
   readonly #size = new Vector2();
-  /** The meshes of a frame, and the splats unless there is tone mapping. */
+  /** Image with the meshes of a frame, and with the splats unless the renderer has tone mapping. */
   #frame: RenderImage | undefined;
-  /** The meshes with tone mapping, and the splats. */
+  /**
+   * Image with the tone-mapped meshes and the splats, and the curve that it was created for; undefined without tone
+   * mapping.
+   */
   #mapped: { readonly image: RenderImage; readonly map: Quad; readonly curve: ToneMapping } | undefined;
 
-  /** @throws GaussianSplatError `argument/value` for a renderer that is not initialized, or does not use WebGPU. */
+  /**
+   * Creates a renderer of splats for a renderer of three.js.
+   * @throws GaussianSplatError `argument/value` for a renderer that is not initialized, or does not use WebGPU.
+   */
   constructor(renderer: WebGPURenderer, options: SplatRendererOptions = {}) {
     const { device, isWebGPUBackend = false } = renderer.backend;
     if (!isWebGPUBackend || !device)
       throw wrong(
         'renderer',
-        'a WebGPURenderer that draws with WebGPU and is initialised',
-        isWebGPUBackend ? 'one that is not initialised' : 'one that draws with WebGL',
+        'a WebGPURenderer that draws with WebGPU and is initialized',
+        isWebGPUBackend ? 'one that is not initialized' : 'one that draws with WebGL',
         'await renderer.init() first, and see whether the browser has WebGPU',
       );
     this.#renderer = renderer;
@@ -118,7 +127,7 @@ export class SplatRenderer {
       clipDepth: camera.coordinateSystem === WebGPUCoordinateSystem ? '0..1' : '-1..1',
     });
     const depth = stored ? this.#depthOf(this.#gpu(stored), camera) : undefined;
-    const image = { target: this.#gpu(target.texture), over: 'target', colors: this.#colors, depth } as const;
+    const image = { target: this.#gpu(target.texture), background: 'load', colors: this.#colors, depth } as const;
     world.viewpoint.draw(view, image);
   }
 
@@ -137,7 +146,7 @@ export class SplatRenderer {
     const place = toModel.multiply(camera.matrixWorld);
     const [position, turn] = [new Vector3(), new Quaternion()];
     place.decompose(position, turn, new Vector3());
-    // Lengths scale with the object, but the angles of the camera do not.
+    // Only the position is converted by the object's scale; the view matrix has none.
     const view = place.compose(position, turn, new Vector3(1, 1, 1)).invert();
     const { x: width, y: height } = this.#renderer.getDrawingBufferSize(this.#size);
     const clipDepth = camera.coordinateSystem === WebGPUCoordinateSystem ? '0..1' : '-1..1';
@@ -146,7 +155,7 @@ export class SplatRenderer {
     };
   }
 
-  /** Frees the memory of a camera, or of all; later draws allocate it again. */
+  /** Frees the memory of a camera, or without one of all cameras. Later draws allocate it again. */
   dispose(camera?: Camera): void {
     for (const worlds of this.#worlds.values()) {
       for (const [own, { viewpoint }] of worlds) {
@@ -173,7 +182,7 @@ export class SplatRenderer {
     return world;
   }
 
-  /** Intermediate target of a whole frame for the canvas. */
+  /** Returns the image that a whole frame is drawn into, in the size of the current target. */
   #frameOf(): RenderImage {
     const { width, height } = this.#renderer.getRenderTarget() ?? drawingBuffer(this.#renderer, this.#size);
     this.#frame ??= imageOf(new DepthTexture(width, height, FloatType));
@@ -181,7 +190,7 @@ export class SplatRenderer {
     return this.#frame;
   }
 
-  /** Draws a frame with a tone curve. */
+  /** Applies a tone curve to a frame, and returns the resulting image. */
   #map(drawn: RenderImage, curve: ToneMapping): RenderImage {
     if (this.#mapped?.curve !== curve) {
       this.#forgetMapped();
@@ -230,7 +239,7 @@ interface Quad {
   readonly quad: QuadMesh;
 }
 
-/** A frame in linear light, and the material that copies it. */
+/** An image in linear light, and the material that copies it to the target. */
 interface RenderImage {
   readonly target: RenderTarget;
   readonly copy: Quad;

@@ -2,9 +2,9 @@ import type { Box, GaussianScene } from '@gaussian-splat/renderer';
 import { Object3D } from 'three/webgpu';
 
 export interface SplatSceneOptions {
-  /** Factor of the opacity of each splat, 0 to 1. Default: 1. */
+  /** Factor of the opacity of each splat, 0..1. Default: 1. */
   readonly opacity?: number;
-  /** Only splats whose centers lie in this box, in the scene's own coordinates, are drawn. */
+  /** Box in the scene's own coordinates. Only splats whose centers are inside are drawn. Default: all. */
   readonly crop?: Box;
 }
 
@@ -19,7 +19,7 @@ export interface SplatSceneOptions {
  */
 export class SplatScene extends Object3D {
   readonly isSplatScene = true;
-  /** The drawn Gaussians, which belong to their creator. */
+  /** The drawn Gaussians. Their creator frees them. */
   gaussians: GaussianScene;
   opacity: number;
   crop: Box | undefined;

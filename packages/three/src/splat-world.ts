@@ -2,7 +2,7 @@ import { Viewpoint, World, type FrameSettings, type Placement } from '@gaussian-
 import type { Camera, Object3D } from 'three/webgpu';
 import { isSplatScene, type SplatScene } from './splat-scene.js';
 
-/** The splats of a three.js scene for one camera. */
+/** The splats of a three.js scene as seen by one camera. */
 export class SplatWorld {
   readonly viewpoint: Viewpoint;
   readonly #world = new World();
@@ -12,21 +12,21 @@ export class SplatWorld {
     this.viewpoint = new Viewpoint(device, this.#world, { settings, onIncomplete });
   }
 
-  /** Whether there is something to draw. */
+  /** Whether no visible splats are in the world. */
   get isEmpty(): boolean {
     return !this.#world.placements.some(({ visible }) => visible);
   }
 
-  /** Synchronizes with the scene graph: the set of splats, their transforms and their visibility. */
+  /** Synchronizes the world with the scene graph: the set of splats, their transforms and their visibility. */
   follow(root: Object3D, camera: Camera): void {
     const seen = new Set<SplatScene>();
     root.traverseVisible((object) => {
-      if (isSplatScene(object) && object.layers.test(camera.layers)) seen.add(object);
+      if (isSplatScene(object) && object.layers.test(camera.layers) && isSolid(object)) seen.add(object);
     });
     for (const splats of seen) this.#place(splats);
     for (const [splats, placement] of this.#placements) {
       if (seen.has(splats)) continue;
-      // Hidden ones are removed, too, so that they use no capacity.
+      // Hidden splats are removed, too, so that they use no capacity.
       this.#world.remove(placement);
       this.#placements.delete(splats);
     }
@@ -45,6 +45,9 @@ export class SplatWorld {
   }
 }
 
-/** three.js stores matrices column-major. */
+/** Whether the matrix of an object can be inverted. A scale of 0 makes the object invisible, as it does with meshes. */
+const isSolid = ({ matrixWorld }: Object3D): boolean => Number.isFinite(1 / matrixWorld.determinant());
+
+/** Returns the elements of a matrix of three.js, which are column-major, in row-major order. */
 const rowMajor = (elements: readonly number[]): number[] =>
   elements.map((_, k) => elements[4 * (k % 4) + Math.floor(k / 4)]);

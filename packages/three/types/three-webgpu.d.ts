@@ -2,6 +2,7 @@
 export class Matrix4 {
   readonly elements: number[];
   copy(matrix: Matrix4): this;
+  determinant(): number;
   invert(): this;
   multiply(matrix: Matrix4): this;
   compose(position: Vector3, quaternion: Quaternion, scale: Vector3): this;

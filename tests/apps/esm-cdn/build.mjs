@@ -1,4 +1,4 @@
-/** What CDNs of npm packages make of one: a single module with all that it imports. */
+/** The output of CDNs for an npm package: a single module with all its imports. */
 import { build } from 'esbuild';
 
 await build({

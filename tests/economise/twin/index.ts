@@ -1,4 +1,4 @@
-/** What the economiser does on the GPU, in plain code. */
+/** The economiser's GPU work in plain code. */
 export { PaintedEvaluator } from './painted-evaluator.js';
 export { Studio } from './painter.js';
 export { cpuPainter, cpuScorer } from './raster.js';

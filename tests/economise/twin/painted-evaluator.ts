@@ -19,21 +19,21 @@ import { scoreSplats } from './score.js';
 import type { ContributionScorer } from './scorer.js';
 
 export interface PaintedEvaluatorOptions {
-  /** The views of three kinds, none of which may share one: what was not seen in the first would seem unneeded in the second. */
+  /** The views of three kinds, which must not overlap: a splat unseen in the first would seem unneeded in the second. */
   readonly views: ViewSplit;
-  /** Draws the held-out views of clouds to compare: what the result is judged by. Default {@link cpuPainter}; {@link Studio} is the project's renderer. */
+  /** Draws the held-out views of clouds to compare: these judge the result. Default {@link cpuPainter}; {@link Studio} is the project's renderer. */
   readonly studio?: Painter;
-  /** Draws all other pictures; default {@link cpuPainter}. */
+  /** Draws all other images; default {@link cpuPainter}. */
   readonly sketcher?: Painter;
   /** Default: {@link cpuScorer} of the cloud. */
   readonly scorer?: ContributionScorer;
 }
 
-/** Scores in plain code, and draws each reduced cloud anew: what the GPU's evaluator is held against, and what searches are tested with. */
+/** Scores in plain code, and draws each reduced cloud again: the reference of the GPU's evaluator, and the evaluator in tests of searches. */
 export class PaintedEvaluator implements Evaluator {
   readonly #cloud: GaussianCloud;
   readonly #options: PaintedEvaluatorOptions;
-  /** Pictures of the whole scene, by who drew them and of which views. */
+  /** Images of the whole scene, by painter and views. */
   readonly #whole = new Map<Painter, Map<EvaluationViews, Promise<Image[]>>>();
   #scores: Scores | undefined;
 

@@ -1,19 +1,18 @@
 import type { Camera, GaussianCloud } from '@gaussian-splat/core';
 import type { Image } from '@gaussian-splat/economise';
 import { ALPHA_MIN, factors, project, type Projected } from '../../../packages/economise/src/merge/project.js';
-import { colorsOf } from './colours.js';
+import { colorsOf } from './colors.js';
 import type { Painter } from './painter.js';
 import type { ContributionScorer, Contributions } from './scorer.js';
 
 const ALPHA_MAX = 0.99;
-/** Behind so much nothing more is seen. */
+/** Absorbed light behind which nothing more is visible. */
 const OPAQUE = 1e-4;
 /** Counts are below this: a depth's 32 bits and a number fit the 53 bits of a float64. */
 const MAX_COUNT = 2 ** 21;
 
 /**
- * A scorer that blends on the CPU, front to back, by the rules of the renderer: for tools where there is no GPU, and the one whose
- * figures others are held against.
+ * A scorer that blends on the CPU, front to back, by the rules of the renderer: for tools without a GPU, and the reference of other scorers.
  */
 export function cpuScorer(cloud: GaussianCloud): ContributionScorer {
   const roots = factors(cloud);
@@ -21,17 +20,17 @@ export function cpuScorer(cloud: GaussianCloud): ContributionScorer {
   const found = { peak: none(), energy: none(), removal: none() };
   return (camera) => {
     const projected = project(cloud, roots, camera);
-    const colours = colorsOf(cloud, projected, camera);
+    const colors = colorsOf(cloud, projected, camera);
     const order = nearToFar(projected);
     const image = newImage(camera);
-    paint(projected, order, camera, colours, image);
+    paint(projected, order, camera, colors, image);
     for (const values of Object.values(found)) values.fill(0);
-    weigh(projected, order, camera, colours, image, found);
+    weigh(projected, order, camera, colors, image, found);
     return found;
   };
 }
 
-/** Draws images by the same code: where many small ones are wanted, it beats a GPU that is none. */
+/** Draws images by the same code: for many small images it is faster than a software GPU. */
 export const cpuPainter: Painter = {
   draw: async (cloud, views) => {
     const roots = factors(cloud);
@@ -79,7 +78,7 @@ class Span {
   #yy = 0;
   #opacity = 0;
   /** The largest xx·dx² + 2·xy·dx·dy + yy·dy² that paints. */
-  #most = 0;
+  #max = 0;
 
   constructor({ ellipses }: Projected, { width }: Camera) {
     this.#ellipses = ellipses;
@@ -96,7 +95,7 @@ class Span {
     this.#xy = ellipses[at + 3];
     this.#yy = ellipses[at + 4];
     this.#opacity = ellipses[at + 5];
-    this.#most = 2 * Math.log(this.#opacity / ALPHA_MIN);
+    this.#max = 2 * Math.log(this.#opacity / ALPHA_MIN);
     this.bend = Math.exp(-this.#xx);
   }
 
@@ -106,7 +105,7 @@ class Span {
     const yy = this.#yy;
     const dy = row + 0.5 - this.#centerY;
     const middle = this.#xy * dy;
-    const inside = middle * middle - xx * (yy * dy * dy - this.#most);
+    const inside = middle * middle - xx * (yy * dy * dy - this.#max);
     if (!(inside > 0)) return false;
     const reach = Math.sqrt(inside);
     this.first = Math.max(0, Math.ceil(this.#centerX - (middle + reach) / xx));
@@ -121,16 +120,16 @@ class Span {
 
 /** First and last row that a splat reaches. */
 function rowsOf({ ellipses, halfHeights }: Projected, k: number, { height }: Camera): readonly [number, number] {
-  const [centre, half] = [ellipses[6 * k + 1] - 0.5, halfHeights[k]];
-  return [Math.max(0, Math.ceil(centre - half)), Math.min(height - 1, Math.floor(centre + half))];
+  const [center, half] = [ellipses[6 * k + 1] - 0.5, halfHeights[k]];
+  return [Math.max(0, Math.ceil(center - half)), Math.min(height - 1, Math.floor(center + half))];
 }
 
-/** Blends the splats into an image. @param colours [count, 3] */
-function paint(projected: Projected, order: Uint32Array, camera: Camera, colours: Float32Array, image: Image): void {
+/** Blends the splats into an image. @param colors [count, 3] */
+function paint(projected: Projected, order: Uint32Array, camera: Camera, colors: Float32Array, image: Image): void {
   const { width } = camera;
   const span = new Span(projected, camera);
   for (const k of order) {
-    const [red, green, blue] = [colours[3 * k], colours[3 * k + 1], colours[3 * k + 2]];
+    const [red, green, blue] = [colors[3 * k], colors[3 * k + 1], colors[3 * k + 2]];
     const [top, bottom] = rowsOf(projected, k, camera);
     span.begin(k);
     for (let row = top; row <= bottom; row++) {
@@ -152,14 +151,13 @@ function paint(projected: Projected, order: Uint32Array, camera: Camera, colours
 }
 
 /**
- * Blends once more, against the finished image: what lies in front of and on a splat is known by then, so that the rest of the image is what lies
- * behind, and what it would be if the splat did not stand before it.
+ * Blends once more, against the finished image: by then the light in front of and on a splat is known, so that the rest of the image is the light behind it, also as it would be without the splat.
  */
 function weigh(
   projected: Projected,
   order: Uint32Array,
   camera: Camera,
-  colours: Float32Array,
+  colors: Float32Array,
   image: Image,
   found: Contributions,
 ): void {
@@ -167,7 +165,7 @@ function weigh(
   const painted = newImage(camera);
   const span = new Span(projected, camera);
   for (const k of order) {
-    const [red, green, blue] = [colours[3 * k], colours[3 * k + 1], colours[3 * k + 2]];
+    const [red, green, blue] = [colors[3 * k], colors[3 * k + 1], colors[3 * k + 2]];
     const [top, bottom] = rowsOf(projected, k, camera);
     let [peak, energy, removal] = [0, 0, 0];
     span.begin(k);

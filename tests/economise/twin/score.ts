@@ -1,6 +1,6 @@
 import type { Camera, GaussianCloud } from '@gaussian-splat/core';
 import { MIN_LOOKS, UNSEEN_CONTRAST, type Scores } from '../../../packages/economise/src/score.js';
-import { ColorMoments } from './colour-moments.js';
+import { ColorMoments } from './color-moments.js';
 import type { ContributionScorer } from './scorer.js';
 
 /** Looks at a cloud from all views. */
@@ -14,7 +14,7 @@ export async function scoreSplats(
   const contribution = new Float32Array(count);
   const removalError = new Float32Array(count);
   const looks = new Uint16Array(count);
-  const colours = new ColorMoments(cloud);
+  const colors = new ColorMoments(cloud);
   for (const view of views) {
     signal?.throwIfAborted();
     const { peak, energy, removal } = await scorer(view);
@@ -24,10 +24,10 @@ export async function scoreSplats(
       const error = removal[i] + UNSEEN_CONTRAST * energy[i];
       if (error > removalError[i]) removalError[i] = error;
     }
-    if (cloud.shDegree > 0) colours.add(view, energy);
+    if (cloud.shDegree > 0) colors.add(view, energy);
   }
-  colours.addPrior(looks);
-  const lowered = colours.lowered();
+  colors.addPrior(looks);
+  const lowered = colors.lowered();
   for (let i = 0; i < count; i++) {
     if (looks[i] >= MIN_LOOKS) continue;
     [contribution[i], removalError[i]] = [1, Infinity];
@@ -36,7 +36,7 @@ export async function scoreSplats(
   return { contribution, removalError, lowered };
 }
 
-/** Counts the views in whose frame the centre of each splat lies. */
+/** Counts the views in whose frame the center of each splat lies. */
 function countLooks({ count, positions, origin }: GaussianCloud, view: Camera, looks: Uint16Array): void {
   const { worldToCamera: m, fx, fy, cx, cy, width, height, near } = view;
   for (let i = 0; i < count; i++) {

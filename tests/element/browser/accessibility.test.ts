@@ -27,7 +27,7 @@ describe('axe finds nothing in the element', () => {
       () => turning.shadowRoot?.querySelector('[part=pause-button]') instanceof Element,
       'a button that stops it',
     );
-    await until(() => application.shadowRoot?.querySelector('[part=prompt]') !== null, 'the prompt');
+    await until(() => application.shadowRoot?.querySelector('[part=interaction-prompt]') !== null, 'the prompt');
     assertEqual(await violations(document, ELEMENT_ONLY), []);
   });
 
@@ -97,15 +97,15 @@ describe('a page that runs from right to left', () => {
   });
 });
 
-describe('forced colours', () => {
+describe('forced colors', () => {
   it('leave the progress bar visible', async () => {
     const element = show({ src: '/net/slow/compass.ply?ms=20000' });
     const part = (name: string): HTMLElement | null | undefined =>
       element.shadowRoot?.querySelector<HTMLElement>(`[part=progress-${name}]`);
     await until(() => !!part('bar'), 'the progress bar');
     await emulateMedia({ forcedColors: 'active' });
-    const colours = ['bar', 'track'].map((name) => getComputedStyle(part(name) as HTMLElement).backgroundColor);
+    const colors = ['bar', 'track'].map((name) => getComputedStyle(part(name) as HTMLElement).backgroundColor);
     await emulateMedia({ forcedColors: 'none' });
-    assert(colours[0] !== colours[1], `bar and track are ${colours.join(' and ')}`);
+    assert(colors[0] !== colors[1], `bar and track are ${colors.join(' and ')}`);
   });
 });

@@ -1,5 +1,5 @@
 /**
- * What pages are spared whose visitors choose the scenes: requests to other servers, endless requests for what is missing, scenes beyond their limits.
+ * Protection of pages whose visitors choose the scenes: no requests to other servers, no endless requests for missing files, no scenes beyond their limits.
  * SECURITY.md: "Pages set their own limits", "Manifests name files of their own server".
  */
 import '@gaussian-splat/element';
@@ -8,7 +8,7 @@ import { assert, assertEqual, COMPASS, delay, nextEvent, show, until } from './s
 
 const FOLDER = '/net/kept/addresses/';
 
-/** Puts files where the server logs who asks for them. */
+/** Puts files on the server, which logs their requests. */
 async function keep(files: Record<string, BodyInit>): Promise<void> {
   for (const [name, body] of Object.entries(files)) await fetch(FOLDER + name, { method: 'PUT', body });
 }
@@ -52,7 +52,7 @@ describe('scenes of strangers', () => {
     const ball = await (await fetch(COMPASS)).arrayBuffer();
     await keep({ 'b.splat': ball, 'missing.json': sequence(['b.splat', 'none.splat', 'b.splat?2'], 20) });
     const element = show({ src: `${FOLDER}missing.json`, loop: '' });
-    // The frame ahead is asked for before the first one is on show.
+    // The next frame is requested before the first one is visible.
     let errors = 0;
     element.addEventListener('generator-error', () => errors++);
     await element.ready;

@@ -1,4 +1,4 @@
-/** AR with an emulated phone in an emulated room: where the subject stands, how large it is, and what iPhones get. */
+/** AR with an emulated phone in an emulated room: the position and size of the subject, and the file for iPhones. */
 import '@gaussian-splat/element';
 import type { GaussianSplatElement } from '@gaussian-splat/element';
 import { GlRenderer } from '@gaussian-splat/renderer/webgl';
@@ -15,30 +15,75 @@ interface Session {
 }
 let session: Session | undefined;
 
-/** The floor of the room: hits of the ray from the eyes, 20 degrees down. */
-function room(): void {
-  const { XRSession, XRFrame } = globalThis as unknown as Record<string, { prototype: Record<string, unknown> }>;
+interface Hit {
+  readonly at: readonly number[];
+  /** Normal of the surface. Default: upwards. */
+  readonly normal?: readonly number[];
+}
+const FLOOR: Hit = { at: [0.2, PLANE, -1.5] };
+
+const classes = globalThis as unknown as Record<string, { prototype: Record<string, unknown> }>;
+
+/** The surfaces of the room that the ray from the eyes hits. */
+function room(hits: readonly Hit[]): void {
+  const { XRSession, XRFrame } = classes;
   XRSession.prototype.requestHitTestSource = () => Promise.resolve({ cancel: () => undefined });
-  XRFrame.prototype.getHitTestResults = () => [
-    {
+  XRFrame.prototype.getHitTestResults = () =>
+    hits.map(({ at: [x, y, z], normal = [0, 1, 0] }) => ({
       getPose: () => ({
         transform: {
-          position: { x: 0.2, y: PLANE, z: -1.5 },
-          matrix: Float32Array.from([1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0.2, PLANE, -1.5, 1]),
+          position: { x, y, z },
+          matrix: Float32Array.from([1, 0, 0, 0, ...normal, 0, 0, 0, 1, 0, x, y, z, 1]),
         },
       }),
-    },
-  ];
+    }));
+}
+
+/** Puts fingers on the screen, at points of the room that they cover. */
+function touch(points: readonly (readonly number[])[]): void {
+  const { XRSession, XRFrame } = classes;
+  const matrices = points.map((point) => {
+    const way = [point[0], point[1] - 1.6, point[2]];
+    const back = way.map((value) => -value / Math.hypot(...way));
+    return Float32Array.from([1, 0, 0, 0, 0, 1, 0, 0, ...back, 0, 0, 1.6, 0, 1]);
+  });
+  fingers = matrices.map((matrix) => ({ handedness: 'none', targetRayMode: 'screen', targetRaySpace: { matrix } }));
+  if (isTouchable) return;
+  isTouchable = true;
+  Object.defineProperty(XRSession.prototype, 'inputSources', { configurable: true, get: () => fingers });
+  const getPose = XRFrame.prototype.getPose as (space: { matrix?: Float32Array }, base: object) => object;
+  XRFrame.prototype.getPose = function (space: { matrix?: Float32Array }, base: object) {
+    return space.matrix ? { transform: { matrix: space.matrix } } : getPose.call(this, space, base);
+  };
+}
+let fingers: readonly object[] = [];
+let isTouchable = false;
+
+/** The transform from the scene's frame to that of the view in the next frame. */
+async function nextView(): Promise<ArrayLike<number>> {
+  const { render } = GlRenderer.prototype;
+  let camera: { worldToCamera: ArrayLike<number> } | undefined;
+  GlRenderer.prototype.render = function (request, quads) {
+    if (request.shDegree > 0) ({ camera } = request);
+    render.call(this, request, quads);
+  };
+  try {
+    await until(() => camera !== undefined, 'a picture', LIMIT_MS);
+    return camera!.worldToCamera;
+  } finally {
+    Object.assign(GlRenderer.prototype, { render });
+  }
 }
 
 /** An element whose object is placed, and the scene's frame to that of the view. */
 async function start(
   attributes: Readonly<Record<string, string>>,
   prepare: (element: GaussianSplatElement) => void = () => undefined,
+  hits: readonly Hit[] = [FLOOR],
 ): Promise<[GaussianSplatElement, ArrayLike<number>]> {
   // The emulator draws two views; those of a phone are at one place.
   headset().device.ipd = 0;
-  room();
+  room(hits);
   const xr = (navigator as unknown as { xr: { requestSession: unknown; isSessionSupported: unknown } }).xr;
   xr.isSessionSupported = () => Promise.resolve(true);
   const asked = (xr.requestSession as (mode: string, options: object) => Promise<Session>).bind(xr);
@@ -47,12 +92,6 @@ async function start(
     assert(JSON.stringify(options).includes('hit-test'), JSON.stringify(Object.keys(options)));
     return asked('immersive-ar', { optionalFeatures: ['local-floor'] }).then((begun) => (session = begun));
   };
-  const { render } = GlRenderer.prototype;
-  let camera: { worldToCamera: ArrayLike<number> } | undefined;
-  GlRenderer.prototype.render = function (request, quads) {
-    if (request.shDegree > 0) ({ camera } = request);
-    render.call(this, request, quads);
-  };
   try {
     const element = await showLoaded({ src: COMPASS, ar: '', ...STILL, ...attributes });
     prepare(element);
@@ -60,15 +99,13 @@ async function start(
     await until(() => button() !== null, 'the button', LIMIT_MS);
     button()!.click();
     await until(() => element.getAttribute('ar-status') === 'object-placed', 'a place', LIMIT_MS);
-    await until(() => camera !== undefined, 'a picture', LIMIT_MS);
-    return [element, camera!.worldToCamera];
+    return [element, await nextView()];
   } finally {
-    Object.assign(GlRenderer.prototype, { render });
     xr.requestSession = asked;
   }
 }
 
-/** A point of the scene in the room: the phone stands at the origin of its floor, 1.6 m high, and looks ahead. */
+/** A point of the scene in the room: the phone stands at the origin of its floor, 1.6 m high, and faces forward. */
 function inRoom(m: ArrayLike<number>, [x, y, z]: readonly number[]): number[] {
   const row = (r: number): number => m[4 * r] * x + m[4 * r + 1] * y + m[4 * r + 2] * z + m[4 * r + 3];
   return [row(0), 1.6 - row(1), -row(2)];
@@ -111,6 +148,65 @@ describe('AR', () => {
     assert(size > 0.45 && size < 1.05, `${size} m`);
     element.exitXR!();
     await until(() => element.getAttribute('ar-status') === 'not-presenting', 'an end', LIMIT_MS);
+  });
+
+  itInLab('stands on a floor behind a wall, hangs at a wall behind a floor, and else takes what there is', async () => {
+    const wall: Hit = { at: [0, 1.2, -1], normal: [0, 0, 1] };
+    for (const [attributes, hits, z] of [
+      [{}, [wall, FLOOR], FLOOR.at[2]],
+      [{ 'ar-placement': 'wall' }, [FLOOR, wall], wall.at[2]],
+      [{}, [wall], wall.at[2]],
+    ] as const) {
+      const [element, m] = await start(attributes as Record<string, string>, undefined, hits);
+      const { bounds } = (element as unknown as { core: { camera: { bounds: { center: number[]; radius: number } } } })
+        .core.camera;
+      const ahead = 'ar-placement' in attributes ? bounds.radius * Math.hypot(m[0], m[1], m[2]) : 0;
+      const middle = inRoom(m, bounds.center);
+      assert(Math.abs(middle[2] - z - ahead) < 0.03, `${middle} in place of ${z}`);
+      element.exitXR!();
+      await until(() => element.getAttribute('ar-status') === 'not-presenting', 'an end', LIMIT_MS);
+      element.remove();
+    }
+  });
+
+  itInLab('follows fingers: a slow pinch leaves true size, and a drag moves along the wall', async () => {
+    const [element, m] = await start({ unit: '30cm' });
+    const sizeOf = (view: ArrayLike<number>): number => Math.hypot(view[0], view[1], view[2]) / 0.3;
+    assert(Math.abs(sizeOf(m) - 1) < 1e-3, `true size, ${sizeOf(m)}`);
+    const [, y, z] = FLOOR.at;
+    for (let apart = 0.2; apart < 0.3; apart *= 1.01) {
+      touch([[-apart / 2, y, z], [apart / 2, y, z]]); // prettier-ignore
+      await frames(1);
+    }
+    touch([]);
+    const size = sizeOf(await nextView());
+    assert(size > 1.3, `${size} after a pinch by half`);
+    element.exitXR!();
+    await until(() => element.getAttribute('ar-status') === 'not-presenting', 'an end', LIMIT_MS);
+    element.remove();
+
+    const wall: Hit = { at: [0, 1.6, -2], normal: [0, 0, 1] };
+    const [other, before] = await start({ 'ar-placement': 'wall' }, undefined, [wall]);
+    const { bounds } = (other as unknown as { core: { camera: { bounds: { center: number[] } } } }).core.camera;
+    for (let moved = 0; moved < 0.41; moved += 0.1) {
+      touch([[moved, 1.6 + moved / 2, -2]]);
+      await frames(2);
+    }
+    touch([]);
+    const [from, to] = [inRoom(before, bounds.center), inRoom(await nextView(), bounds.center)];
+    const by = to.map((value, k) => value - from[k]);
+    assert(Math.hypot(by[0] - 0.4, by[1] - 0.2, by[2]) < 0.01, `moved by ${by}`);
+    other.exitXR!();
+    await until(() => other.getAttribute('ar-status') === 'not-presenting', 'an end', LIMIT_MS);
+  });
+
+  itInLab('says so if the room is not searched', async () => {
+    const searched = start({}, () => {
+      classes.XRSession.prototype.requestHitTestSource = () =>
+        Promise.reject(new DOMException('no room', 'OperationError'));
+    }).catch(() => undefined);
+    await until(() => document.querySelector('gaussian-splat')?.getAttribute('ar-status') === 'failed', 'a failure');
+    await searched;
   });
 
   itInLab("the element's labels stand over the camera's image at their points, and return to the page", async () => {

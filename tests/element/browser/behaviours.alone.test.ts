@@ -1,4 +1,4 @@
-/** What goes on around the camera: posters, prompts, turning by itself, flying, speaking. */
+/** Behavior around the camera: posters, prompts, automatic rotation, flights, announcements. */
 import '@gaussian-splat/element';
 import type { GaussianSplatElement } from '@gaussian-splat/element';
 import { emulateMedia, resetMouse, sendKeys, sendMouse } from '@web/test-runner-commands';
@@ -23,7 +23,7 @@ const partOf = (element: GaussianSplatElement, selector: string): HTMLElement | 
   element.shadowRoot?.querySelector<HTMLElement>(selector) ?? null;
 const theta = (element: GaussianSplatElement): number => (element.getCameraOrbit().theta * 180) / Math.PI;
 
-/** Where the camera itself is, in viewer space. */
+/** The camera's position in viewer space. */
 function eyeOf(element: GaussianSplatElement): number[] {
   const { theta, phi, radius } = element.getCameraOrbit();
   const { x, y, z } = element.getCameraTarget();
@@ -34,7 +34,7 @@ function eyeOf(element: GaussianSplatElement): number[] {
 const distance = (a: readonly number[], b: readonly number[]): number =>
   Math.hypot(...a.map((value, axis) => value - b[axis]));
 
-/** Much of what is tested here comes after a rest, or must not come. */
+/** Many events that these tests check come after a rest, or must not come. */
 beforeEach(() => hurry(3));
 
 afterEach(async () => {
@@ -67,7 +67,7 @@ describe('the poster', () => {
     Object.assign(own, { slot: 'poster', textContent: 'Unser Poster' });
     element.append(own);
     await element.updateComplete;
-    const cue = partOf(element, '[part=poster-cue]')?.getBoundingClientRect();
+    const cue = partOf(element, '[part=poster-icon]')?.getBoundingClientRect();
     const box = element.getBoundingClientRect();
     assert(cue && cue.width > 20, 'a sign');
     assertEqual(Math.round(cue.x + cue.width / 2 - box.x), Math.round(box.width / 2), 'in the middle');
@@ -101,20 +101,20 @@ describe('the interaction prompt', () => {
 
   it('comes after a rest, costs no frame, and goes with the first touch', async () => {
     const element = await showLoaded(prompted);
-    // What follows a first frame is none of the prompt's.
+    // Frames after the first one are not the prompt's.
     await atRest(element);
     element.resetInteractionPrompt();
     const before = submits;
-    await until(() => partOf(element, '[part=prompt]') !== null, 'the prompt');
+    await until(() => partOf(element, '[part=interaction-prompt]') !== null, 'the prompt');
     await delay(300);
     assert(submits - before <= 1, `${submits - before} submits`);
     element.focus();
     await sendKeys({ press: 'ArrowRight' });
-    await until(() => partOf(element, '[part=prompt]') === null, 'the prompt to go');
+    await until(() => partOf(element, '[part=interaction-prompt]') === null, 'the prompt to go');
     await delay(400);
-    assertEqual(partOf(element, '[part=prompt]'), null, 'it stays away');
+    assertEqual(partOf(element, '[part=interaction-prompt]'), null, 'it stays away');
     element.resetInteractionPrompt();
-    await until(() => partOf(element, '[part=prompt]') !== null, 'the prompt after a reset');
+    await until(() => partOf(element, '[part=interaction-prompt]') !== null, 'the prompt after a reset');
   });
 
   it('does not come without controls, nor with interaction-prompt="none"', async () => {
@@ -153,7 +153,7 @@ describe('the interaction prompt', () => {
     const element = await showLoaded({ ...prompted, 'interaction-prompt-style': 'wiggle' });
     let changes = 0;
     element.addEventListener('camera-change', () => changes++);
-    await until(() => partOf(element, '[part=prompt].basic') !== null, 'the prompt');
+    await until(() => partOf(element, '[part=interaction-prompt].basic') !== null, 'the prompt');
     await delay(500);
     assertEqual(changes, 0, 'moves');
   });
@@ -242,7 +242,7 @@ describe('what moves by itself', () => {
     const button = buttonOf(element);
     assert(button, 'a button');
     const opacity = (): string => getComputedStyle(button).opacity;
-    assertEqual([does(element), opacity()], ['Stop the motion', '0'], 'at first');
+    assertEqual([does(element), opacity()], ['Pause', '0'], 'at first');
     await sendKeys({ press: 'Tab' });
     assertEqual([element.shadowRoot?.activeElement, opacity()], [button, '1'], 'under the keyboard');
     await sendKeys({ press: 'Space' });
@@ -256,7 +256,7 @@ describe('what moves by itself', () => {
     element.autoRotateDelay = 60_000;
     await sendMouse({ type: 'click', position: [Math.round(x + width / 2), Math.round(y + height / 2)] });
     await element.updateComplete;
-    assertEqual([does(element), opacity(), await isMoving(element)], ['Stop the motion', '1', true], 'started');
+    assertEqual([does(element), opacity(), await isMoving(element)], ['Pause', '1', true], 'started');
     element.style.setProperty('--pause-button-display', 'none');
     assertEqual(getComputedStyle(button).display, 'none', 'where the page brings its own');
     element.autoRotate = false;
@@ -406,7 +406,10 @@ describe('screen readers', () => {
       a11y: '{"right": "Blick von rechts", "interaction-prompt": "Ziehen"}',
       'interaction-prompt-threshold': '50',
     });
-    await until(() => partOf(element, '[part=prompt]')?.getAttribute('aria-label') === 'Ziehen', 'the prompt');
+    await until(
+      () => partOf(element, '[part=interaction-prompt]')?.getAttribute('aria-label') === 'Ziehen',
+      'the prompt',
+    );
     element.focus();
     for (let i = 0; i < 4; i++) await sendKeys({ press: 'ArrowRight' });
     await until(() => spoken(element) !== '', 'words');

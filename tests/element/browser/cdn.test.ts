@@ -51,7 +51,7 @@ describe('the CDN build', () => {
       performance
         .getEntriesByType('resource')
         .map(({ name }) => name)
-        // What sets the quality while moving is fetched whenever the first picture is there.
+        // The code of dynamic quality is fetched as soon as the first frame is drawn.
         .filter(
           (name) => name.startsWith(`${origin}/cdn/`) && /cdn\/(?!dynamic-quality)[^/]*-[\w-]{8}\.js$/.test(name),
         );
@@ -61,10 +61,10 @@ describe('the CDN build', () => {
       return element;
     };
     assert((await shown(COMPASS.replace('.splat', '.ply'))).loaded, 'a PLY file is shown');
-    // The self-test of the GPU with the code that packs its splats (`sh`), reads its frames (`capture`) and the counts that it reads, printing, and on a first visit the search for what suits the GPU. What it found is kept.
+    // The self-test of the GPU with the code that packs its splats (`sh`), reads its frames (`capture`) and the counts that it reads, printing, and on a first visit the search for what suits the GPU. Its result is stored.
     await until(() => Object.keys(localStorage).some((key) => key.startsWith('gaussian-splat ')), 'a choice is kept');
     const first = parts().length;
-    const expected = /cdn\/(timing|sh|capture|statistics|print-controller|search)-/;
+    const expected = /cdn\/(timing|sh|capture|frame-stats|print-controller|search)-/;
     const others = parts().filter((part) => !expected.test(part));
     assertEqual(others, [], 'further parts fetched for a PLY file');
     assert((await shown(COMPASS)).loaded, 'another is shown');
@@ -92,7 +92,7 @@ describe('the CDN build', () => {
     assertEqual(data.violations, ['worker-src'], 'violations of the policy');
   });
 
-  /** What a page in a frame has to say about itself. */
+  /** Messages of a page within a frame. */
   async function reportOf(address: string): Promise<Record<string, unknown>> {
     const frame = document.createElement('iframe');
     const answer = nextEvent<MessageEvent<Record<string, unknown>>>(window, 'message', 60_000);
@@ -145,7 +145,7 @@ describe('the CDN build', () => {
     document.body.append(frame);
     const { data } = await answer;
     assertEqual([data.delay, data.runtime], [7, '/elsewhere/'], 'releaseDelay, runtimeLocation');
-    // Found where urlModifier sends it, and then refused by the budget.
+    // The loader finds it at urlModifier's address, and the budget then refuses it.
     assertEqual(data.reason, 'out-of-memory/budget', 'reason');
   });
 

@@ -2,14 +2,25 @@
 import '@gaussian-splat/element';
 import { unzipSync } from 'fflate';
 import type { GaussianSplatElement } from '@gaussian-splat/element';
-import { assert, assertEqual, atRest, COMPASS, nextEvent, show, showLoaded, until } from './support/harness.js';
+import {
+  assert,
+  assertEqual,
+  atRest,
+  COMPASS,
+  delay,
+  gated,
+  nextEvent,
+  show,
+  showLoaded,
+  until,
+} from './support/harness.js';
 import { isBlue, isGreen, isRed, screenOf, type Rgb } from './support/screen.js';
 
 const CLIP = '/net/clip/ball.gsv';
-/** Of the conformance corpus: an object of six splats that moves and turns. */
+/** A clip of the conformance corpus: an object of six splats that moves and turns. */
 const MOVING = 'object/ObjectTrackComposed-UseChunkIndex-UseCrc';
 
-async function shows(element: GaussianSplatElement, isColor: (colour: Rgb) => boolean): Promise<boolean> {
+async function shows(element: GaussianSplatElement, isColor: (color: Rgb) => boolean): Promise<boolean> {
   return (await screenOf(element)).middleOf(isColor) !== null;
 }
 
@@ -21,9 +32,9 @@ async function seek(element: GaussianSplatElement, seconds: number): Promise<voi
 }
 
 async function showsAlone(element: GaussianSplatElement, frame: number): Promise<void> {
-  const colours = [isRed, isGreen, isBlue];
-  for (const [k, isColor] of colours.entries())
-    assertEqual(await shows(element, isColor), k === frame % 3, `colour ${k} in frame ${frame}`);
+  const colors = [isRed, isGreen, isBlue];
+  for (const [k, isColor] of colors.entries())
+    assertEqual(await shows(element, isColor), k === frame % 3, `color ${k} in frame ${frame}`);
 }
 
 const spansOf = ({ buffered }: GaussianSplatElement): number[][] =>
@@ -46,6 +57,33 @@ describe('a clip', () => {
       await showsAlone(element, frame);
     }
     await until(() => JSON.stringify(spansOf(element)) === '[[0,1.2]]', 'all of it is there');
+  });
+
+  it('does not play by itself after pause(), also while it is loading', async () => {
+    const element = show({ src: CLIP, autoplay: '' });
+    await element.updateComplete;
+    element.pause();
+    await element.ready;
+    await until(() => element.revealed, 'the scene');
+    await delay(200);
+    assertEqual([element.loaded, element.paused, element.currentTime], [true, true, 0], 'loaded, paused, time');
+    await element.play();
+    await until(() => element.currentTime > 0, 'a script starts it');
+  });
+
+  it('stands while its element has no height', async () => {
+    const element = await showLoaded({ src: CLIP });
+    await element.play();
+    await until(() => element.currentTime > 0.1, 'it plays');
+    element.style.height = '0';
+    await delay(200);
+    const { currentTime } = element;
+    await delay(800);
+    element.style.height = '100px';
+    const before = await new Promise<number>((resolve) =>
+      element.addEventListener('timeupdate', () => resolve(element.currentTime), { once: true }),
+    );
+    assert(before < currentTime + 0.6, `from ${currentTime} to ${before} s in no time`);
   });
 
   it('begins at the time that is asked for', async () => {
@@ -72,17 +110,19 @@ describe('a clip', () => {
     assertEqual(waits, 0, 'waits');
   });
 
-  it('waits for what has not come, and goes on from there', async () => {
+  it('waits for what has not come, also after a frame that is late, and goes on from there', async () => {
     const gate = `clip-${Math.round(performance.timeOrigin)}`;
     const element = await showLoaded({ src: `${CLIP}?gate=${gate}` });
     const said: string[] = [];
     for (const type of ['waiting', 'canplay', 'playing', 'ended'])
       element.addEventListener(type, () => said.push(`${type} ${element.currentTime.toFixed(1)}`));
     await element.play();
-    await until(() => said.some((each) => each.startsWith('waiting')), 'it waits');
-    const { currentTime } = element;
-    assertEqual(element.readyState, 2, 'readyState');
-    assert(currentTime > 0.39 && currentTime < 0.7, `it waits at ${currentTime} s, in the group that is missing`);
+    await until(() => said.includes('playing 0.0'), 'it plays');
+    // Longer than the whole clip.
+    for (const end = performance.now() + 1500; performance.now() < end;);
+    await until(() => said.length > 1, 'it waits');
+    assertEqual(said, ['playing 0.0', 'waiting 0.4'], 'events of a clip whose second group is missing');
+    assertEqual([element.readyState, element.currentTime], [2, 0.4], 'readyState, currentTime');
     await fetch(`/net/open/${gate}`);
     await until(() => said.some((each) => each.startsWith('ended')), 'it goes on to the end');
     const order = said.map((each) => each.split(' ')[0]);
@@ -222,5 +262,55 @@ describe('a clip', () => {
     await until(() => second.currentTime > 0.3, 'the second one plays');
     second.pause();
     assertEqual(first.currentTime, 0.95, 'the first one stands');
+  });
+
+  it('in a <splat-scene> stops at the frame on show if a script pauses it, and the others go on', async () => {
+    const element = await showLoaded({ src: COMPASS, loop: '' });
+    element.insertAdjacentHTML('beforeend', `<splat-scene src="${CLIP}"></splat-scene>`.repeat(2));
+    const children = [...element.children] as (HTMLElement & { paused: boolean; currentTime: number; pause(): void })[];
+    await until(() => element.duration === 1.2, 'the clock of the element');
+    await element.play();
+    await until(() => element.currentTime > 0.3, 'its time to go on');
+    const events: string[] = [];
+    children[0].addEventListener('pause', ({ type }) => events.push(type));
+    children[0].pause();
+    const [paused, other] = children.map(({ currentTime }) => currentTime);
+    assert(paused > 0.3 && Math.abs(paused - other) < 1e-9, `${paused} s of ${other} s`);
+    assertEqual([children[0].paused, children[1].paused, events], [true, false, ['pause']], 'paused, events');
+    await until(() => children[1].currentTime !== other, 'the other one goes on');
+    assertEqual(children[0].currentTime, paused, 'it stands');
+  });
+
+  it('gives its clock to what follows it: not to one that comes while another src loads, and to all once it is removed', async () => {
+    const element = await showLoaded({ src: CLIP });
+    const { src, open } = gated('compass.ply');
+    // A child that loads does not delay the scene that is shown.
+    const slow = Object.assign(document.createElement('splat-scene'), { src });
+    const loading = nextEvent(slow, 'loadstart');
+    element.append(slow);
+    await loading;
+    await element.play();
+    assertEqual(element.paused, false, 'it plays');
+    const changes: number[] = [];
+    const next = gated('compass.ply');
+    element.src = next.src;
+    await nextEvent(element, 'emptied');
+    element.addEventListener('durationchange', () => changes.push(element.duration));
+    const loaded = nextEvent(slow, 'load');
+    await open();
+    await loaded;
+    assertEqual(changes, [], 'durations while the next scene loads');
+    await next.open();
+    await element.ready;
+    const child = Object.assign(document.createElement('splat-scene'), { src: CLIP });
+    const comes = nextEvent(child, 'load');
+    element.append(child);
+    await comes;
+    assertEqual(element.duration, 1.2, 'duration of what follows the clock');
+    element.src = null;
+    await nextEvent(element, 'emptied');
+    assertEqual(element.duration, 1.2, 'without a scene of its own');
+    await element.play();
+    await until(() => element.currentTime > 0, 'the child plays');
   });
 });

@@ -13,7 +13,7 @@ const imageOf = async (element: GaussianSplatElement): Promise<string> => {
   return bytes.join();
 };
 
-/** Colours of the picture as it is now. */
+/** Colors of the current frame. */
 async function pixelsOf(element: GaussianSplatElement): Promise<Uint8ClampedArray> {
   const bitmap = await createImageBitmap(await element.toBlob());
   const context = new OffscreenCanvas(bitmap.width, bitmap.height).getContext('2d')!;
@@ -27,31 +27,31 @@ describe('levels of detail of a plain file', () => {
   it('are built where pixels are named, draw fewer splats, and go without a trace', async () => {
     const element = await showLoaded({ src: ball(6_000), 'camera-orbit': '0deg 75deg 300%' });
     const whole = await imageOf(element);
-    const { bytes, inMemory } = element.stats!;
+    const { bytes, resident } = element.stats!;
     const all = (await element.updateStats())!.drawn!;
     assert(!hasLevels(element), 'none unasked: the scene is small');
     element.detail = '4px';
     await until(() => hasLevels(element), 'levels');
     await frames(2);
-    const { why = [], detail } = element.stats!;
+    const { reasons = [], detail } = element.stats!;
     assertEqual(detail.pixels, 4, 'pixels');
-    assert(detail.splats > 0.33 * inMemory && detail.splats < 0.6 * inMemory, `${detail.splats} splats more`);
+    assert(detail.splats > 0.33 * resident && detail.splats < 0.6 * resident, `${detail.splats} splats more`);
     assert(element.stats!.bytes.scene > bytes.scene, 'counted');
     assert(
-      why.some((sentence) => /merged splats.*4 px/.test(sentence)),
-      `says: ${why.join(' ')}`,
+      reasons.some((sentence) => /merged splats.*4 px/.test(sentence)),
+      `says: ${reasons.join(' ')}`,
     );
     const few = (await element.updateStats())!.drawn!;
     assert(few < 0.5 * all, `${few} of ${all} drawn`);
     assert((await imageOf(element)) !== whole, 'another picture');
-    // With the levels there and none of them drawn.
+    // The levels are loaded, and none of them is drawn.
     element.detail = 'auto';
     await frames(2);
     assert((await imageOf(element)) === whole, 'the whole picture');
-    assert(/merged splats.*while they move/.test(element.stats!.why.join()), 'moving pictures may have some');
+    assert(/merged splats.*while they move/.test(element.stats!.reasons.join()), 'moving pictures may have some');
     element.quality = 'default';
     await frames(2);
-    assertEqual(element.stats!.why, [], 'with a chosen quality no picture has any');
+    assertEqual(element.stats!.reasons, [], 'with a chosen quality no picture has any');
     element.quality = null;
     element.detail = 'off';
     await until(() => !hasLevels(element), 'no levels');
@@ -59,10 +59,10 @@ describe('levels of detail of a plain file', () => {
     assert((await imageOf(element)) === whole, 'the whole picture again');
   });
 
-  // By the clock of the controller, which a busy machine draws out.
+  // Time by the controller's clock, which a busy machine stretches.
   itInLab('are built unasked where a large scene moves too slowly, and rest pictures stay whole', async () => {
     const element = await showLoaded({ src: ball(50_000), 'camera-orbit': AT_REST }, 'width: 60px; height: 40px');
-    // The camera may still be on its way from where the first splats had put it.
+    // The camera may still be moving from its position for the first splats.
     await atRest(element);
     const whole = await pixelsOf(element);
     const start = performance.now();

@@ -108,7 +108,7 @@ describe('memory that is not to be had', () => {
     const element = await showLoaded({ src: COMPASS }, 'width: 60px; height: 50px');
     const { createTexture } = GPUDevice.prototype;
     let refused = 0;
-    // Whoever asks for a texture gets it, and the device is asked for 200 GB besides.
+    // Requests for a texture succeed, and the device must also allocate 200 GB.
     GPUDevice.prototype.createTexture = function (descriptor) {
       refused++;
       createTexture.call(this, { size: [8192, 8192, 200], format: 'rgba32float', usage: GPUTextureUsage.COPY_DST });
@@ -139,7 +139,7 @@ describe('the loss of the device', () => {
     devices[devices.length - 1].destroy();
     await nextEvent(element, 'contextrestored');
     assertEqual(seen, ['contextlost', 'contextrestored'], 'events');
-    assertEqual((await screenOf(element)).differences(before), 0, 'differing colour values');
+    assertEqual((await screenOf(element)).differences(before), 0, 'differing color values');
     assert(element.loaded && element.error === null, 'loaded');
   });
 
@@ -185,7 +185,7 @@ describe('the loss of the device', () => {
       await frames(2);
       // The second loss may have come after the recovery; then another pair follows.
       await until(() => seen[seen.length - 1] === 'contextrestored', 'the last recovery');
-      assertEqual((await screenOf(element)).differences(before), 0, `differing colour values after loss ${i}`);
+      assertEqual((await screenOf(element)).differences(before), 0, `differing color values after loss ${i}`);
     }
     assert(
       seen.length >= 12 && seen.every((type, i) => type === ['contextlost', 'contextrestored'][i % 2]),
@@ -220,7 +220,7 @@ describe('the loss of the device', () => {
       await nextEvent(element, 'error');
       assertEqual([element.error?.code, element.error?.reason], ['device-lost', 'device-lost/unrecoverable'], 'codes');
       assert(before.middleOf(isRed), 'a picture before');
-      assertEqual((await screenOf(element)).differences(before), 0, 'colour values of the last picture that differ');
+      assertEqual((await screenOf(element)).differences(before), 0, 'color values of the last picture that differ');
       const { message } = element.error!;
       const said =
         /lost \(reason "destroyed": Device was destroyed\), and no other in its place \(.*: the GPU process does not answer\)\. /;
@@ -259,8 +259,8 @@ describe('the loss of the device', () => {
       await frames();
       assertEqual([...seen].sort(), ['contextlost', 'contextrestored', 'error', 'load'], 'events');
       assertEqual([element.loaded, element.error], [true, null], 'loaded');
-      assertEqual((await screenOf(element)).differences(before), 0, 'differing colour values');
-      // What was set to another scene, or to none, asks no more.
+      assertEqual((await screenOf(element)).differences(before), 0, 'differing color values');
+      // Elements with a new scene, or with none, send no more requests.
       refusals = 3;
       devices[devices.length - 1].destroy();
       await nextEvent(element, 'error');
@@ -291,16 +291,16 @@ describe('the loss of the device', () => {
     for (let i = 0; i < 3; i++) {
       const restored = nextEvent(element, 'contextrestored');
       devices[devices.length - 1].destroy();
-      let pictures = 0;
+      let images = 0;
       for (let k = 0; k < 3; k++) {
         const blob = await element
           .toBlob()
           .catch((error: DOMException) => assertEqual(error.name, 'InvalidStateError'));
         if (!blob) continue;
-        pictures++;
+        images++;
         assertEqual(await opaque(blob), expected, 'pixels that are not empty');
       }
-      assert(pictures < 3, 'the loss was noticed');
+      assert(images < 3, 'the loss was noticed');
       await restored;
       await frames();
     }
@@ -353,6 +353,26 @@ describe('the loss of the device', () => {
     } finally {
       GaussianSplatElement.sharedDevice = original;
     }
+  });
+});
+
+it('a page with vr draws with WebGPU if no adapter is compatible with headsets', async () => {
+  const { gpu } = navigator;
+  const asked: unknown[] = [];
+  const others = {
+    getPreferredCanvasFormat: () => gpu.getPreferredCanvasFormat(),
+    wgslLanguageFeatures: gpu.wgslLanguageFeatures,
+    requestAdapter: (options: { xrCompatible?: boolean } & GPURequestAdapterOptions) => {
+      asked.push(options.xrCompatible);
+      return options.xrCompatible ? Promise.resolve(null) : gpu.requestAdapter(options);
+    },
+  };
+  await withGpu(others, async () => {
+    const element = show({ src: COMPASS, renderer: 'webgpu', vr: '' });
+    await element.ready;
+    assertEqual([element.loaded, element.error], [true, null], 'loaded and error');
+    assertEqual(asked.slice(0, 2), [true, false], 'adapters that were requested');
+    element.remove();
   });
 });
 

@@ -1,4 +1,4 @@
-/** What a page does to splats: `<splat-cut>`, `reveal-effect` and `splatShader`. */
+/** Effects of a page on splats: `<splat-cut>`, `reveal-effect` and `splatShader`. */
 import '@gaussian-splat/element';
 import type { GaussianSplatElement } from '@gaussian-splat/element';
 import { emulateMedia } from '@web/test-runner-commands';
@@ -12,6 +12,7 @@ import {
   delay,
   FIXTURES,
   frames,
+  gated,
   nextEvent,
   showLoaded,
   submits,
@@ -145,21 +146,35 @@ it('a scene appears by the progress of the page, and by time', async () => {
     assertEqual(await countOf(element, isColored), whole, `${effect} ends with all of it`);
   }
   const timed = await showLoaded({ ...VIEW, 'reveal-effect': 'sweep x 300ms' });
+  // A page that does not scroll computes 0 / 0.
+  timed.revealProgress = NaN;
   await delay(600);
   await atRest(timed);
   assertEqual(await countOf(timed, isColored), whole, 'after its time');
+  // The scene that is shown stays as it is until the next one has loaded, which then appears from its beginning.
+  const { src, open } = gated('compass.ply');
+  timed.setAttribute('reveal-effect', 'fade 3600s');
+  timed.src = src;
+  await nextEvent(timed, 'loadstart');
+  await frames(4);
+  assertEqual(await countOf(timed, isColored), whole, 'while the next one loads');
+  const loaded = nextEvent(timed, 'load');
+  await open();
+  await loaded;
+  await frames(4);
+  assertEqual(await countOf(timed, isColored), 0, 'at the beginning of the next one');
 });
 
 it('a function of the page changes splats; a wrong one is told of by its line, and the scene stays', async () => {
   const element = await showLoaded(VIEW);
   const whole = await countOf(element, isColored);
-  const told = nextEvent<CustomEvent<{ code: string; message: string }>>(element, 'shader-error');
+  const reported = nextEvent<CustomEvent<{ code: string; message: string }>>(element, 'shader-error');
   const { warn } = console;
   console.warn = () => undefined;
   element.splatShader = {
-    code: 'fn modify(splat: Splat, uniforms: Uniforms) -> Splat {\n  var s = splat;\n  s.colour = vec3f(0.0);\n  return s;\n}',
+    code: 'fn modify(splat: Splat, uniforms: Uniforms) -> Splat {\n  var s = splat;\n  s.paint = vec3f(0.0);\n  return s;\n}',
   };
-  const { detail } = await told;
+  const { detail } = await reported;
   console.warn = warn;
   assertEqual(detail.code, 'argument/splat-shader', 'code');
   assert(detail.message.includes('in line 3'), detail.message);
@@ -227,7 +242,7 @@ it('what a shader moves has a pause button, stands still with reduced motion, an
   // Autotuning submits work at rest, until its result is stored.
   await until(() => Object.keys(localStorage).some((key) => key.startsWith('gaussian-splat ')), 'a stored choice');
   element.splatShader = { code, animated: true };
-  await until(() => buttonOf(element)?.getAttribute('aria-label') === 'Stop the motion', 'a button that pauses');
+  await until(() => buttonOf(element)?.getAttribute('aria-label') === 'Pause', 'a button that pauses');
   assertEqual(await violationsIn(element), [], 'violations');
   const moves = async (): Promise<boolean> => {
     const before = submits;
@@ -240,7 +255,7 @@ it('what a shader moves has a pause button, stands still with reduced motion, an
     () => buttonOf(element)?.getAttribute('aria-label') === 'Start the motion',
     'the button of what stands still',
   );
-  // The frame of better quality at rest comes later on a busy machine; what moves submits in every interval.
+  // The frame of better quality at rest comes later on a busy machine; moving elements submit in every interval.
   let isStill = false;
   for (let tries = 0; tries < 20 && !isStill; tries++) isStill = !(await moves());
   assert(isStill, 'it stands still');

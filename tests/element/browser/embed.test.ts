@@ -30,15 +30,17 @@ describe('embed.html', () => {
       src: COMPASS,
       alt: '<b>A scene</b>',
       'camera-orbit': '30deg 75deg auto',
+      vr: '',
+      unit: '37cm',
       onload: 'x',
       chain: 'a.onnx',
     };
     const page = await open(String(new URLSearchParams(query)));
     const scene = page.querySelector<Splat>('gaussian-splat')!;
-    const names = ['alt', 'camera-orbit', 'camera-controls', 'onload', 'chain'];
+    const names = ['alt', 'camera-orbit', 'camera-controls', 'vr', 'unit', 'onload', 'chain'];
     assertEqual(
       names.map((name) => scene.getAttribute(name)),
-      ['<b>A scene</b>', '30deg 75deg auto', '', null, null],
+      ['<b>A scene</b>', '30deg 75deg auto', '', '', '37cm', null, null],
       'attributes',
     );
     await until(() => scene.loaded, 'the scene', 30_000);
@@ -93,8 +95,10 @@ describe('embed.html', () => {
       assert(page.querySelector('gaussian-splat') === null, src);
       assert(/^src: expected a file of http/.test(page.querySelector('p')!.textContent), src);
     }
-    const poster = await open(String(new URLSearchParams({ src: COMPASS, poster: refused[0] })));
-    assert(/^poster: expected/.test(poster.querySelector('p')!.textContent), 'a poster');
+    for (const name of ['poster', 'views', 'skybox-image', 'walk-map', 'ios-src']) {
+      const page = await open(String(new URLSearchParams({ src: COMPASS, [name]: refused[0] })));
+      assert(page.querySelector('p')!.textContent.startsWith(`${name}: expected`), name);
+    }
     assert(/^src: expected the address/.test((await open('')).querySelector('p')!.textContent), 'no address');
   });
 
@@ -104,7 +108,7 @@ describe('embed.html', () => {
     frame.src = `/packages/element/cdn/embed.html?src=${COMPASS}`;
     frame.style.cssText = 'width: 300px; height: 200px; border: 0';
     document.body.append(frame);
-    // Nobody can look into it but on the screen.
+    // Scripts cannot read it, so the test reads the screen.
     assert(
       await comesToShow(frame, (screen) => screen.middleOf(([red]) => red < 100) !== null),
       'the frame stays blank',

@@ -7,7 +7,7 @@ const canvasOf = (element: Element): HTMLCanvasElement | null | undefined =>
 
 describe('on a dense screen', () => {
   before(async () => {
-    // A freshly opened page may tell its ratio a moment late.
+    // A freshly opened page may report its ratio with a delay.
     await until(() => devicePixelRatio === 2 && matchMedia('(resolution: 2dppx)').matches, 'the ratio of this screen');
   });
 
@@ -36,7 +36,7 @@ describe('on a dense screen', () => {
     };
     try {
       const element = await showLoaded();
-      // An emulated screen may tell its ratio more than once; the last watch is the one in force.
+      // An emulated screen may report its ratio more than once; the last watch is the one in force.
       await until(() => canvasOf(element)?.width === 240 && queries.at(-1)?.matches === true, 'the watched ratio');
       const before = queries.length;
       Object.defineProperty(window, 'devicePixelRatio', { configurable: true, get: () => 3 });

@@ -19,7 +19,7 @@ function placeOf(element: GaussianSplatElement): Place {
   return { theta: degrees(theta), phi: degrees(phi), radius, target: [x, y, z] };
 }
 
-/** Where the camera ends up after what was done, all motion over. */
+/** The camera after an input, once all motion has ended. */
 async function settled(element: GaussianSplatElement): Promise<Place> {
   let before = '';
   await until(() => {

@@ -1,4 +1,4 @@
-/** Which thing: what a click, the pointer or the keyboard meets, among scenes and meshes. */
+/** Picking: the object that a click, the pointer or the keyboard hits, among scenes and meshes. */
 import '@gaussian-splat/element/scenes.js';
 import type { GaussianSplatElement } from '@gaussian-splat/element';
 import type { ScenePointerEvent, SplatMeshElement, SplatSceneElement } from '@gaussian-splat/element/scenes.js';
@@ -71,6 +71,26 @@ describe('positionFromPoint', () => {
     const wood = await element.positionFromPoint(...at(-3, 2));
     assert(wood?.element === box, `the mesh, not ${wood?.element.localName}`);
     assertEqual([wood.mesh, wood.material, wood.splat], ['Seat', 'Oak', null], 'names of the file');
+  });
+
+  it('finds a mesh where a bone has moved it', async () => {
+    document.body.style.margin = '0';
+    const element = await showLoaded({ src: COMPASS, ...VIEW }, 'width: 240px; height: 200px');
+    const box = document.createElement('splat-mesh') as SplatMeshElement;
+    const src = boxGlb({ half: [0.5, 0.5, 0.5], moves: 6, isSkinned: true });
+    Object.assign(box, { src, position: [-3, 2, 0], loop: true });
+    element.append(box);
+    await until(() => box.loaded, `the box, with ${box.error?.message ?? ''}`);
+    for (const [time, x] of [
+      [0, -3],
+      [0.5, 0],
+      [0.9, 2.4],
+    ] as const) {
+      box.currentTime = time;
+      await atRest(element);
+      const found = await element.positionFromPoint(...at(x, 2));
+      assert(found?.element === box, `at ${time} s the box, not ${found?.element.localName}`);
+    }
   });
 
   for (const renderer of ['webgpu', 'webgl'])

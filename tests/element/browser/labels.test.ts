@@ -1,15 +1,18 @@
-/** What many labels cost while the camera turns. */
+/** The cost of many labels while the camera turns. */
 import '@gaussian-splat/element';
 import type { GaussianSplatElement } from '@gaussian-splat/element';
 import { executeServerCommand } from '@web/test-runner-commands';
-import { isLab } from '../../support/extent-in-pages.js';
+import { isLab, itInLab } from '../../support/extent-in-pages.js';
 import { assert, frames, nextEvent, showLoaded, until } from './support/harness.js';
 
 const LABELS = 500;
-/** Of a measurement. */
+/** Seconds of a measurement. */
 const FRAMES = isLab ? 60 : 20;
 const STEPS = 10;
-/** Most milliseconds of script and style that labels take of a frame in which the camera turns by 6 degrees a second. */
+/**
+ * Upper limit of the time of scripts and style, ms, for labels in a frame in which the camera turns by 6 degrees a
+ * second.
+ */
 const MAX_MS = 4;
 
 interface Metrics {
@@ -20,7 +23,7 @@ interface Metrics {
   readonly LayoutDuration: number;
 }
 
-/** Costs of one frame; times are CPU milliseconds of the page's thread. */
+/** Costs of one frame; times are CPU milliseconds of the main thread. */
 interface FrameCost {
   readonly scriptMs: number;
   readonly styleMs: number;
@@ -61,7 +64,7 @@ async function turn(element: GaussianSplatElement, degrees: number, count: numbe
   await frames(1);
 }
 
-/** The mean of frames in which the camera turns. */
+/** The mean over frames with a turning camera. */
 async function costOf(element: GaussianSplatElement, degrees: number): Promise<FrameCost> {
   await turn(element, degrees, 5);
   const read = (): Promise<Metrics> => executeServerCommand<Metrics, undefined>('thread-metrics');
@@ -91,7 +94,7 @@ async function writesOf(element: GaussianSplatElement, degrees: number): Promise
 }
 
 describe('many labels', () => {
-  it('cost a frame of a turning camera few milliseconds', async () => {
+  itInLab('cost a frame of a turning camera few milliseconds', async () => {
     const alone = await withLabels(0);
     const without = await costOf(alone, 0.1);
     alone.remove();

@@ -41,7 +41,7 @@ function assertSame(found: PackedGaussians, expected: PackedGaussians): void {
 describe('a large PLY', () => {
   let expected: PackedGaussians;
   before(async () => {
-    // By one thread, which has nobody to ask.
+    // One thread without helpers.
     const { loadScene } = (await import(SCRIPT)) as typeof sceneWorker;
     const whole = await loadScene(request(FILE), signal, { onProgress: ignore });
     assert('packed' in whole && whole.packed, 'a scene');

@@ -40,7 +40,7 @@ describe('power', () => {
   });
 
   it('a motion draws until it has come to rest, then stops', async () => {
-    // With "auto" the true image follows a motion that was drawn with less: one more frame.
+    // A full frame follows a reduced motion with "auto": one more frame.
     const element = await showLoaded({ quality: 'default' });
     let changes = 0;
     element.addEventListener('camera-change', () => changes++);
@@ -93,6 +93,18 @@ describe('power', () => {
     lazy.style.marginTop = '0';
     await lazy.ready;
     assert(lazy.loaded, 'the lazy one loads in sight');
+  });
+
+  it('play() loads a lazy element off screen, and not the scene that replaces it', async () => {
+    const element = show({ src: COMPASS }, 'width: 100px; height: 100px; margin-top: 5000px');
+    const failure = await element.play().catch(({ name }: Error) => name);
+    assertEqual([failure, element.loaded], ['NotSupportedError', true], 'failure, loaded');
+    let loads = 0;
+    element.addEventListener('loadstart', () => loads++);
+    element.src = `${FIXTURES}green.splat`;
+    await element.updateComplete;
+    await delay(200);
+    assertEqual(loads, 0, 'loads');
   });
 });
 
@@ -147,7 +159,7 @@ describe('size', () => {
       const { display, contentVisibility } = getComputedStyle(element);
       return [display, contentVisibility];
     });
-    // What the browser may find and show is not gone.
+    // Text that the browser's search can find and reveal is not hidden.
     assertEqual([displays[0][0], displays[1]], ['none', ['block', 'hidden']], 'display, and content-visibility');
   });
 
@@ -304,6 +316,9 @@ describe('properties', () => {
     Object.assign(element, { chain: null, postprocess: undefined });
     await element.updateComplete;
     assert(element.loaded, 'the scene is still there');
+    const again = nextEvent(element, 'generator-error', 1_000);
+    Object.assign(element, { postprocess: '/a/missing.onnx' });
+    await again;
   });
 });
 
@@ -321,7 +336,7 @@ describe('paper', () => {
     truth.drawImage(image, 0, 0);
     const wanted = truth.getImageData(0, 0, copy.width, copy.height).data;
     // Straight alpha and back costs a step or two.
-    const largest = data.reduce((most, value, i) => Math.max(most, Math.abs(value - wanted[i])), 0);
+    const largest = data.reduce((max, value, i) => Math.max(max, Math.abs(value - wanted[i])), 0);
     assert(largest <= 4 && data.some((value) => value > 0), `differs by ${largest}`);
     dispatchEvent(new Event('afterprint'));
     assertEqual(canvases().length, 1, 'canvases');

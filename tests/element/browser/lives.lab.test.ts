@@ -35,7 +35,7 @@ async function withReleaseDelay(ms: number, work: () => Promise<void>): Promise<
   GaussianSplatElement.releaseDelay = ms;
   try {
     await work();
-    // What is still in the page goes now, and not after the delay of others.
+    // Elements that are still in the page are removed now, without the delay of others.
     document.body.replaceChildren();
     await delay(300);
   } finally {
@@ -48,7 +48,7 @@ describe('a long life', () => {
     // 100, or what `npm run lab:lives` asks for.
     const cycles = Number(await (await fetch('/net/soak-cycles')).text());
     await withReleaseDelay(0, async () => {
-      // It keeps the device, so that what the device owns for all is not counted as coming and going.
+      // It keeps the device, so that resources that the device shares do not count as created and destroyed.
       const resident = await showLoaded();
       const random = seeded(7);
       const elements: WeakRef<object>[] = [];
@@ -85,7 +85,7 @@ describe('a long life', () => {
       assertEqual(gpuAfter, gpuBefore, 'GPU ledger');
       assertEqual(devices.length, count, 'devices');
       const perCycle = (heapAfter - heapMiddle) / (0.45 * cycles);
-      // Snapshots show nothing of ours in what is left, which is code that the engine compiles meanwhile. One element would be 7 KB.
+      // Snapshots show that the rest is code that the engine compiles meanwhile, without our objects. One element would be 7 KB.
       assert(perCycle < 5_000, `the heap grows by ${Math.round(perCycle)} bytes a cycle`);
       // The last one may still be on a stack.
       const held = elements.filter((element) => element.deref()).length;
@@ -123,7 +123,7 @@ describe('a long life', () => {
 
   it('losses of the device at random moments: a pair of events each, and the first picture each time', async () => {
     const element = await showLoaded({ 'camera-orbit': '25deg 65deg auto', 'interaction-prompt': 'none' });
-    const picture = await screenOf(element);
+    const image = await screenOf(element);
     const goal = element.getAttribute('camera-orbit') ?? '';
     const seen: string[] = [];
     for (const type of ['contextlost', 'contextrestored', 'error', 'load', 'emptied']) {
@@ -141,7 +141,7 @@ describe('a long life', () => {
       element.cameraOrbit = goal;
       element.jumpCameraToGoal();
       await frames(2);
-      assertEqual((await screenOf(element)).differences(picture), 0, `differing colour values after loss ${i}`);
+      assertEqual((await screenOf(element)).differences(image), 0, `differing color values after loss ${i}`);
     }
     assertEqual(seen, Array.from({ length: losses }, () => ['contextlost', 'contextrestored']).flat(), 'events');
   }).timeout(120_000);

@@ -1,4 +1,4 @@
-/** Streamed SOG (`lod-meta.json`) box by box: what is fetched when, and what is on show meanwhile. */
+/** Streamed SOG (`lod-meta.json`) box by box: the order of requests, and the visible content meanwhile. */
 import { GaussianSplatElement } from '@gaussian-splat/element';
 import { lodFolder, type LodFolder } from '../../support/lod-folder.js';
 import { pebbles } from '../../support/scenes/pebbles.js';
@@ -7,7 +7,7 @@ import { assert, assertEqual, claimComing, show, until } from './support/harness
 
 const folder = lodFolder(pebbles(14_000), { levels: 3, boxes: 2 });
 
-/** Puts a folder on the server, but for files that are lost. */
+/** Puts a folder on the server, except for the lost files. */
 async function serve(name: string, { index, files }: LodFolder = folder, lost = /$^/): Promise<Served> {
   const address = `/net/kept/${name}/`;
   const put = (path: string, bytes: Uint8Array): Promise<unknown> =>
@@ -39,7 +39,7 @@ async function asked({ log }: Served, path: string): Promise<readonly string[]> 
   throw new Error(`nobody asks for ${path}: ${(await log()).join(' ')}`);
 }
 
-/** Colours of the picture as it is now. */
+/** Colors of the current frame. */
 async function pixelsOf(element: GaussianSplatElement): Promise<Uint8ClampedArray> {
   const bitmap = await createImageBitmap(await element.toBlob());
   const context = new OffscreenCanvas(bitmap.width, bitmap.height).getContext('2d')!;
@@ -97,7 +97,7 @@ describe('a streamed SOG scene', () => {
     const whole = await serve('off');
     const element = show({ src: whole.src, 'camera-orbit': NEAR, detail: 'off' });
     await element.ready;
-    assertEqual(element.stats?.modelled, 14_000, 'splats');
+    assertEqual(element.stats?.total, 14_000, 'splats');
     assertEqual((await whole.log()).join(' '), 'lod-meta.json 0_0/meta.json');
     await close(element);
   });
@@ -106,7 +106,7 @@ describe('a streamed SOG scene', () => {
     const served = await serve('webgl');
     const element = show({ src: served.src, 'camera-orbit': NEAR, renderer: 'webgl' });
     await element.ready;
-    assertEqual([element.error, element.stats?.renderer, element.stats?.modelled], [null, 'webgl', 14_000], 'on show');
+    assertEqual([element.error, element.stats?.renderer, element.stats?.total], [null, 'webgl', 14_000], 'on show');
     assertEqual((await served.log()).at(-1), '0_0/meta.json', 'asked for last');
     await close(element);
   });
@@ -114,7 +114,7 @@ describe('a streamed SOG scene', () => {
   it('of 500,000 splats through 20 Mbit/s has its first frame after a twentieth of the bytes', async function () {
     const src = '/net/metered/captured/scenes/playbot-streamed/lod-meta.json';
     if (!(await fetch('/net/shared/scenes/playbot-streamed/lod-meta.json')).ok) return this.skip();
-    // A page has the code that streams by the second scene of this file; the link is what is measured.
+    // The page loaded the streaming code with this file's second scene, so only the link is measured.
     const start = performance.now();
     const element = show({ src });
     let sent: Promise<string> | undefined;
@@ -144,7 +144,7 @@ describe('a streamed SOG scene', () => {
     await until(() => warned.some((message) => message.includes('404')), 'a word on the missing file');
     assert(element.loaded && element.error === null, 'still on show');
     for (const [path, bytes] of folder.files) if (path.startsWith('1_0')) await served.put(path, bytes);
-    // Any picture is a look at what is missing; it is asked for again after four seconds.
+    // Every frame checks for missing files; a file is requested again after four seconds.
     const turning = setInterval(() => (element.cameraOrbit = `${30 + (performance.now() % 7)}deg 60deg 9m`), 200);
     await asked(served, '0_0/meta.json');
     clearInterval(turning);

@@ -32,7 +32,7 @@ describe('code that cannot be loaded when it is needed', () => {
     await lose();
   });
 
-  // What a page has loaded once it has for good: the missing come before those that are there.
+  // A page keeps loaded code for good: missing code is tested before available code.
   it('is told as such: all that reads scenes, worker or not, and load() tries again', async () => {
     const script = '/packages/element/dist/loading/scene-worker.js';
     let workers = 0;
@@ -42,7 +42,8 @@ describe('code that cannot be loaded when it is needed', () => {
     });
     const element = await assertLost('/net/status/404', 'loading/scene-worker.js', /reads scenes/);
     await claimComing(/no worker could be started/);
-    // Once it is there, it is taken: then it is the scene that is missing, which needs no more code that the tests below are to miss.
+    // When available, it is used: then only the scene is missing, which needs none of the code that the tests below
+    // omit.
     await lose();
     element.load();
     await element.ready;

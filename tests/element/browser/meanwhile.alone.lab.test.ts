@@ -80,15 +80,15 @@ describe('a urlModifier', () => {
 
   it('that throws is reported as any listener, and the address counts as it is', async () => {
     const { reportError } = window;
-    const told: string[] = [];
-    window.reportError = (error) => told.push(String(error));
+    const reported: string[] = [];
+    window.reportError = (error) => reported.push(String(error));
     try {
       const element = await shown(() => {
         throw new Error('no token yet');
       });
       // Elements of tests before may still be about to go.
       assertEqual([element.loaded, element.error], [true, null], 'loaded');
-      assert(told.length > 0 && told.every((sentence) => sentence === 'Error: no token yet'), told.join());
+      assert(reported.length > 0 && reported.every((sentence) => sentence === 'Error: no token yet'), reported.join());
     } finally {
       window.reportError = reportError;
     }
@@ -220,14 +220,18 @@ describe('attributes and events', () => {
       view.dispatchEvent(
         new PointerEvent(type, { pointerId: 7, pointerType: 'mouse', button: 0, buttons, clientX, clientY: 50 }),
       );
+    const key = (init: KeyboardEventInit): boolean =>
+      view.dispatchEvent(new KeyboardEvent('keydown', { ...init, cancelable: true, bubbles: true }));
+    // The code for mouse and keys may come after the scene.
+    await until(() => !key({ key: 'ArrowLeft' }), 'the code of mouse and keys');
+    element.jumpCameraToGoal();
     const { theta } = element.getCameraOrbit();
     pointer('pointerdown', 20, 1);
     pointer('pointermove', 60, 0);
     pointer('pointermove', 90, 1);
     await frames(3);
     assertEqual(element.getCameraOrbit().theta, theta);
-    const press = (repeat: boolean): boolean =>
-      view.dispatchEvent(new KeyboardEvent('keydown', { key: ' ', repeat, cancelable: true, bubbles: true }));
+    const press = (repeat: boolean): boolean => key({ key: ' ', repeat });
     assertEqual([press(false), press(true), press(true)], [false, false, false], "all are the element's");
   });
 

@@ -1,7 +1,7 @@
-/** The ruler: by mouse and by keyboard alone, its length, its words, and what a screen reader hears. */
+/** The ruler: by mouse and by keyboard alone, its length, its texts, and the announcements of a screen reader. */
 import '@gaussian-splat/element';
 import type { GaussianSplatElement } from '@gaussian-splat/element';
-import { assert, assertEqual, atRest, nextEvent, showLoaded, until } from './support/harness.js';
+import { assert, assertEqual, atRest, delay, nextEvent, showLoaded, until } from './support/harness.js';
 
 const STILL = { 'interpolation-decay': '0', 'interaction-prompt': 'none', 'camera-controls': '' };
 
@@ -101,6 +101,16 @@ describe('measure', () => {
     assertEqual(detail.meters, null, 'meters');
     assert(detail.length > 0.5 && detail.length < 1.5, `${detail.length}`);
     assert(!/m/.test(label(element)) && label(element).includes('±'), label(element));
+    // Another unit counts at once, and a key that is held down is one key press.
+    element.setAttribute('unit', '2m');
+    await until(() => / m ± .* m$/.test(label(element)), 'a length in meters');
+    const hasLine = (): boolean => element.shadowRoot!.querySelector('.ruler line') !== null;
+    view.dispatchEvent(new KeyboardEvent('keydown', { key: 'Enter', code: 'Enter', bubbles: true, repeat: true }));
+    await delay(200);
+    assert(hasLine(), 'a repeated key sets another end');
+    element.src = floor();
+    await element.ready;
+    await until(() => !hasLine(), 'an end of the ruler of another scene');
     press('Escape');
     await element.updateComplete;
     assertEqual(element.shadowRoot!.querySelector('.ruler'), null, 'the ruler');

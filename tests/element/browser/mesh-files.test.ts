@@ -1,5 +1,5 @@
 /**
- * Files of meshes are data from strangers as those of scenes are. SECURITY.md: "Pages set their own limits", "Manifests name files of their own server", "Downloads end", "A scene that asks for too much
+ * Mesh files are untrusted data, as scene files are. SECURITY.md: "Pages set their own limits", "Manifests name files of their own server", "Downloads end", "A scene that asks for too much
  * harms itself".
  * SECURITY.md: "A scene that asks for too much harms itself".
  */
@@ -94,12 +94,12 @@ describe('files of meshes', () => {
     const mesh = await meshOf(`${FIXTURES}ktx2.glb`);
     await until(() => mesh.loaded || mesh.error !== null, 'the mesh', 60_000);
     assertEqual(mesh.error, null, `${mesh.error?.message}`);
-    const most =
+    const max =
       (channel: number) =>
       (color: Rgb): boolean =>
         color.every((value, k) => k === channel || value < color[channel] / 2) && color[channel] > 60;
     const isShown = await comesToShow(mesh.parentElement!, (screen) => {
-      const [red, green, blue] = [0, 1, 2].map((channel) => screen.middleOf(most(channel)));
+      const [red, green, blue] = [0, 1, 2].map((channel) => screen.middleOf(max(channel)));
       if (!red || !green || !blue) return false;
       // The first row of the image is its top: red, then green; blue is below red.
       return red.x < green.x && red.y < blue.y && Math.abs(red.y - green.y) < 10;

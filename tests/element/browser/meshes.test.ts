@@ -15,7 +15,7 @@ const VIEW = {
   'field-of-view': '45deg',
   quality: 'default',
 };
-const METRE = 50 / Math.tan(Math.PI / 8) / 10;
+const METER = 50 / Math.tan(Math.PI / 8) / 10;
 
 function place(attributes: Readonly<Record<string, string>> = {}): GaussianSplatElement {
   const element = document.createElement('gaussian-splat');
@@ -32,9 +32,9 @@ function mesh(options: BoxOptions, attributes: Readonly<Record<string, string>> 
   return child;
 }
 
-const placeOf = async (element: Element, isPicked: (colour: Rgb) => boolean): Promise<number[] | null> => {
+const placeOf = async (element: Element, isPicked: (color: Rgb) => boolean): Promise<number[] | null> => {
   const middle = (await screenOf(element)).middleOf(isPicked);
-  return middle && [(middle.x - 60) / METRE, (50 - middle.y) / METRE];
+  return middle && [(middle.x - 60) / METER, (50 - middle.y) / METER];
 };
 
 function assertNear(
@@ -53,27 +53,27 @@ describe('meshes', () => {
     const ball = document.createElement('splat-scene') as SplatSceneElement;
     ball.setAttribute('src', GREEN);
     ball.setAttribute('scale', '2');
-    const behind = mesh({ colour: [0, 0, 1], half: [1, 1, 0.1] }, { position: '2 0 -3' });
+    const behind = mesh({ color: [0, 0, 1], half: [1, 1, 0.1] }, { position: '2 0 -3' });
     const before = mesh({ half: [0.2, 0.2, 0.1] }, { position: '0 0 3m' });
     element.append(ball, behind, before);
     await until(() => ball.loaded && behind.loaded && before.loaded, `all three, with ${behind.error?.message ?? ''}`);
-    await comesToShow(element, (screen) => isGreen(screen.at(60 - 0.5 * METRE, 50)));
+    await comesToShow(element, (screen) => isGreen(screen.at(60 - 0.5 * METER, 50)));
     const screen = await screenOf(element);
-    const at = (x: number): Rgb => screen.at(60 + x * METRE, 50);
+    const at = (x: number): Rgb => screen.at(60 + x * METER, 50);
     assert(isRed(at(0)), `the near box hides the ball: ${at(0).join()}`);
     assert(isGreen(at(-0.5)), `beside it the ball: ${at(-0.5).join()}`);
-    // A metre is 10/13 as long as far away.
+    // A meter is 10/13 as long as far away.
     assert(isGreen(at(0.9)), `before the far box is the ball: ${at(0.9).join()}`);
     assert(isBlue(at(2.15)), `the far box beside the ball: ${at(2.15).join()}`);
-    const colour = (await screenOf(element)).at(60, 50);
-    assert(colour[0] > 230 && colour[1] < 60 && colour[2] < 60, `its own colour: ${colour.join()}`);
+    const color = (await screenOf(element)).at(60, 50);
+    assert(color[0] > 230 && color[1] < 60 && color[2] < 60, `its own color: ${color.join()}`);
     before.remove();
     await frames();
     assert(isGreen((await screenOf(element)).at(60, 50)), 'taken away');
     behind.rotation = [0, Math.PI / 2, 0];
     await behind.updateComplete;
     await frames();
-    assert(!isBlue((await screenOf(element)).at(60 + 2.15 * METRE, 50)), 'turned to its edge');
+    assert(!isBlue((await screenOf(element)).at(60 + 2.15 * METER, 50)), 'turned to its edge');
   });
 
   it('are layers of the picture: edges show the splats behind them, and so does glass', async () => {
@@ -82,22 +82,22 @@ describe('meshes', () => {
     ball.setAttribute('src', GREEN);
     ball.setAttribute('scale', '40');
     const black = mesh(
-      { surface: 'unlit', colour: [0, 0, 0], half: [0.6, 0.6, 0.1] },
+      { surface: 'unlit', color: [0, 0, 0], half: [0.6, 0.6, 0.1] },
       { position: '-0.9 0 3', rotation: '0 0 17deg' },
     );
     const before = mesh(
-      { surface: 'unlit', colour: [1, 0, 0], alpha: 0.5, half: [0.3, 0.3, 0.05] },
+      { surface: 'unlit', color: [1, 0, 0], alpha: 0.5, half: [0.3, 0.3, 0.05] },
       { position: '0.9 0.5 3' },
     );
     const behind = mesh(
-      { surface: 'unlit', colour: [1, 0, 0], alpha: 0.5, half: [0.3, 0.3, 0.05] },
+      { surface: 'unlit', color: [1, 0, 0], alpha: 0.5, half: [0.3, 0.3, 0.05] },
       { position: '0.9 -0.5 -6' },
     );
     element.append(ball, black, before, behind);
     await until(() => [ball, black, before, behind].every(({ loaded }) => loaded), 'all');
     await frames();
     const screen = await screenOf(element);
-    const near = (x: number, y: number): Rgb => screen.at(60 + (x * METRE * 10) / 7, 50 - (y * METRE * 10) / 7);
+    const near = (x: number, y: number): Rgb => screen.at(60 + (x * METER * 10) / 7, 50 - (y * METER * 10) / 7);
     const green = screen.at(60, 50);
     assert(isGreen(green), `the ball: ${green.join()}`);
     assert(Math.max(...near(-0.9, 0)) <= 1, `the black box: ${near(-0.9, 0).join()}`);
@@ -113,42 +113,42 @@ describe('meshes', () => {
       through.every((value, k) => Math.abs(value - mixed[k]) <= 14),
       `through glass: ${through.join()} for ${mixed.join()}`,
     );
-    const hidden = screen.at(60 + (0.9 * METRE * 10) / 16, 50 + (0.5 * METRE * 10) / 16);
+    const hidden = screen.at(60 + (0.9 * METER * 10) / 16, 50 + (0.5 * METER * 10) / 16);
     assert(hidden[0] <= green[0] + 12, `glass behind the ball: ${hidden.join()}`);
   });
 
   it('without light keep their base colors, and lit by even light nearly so', async () => {
-    const greys = [0, 0.02, 0.1, 0.214, 0.5, 1];
+    const grays = [0, 0.02, 0.1, 0.214, 0.5, 1];
     const shown = [0, 39, 89, 127, 188, 255];
     const element = place();
-    const boxes = greys.flatMap((grey, i) =>
+    const boxes = grays.flatMap((gray, i) =>
       (['unlit', 'rough'] as const).map((surface, row) =>
-        mesh({ surface, colour: [grey, grey, grey], half: [0.4, 0.4, 0.05] }, { position: `${i - 2.5} ${row} 0` }),
+        mesh({ surface, color: [gray, gray, gray], half: [0.4, 0.4, 0.05] }, { position: `${i - 2.5} ${row} 0` }),
       ),
     );
-    const orange = mesh({ surface: 'unlit', colour: [1, 0.2122, 0], half: [0.4, 0.4, 0.05] }, { position: '0 -2 0' });
+    const orange = mesh({ surface: 'unlit', color: [1, 0.2122, 0], half: [0.4, 0.4, 0.05] }, { position: '0 -2 0' });
     element.append(...boxes, orange);
     await until(() => [...boxes, orange].every(({ loaded }) => loaded), 'all boxes');
     await frames();
     const screen = await screenOf(element);
-    const at = (x: number, y: number): Rgb => screen.at(60 + x * METRE, 50 - y * METRE);
-    const unlit = greys.map((_, i) => at(i - 2.5, 0));
+    const at = (x: number, y: number): Rgb => screen.at(60 + x * METER, 50 - y * METER);
+    const unlit = grays.map((_, i) => at(i - 2.5, 0));
     for (const [i, found] of unlit.entries())
       assert(
         found.every((value) => Math.abs(value - shown[i]) <= 1),
-        `grey ${shown[i]}: ${found.join()}`,
+        `gray ${shown[i]}: ${found.join()}`,
       );
     const found = at(0, -2);
     assert(
       [255, 127, 0].every((value, k) => Math.abs(value - found[k]) <= 1),
       `orange: ${found.join()}`,
     );
-    const lit = greys.map((_, i) => at(i - 2.5, 1)[0]);
-    const most = Math.max(...lit.map((value, i) => Math.abs(value - shown[i])));
-    assert(most <= 24, `lit greys ${lit.join()} for ${shown.join()}`);
+    const lit = grays.map((_, i) => at(i - 2.5, 1)[0]);
+    const max = Math.max(...lit.map((value, i) => Math.abs(value - shown[i])));
+    assert(max <= 24, `lit grays ${lit.join()} for ${shown.join()}`);
   });
 
-  itInLab('are in pictures of toBlob(), over a colour and over nothing, and hide splats there', async () => {
+  itInLab('are in pictures of toBlob(), over a color and over nothing, and hide splats there', async () => {
     const element = place({ src: GREEN });
     element.append(mesh({ half: [0.2, 0.2, 0.1] }, { position: '0 0 3m' }));
     await element.ready;
@@ -165,7 +165,7 @@ describe('meshes', () => {
       const clear = await pixels(size);
       assertEqual(clear.corner, [0, 0, 0, 0], 'nothing behind');
       const blue = await pixels({ ...size, background: 'rgb(0 0 255)' });
-      assertEqual(blue.corner, [0, 0, 255, 255], 'the colour behind');
+      assertEqual(blue.corner, [0, 0, 255, 255], 'the color behind');
       assert(isRed(blue.middle as unknown as Rgb), `the mesh over it: ${blue.middle.join()}`);
       assertEqual(blue.middle, clear.middle, 'what is opaque is the same over both');
       if ('width' in size) assertEqual(blue.size, [240, 200], 'size');
@@ -193,7 +193,7 @@ describe('meshes', () => {
 
   itInLab('move: by their own clock, or by that of the element', async () => {
     const element = place({ src: COMPASS });
-    const follower = mesh({ moves: 4, colour: [1, 0, 1], half: [0.3, 0.3, 0.3] }, { position: '-2 2 0' });
+    const follower = mesh({ moves: 4, color: [1, 0, 1], half: [0.3, 0.3, 0.3] }, { position: '-2 2 0' });
     element.append(follower);
     await element.ready;
     assertEqual([element.duration, follower.duration], [1, 1], 'durations');
@@ -215,7 +215,7 @@ describe('meshes', () => {
     const element = place();
     const child = document.createElement('splat-scene');
     child.setAttribute('src', `${src}#both.glb`);
-    // glTF shows its front where a scene of a trainer has its back.
+    // The front of a glTF object faces the side to which a trainer's scene turns its back.
     child.setAttribute('rotation', '0 180deg 0');
     element.append(child);
     await element.ready;
@@ -246,6 +246,39 @@ describe('meshes', () => {
     assert(point && Math.abs(point.z - 4.5) < 0.02, `picked: ${point?.toString()}`);
   });
 
+  itInLab('that leave while others compile leave these to be shown', async () => {
+    const element = place({});
+    const first = mesh({ color: [0, 1, 0], half: [0.3, 0.3, 0.3] }, { position: '-2 2 0' });
+    element.append(first);
+    await until(() => first.loaded, 'the first mesh');
+    const errors: string[] = [];
+    const { createShaderModule } = GPUDevice.prototype;
+    const { error } = console;
+    let isRemoved = false;
+    console.error = (...words: unknown[]) => errors.push(words.join(' '));
+    // The moment between the shaders of three.js and their pipeline.
+    GPUDevice.prototype.createShaderModule = function removing(descriptor) {
+      if (!descriptor.label?.startsWith('gs.')) {
+        isRemoved = true;
+        first.remove();
+      }
+      return createShaderModule.call(this, descriptor);
+    };
+    try {
+      // Another kind of material needs other shaders.
+      const second = mesh({ color: [1, 0, 1], half: [0.3, 0.3, 0.3], surface: 'unlit' }, { position: '2 2 0' });
+      element.append(second);
+      await until(() => second.loaded || second.error !== null, 'the second mesh');
+      assertEqual([second.loaded, isRemoved], [true, true], 'loaded; removed meanwhile');
+      const isPink = ([r, g, b]: Rgb): boolean => r > 150 && b > 150 && g < 110;
+      assert(await comesToShow(element, (screen) => screen.middleOf(isPink) !== null), 'the second mesh is drawn');
+      assertEqual(errors, [], 'errors');
+    } finally {
+      console.error = error;
+      GPUDevice.prototype.createShaderModule = createShaderModule;
+    }
+  });
+
   itInLab('that cannot be read leave the others; a lost device brings them back; nothing stays behind', async () => {
     const before = GaussianSplatElement.releaseDelay;
     GaussianSplatElement.releaseDelay = 0;
@@ -262,13 +295,13 @@ describe('meshes', () => {
       await element.ready;
       assertEqual([broken.error?.reason, missing.error?.reason], ['decode/truncated', 'network/status'], 'errors');
       assert(good.loaded && element.error === null, 'the others');
-      const picture = await screenOf(element);
+      const image = await screenOf(element);
       for (let i = 0; i < (isLab ? 3 : 1); i++) {
         const restored = nextEvent(element, 'contextrestored', 60_000);
         devices.at(-1)!.destroy();
         await restored;
         await frames();
-        assertEqual((await screenOf(element)).differences(picture, 2), 0, 'the picture is back');
+        assertEqual((await screenOf(element)).differences(image, 2), 0, 'the picture is back');
       }
       document.body.replaceChildren();
       await delay(300);

@@ -1,5 +1,5 @@
 /**
- * Pages whose scripts have replaced what browsers bring, and browsers that lack some of it: the scene is shown, or an error says what is the matter. Each page is a frame with the CDN build.
+ * Pages whose scripts have replaced browser APIs, and browsers that lack some of them: the scene is shown, or an error names the cause. Each page is a frame with the CDN build.
  * SECURITY.md: "The page lives on".
  */
 import { itInLab } from '../../support/extent-in-pages.js';

@@ -1,4 +1,4 @@
-/** Views by parallel rays: what is picked lies where the pixel says, whatever its depth, on splats and on meshes. */
+/** Orthographic views: picked points match their pixels at any depth, on splats and on meshes. */
 import '@gaussian-splat/element/scenes.js';
 import type { GaussianSplatElement } from '@gaussian-splat/element';
 import type { SplatMeshElement, SplatSceneElement } from '@gaussian-splat/element/scenes.js';
@@ -27,7 +27,7 @@ interface Picked {
   readonly mesh: string | null;
 }
 
-/** What lies under pixels, and how far from where parallel rays have them. */
+/** Points picked under pixels, and their distances to the expected parallel rays. */
 async function pick(element: GaussianSplatElement): Promise<Picked[]> {
   const { left, top } = element.getBoundingClientRect();
   const picked: Picked[] = [];

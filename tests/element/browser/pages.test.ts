@@ -1,7 +1,7 @@
-/** What pages do around a scene: show it later, open panels from its labels, turn it with CSS. */
+/** Actions of a page around a scene: show it later, open panels from its labels, turn it with CSS. */
 import '@gaussian-splat/element';
 import type { GaussianSplatElement } from '@gaussian-splat/element';
-import { resetMouse, sendMouse } from '@web/test-runner-commands';
+import { resetMouse, sendKeys, sendMouse } from '@web/test-runner-commands';
 import { itInLab } from '../../support/extent-in-pages.js';
 import { assert, assertEqual, COMPASS, delay, frames, show, showLoaded, until } from './support/harness.js';
 import { comesToShow, isGreen, isRed, screenOf, sendTouch, turnWheel } from './support/screen.js';
@@ -173,6 +173,19 @@ describe('panels and links in labels', () => {
     panel.firstElementChild!.addEventListener('click', () => clicks++);
     await sendMouse({ type: 'click', position: middle(panel.firstElementChild!) });
     assertEqual(clicks, 1, 'clicks');
+  });
+
+  it('a label is clicked by key after a drag that ends without a click, as with the right button', async () => {
+    const button = (await withLabels()).querySelector('button')!;
+    await sendMouse({ type: 'move', position: [100, 180] });
+    await sendMouse({ type: 'down', button: 'right' });
+    await sendMouse({ type: 'move', position: [130, 185] });
+    await sendMouse({ type: 'move', position: [160, 190] });
+    await sendMouse({ type: 'up', button: 'right' });
+    button.focus();
+    assert(document.activeElement === button, 'focus');
+    await sendKeys({ press: 'Enter' });
+    assert(document.getElementById('panel')!.matches(':popover-open'), 'its panel is open');
   });
 });
 

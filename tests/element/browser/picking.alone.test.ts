@@ -1,4 +1,4 @@
-/** Points of the scene: under a pointer, under a label, and the picture of all of them. */
+/** Points of the scene: under a pointer, under a label, and the image of all of them. */
 import '@gaussian-splat/element';
 import type { GaussianSplatElement } from '@gaussian-splat/element';
 import { GaussianSplatElement as ElementClass } from '@gaussian-splat/element';
@@ -28,7 +28,7 @@ async function compass(attributes: Readonly<Record<string, string>> = {}): Promi
 const near = (actual: number, expected: number, tolerance: number, what: string): void =>
   assert(Math.abs(actual - expected) <= tolerance, `${what}: expected ${expected}, found ${actual}`);
 
-/** CSS pixels of the page where a point of viewer space lies, by the documented pinhole geometry for theta 0, phi 90 degrees. */
+/** CSS pixels of a point in viewer space, by the documented pinhole geometry for theta 0, phi 90 degrees. */
 function pageOf(element: GaussianSplatElement, [x, y, z]: readonly number[]): [number, number] {
   const { radius } = element.getCameraOrbit();
   const focal = 160 / 2 / Math.tan(element.getFieldOfView().radians / 2);
@@ -326,7 +326,7 @@ describe('pictures', () => {
       document.body.prepend(image);
       const differing = (await screenOf(image)).differences(screen, 2);
       image.remove();
-      assertEqual(differing, 0, 'differing colour values');
+      assertEqual(differing, 0, 'differing color values');
     }
     assert((await element.toBlob({ mimeType: 'image/webp', qualityArgument: 0.5 })).type === 'image/webp', 'webp');
     assertEqual((await screenOf(element)).differences(screen), 0, 'the page afterwards');
@@ -349,11 +349,11 @@ describe('pictures', () => {
     assertEqual([wide.width, wide.height, wide.data[3]], [300, 100, 0], 'transparent');
     const refused = (options: object): Promise<string> => element.toBlob(options).then(() => 'none', ({ name }: Error) => name); // prettier-ignore
     assertEqual(await refused({ width: 1e6 }), 'RangeError');
-    assertEqual(await refused({ background: 'no colour' }), 'TypeError');
+    assertEqual(await refused({ background: 'no color' }), 'TypeError');
     element.style.filter = 'brightness(0)';
     const dark = await pixelsOf(await element.toBlob());
-    const most = dark.data.reduce((found, value, i) => (i % 4 === 3 ? found : Math.max(found, value)), 0);
-    assertEqual(most, 0, 'the filter of the element');
+    const max = dark.data.reduce((found, value, i) => (i % 4 === 3 ? found : Math.max(found, value)), 0);
+    assertEqual(max, 0, 'the filter of the element');
   });
 
   it('count attributes that were set just before', async () => {

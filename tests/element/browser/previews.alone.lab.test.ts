@@ -1,4 +1,4 @@
-/** Loading a large scene: what can be seen early, and what the page notices of it. */
+/** Loading a large scene: early previews, and the cost for the page. */
 import { GaussianSplatElement } from '@gaussian-splat/element';
 import {
   assert,
@@ -14,14 +14,14 @@ import {
 } from './support/harness.js';
 import { isRed, screenOf } from './support/screen.js';
 
-/** Of the ball that the server makes. */
+/** Splats of the ball that the server creates. */
 const SLOW_SPLATS = 4_000;
 const SCENE = '/net/shared/scenes/playbot-streamed/0_0/meta.json';
 
-/** What was submitted is done. */
+/** Waits until the submitted work is done. */
 const gpuIdle = (): Promise<undefined> => devices[devices.length - 1].queue.onSubmittedWorkDone();
 
-/** The longest task of the page's own thread, ms; those under 50 ms are not told. */
+/** The longest task of the main thread in ms; tasks under 50 ms are not reported. */
 function watchThread(): () => Promise<number> {
   let longest = 0;
   const observer = new PerformanceObserver((list) => {
@@ -42,7 +42,7 @@ describe('a scene of 500,000 splats', () => {
     const loader = GaussianSplatElement.sceneLoader;
     const url = new URL(SCENE, location.href).href;
     const request = { url, credentials: 'same-origin', sh: 'auto' } as const;
-    // The worker and its readers are there before the clock starts, as in a page that loads its second scene.
+    // The worker and its readers are loaded before the measurement starts, as in a page that loads its second scene.
     const small = new URL('/tests/element/browser/fixtures/compass.ply', location.href).href;
     await loader.load({ ...request, url: small }, new AbortController().signal, () => undefined);
     // The best of three: other work on the machine comes and goes.
@@ -71,7 +71,7 @@ describe('a scene of 500,000 splats', () => {
 });
 
 describe('previews on show', () => {
-  // Worker, device and pipelines are there before the clock starts.
+  // Worker, device and pipelines are loaded before the measurement starts.
   beforeEach(async () => void (await showLoaded({ src: '/tests/element/browser/fixtures/compass.ply' })));
 
   it('of 500,000 splats a picture is there within a third of the time; the page is never blocked, and the camera never jumps', async function () {
@@ -102,8 +102,8 @@ describe('previews on show', () => {
       const first = performance.now() - start;
       assert(detail.splats > 10_000 && detail.splats < 500_000, `${detail.splats} splats`);
       await until(() => element.stats?.isPreview === true, 'statistics of the preview');
-      const { isPreview, why = [] } = element.stats ?? {};
-      assert(isPreview && why.some((sentence) => /part/.test(sentence)), `stats say ${why.join(' ')}`);
+      const { isPreview, reasons = [] } = element.stats ?? {};
+      assert(isPreview && reasons.some((sentence) => /part/.test(sentence)), `stats say ${reasons.join(' ')}`);
       assert(!element.loaded && element.revealed && element.matches(':state(preview)'), 'on show, and not loaded');
       await element.toBlob().then(
         () => assert(false, 'no picture of a part'),

@@ -1,4 +1,4 @@
-/** Videos: frames of `gaussian-splat video` and of the element are the same, and the browser records what is on the screen. */
+/** Videos: frames of `gaussian-splat video` and of the element are the same, and the browser records the screen. */
 import '@gaussian-splat/element';
 import type { GaussianSplatElement } from '@gaussian-splat/element';
 import { executeServerCommand } from '@web/test-runner-commands';
@@ -85,6 +85,15 @@ describe('the frames of a path', () => {
     assertEqual(failed, 'TypeError', 'without views');
     const endless = await framesOf(element.recordFrames()).catch((error: Error) => error.name);
     assertEqual(endless, 'TypeError', 'without an end');
+  });
+
+  it('end with an error if another scene takes the place of one that moves', async () => {
+    const element = await showLoaded({ ...STILL, src: '/net/clip/ball.gsv' }, STYLE);
+    const images = element.recordFrames({ frames: 10, frameRate: 10 });
+    await images.next();
+    const next = images.next().catch(({ name }: Error) => name);
+    element.src = COMPASS;
+    assertEqual(await next, 'InvalidStateError', 'error');
   });
 });
 

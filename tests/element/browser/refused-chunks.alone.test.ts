@@ -1,4 +1,4 @@
-/** Every chunk of the CDN build is refused once, by its address. Whoever asks again gets it, and nothing is left uncaught. */
+/** Every chunk of the CDN build is refused once, by its address. A second request succeeds, and no error stays uncaught. */
 import type { GaussianSplatElement } from '@gaussian-splat/element';
 import { detailFolder } from '../../support/detail-folder.js';
 import { itInLab } from '../../support/extent-in-pages.js';
@@ -24,9 +24,9 @@ const NOT_ASKED: Readonly<Record<string, string>> = {
   'start-helpers': 'PLY files of 32 MB',
   'part-uploads': 'PLY files that are uploaded in parts',
   'preview-uploads': 'previews of files that arrive slowly',
-  timing: 'a known fault: once for each device; without its self-test a device keeps the default variants',
+  timing: 'asked for again by the next request for variants; this test does not refuse it yet',
   sh: 'imported by timing',
-  'part-request': 'shared by chunks that are asked for',
+  'file-request': 'shared by chunks that are asked for',
 };
 
 const uncaught: string[] = [];
@@ -49,7 +49,7 @@ async function again(what: string, act: () => Promise<unknown>): Promise<void> {
   }
 }
 
-/** Loads what an element has, until no code is missing any more; what else may be wrong with it does not count. */
+/** Loads the sources of an element until no code is missing any more. Other errors do not count. */
 const load = (element: GaussianSplatElement, isWrong = false): Promise<void> =>
   again(String(element.src), async () => {
     await element.ready;
@@ -59,7 +59,7 @@ const load = (element: GaussianSplatElement, isWrong = false): Promise<void> =>
     throw new Error(error.message);
   });
 
-/** What asks for a chunk at most every five seconds after a failure, on updates or frames. */
+/** Triggers that request a chunk at most every five seconds after a failure, on updates or frames. */
 const eventually = (what: string, isThere: () => boolean, poke: () => void): Promise<void> =>
   until(
     () => {
@@ -86,7 +86,7 @@ const file = (name: string, ...parts: BlobPart[]): File => new File(parts, name)
 const json = (value: object): string => JSON.stringify(value);
 
 describe('chunks that are refused once', () => {
-  // What is missing is said in the console; that is no fault here.
+  // The console reports missing code, which is no fault here.
   const { warn } = console;
   before(() => {
     console.warn = (...words: unknown[]) => {
@@ -104,7 +104,7 @@ describe('chunks that are refused once', () => {
     const part = (name: string): Element | null => element.shadowRoot!.querySelector(`[part=${name}]`);
     await load(element);
 
-    // Methods: whoever calls them again gets what they want.
+    // Methods: a second call succeeds.
     await again('flyTo', () => element.flyTo({ orbit: '10deg 75deg 5m' }, { duration: 0 }));
     await again('toBlob', () => element.toBlob());
     await again('positionFromPoint', () => element.positionFromPoint(20, 20));
@@ -209,7 +209,7 @@ describe('chunks that are refused once', () => {
     child.setAttribute('interactive', '');
     await comes('interaction', () => child.toggleAttribute('interactive'));
 
-    // What few pages ask for, by attributes and a child.
+    // Features that few pages use, by attributes and a child.
     for (const name of ['measure', 'vr', 'ar']) element.setAttribute(name, '');
     element.setAttribute('shadow-intensity', '1');
     const cut = document.createElement('splat-cut');

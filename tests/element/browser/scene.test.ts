@@ -1,5 +1,6 @@
 import '@gaussian-splat/element';
 import type { ElementError, GaussianSplatElement } from '@gaussian-splat/element';
+import { executeServerCommand } from '@web/test-runner-commands';
 import {
   assert,
   assertEqual,
@@ -29,14 +30,14 @@ const rendered = (element: GaussianSplatElement, selector: string): Promise<Elem
     look();
   });
 
-/** Splats whose colours change a little with the direction: harmonics of degree 1, that 8 bits are enough for. */
+/** Splats whose colors change a little with the direction: harmonics of degree 1, that 8 bits are enough for. */
 function glossy(): string {
   const numbered = (name: string, count: number): string[] => Array.from({ length: count }, (_, i) => `${name}_${i}`);
-  const colours = [...numbered('f_dc', 3), ...numbered('f_rest', 9)];
-  const names = ['x', 'y', 'z', ...colours, 'opacity', ...numbered('scale', 3), ...numbered('rot', 4)];
+  const colors = [...numbered('f_dc', 3), ...numbered('f_rest', 9)];
+  const names = ['x', 'y', 'z', ...colors, 'opacity', ...numbered('scale', 3), ...numbered('rot', 4)];
   const rows = Array.from({ length: 50 }, (_, i) => {
     const place = [Math.sin(7 * i), Math.sin(11 * i), Math.sin(13 * i)];
-    return [...place, ...colours.map((_, k) => 0.05 * Math.sin(i + 3 * k)), 2, -2, -2, -2, 1, 0, 0, 0].join(' ');
+    return [...place, ...colors.map((_, k) => 0.05 * Math.sin(i + 3 * k)), 2, -2, -2, -2, 1, 0, 0, 0].join(' ');
   });
   const head = ['ply', 'format ascii 1.0', 'element vertex 50', ...names.map((name) => `property float ${name}`)];
   return [...head, 'end_header', ...rows, ''].join('\n');
@@ -53,10 +54,10 @@ describe('a scene', () => {
     assert(green.y < 50 && Math.abs(green.x - 60) < 3, `green ${green.x}, ${green.y}`);
     assertEqual(screen.at(2, 2), [200, 100, 220], 'background in the corner');
     const between = screen.at(60, 45);
-    assert(Math.abs(between[0] - between[2]) < 60, `no colour fringe at a half-transparent pixel: ${between.join()}`);
+    assert(Math.abs(between[0] - between[2]) < 60, `no color fringe at a half-transparent pixel: ${between.join()}`);
   });
 
-  it('asked for as reference after it was loaded has the colours of one that was loaded as such', async () => {
+  it('asked for as reference after it was loaded has the colors of one that was loaded as such', async () => {
     const src = `${URL.createObjectURL(new Blob([glossy()]))}#glossy.ply`;
     const asked = await showLoaded({ src, quality: 'reference' });
     const element = await showLoaded({ src });
@@ -69,7 +70,7 @@ describe('a scene', () => {
     let events = 0;
     for (const type of ['loadstart', 'emptied', 'load', 'error']) element.addEventListener(type, () => events++);
     element.quality = 'reference';
-    await until(() => bytes() > rounded, 'more exact colours', 30_000);
+    await until(() => bytes() > rounded, 'more exact colors', 30_000);
     assertEqual([bytes(), events, element.loaded], [asked.stats?.bytes.scene, 0, true], 'bytes, events, loaded');
     assertEqual(String(element.getCameraOrbit()), orbit, 'the camera');
     element.quality = 'default';
@@ -208,6 +209,38 @@ describe('src', () => {
     element.src = new Blob(['no scene']);
     const { detail } = await nextEvent<CustomEvent<ElementError>>(element, 'error');
     assertEqual(detail.reason, 'decode/unknown-format', detail.message);
+  });
+
+  it('gives the memory of a file back once nothing refers to the file', async () => {
+    const { revokeObjectURL } = URL;
+    // Workers have such addresses, too.
+    const revoked = new Set<string>();
+    URL.revokeObjectURL = (url) => {
+      revoked.add(url);
+      revokeObjectURL(url);
+    };
+    try {
+      const element = show({});
+      const showFile = async (): Promise<string> => {
+        element.src = new File([await (await fetch(COMPASS)).arrayBuffer()], 'compass.splat');
+        const { detail } = await nextEvent<CustomEvent<{ url: string }>>(element, 'load');
+        return detail.url.replace(/#.*/, '');
+      };
+      const url = await showFile();
+      await executeServerCommand('heap-size');
+      await delay(50);
+      assertEqual(revoked.has(url), false, 'revoked while it is shown');
+      element.src = COMPASS;
+      await nextEvent(element, 'load');
+      const end = performance.now() + 20_000;
+      while (!revoked.has(url) && performance.now() < end) {
+        await executeServerCommand('heap-size');
+        await delay(50);
+      }
+      assertEqual(revoked.has(url), true, 'revoked afterwards');
+    } finally {
+      URL.revokeObjectURL = revokeObjectURL;
+    }
   });
 
   it('a flip there and back loads nothing anew', async () => {

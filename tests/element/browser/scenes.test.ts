@@ -19,9 +19,9 @@ import {
 import { comesToShow, isBlue, isGreen, isRed, screenOf, type Screen } from './support/screen.js';
 
 const GREEN = `${FIXTURES}green.splat`;
-/** From 10 m on the z axis: a metre at the origin is 12.07 pixels. */
+/** From 10 m on the z axis: a meter at the origin is 12.07 pixels. */
 const VIEW = 'camera-orbit="0deg 90deg 10m" camera-target="0 0 0" field-of-view="45deg" quality="default"';
-const METRE = 50 / Math.tan(Math.PI / 8) / 10;
+const METER = 50 / Math.tan(Math.PI / 8) / 10;
 
 function place(html: string): GaussianSplatElement {
   const page = document.createElement('div');
@@ -42,13 +42,13 @@ const childrenOf = (element: Element): SplatSceneElement[] => [
   ...element.querySelectorAll<SplatSceneElement>('splat-scene'),
 ];
 
-/** Where a colour's middle is, in metres from the middle of the picture. */
+/** Centroid of a color, in meters from the middle of the image. */
 async function placeOf(
   element: Element,
   isPicked: Parameters<Awaited<ReturnType<typeof screenOf>>['middleOf']>[0],
 ): Promise<readonly [number, number] | null> {
   const middle = (await screenOf(element)).middleOf(isPicked);
-  return middle && [(middle.x - 60) / METRE, (50 - middle.y) / METRE];
+  return middle && [(middle.x - 60) / METER, (50 - middle.y) / METER];
 }
 
 function assertNear(
@@ -78,7 +78,7 @@ describe('several scenes in one element', () => {
     );
     const alone = await placeLoaded(`<gaussian-splat ${VIEW}>
       <splat-scene src="${COMPASS}" position="0 1 0" rotation="0 0 90deg" scale="2 2 2"></splat-scene></gaussian-splat>`);
-    // Turned against the clock: what was on the right is above.
+    // Turned counterclockwise, so the right side becomes the top.
     assertNear(await placeOf(alone, isRed), [0, 3], 'red');
     assertNear(await placeOf(alone, isBlue), [0, -1], 'blue');
     assertNear(await placeOf(alone, isGreen), [-2, 1], 'green');
@@ -139,7 +139,7 @@ describe('several scenes in one element', () => {
     child.crop = null;
     child.opacity = 0.5;
     await child.updateComplete;
-    const [r] = (await screenOf(element)).at(60 + METRE * -2, 50 - METRE);
+    const [r] = (await screenOf(element)).at(60 + METER * -2, 50 - METER);
     assert(r === 255 && (await placeOf(element, isRed)) === null, 'half of it: pink on the white page');
     child.opacity = null;
     child.scale = 0;
@@ -166,6 +166,16 @@ describe('several scenes in one element', () => {
     assert(y > 1, `another scene in its place: ${y}`);
   });
 
+  it('put into an element that shows nothing yet, is framed there', async () => {
+    const child = `<splat-scene src="${COMPASS}" position="20m 0 0"></splat-scene>`;
+    const element = await placeLoaded(`<gaussian-splat>${child}</gaussian-splat>`);
+    const other = place('<gaussian-splat></gaussian-splat>');
+    await other.ready;
+    other.append(...childrenOf(element));
+    await comesToShow(other, (screen) => screen.middleOf(isRed) !== null);
+    assertNear([other.getCameraTarget().x], [20], 'x of the camera target', 1);
+  });
+
   it('24 of them: one missing and one hostile leave 22 visible, with named errors', async () => {
     const children = Array.from({ length: 24 }, (_, i) => {
       const src = i === 5 ? '/net/missing.splat' : i === 11 ? `${FIXTURES}truncated.ply` : GREEN;
@@ -183,7 +193,7 @@ describe('several scenes in one element', () => {
     assert(element.shadowRoot?.querySelector('[part=error]') === null, 'no message covers them');
     const screen = await screenOf(element);
     for (const [i, { loaded }] of all.entries()) {
-      const [x, y] = [60 + METRE * ((i % 6) - 2.5), 50 - METRE * (Math.floor(i / 6) - 1.5)];
+      const [x, y] = [60 + METER * ((i % 6) - 2.5), 50 - METER * (Math.floor(i / 6) - 1.5)];
       assertEqual(isGreen(screen.at(x, y)), loaded, `scene ${i}`);
     }
     assertEqual(
@@ -191,7 +201,7 @@ describe('several scenes in one element', () => {
       2,
       'stats',
     );
-    assertEqual(element.stats?.modelled, 22, 'splats of all');
+    assertEqual(element.stats?.total, 22, 'splats of all');
     const before = submits;
     await delay(300);
     assertEqual(submits - before, 0, 'nothing is drawn at rest');
@@ -216,10 +226,10 @@ describe('several scenes in one element', () => {
     const { left, top } = element.getBoundingClientRect();
     const point = await element.positionFromPoint(left + red.x, top + red.y);
     assert(point && Math.abs(point.x - 21) < 0.5, `picked: ${point?.toString()}`);
-    const picture = await createImageBitmap(await element.toBlob());
-    const context = new OffscreenCanvas(picture.width, picture.height).getContext('2d')!;
-    context.drawImage(picture, 0, 0);
-    const { data } = context.getImageData(0, 0, picture.width, picture.height);
+    const image = await createImageBitmap(await element.toBlob());
+    const context = new OffscreenCanvas(image.width, image.height).getContext('2d')!;
+    context.drawImage(image, 0, 0);
+    const { data } = context.getImageData(0, 0, image.width, image.height);
     const count = (isPicked: (i: number) => boolean): number =>
       data.filter((_, i) => i % 4 === 0 && isPicked(i)).length;
     assert(count((i) => data[i] > 150 && data[i + 1] < 100 && data[i + 3] > 100) > 0, 'red in the picture');
@@ -238,12 +248,12 @@ describe('several scenes in one element', () => {
       const events: string[] = [];
       for (const type of ['contextlost', 'contextrestored', 'load', 'error'] as const)
         element.addEventListener(type, () => events.push(type));
-      const picture = await screenOf(element);
+      const image = await screenOf(element);
       const restored = nextEvent(element, 'contextrestored');
       devices.at(-1)!.destroy();
       await restored;
       await frames();
-      assertEqual((await screenOf(element)).differences(picture, 2), 0, 'the picture is back');
+      assertEqual((await screenOf(element)).differences(image, 2), 0, 'the picture is back');
       assertEqual(events, ['contextlost', 'contextrestored'], 'events');
       childrenOf(element)[1].remove();
       await frames();

@@ -22,7 +22,7 @@ const MOVIE = '/net/sequence/movie.json';
 /** Frames of the movie that were fetched since this was last asked. */
 const fetchedFrames = async (): Promise<number[]> => (await (await fetch('/net/sequence/asked')).json()) as number[];
 
-async function shows(element: GaussianSplatElement, isColor: (colour: Rgb) => boolean): Promise<boolean> {
+async function shows(element: GaussianSplatElement, isColor: (color: Rgb) => boolean): Promise<boolean> {
   return (await screenOf(element)).middleOf(isColor) !== null;
 }
 
@@ -128,7 +128,7 @@ describe('a sequence of files', () => {
   });
 
   itInLab('where every frame is late, in a second round too, pictures follow the clock at a distance', async () => {
-    // Three seconds, of which two are looked ahead, and each frame takes longer than eight of them.
+    // Three seconds, two of them prefetched, and each frame takes longer than eight of them.
     const element = await showLoaded({ src: `${MOVIE}?count=72&fps=24&ms=350`, loop: '' });
     const seen = [new Set<number>(), new Set<number>()];
     let [round, last] = [0, 0];
@@ -159,7 +159,7 @@ describe('a sequence of files', () => {
   itInLab('fetches two seconds of frames ahead, whatever its length', async () => {
     await fetchedFrames();
     const element = await showLoaded({ src: `${MOVIE}?count=300&fps=10` });
-    let most = 0;
+    let max = 0;
     for (const seconds of [0, 5, 29, 12]) {
       await seek(element, seconds);
       await delay(300);
@@ -170,9 +170,9 @@ describe('a sequence of files', () => {
         `frames ${fetched.join()} at ${seconds} s`,
       );
       assert(seconds === 0 || fetched.includes(10 * seconds), `frames ${fetched.join()} at ${seconds} s`);
-      most = Math.max(most, fetched.length);
+      max = Math.max(max, fetched.length);
     }
-    assert(most > 5, 'and fetches ahead');
+    assert(max > 5, 'and fetches ahead');
   });
 
   it('a frame that is not there is told once and passed over', async () => {
@@ -187,12 +187,12 @@ describe('a sequence of files', () => {
   });
 });
 
-const TOLD = ['emptied', 'loadstart', 'durationchange', 'loadedmetadata', 'loadeddata', 'canplay', 'error'];
+const REPORTED = ['emptied', 'loadstart', 'durationchange', 'loadedmetadata', 'loadeddata', 'canplay', 'error'];
 
 function eventsOf(element: GaussianSplatElement): string[] {
-  const told: string[] = [];
-  for (const type of TOLD) element.addEventListener(type, () => told.push(type));
-  return told;
+  const reported: string[] = [];
+  for (const type of REPORTED) element.addEventListener(type, () => reported.push(type));
+  return reported;
 }
 
 /** The name of the error that a promise is rejected with. */
@@ -209,15 +209,15 @@ describe('the clock', () => {
     element.playbackRate = 8;
     await element.play();
     await ended;
-    const told = eventsOf(element);
+    const reported = eventsOf(element);
     element.src = `${MOVIE}?another`;
     await nextEvent(element, 'load');
     assertEqual([element.currentTime, element.ended, element.paused], [0, false, true], 'time, ended, paused');
     const fresh = ['emptied', 'loadstart', 'durationchange', 'loadedmetadata', 'loadeddata', 'canplay'];
-    assertEqual(told.splice(0), ['durationchange', ...fresh], 'events');
+    assertEqual(reported.splice(0), ['durationchange', ...fresh], 'events');
     element.src = '/net/status/404';
     await nextEvent(element, 'error');
-    assertEqual(told.splice(0), ['durationchange', 'emptied', 'loadstart', 'error'], 'events of one that fails');
+    assertEqual(reported.splice(0), ['durationchange', 'emptied', 'loadstart', 'error'], 'events of one that fails');
     assertEqual(element.duration, NaN, 'its duration');
   });
 
@@ -247,7 +247,7 @@ describe('the clock', () => {
     const element = await showLoaded({ src: `${MOVIE}?count=600&fps=2` });
     await element.play();
     const goesOnFrom = async (seconds: number, what: string): Promise<void> => {
-      // Told before the clock goes on.
+      // The event fires before the clock continues.
       await nextEvent(element, 'playing');
       assertEqual(element.currentTime, seconds, what);
       await until(() => element.currentTime > seconds, 'the time to go on');
@@ -296,7 +296,7 @@ function silence(): string {
 
 type Timed = Pick<HTMLMediaElement, 'currentTime' | 'readyState' | 'seeking'> & { src: string | Blob | null };
 
-/** What a page may say of a source and a time within one task, and where the clock is then and in the end. */
+/** Actions of a page on a source and a time within one task, and the clock's time then and in the end. */
 const SCRIPTS: Readonly<Record<string, (media: Timed, a: string, b: string) => void>> = {
   'another src, then a time': (media, _, b) => {
     media.src = b;
@@ -326,7 +326,7 @@ const SCRIPTS: Readonly<Record<string, (media: Timed, a: string, b: string) => v
 
 describe('a source and a time in one task', () => {
   async function timesOf(media: Timed, a: string, b: string): Promise<unknown[]> {
-    const told: unknown[] = [];
+    const reported: unknown[] = [];
     const settled = (): Promise<void> => until(() => media.readyState > 0 && !media.seeking, 'the source');
     for (const isFirst of [true, false]) {
       for (const [name, script] of Object.entries(SCRIPTS)) {
@@ -338,10 +338,10 @@ describe('a source and a time in one task', () => {
         const now = media.currentTime;
         await frames(2);
         await settled();
-        told.push([name, isFirst, now, media.currentTime]);
+        reported.push([name, isFirst, now, media.currentTime]);
       }
     }
-    return told;
+    return reported;
   }
 
   it('are those of the audio element', async () => {

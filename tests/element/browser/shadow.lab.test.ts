@@ -1,4 +1,4 @@
-/** The shadow on the ground: where it lies, how dark, made once, and gone from below. */
+/** The shadow on the ground: its position and darkness, created once, and hidden from below. */
 import '@gaussian-splat/element';
 import type { GaussianSplatElement } from '@gaussian-splat/element';
 import { boxGlb } from './support/glb.js';
@@ -68,8 +68,8 @@ describe('shadow-intensity', () => {
       assertEqual(submits - before, 0, 'frames of a page that rests');
       element.setAttribute('camera-orbit', '0deg 150deg 4m');
       await atRest(element);
-      const picture = await screenOf(element);
-      const [red] = picture.at(30, 20);
+      const image = await screenOf(element);
+      const [red] = image.at(30, 20);
       assert(Math.abs(red - 200) < 3, `${red}: seen from below there is none`);
     });
 

@@ -1,7 +1,18 @@
-/** The environment behind a scene: where its colors lie, with both renderers, in saved images, and what goes wrong with it. */
+/** The environment behind a scene: positions of its colors, with both renderers, in saved images, and its errors. */
 import '@gaussian-splat/element';
-import type { GaussianSplatElement } from '@gaussian-splat/element';
-import { assert, assertEqual, atRest, claimComing, COMPASS, delay, showLoaded, submits } from './support/harness.js';
+import { GaussianSplatElement } from '@gaussian-splat/element';
+import { holdings } from './support/ledger.js';
+import {
+  assert,
+  assertEqual,
+  atRest,
+  claimComing,
+  COMPASS,
+  delay,
+  showLoaded,
+  submits,
+  until,
+} from './support/harness.js';
 import { comesToShow, isBlue, isGreen, isRed, screenOf, type Rgb } from './support/screen.js';
 
 const STYLE = 'width: 160px; height: 120px';
@@ -24,7 +35,7 @@ async function skyUrl(): Promise<string> {
 const load = async (more: Readonly<Record<string, string>> = {}): Promise<GaussianSplatElement> =>
   showLoaded({ src: COMPASS, ...VIEW, 'skybox-image': await skyUrl(), 'interpolation-decay': '0', ...more }, STYLE);
 
-/** Corners of the picture: there are no splats. */
+/** Corners of the image, without splats. */
 const cornersOf = async (element: Element): Promise<Rgb[]> => {
   const screen = await screenOf(element);
   return [screen.at(3, 3), screen.at(156, 3), screen.at(3, 116), screen.at(156, 116)];
@@ -70,4 +81,21 @@ describe('a sky that cannot be', () => {
     await claimComing(/skybox-image: expected an image at/);
     assertEqual(element.loaded, true, 'loaded');
   });
+});
+
+it('a sky and a shadow leave the GPU with their element', async () => {
+  const { releaseDelay } = GaussianSplatElement;
+  GaussianSplatElement.releaseDelay = 0;
+  try {
+    // It keeps the device.
+    await atRest(await showLoaded());
+    const before = holdings().objects;
+    const element = await load({ 'shadow-intensity': '1', 'camera-orbit': '45deg 60deg 12m' });
+    await atRest(element, 1_500);
+    assert(holdings().objects > before, 'they are on the GPU');
+    element.remove();
+    await until(() => holdings().objects <= before, 'their memory to be free', 1_000);
+  } finally {
+    GaussianSplatElement.releaseDelay = releaseDelay;
+  }
 });

@@ -1,4 +1,4 @@
-/** Sound beside a clip: in step with its time, silent where browsers or visitors want it so, with captions. */
+/** Sound beside a clip: in step with its time, silent if browsers or visitors mute it, with captions. */
 import '@gaussian-splat/element';
 import type { GaussianSplatElement } from '@gaussian-splat/element';
 import { assert, assertEqual, frames, nextEvent, showLoaded, until } from './support/harness.js';
@@ -60,7 +60,7 @@ async function showWithSound(isMuted = true): Promise<[GaussianSplatElement, HTM
   return [element, audio];
 }
 
-/** Lets an element play by a clock of its own that begins 80 ms late and runs 0.2 % too fast: on a machine without a sound card, which draws with its processor, real sound stutters. */
+/** Lets an element play by a separate clock that starts 80 ms late and runs 0.2 % too fast: on a machine without a sound card, which draws on its CPU, real sound stutters. */
 function steady(audio: HTMLAudioElement): void {
   let [at, since, rate, isPaused] = [0, 0, 1, true];
   const now = (): number => (isPaused ? at : at + Math.max(0, (1.002 * rate * (performance.now() - since)) / 1000));
@@ -93,7 +93,8 @@ describe('sound', () => {
     const off: number[] = [];
     const ended = nextEvent(element, 'ended');
     let [before, begun] = [NaN, 0];
-    // What is on show belongs to the time of its frame: the clock has come to it once all callbacks of the frame have run.
+    // The visible splats belong to the time of their frame: the clock has reached it once all callbacks of the frame
+    // have run.
     const look = (frameTime: number): void => {
       if (element.ended) return;
       requestAnimationFrame(look);
@@ -137,6 +138,11 @@ describe('sound', () => {
     });
     await element.play();
     await until(() => rounds >= 2 && !audio.paused, 'two rounds', 4 * LIMIT_MS);
+    element.style.marginTop = '5000px';
+    await until(() => audio.paused, 'silence out of view', 2 * LIMIT_MS);
+    assertEqual(element.paused, false, 'the scene is not paused');
+    element.style.marginTop = '';
+    await until(() => !audio.paused, 'sound again', LIMIT_MS);
     element.pause();
     await until(() => audio.paused, 'silence', LIMIT_MS);
     audio.remove();

@@ -10,8 +10,7 @@ import { assert, assertEqual, claimComing, devices, nextEvent, show, until } fro
 const folder = detailFolder(pebbles(40_000));
 
 /**
- * Serves the folder: the manifest at an address of its own, pages where the worker finds them as well; `lost` names those that are not there. Notes what the page asks its
- * loader for, and what it fetches itself.
+ * Serves the folder: the manifest at its own address, pages at addresses that the worker can fetch as well; `lost` names missing pages. Records the page's requests to its loader, and its own fetches.
  */
 async function serve(
   address: string,
@@ -117,7 +116,7 @@ describe('a streamed scene', () => {
     await element.ready;
     assert(element.loaded, `loaded: ${element.stats?.scenes[0]?.error?.message}`);
     const few = requests.length;
-    // Close to the scene itself; close to where it would stand without its place nothing more is asked for.
+    // Close to the scene itself. At its position without the placement no more pages are requested.
     element.setAttribute('camera-orbit', '200deg 80deg 1m');
     await until(() => requests.length > few + 3, 'pages for a closer view');
     assertEqual(new Set(requests).size, requests.length, 'no page twice');

@@ -4,7 +4,17 @@ import type { GaussianSplatElement } from '@gaussian-splat/element';
 import { emulateMedia, resetMouse, sendKeys, sendMouse } from '@web/test-runner-commands';
 import { itInLab } from '../../support/extent-in-pages.js';
 import { violationsIn } from './support/axe.js';
-import { assert, assertEqual, claimFault, delay, frames, showLoaded, until } from './support/harness.js';
+import {
+  assert,
+  assertEqual,
+  claimComing,
+  claimFault,
+  delay,
+  frames,
+  nextEvent,
+  showLoaded,
+  until,
+} from './support/harness.js';
 
 const STILL = {
   'camera-controls': '',
@@ -52,6 +62,23 @@ describe('flyTo', () => {
     element.resetCamera();
     element.jumpCameraToGoal();
     near(theta(element), 0, 'theta after a reset');
+  });
+
+  it('begins where the camera is, which may be on its way to another place', async () => {
+    const element = await scene({ 'interpolation-decay': '2000', views: VIEWS });
+    await until(() => partOf(element, 'next-view') !== null, 'the bar');
+    element.cameraOrbit = '150deg 90deg 8m';
+    await until(() => theta(element) > 0, 'the way');
+    const begun = nextEvent(element, 'view-change');
+    const flight = element.flyTo('Back', { duration: 10_000 });
+    await begun;
+    const before = theta(element);
+    await nextEvent(element, 'camera-change');
+    await nextEvent(element, 'camera-change');
+    assert(before < 90, `${before} degrees: the camera moves slowly`);
+    assert(theta(element) < before + 30, `the flight begins with a jump from ${before} to ${theta(element)} degrees`);
+    element.cameraOrbit = '0deg 90deg 8m';
+    assertEqual(await flight, false, 'arrived');
   });
 
   it('gives way to hands, to attributes and to another flight: false', async () => {
@@ -108,8 +135,8 @@ describe('flyTo', () => {
 describe('a list of views', () => {
   it('has a bar, keys, an event and words; axe finds nothing', async () => {
     const element = await scene({ views: VIEWS });
-    const told: unknown[] = [];
-    element.addEventListener('view-change', ({ detail }) => told.push(detail));
+    const reported: unknown[] = [];
+    element.addEventListener('view-change', ({ detail }) => reported.push(detail));
     await until(() => partOf(element, 'next-view') !== null, 'the bar');
     const { left, top, width, height } = partOf(element, 'next-view')!.getBoundingClientRect();
     assert(width >= 24 && height >= 24, `${width} x ${height}`);
@@ -126,7 +153,7 @@ describe('a list of views', () => {
     near(element.getCameraTarget().x, 0.5, 'target');
     await sendKeys({ press: 'p' });
     await until(() => spoken(element) === 'Right (2/3)', 'P');
-    assertEqual(told, [0, 1, 2, 1].map((index) => ({ name: ['Front', 'Right', 'Back'][index], index })), 'view-change'); // prettier-ignore
+    assertEqual(reported, [0, 1, 2, 1].map((index) => ({ name: ['Front', 'Right', 'Back'][index], index })), 'view-change'); // prettier-ignore
     const ids = element.shadowRoot!.querySelector('#view')!.getAttribute('aria-describedby')!.split(' ');
     assert(
       ids.some((id) => /N and P/.test(element.shadowRoot!.getElementById(id)?.textContent ?? '')),
@@ -134,6 +161,9 @@ describe('a list of views', () => {
     );
     assertEqual(await element.previousView(FAST), true);
     near(theta(element), 0, 'theta');
+    const both = await Promise.all([element.nextView(FAST), element.nextView(FAST)]);
+    assertEqual(both, [false, true], 'the second flight takes over from the first');
+    near(Math.abs(theta(element)), 180, 'theta two views on');
     element.a11y = { 'next-view': 'Weiter', front: 'Von vorn' };
     await until(() => partOf(element, 'next-view')?.getAttribute('aria-label') === 'Weiter', 'words of the page');
     element.views = null;
@@ -171,6 +201,10 @@ describe('a list of views', () => {
     element.views = '{"scenes": []}';
     await until(() => partOf(element, 'view-name') === null, 'no views');
     claimFault(/console\.warn: <gaussian-splat> views: .*expected a list of views/);
+    element.views = '[{ "name": "Nowhere", "orbit": "far away" }]';
+    await until(() => partOf(element, 'next-view') !== null, 'the bar');
+    partOf(element, 'next-view')!.click();
+    await claimComing(/console\.warn: <gaussian-splat> views: .*view\.orbit/);
   });
 
   itInLab('is a path: by a share of it, and in time', async () => {
@@ -179,6 +213,9 @@ describe('a list of views', () => {
     near(theta(element), 90, 'in the middle is the second of three');
     await element.seekPath(7);
     near(theta(element), 180, 'no farther than the end');
+    // A page that does not scroll computes 0 / 0.
+    await element.seekPath(NaN);
+    near(theta(element), 0, 'the beginning');
     const seen: number[] = [];
     element.addEventListener('camera-change', () => seen.push(theta(element)));
     assertEqual(await element.flyPath({ duration: 400 }), true);

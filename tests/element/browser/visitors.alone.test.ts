@@ -1,4 +1,4 @@
-/** Visitors who get lost, who scroll past, who drag where something lies in the way: what the element does for them. */
+/** Visitors who get lost, who scroll past, who drag over an obstacle: the element's help for each. */
 import '@gaussian-splat/element';
 import type { GaussianSplatElement } from '@gaussian-splat/element';
 import { resetMouse, sendKeys, sendMouse } from '@web/test-runner-commands';
@@ -64,18 +64,18 @@ afterEach(async () => {
 describe('nobody loses the scene', () => {
   const random = randomSource(11);
   const point = (): number[] => [Math.round(random() * WIDTH), Math.round(random() * HEIGHT)];
-  /** The same events as of a hand, without the browser's own time between them. */
+  /** The same events as from a hand, without the browser's time between them. */
   const gesture = (surface: HTMLElement, pointerType: 'mouse' | 'touch', button: number, ways: number[][][]): void => {
-    const tell = (type: string, [clientX, clientY]: number[], pointerId: number): void => {
+    const report = (type: string, [clientX, clientY]: number[], pointerId: number): void => {
       const buttons = type === 'pointerup' ? 0 : button === 2 ? 2 : 1;
       const pointer = { pointerType, pointerId: pointerId + 1, button, buttons, clientX, clientY, bubbles: true };
       surface.dispatchEvent(new PointerEvent(type, pointer));
     };
-    ways.forEach(([from], id) => tell('pointerdown', from, id));
+    ways.forEach(([from], id) => report('pointerdown', from, id));
     for (const share of [0.2, 0.6, 1]) {
-      ways.forEach(([from, to], id) => tell('pointermove', from.map((v, k) => v + share * (to[k] - v)), id)); // prettier-ignore
+      ways.forEach(([from, to], id) => report('pointermove', from.map((v, k) => v + share * (to[k] - v)), id)); // prettier-ignore
     }
-    ways.forEach(([, to], id) => tell('pointerup', to, id));
+    ways.forEach(([, to], id) => report('pointerup', to, id));
   };
 
   it('by 100 gestures of fingers: it is in sight, or one tap on the button away', async () => {
@@ -147,7 +147,7 @@ describe('nobody loses the scene', () => {
     await swipe([[[100, 80], [60, 80]]]); // prettier-ignore
     await until(() => partOf(element, 'reset-button') !== null, 'the button');
     const button = partOf(element, 'reset-button')!;
-    assertEqual(button.getAttribute('aria-label'), 'Bring the view back', 'name');
+    assertEqual(button.getAttribute('aria-label'), 'Reset view', 'name');
     const { width, height } = button.getBoundingClientRect();
     assert(width >= 24 && height >= 24, `${width} x ${height}`);
     button.click();
@@ -262,7 +262,7 @@ describe('drags', () => {
     button.addEventListener('click', () => clicks++);
     await until(() => element.queryHotspot('hotspot-middle')?.visible === true, 'the label');
     await drag([100, 80], [60, 80]);
-    // It counts from where it was a drag and no click.
+    // The gesture counts from the point at which it was a drag and no click.
     assert(theta(element) > 50 && theta(element) <= 90, `theta ${theta(element)}`);
     assertEqual(clicks, 0, 'clicks of a drag');
     element.cameraOrbit = '0deg 90deg 8m';
@@ -275,6 +275,14 @@ describe('drags', () => {
     const { radius } = element.getCameraOrbit();
     await turnWheel(100, 80, 60);
     await until(() => element.getCameraOrbit().radius > radius, 'the zoom over a label');
+  });
+
+  it('of one finger that begin on a hotspot turn the scene', async () => {
+    const element = await scene({ 'camera-orbit': '0deg 90deg 8m' });
+    label(element);
+    await until(() => element.queryHotspot('hotspot-middle')?.visible === true, 'the label');
+    await swipe([[[100, 80], [40, 80]]]); // prettier-ignore
+    await until(() => theta(element) > 50, 'the turn');
   });
 
   it('of one finger on a hotspot and one beside it pinch', async () => {
@@ -311,7 +319,7 @@ describe('drags', () => {
 });
 
 describe('a carousel that listens to pointers', () => {
-  /** As such code is written: it slides by what a pointer moves, unless somebody else has used the move. */
+  /** As such code is written: it slides by a pointer's movement, unless other code has used the move. */
   async function carouselAround(element: GaussianSplatElement): Promise<() => number> {
     const slides = document.createElement('div');
     slides.style.cssText = 'width: 600px; padding: 40px 0; touch-action: pan-y';
@@ -411,13 +419,13 @@ describe('small and certain', () => {
 
   it('the prompt stands low, and goes when it has been seen', async () => {
     const element = await showLoaded({ 'camera-controls': '', 'interaction-prompt-threshold': '0' }, SIZE);
-    await until(() => partOf(element, 'prompt') !== null, 'the prompt');
-    const { top, bottom } = partOf(element, 'prompt')!.getBoundingClientRect();
+    await until(() => partOf(element, 'interaction-prompt') !== null, 'the prompt');
+    const { top, bottom } = partOf(element, 'interaction-prompt')!.getBoundingClientRect();
     const box = element.getBoundingClientRect();
     assert(bottom <= box.bottom && top > box.top + HEIGHT / 2, `from ${top} to ${bottom}`);
     hurry(10);
-    await until(() => partOf(element, 'prompt') === null, 'the prompt to go', 5_000);
+    await until(() => partOf(element, 'interaction-prompt') === null, 'the prompt to go', 5_000);
     await delay(5_000);
-    assertEqual(partOf(element, 'prompt'), null, 'it stays away');
+    assertEqual(partOf(element, 'interaction-prompt'), null, 'it stays away');
   });
 });

@@ -1,14 +1,14 @@
 /** VR with an emulated headset: both eyes against the oracle, sessions that begin and end, and all that may go wrong. */
 import '@gaussian-splat/element';
-import { cameraFromProjection, multiply, type Camera } from '@gaussian-splat/core';
 import type { GaussianSplatElement } from '@gaussian-splat/element';
+import { executeServerCommand } from '@web/test-runner-commands';
 import { fetchScene, readScene } from '@gaussian-splat/formats';
 import { orderView, SplatOrder } from '@gaussian-splat/renderer/webgl';
 import { renderOracle, toRgba } from '../../oracle/oracle.js';
 import { itInLab } from '../../support/extent-in-pages.js';
 import { psnr } from '../../support/metrics.js';
 import { violationsIn } from './support/axe.js';
-import { EYE, headset } from './support/headset.js';
+import { headset } from './support/headset.js';
 import {
   assert,
   assertEqual,
@@ -20,6 +20,7 @@ import {
   submits,
   until,
 } from './support/harness.js';
+import { cameraOf } from './support/vr-camera.js';
 
 const STILL = { 'interpolation-decay': '0', 'interaction-prompt': 'none', 'camera-orbit': '30deg 80deg 6m' };
 const VR = { vr: '', 'camera-controls': '', ...STILL };
@@ -40,7 +41,7 @@ const buttonOf = (element: GaussianSplatElement): HTMLButtonElement | null =>
 const unhandled: unknown[] = [];
 addEventListener('unhandledrejection', ({ reason }) => unhandled.push(reason));
 
-/** Sessions that were begun, and what was done to begin them. */
+/** Sessions that were started, and the calls that started them. */
 let session: { end(): Promise<void> } | undefined;
 
 async function showVr(attributes: Readonly<Record<string, string>> = {}): Promise<GaussianSplatElement> {
@@ -78,26 +79,6 @@ async function leave(element: GaussianSplatElement): Promise<void> {
   element.exitXR!();
   await until(() => buttonOf(element) !== null, 'the button after the session', LIMIT_MS);
   headset().layer = undefined;
-}
-
-/** The camera of an eye in the scene's frame, by the rules of the start: the camera's place and heading, the floor 1.6 m below. */
-function cameraOf(element: GaussianSplatElement, eye: 'left' | 'right'): Camera {
-  const { theta, phi, radius } = element.getCameraOrbit();
-  const target = element.getCameraTarget();
-  const at = [
-    target.x + radius * Math.sin(phi) * Math.sin(theta),
-    target.y + radius * Math.cos(phi) - 1.6,
-    target.z + radius * Math.sin(phi) * Math.cos(theta),
-  ];
-  const [sin, cos] = [Math.sin(theta), Math.cos(theta)];
-  const turn = [cos, 0, -sin, 0, 0, 1, 0, 0, sin, 0, cos, 0, 0, 0, 0, 1];
-  const move = [1, 0, 0, -at[0], 0, 1, 0, -at[1], 0, 0, 1, -at[2], 0, 0, 0, 1];
-  const upright = [1, 0, 0, 0, 0, -1, 0, 0, 0, 0, -1, 0, 0, 0, 0, 1];
-  const { position, ipd } = headset().device;
-  const side = (eye === 'left' ? -1 : 1) * (ipd / 2);
-  const view = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, -side, -position.y, 0, 1];
-  const room = cameraFromProjection(view, headset().projection(eye), { ...EYE, clipDepth: '-1..1' });
-  return { ...room, worldToCamera: multiply(multiply(multiply(room.worldToCamera, turn), move), upright) };
 }
 
 describe('VR', () => {
@@ -160,6 +141,34 @@ describe('VR', () => {
     assert(submits > drawn, 'the page draws again');
   });
 
+  it('a session that is granted after the element has left or lost its attribute ends at once', async () => {
+    const { requestSession } = xr();
+    for (const leave of [(of: Element) => of.remove(), (of: Element) => of.removeAttribute('vr')]) {
+      const element = await showVr();
+      let grant: () => void = () => undefined;
+      let ended: Promise<unknown> | undefined;
+      xr().requestSession = async function (mode, options) {
+        await new Promise<void>((resolve) => (grant = resolve));
+        const begun = await requestSession.call(this, mode, options);
+        ended = nextEvent(begun as unknown as EventTarget, 'end', LIMIT_MS);
+        return begun;
+      };
+      try {
+        const activated = element.activateVR!();
+        leave(element);
+        await element.updateComplete;
+        grant();
+        await activated;
+        await ended;
+      } finally {
+        xr().requestSession = requestSession;
+      }
+      assertEqual(headset().layer, undefined, 'a layer');
+      assertEqual(element.getAttribute('vr-status'), 'not-presenting', 'status');
+      element.remove();
+    }
+  });
+
   it('one order by depth serves both eyes', async () => {
     const element = await showVr();
     const cloud = await readScene(await fetchScene('/demo/dist/scenes/skull.spz'), { name: 'skull.spz' });
@@ -196,10 +205,14 @@ describe('VR', () => {
     try {
       const element = await showVr();
       const before = String(element.getCameraOrbit());
+      const heaps: number[] = [];
       for (let i = 0; i < count; i++) {
         await enter(element);
         await leave(element);
+        if (i % 45 === 9) heaps.push(await executeServerCommand<number, undefined>('heap-size'));
       }
+      const perSession = (heaps[2] - heaps[1]) / 45;
+      console.log(`heap after 10, 55 and 100 sessions: ${heaps.join(', ')} bytes, ${Math.round(perSession)} a session`);
       assertEqual(String(element.getCameraOrbit()), before, 'camera');
       await until(() => contexts.every((gl) => gl.isContextLost()), 'an end of all contexts of sessions', LIMIT_MS);
       assertEqual(element.getAttribute('vr-status'), 'not-presenting', 'status');

@@ -1,7 +1,19 @@
 /** Walking on a floor that the element finds in the splats. */
-import '@gaussian-splat/element';
+import '@gaussian-splat/element/scenes.js';
 import type { GaussianSplatElement } from '@gaussian-splat/element';
-import { assert, assertEqual, atRest, claimComing, delay, frames, nextEvent, show, until } from './support/harness.js';
+import type { SplatSceneElement } from '@gaussian-splat/element/scenes.js';
+import {
+  assert,
+  assertEqual,
+  atRest,
+  claimComing,
+  delay,
+  FIXTURES,
+  frames,
+  nextEvent,
+  show,
+  until,
+} from './support/harness.js';
 
 /** Flat splats on the floor and walls of a room of `side` by `side` meters, the floor at height 0: a `.splat` file, y down. */
 function room(side: number, unit = 1): string {
@@ -103,6 +115,59 @@ describe('navigation="walk"', () => {
     const distance = (): number => Math.hypot(eyeOf(element)[0] - target.x, eyeOf(element)[2] - target.z);
     await until(() => distance() < 0.15, 'the place of the click');
     assert(Math.hypot(eyeOf(element)[0] - before[0], eyeOf(element)[2] - before[2]) > 0.3, 'it has walked');
+  });
+
+  it('walks to a click beside a child that takes clicks, and not to one on it', async () => {
+    const element = show(
+      { src: room(5), 'camera-controls': '', 'interpolation-decay': '0', 'interaction-prompt': 'none' },
+      'width: 200px; height: 160px',
+    );
+    const ball = document.createElement('splat-scene') as SplatSceneElement;
+    Object.assign(ball, { src: `${FIXTURES}green.splat`, position: [0, 1.6, -1.5], scale: 0.3, interactive: true });
+    element.append(ball);
+    await element.ready;
+    const part = (): Element | null => element.shadowRoot!.querySelector('[part=scene-button]');
+    await until(() => ball.loaded && part() !== null, 'the code of clicks');
+    const ready = nextEvent(element, 'walk-ready');
+    element.setAttribute('navigation', 'walk');
+    await ready;
+    await atRest(element);
+    const start = eyeOf(element);
+    const { left, top, width, height } = element.getBoundingClientRect();
+    const click = (y: number): boolean =>
+      viewOf(element).dispatchEvent(
+        new MouseEvent('click', { clientX: left + width / 2, clientY: top + y * height, bubbles: true }),
+      );
+    const away = (): number => Math.hypot(eyeOf(element)[0] - start[0], eyeOf(element)[2] - start[2]);
+    const hit = nextEvent(ball, 'click');
+    click(0.5);
+    await hit;
+    await delay(200);
+    assert(away() < 0.01, 'a click on the child walks');
+    click(0.95);
+    await until(() => away() > 0.3, 'a walk');
+  });
+
+  it('Home returns to the start, and a view that has moved the camera is where the walk goes on', async () => {
+    const element = await walkIn(room(5));
+    const start = eyeOf(element);
+    press(element, 'keydown', 'KeyW');
+    await until(() => Math.hypot(eyeOf(element)[0] - start[0], eyeOf(element)[2] - start[2]) > 1, 'a walk');
+    press(element, 'keyup', 'KeyW');
+    await atRest(element);
+    press(element, 'keydown', 'Home');
+    await frames(4);
+    for (const axis of [0, 1, 2]) near(eyeOf(element)[axis], start[axis], 1e-3, `eye after Home, axis ${axis}`);
+    near(element.getCameraOrbit().phi, Math.PI / 2, 1e-6, 'it looks straight ahead');
+    await element.flyTo({ position: [-1, 1.2, -1], lookAt: [0, 1.2, -1] }, { duration: 0 });
+    near(eyeOf(element)[1], 1.2, 1e-6, 'the view');
+    press(element, 'keydown', 'KeyW');
+    press(element, 'keyup', 'KeyW');
+    await frames(4);
+    const [x, y, z] = eyeOf(element);
+    near(y, 1.6, 0.03, 'height of the eyes');
+    near(z, -1, 0.05, 'beside the view');
+    assert(x > -1 && x < -0.5, `a step ahead of the view: ${x}`);
   });
 
   it('takes the unit of the file: the same room in units of 50 cm', async () => {

@@ -1,4 +1,4 @@
-/** The element where there is no WebGPU, or where a page asks for WebGL: the same scene, camera, events and questions. */
+/** The element without WebGPU, or on a page that requests WebGL: the same scene, camera, events and questions. */
 import '@gaussian-splat/element';
 import type { SplatMeshElement, SplatSceneElement } from '@gaussian-splat/element/scenes.js';
 import { GaussianSplatElement as ElementClass, type GaussianSplatElement } from '@gaussian-splat/element';
@@ -22,10 +22,10 @@ import {
 const GIF = 'data:image/gif;base64,R0lGODlhAQABAAAAACw=';
 const STILL = { 'interpolation-decay': '0', 'interaction-prompt': 'none' };
 const WEBGL = { renderer: 'webgl', 'camera-orbit': '0deg 90deg 8m', ...STILL };
-/** dB between two renderers' pictures of 8 bits. */
+/** PSNR in dB between two renderers' images of 8 bits. */
 const MIN_DB = 50;
 
-/** Contexts that the element has asked for, and what they have drawn. */
+/** Contexts that the element has requested, and their draw calls. */
 const contexts: WebGL2RenderingContext[] = [];
 let draws = 0;
 const getContext = HTMLCanvasElement.prototype.getContext;
@@ -40,15 +40,42 @@ WebGL2RenderingContext.prototype.drawElementsInstanced = function counting(...ar
   drawElements.apply(this, args);
 };
 
+/** Programs that were linked, and questions for their status that came before the compilation had ended: these block the main thread. Some browsers cannot say. */
+let [links, waits] = [0, 0];
+const linkProgram = WebGL2RenderingContext.prototype.linkProgram;
+WebGL2RenderingContext.prototype.linkProgram = function counting(program) {
+  links++;
+  linkProgram.call(this, program);
+};
+const askProgram = WebGL2RenderingContext.prototype.getProgramParameter;
+WebGL2RenderingContext.prototype.getProgramParameter = function counting(program, name) {
+  const extension = this.getExtension('KHR_parallel_shader_compile');
+  if (name === this.LINK_STATUS && extension && !askProgram.call(this, program, extension.COMPLETION_STATUS_KHR))
+    waits++;
+  return askProgram.call(this, program, name) as unknown;
+};
+
+/** A .splat file of splats that cover the whole frame each, in different colors. */
+function largeSplats(count: number): ArrayBuffer {
+  const bytes = new DataView(new ArrayBuffer(32 * count));
+  for (let i = 0; i < count; i++) {
+    const floats = [Math.sin(i), Math.cos(2 * i), Math.sin(3 * i), 4, 4, 4];
+    floats.forEach((value, k) => bytes.setFloat32(32 * i + 4 * k, value, true));
+    const rest = [(37 * i) % 256, (91 * i) % 256, (53 * i) % 256, 12, 255, 128, 128, 128];
+    rest.forEach((value, k) => bytes.setUint8(32 * i + 24 + k, value));
+  }
+  return bytes.buffer;
+}
+
 const pixelsOf = async (element: GaussianSplatElement): Promise<Uint8ClampedArray> => pixelsIn(await element.toBlob());
 
-async function pixelsIn(picture: Blob): Promise<Uint8ClampedArray> {
-  const image = await createImageBitmap(picture);
+async function pixelsIn(photo: Blob): Promise<Uint8ClampedArray> {
+  const image = await createImageBitmap(photo);
   const canvas = new OffscreenCanvas(image.width, image.height);
   const context = canvas.getContext('2d')!;
   context.drawImage(image, 0, 0);
   const { data } = context.getImageData(0, 0, image.width, image.height);
-  // Colours of what is all but transparent have no meaning without it.
+  // Colors of nearly transparent pixels have no meaning without alpha.
   return data.map((value, i) => (i % 4 === 3 ? value : (value * data[i | 3]) / 255));
 }
 
@@ -72,14 +99,14 @@ async function withoutGpu(test: () => Promise<void>): Promise<void> {
 }
 
 async function assertSame(attributes: Readonly<Record<string, string>>): Promise<void> {
-  const pictures = [];
+  const images = [];
   for (const renderer of ['webgl', 'webgpu']) {
     const element = await showLoaded({ ...WEBGL, ...attributes, renderer });
     assertEqual([element.stats?.renderer, element.stats?.renderer], [renderer, renderer], 'renderer');
-    pictures.push(await pixelsOf(element));
+    images.push(await pixelsOf(element));
     element.remove();
   }
-  const found = decibels(pictures[0], pictures[1]);
+  const found = decibels(images[0], images[1]);
   assert(found >= MIN_DB, `${JSON.stringify(attributes)}: ${found.toFixed(1)} dB from WebGPU's picture`);
 }
 
@@ -95,20 +122,20 @@ describe('renderer="webgl"', () => {
       await assertSame({ filter, 'camera-orbit': '30deg 75deg 20m' });
   });
 
-  itInLab('pictures of any size, over a colour, are those of WebGPU', async () => {
+  itInLab('pictures of any size, over a color, are those of WebGPU', async () => {
     const options = { width: 333, height: 111, background: 'rgb(40 80 120)' };
     const taken = [];
     for (const renderer of ['webgl', 'webgpu']) {
       const element = await showLoaded({ ...WEBGL, renderer });
       const before = await pixelsOf(element);
-      const picture = await pixelsIn(await element.toBlob(options));
-      assertEqual(picture.length, 4 * 333 * 111, 'values');
+      const image = await pixelsIn(await element.toBlob(options));
+      assertEqual(image.length, 4 * 333 * 111, 'values');
       assert(
-        picture.every((value, i) => i % 4 !== 3 || value === 255),
+        image.every((value, i) => i % 4 !== 3 || value === 255),
         'nothing is transparent',
       );
       assertEqual(decibels(await pixelsOf(element), before), Infinity, 'the picture on show stays');
-      taken.push(picture);
+      taken.push(image);
       element.remove();
     }
     const found = decibels(taken[0], taken[1]);
@@ -181,6 +208,31 @@ describe('renderer="webgl"', () => {
     }
   });
 
+  it('all scenes of a page share three programs, and no thread waits for their compilation', async () => {
+    const before = links;
+    const elements = await Promise.all([WEBGL, WEBGL].map((attributes) => showLoaded(attributes)));
+    assert(links - before <= 3, `${links - before} programs`);
+    assertEqual(waits, 0, 'waits');
+    const [first, second] = await Promise.all(elements.map(pixelsOf));
+    assertEqual(decibels(first, second), Infinity, 'dB between the two');
+  });
+
+  it('a first frame that splats cover often is drawn in parts, and is the frame drawn at once', async () => {
+    const path = '/net/kept/webgl-covered/large.splat';
+    await fetch(path, { method: 'PUT', body: largeSplats(600) });
+    const before = draws;
+    const element = show({ ...WEBGL, src: path });
+    await element.ready;
+    assert(element.loaded, element.error?.message ?? 'loaded');
+    const parts = draws - before;
+    assert(parts >= 16, `${parts} parts`);
+    const inParts = element.shadowRoot!.querySelector('canvas')!.toDataURL();
+    assertEqual(inParts, element.toDataURL(), 'the picture');
+    // Reading draws the frame once.
+    assert(draws - before - parts <= 1, `${draws - before - parts} later draws`);
+    element.remove();
+  });
+
   it('a lost context comes back with the same picture', async () => {
     const element = await showLoaded(WEBGL);
     const before = await pixelsOf(element);
@@ -196,8 +248,8 @@ describe('renderer="webgl"', () => {
   itInLab('many elements share one context, which is given back', async () => {
     const first = contexts.length;
     const elements = await Promise.all(Array.from({ length: 20 }, () => showLoaded({ ...WEBGL, loading: 'eager' })));
-    const pictures = await Promise.all(elements.map(pixelsOf));
-    for (const picture of pictures) assertEqual(decibels(picture, pictures[0]), Infinity, 'dB');
+    const images = await Promise.all(elements.map(pixelsOf));
+    for (const image of images) assertEqual(decibels(image, images[0]), Infinity, 'dB');
     assert(contexts.length - first <= 1, `${contexts.length - first} contexts`);
     const gl = contexts.at(-1)!;
     for (const element of elements) element.remove();
@@ -250,19 +302,46 @@ describe('renderer="webgl"', () => {
     }
   });
 
-  it('a scene in pages is drawn whole where it fits', async () => {
+  /** Puts the folder of a streamed scene at an address of this page. */
+  async function putPages(name: string): Promise<Readonly<Record<string, string>>> {
     const folder = detailFolder(pebbles(20_000), undefined, { geometry: 'quantized' });
     const put = (path: string, body: BodyInit): Promise<Response> =>
-      fetch(`/net/kept/webgl-pages/${path}`, { method: 'PUT', body });
+      fetch(`/net/kept/${name}/${path}`, { method: 'PUT', body });
     for (const [path, bytes] of folder.files) await put(path, bytes);
     await put('detail.json', JSON.stringify(folder.manifest));
-    const pages = { ...WEBGL, src: '/net/kept/webgl-pages/detail.json' };
-    const element = show(pages);
+    return { ...WEBGL, src: `/net/kept/${name}/detail.json` };
+  }
+
+  it('a scene in pages is drawn whole if it fits', async () => {
+    const element = show(await putPages('webgl-pages'));
     await element.ready;
     assert(element.loaded, element.error?.message ?? 'loaded');
     assertEqual(element.stats?.renderer, 'webgl', 'renderer');
     assertEqual(element.stats?.splats, 20_000, 'splats');
     element.remove();
+  });
+
+  it('a scene in pages that exceeds its budget is drawn within it, its coarsest page first', async () => {
+    const budget = 800_000;
+    ElementClass.memoryBudget = budget;
+    try {
+      const gate = `webgl-${Math.round(performance.timeOrigin)}`;
+      const pages = await putPages('webgl-budget');
+      // The manifest and the coarsest page.
+      const element = show({ ...pages, src: `${pages.src}?passing=2&gate=${gate}` });
+      const { detail } = await nextEvent<CustomEvent<{ splats: number }>>(element, 'preview');
+      await fetch(`/net/open/${gate}`);
+      await element.ready;
+      assert(element.loaded, element.error?.message ?? 'loaded');
+      const { splats, bytes } = element.stats!;
+      assert(detail.splats > 0 && 4 * detail.splats < splats, `first ${detail.splats}, then ${splats} splats`);
+      assert(bytes.scene <= budget, `${bytes.scene} of ${budget} bytes`);
+      // Half of the budget at least is used: it limits the scene, and nothing else does.
+      assert(splats < 20_000 && 2 * bytes.scene > budget, `${splats} splats, ${bytes.scene} bytes`);
+      element.remove();
+    } finally {
+      ElementClass.memoryBudget = null;
+    }
   });
 
   it('what it cannot show is an error by name, the poster stays, and nothing is fetched', async () => {

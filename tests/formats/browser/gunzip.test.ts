@@ -1,4 +1,4 @@
-/** SPZ is inflated by the browser, and each has ways of its own with what is not quite a gzip file. */
+/** SPZ is inflated by the browser, and each treats faulty gzip files in its own way. */
 import { readScene } from '@gaussian-splat/formats';
 import { assert, assertEqual } from '../../element/browser/support/harness.js';
 
@@ -33,6 +33,17 @@ describe('a gzip file', () => {
     for (const behind of [[0, 0, 0], [10], [...'junk'].map((letter) => letter.charCodeAt(0))]) {
       assertEqual(await codeOf(joined(file, Uint8Array.from(behind))), 700, `with ${behind.join()}`);
     }
+  });
+
+  it('of several members is read whole, and so is one of long runs with something behind', async () => {
+    const content = inflatedSpz(700);
+    const parts = [content.subarray(0, 5000), content.subarray(5000, 9000), content.subarray(9000)];
+    const members = await Promise.all(parts.map((part) => gzipped(part.slice())));
+    assertEqual(await codeOf(joined(...members)), 700, 'three members');
+    assertEqual(await codeOf(joined(...members, Uint8Array.of(0, 0))), 700, 'and padding');
+    assertEqual(await codeOf(joined(...members).subarray(0, -40)), 'decode/truncated', 'the last one is cut');
+    // The content of one step is several pieces, which an error would drop.
+    assertEqual(await codeOf(joined(await gzipped(inflatedSpz(70_000)), Uint8Array.of(10))), 70_000, 'long runs');
   });
 
   it('that is cut or damaged is refused', async () => {

@@ -2,7 +2,7 @@
 import type * as Decoder from '../../../packages/formats/dist/webp/decode.js';
 import type * as Native from '../../../packages/formats/dist/webp/native.js';
 
-/** Not part of the package's surface, so it is taken from where the build puts it. */
+/** Not part of the package's surface, so it is imported from the build's output. */
 const BUILT: string = '/packages/formats/dist/webp/decode.js';
 const BUILT_NATIVE: string = '/packages/formats/dist/webp/native.js';
 

@@ -3,7 +3,7 @@ import assert from 'node:assert/strict';
 import { GaussianSplatError, shCoefficientCount, validateCloud, type GaussianCloud } from '@gaussian-splat/core';
 import { readScene, type ReadSceneOptions } from '@gaussian-splat/formats';
 
-/** Asserts that a file is refused with this code, and that the error says where it is wrong and what to do. */
+/** Asserts that a file is refused with this code, and that the error names the place of the fault and the remedy. */
 export async function expectRefusal(
   bytes: Uint8Array,
   code: string,
@@ -32,7 +32,7 @@ export async function refusalOf(
   }
 }
 
-/** Every part of the message is there, and the place names the file. */
+/** Every part of the message exists, and the place names the file. */
 export function assertHelpful(error: GaussianSplatError, name: string): void {
   assert.ok(error.where.includes(name), `where names the file: ${error.where}`);
   for (const part of [error.expected, error.found, error.remedy]) {

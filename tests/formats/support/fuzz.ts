@@ -1,4 +1,4 @@
-/** Damaged files: what every reader must take without a crash, a hang, or memory that nobody bounded. */
+/** Damaged files: every reader must survive them without a crash, a hang, or unbounded memory. */
 import { zipSync } from 'fflate';
 import { GaussianSplatError, validateCloud } from '@gaussian-splat/core';
 import { readPrefix, readScene } from '@gaussian-splat/formats';
@@ -164,7 +164,7 @@ function damage(file: Uint8Array, random: Random): Uint8Array {
   let bytes: Uint8Array = Uint8Array.from(file);
   const below = (n: number): number => Math.floor(random.uniform(0, n));
   for (let changes = 1 + below(4); changes > 0 && bytes.length > 0; changes--) {
-    // Half of the changes go to the first bytes, where the counts are.
+    // Half of the changes go to the first bytes, which hold the counts.
     const at = below(random.uniform(0, 1) < 0.5 ? Math.min(bytes.length, 256) : bytes.length);
     switch (below(7)) {
       case 0:
@@ -208,13 +208,13 @@ export interface FuzzTally {
   /** Refusals by code. */
   readonly codes: Record<string, number>;
   slowestMs: number;
-  /** Most bytes of array buffers that one file had allocated when it was done with. */
+  /** Peak bytes of array buffers that one file had allocated when it was read. */
   maxBytes: number;
 }
 
 /** A damaged scene may take no longer than this, ms, however busy the machine. */
 const MAX_MS = 5_000;
-/** Nor more memory: the sound files have some 10 KB. */
+/** Nor more memory: the sound files have about 10 KB. */
 const MAX_BYTES = 200e6;
 
 /** Reads `count` damaged copies of a format's scenes. Throws at the first that breaks a rule, and says how to make it again. */

@@ -46,22 +46,20 @@ export function writeKsplat(cloud: GaussianCloud, { level, bucketSize = 5 }: Ksp
   section.writeUInt32LE(rest > 0 ? 1 : 0, 36);
   section.writeUInt16LE(shDegree, 40);
 
-  const centre = (bucket: number, axis: number): number => cloud.positions[3 * bucket * bucketSize + axis];
+  const center = (bucket: number, axis: number): number => cloud.positions[3 * bucket * bucketSize + axis];
   if (rest > 0) push(Buffer.from(Uint32Array.of(rest).buffer));
-  for (let b = 0; b < buckets; b++) for (let axis = 0; axis < 3; axis++) push(float(centre(b, axis)));
+  for (let b = 0; b < buckets; b++) for (let axis = 0; axis < 3; axis++) push(float(center(b, axis)));
   const stride = 3 * (shDegree + 1) ** 2;
   for (let i = 0; i < count; i++) {
     for (let axis = 0; axis < 3; axis++) {
       const value = cloud.positions[3 * i + axis];
-      const offset = value - centre(Math.floor(i / bucketSize), axis);
+      const offset = value - center(Math.floor(i / bucketSize), axis);
       push(level === 0 ? float(value) : uint16(Math.round((offset / (blockSize / 2)) * 32_767) + 32_767));
     }
     for (let axis = 0; axis < 3; axis++) push(number(cloud.scales[3 * i + axis]));
     for (let k = 0; k < 4; k++) push(number(cloud.rotations[4 * i + k]));
-    const colour = [0, 1, 2].map((k) => 0.5 + 0.28209479177387814 * cloud.sh[stride * i + k]);
-    push(
-      Buffer.from([...colour, cloud.opacities[i]].map((value) => Math.round(255 * Math.min(1, Math.max(0, value))))),
-    );
+    const color = [0, 1, 2].map((k) => 0.5 + 0.28209479177387814 * cloud.sh[stride * i + k]);
+    push(Buffer.from([...color, cloud.opacities[i]].map((value) => Math.round(255 * Math.min(1, Math.max(0, value))))));
     for (let band = 1; band <= shDegree; band++) {
       for (let channel = 0; channel < 3; channel++) {
         for (let k = band * band; k < (band + 1) ** 2; k++) {

@@ -35,7 +35,7 @@ const drawn = (materials: number): object => ({
   meshes: [{ primitives: many(materials, (material) => ({ attributes: { POSITION: 0 }, material })) }],
 });
 
-/** By what is multiplied. */
+/** Cases by the multiplied part. */
 export const MULTIPLIED_MESHES: Readonly<Record<string, (factor: number) => Multiplied>> = {
   'mesh: points of an accessor without a view': (n) =>
     mesh({ accessors: [{ componentType: 5126, count: 50 * n, type: 'VEC3' }] }),

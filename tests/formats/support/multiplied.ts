@@ -7,7 +7,7 @@ import { smallCloud } from './small-cloud.js';
 import { writeSog } from './sog-writer.js';
 import { writeWebp } from './webp-writer.js';
 
-/** A file that names something so many times, and the file beside it that it names. */
+/** A file that names one thing a number of times, and the file beside it that it names. */
 export interface Multiplied {
   readonly file: Uint8Array;
   readonly beside?: Uint8Array;
@@ -19,7 +19,7 @@ const json = (value: unknown): Uint8Array => strToU8(JSON.stringify(value));
 const many = <T>(count: number, make: (k: number) => T): T[] => Array.from({ length: count }, (_, k) => make(k));
 const bound = { min: [0, 0, 0], max: [1, 1, 1] };
 
-/** Splats of one colour, which take next to no bytes. */
+/** Splats of one color, which take next to no bytes. */
 function plainSog(side: number): { meta: object; image: Uint8Array } {
   const image = writeWebp(new Uint8Array(4 * side * side).fill(255), side, side);
   const codebook = [0.1];
@@ -61,7 +61,7 @@ function spz(count: number): Uint8Array {
   return gzipSync(body);
 }
 
-/** An archive whose directory says of so many names that they are the same bytes. */
+/** An archive whose directory gives the same bytes a number of names. */
 function overlappingZip(count: number): Uint8Array {
   const inner = { 'a/meta.json': new Uint8Array(1 << 20).fill(32) };
   const one = zipSync(inner);
@@ -84,7 +84,7 @@ function overlappingZip(count: number): Uint8Array {
 const tiles = (uris: string[]): Uint8Array =>
   json({ asset: {}, geometricError: 1, root: { children: uris.map((uri) => ({ content: { uri } })) } });
 
-/** By what is multiplied. */
+/** Cases by the multiplied part. */
 export const MULTIPLIED: Readonly<Record<string, (factor: number) => Multiplied>> = {
   'frames of a pattern': (n) => ({
     file: json({ gaussianSplatSequence: 1, framesPerSecond: 24, frames: `${'a'.repeat(999)}{0}.spz`, count: n }),
@@ -109,7 +109,7 @@ export const MULTIPLIED: Readonly<Record<string, (factor: number) => Multiplied>
       256,
     ),
   }),
-  'splats of a SOG of one colour': (n) => {
+  'splats of a SOG of one color': (n) => {
     const { meta, image } = plainSog(Math.min(1_500, Math.ceil(Math.sqrt(256 * n))));
     return { file: zipSync({ 'meta.json': json(meta), i: image }, { level: 9 }) };
   },
@@ -129,7 +129,7 @@ export const MULTIPLIED: Readonly<Record<string, (factor: number) => Multiplied>
     text.copy(head, 8);
     return { file: Buffer.concat([head, file.subarray(start)]) };
   },
-  'splats of a RAD of one colour': (n) => {
+  'splats of a RAD of one color': (n) => {
     const count = Math.min(500_000, 100 * n);
     const zeros = (length: number): Float32Array => new Float32Array(length);
     const cloud = { ...smallCloud(1, 3), count, positions: zeros(3 * count), scales: zeros(3 * count).fill(1) };

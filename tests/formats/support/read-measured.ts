@@ -1,6 +1,5 @@
 /**
- * `node --import tsx read-measured.ts FILE BESIDE …` reads files, each with one beside it or with '', those named `.mesh` for their triangles, in a process of their own, the cheapest first, and prints what each cost as a line
- * of JSON: milliseconds of CPU, and the most memory that the process had beyond what it had before.
+ * `node --import tsx read-measured.ts FILE BESIDE …` reads files, each with one beside it or with '', those named `.mesh` for their triangles, in a process of their own, the cheapest first, and prints the cost of each as a line of JSON: milliseconds of CPU, and the peak memory of the process beyond its memory before.
  */
 import { existsSync, readFileSync } from 'node:fs';
 import { framePath, isSequence, LoadBudget, parseSequence, readScene, readTriangles } from '@gaussian-splat/formats';
@@ -19,7 +18,10 @@ async function read(file: Uint8Array, beside: string, isMesh: boolean): Promise<
   return `${(await readScene(file, { name: 'a', openFile })).count} splats`;
 }
 
-/** Most memory so far, bytes. What `resourceUsage` tells may be that of the process which started this one; on Linux its own is known. */
+/**
+ * Peak memory until now in bytes. `resourceUsage` may report the parent process; on Linux the process's own peak is
+ * known.
+ */
 function peakSoFar(): number {
   const status = existsSync('/proc/self/status') ? readFileSync('/proc/self/status', 'utf8') : '';
   return 1024 * Number(/VmHWM:\s*(\d+)/.exec(status)?.[1] ?? process.resourceUsage().maxRSS);

@@ -1,7 +1,7 @@
 import type { GaussianCloud, ShDegree } from '@gaussian-splat/core';
 import { seededRandom } from '../../support/random.js';
 
-/** A cloud of random, drawable splats: positions in ±2, scales 0.01 to 0.3, colours within 0..1. */
+/** A cloud of random, drawable splats: positions in ±2, scales 0.01 to 0.3, colors within 0..1. */
 export function smallCloud(count: number, shDegree: ShDegree, seed = 1): GaussianCloud {
   const random = seededRandom(seed);
   const numbers = (length: number, from: number, to: number): Float32Array =>

@@ -11,8 +11,8 @@ const range = (values: number[]): [number, number] => [
   values.reduce((a, b) => Math.max(a, b), -Infinity),
 ];
 
-/** 256 values at equal shares of the sorted numbers, and the nearest of them for each number. */
-function quantise(numbers: readonly number[]): { codebook: number[]; codes: number[] } {
+/** 256 values at equal fractions of the sorted numbers, and the nearest of them for each number. */
+function quantize(numbers: readonly number[]): { codebook: number[]; codes: number[] } {
   const sorted = [...numbers].sort((a, b) => a - b);
   const codebook = Array.from({ length: 256 }, (_, k) => sorted[Math.round((k / 255) * (sorted.length - 1))]);
   const codes = numbers.map((value) => {
@@ -71,14 +71,14 @@ export function writeSog(cloud: GaussianCloud): SogFiles {
   const coefficients = (shDegree + 1) ** 2 - 1;
   const stride = 3 * (coefficients + 1);
   const { mins, maxs, low, high } = means(cloud);
-  const scales = quantise(Array.from(cloud.scales, Math.log));
-  const colours = quantise(Array.from({ length: 3 * count }, (_, k) => cloud.sh[stride * Math.floor(k / 3) + (k % 3)]));
+  const scales = quantize(Array.from(cloud.scales, Math.log));
+  const colors = quantize(Array.from({ length: 3 * count }, (_, k) => cloud.sh[stride * Math.floor(k / 3) + (k % 3)]));
   const files: SogFiles = {
     'means_l.webp': low,
     'means_u.webp': high,
     'scales.webp': plane(count, (i) => [...scales.codes.slice(3 * i, 3 * i + 3), 255]),
     'quats.webp': quats(cloud),
-    'sh0.webp': plane(count, (i) => [...colours.codes.slice(3 * i, 3 * i + 3), Math.round(255 * cloud.opacities[i])]),
+    'sh0.webp': plane(count, (i) => [...colors.codes.slice(3 * i, 3 * i + 3), Math.round(255 * cloud.opacities[i])]),
   };
   const meta: Record<string, unknown> = {
     version: 2,
@@ -86,10 +86,10 @@ export function writeSog(cloud: GaussianCloud): SogFiles {
     means: { mins, maxs, files: ['means_l.webp', 'means_u.webp'] },
     scales: { codebook: scales.codebook, files: ['scales.webp'] },
     quats: { files: ['quats.webp'] },
-    sh0: { codebook: colours.codebook, files: ['sh0.webp'] },
+    sh0: { codebook: colors.codebook, files: ['sh0.webp'] },
   };
   if (shDegree > 0) {
-    const rest = quantise(
+    const rest = quantize(
       Array.from({ length: count * 3 * coefficients }, (_, k) => {
         const i = Math.floor(k / (3 * coefficients));
         return cloud.sh[stride * i + 3 + (k % (3 * coefficients))];

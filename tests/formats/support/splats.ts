@@ -77,7 +77,7 @@ export function inriaColumns(splats: RawSplats, type: PlyType = 'float'): PlyCol
   ];
 }
 
-/** What a cloud must hold for these splats: activated values, computed in float64. */
+/** The cloud expected for these splats: activated values, computed in float64. */
 export function activated(splats: RawSplats, keptDegree: ShDegree) {
   return {
     positions: splats.positions.flat(),

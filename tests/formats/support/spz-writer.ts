@@ -95,7 +95,7 @@ export function headerOf(splats: RawSplats, options: SpzWriterOptions, streamCou
   return new Uint8Array(header);
 }
 
-/** Positions, opacities, colours, scales, rotations and harmonics, in the order of the file. */
+/** Positions, opacities, colors, scales, rotations and harmonics, in the order of the file. */
 function streamsOf(splats: RawSplats, options: SpzWriterOptions): Uint8Array[] {
   const { version, fractionalBits = 12, axes = usualAxes(options) } = options;
   const bytes = (values: readonly number[]): Uint8Array => Uint8Array.from(values);

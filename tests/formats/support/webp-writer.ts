@@ -20,10 +20,10 @@ class BitWriter {
   }
 }
 
-/** The position of length 8 in the order in which code lengths are stored, and how many are stored up to it. */
+/** The position of length 8 in the storage order of code lengths, and how many are stored up to it. */
 const STORED_LENGTHS = 12;
 
-/** A code in which the symbols 0 to 255 all have eight bits. */
+/** A code with eight bits for each of the symbols 0 to 255. */
 function writeFlatCode(bits: BitWriter): void {
   bits.write(0, 1);
   bits.write(STORED_LENGTHS - 4, 4);
@@ -56,7 +56,7 @@ export function writeWebp(rgba: Uint8Array, width: number, height: number): Uint
   bits.write(height - 1, 14);
   bits.write(1, 1);
   bits.write(0, 3);
-  // No transform, no colour cache, one group of codes.
+  // No transform, no color cache, one group of codes.
   bits.write(0, 3);
   for (let code = 0; code < 4; code++) writeFlatCode(bits);
   writeEmptyCode(bits);

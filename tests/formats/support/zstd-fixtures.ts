@@ -1,4 +1,4 @@
-/** Contents that anybody can make again, and what the zstd 1.5 command line tool compresses them to. */
+/** Contents that are easy to create again, and the output of the zstd 1.5 command line tool for them. */
 
 /** A linear congruential generator; its lowest bits are left out because they repeat soon. */
 const generator = (seed: number) => () => {

@@ -1,4 +1,4 @@
-/** What renderers do to the element that people do not: markup from a server with a shadow root in it, a new object for every render. */
+/** Actions of renderers on the element that authors do not take: markup from a server with a shadow root in it, a new object for every render. */
 import '@gaussian-splat/element';
 import { assert, assertEqual, COMPASS, frames, showLoaded } from '../../element/browser/support/harness.js';
 import type { GaussianSplatElement } from '@gaussian-splat/element';
@@ -37,7 +37,7 @@ describe('an element that something else renders', () => {
     assertEqual(await render({ version: 1, duration: 2 }), 1, 'a contract');
     assertEqual(await render({ version: 1, duration: 2 }), 1, 'the same again');
     assertEqual(await render({ version: 1, duration: 3 }), 2, 'another one');
-    // With a contract a scene is read as a generator. This file is none; what counts here is how often it is asked for.
+    // A scene with a contract is read as a generator. This file is none, and the test counts its requests.
     assertEqual(element.error?.code, 'decode', 'error');
   });
 });

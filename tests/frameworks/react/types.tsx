@@ -1,6 +1,14 @@
-/** What the types of React's wrapper and of the bare tag take and refuse. Only type-checked, by types.test.ts. */
-import { GaussianSplat, SplatMesh, SplatScene, type HandlerName } from '@gaussian-splat/react';
-import type { GaussianSplatEventMap } from '@gaussian-splat/element';
+/** Accepted and refused types of React's wrapper and of the bare tag. Only type-checked, by types.test.ts. */
+import {
+  GaussianSplat,
+  SplatCut,
+  SplatMesh,
+  SplatScene,
+  type HandlerName,
+  type SplatCutProps,
+} from '@gaussian-splat/react';
+import type { GaussianSplatEventMap, ImmersiveStatusDetail, MeasureDetail } from '@gaussian-splat/element';
+import type { ChildEventMap } from '@gaussian-splat/element/scenes.js';
 import type {} from '@gaussian-splat/react/jsx';
 import type { DOMAttributes } from 'react';
 
@@ -8,7 +16,7 @@ type Ours = Lowercase<`on${keyof GaussianSplatEventMap}`>;
 /** Names that React has for handlers of our events: on the component each must be ours, or React swallows it. */
 type Reacts = { [Name in keyof DOMAttributes<Element>]-?: Lowercase<Name> extends Ours ? Name : never };
 type Swallowed = Exclude<Reacts[keyof Reacts], HandlerName>;
-/** Fails to compile where a name is swallowed, and says which. */
+/** Fails to compile if a name is not checked, and reports the name. */
 export const noneIsSwallowed: [Swallowed] extends [never] ? true : Swallowed = true;
 
 export const component = (
@@ -42,8 +50,27 @@ export const composed = (
       onError={({ detail }) => console.log(detail.reason)}
     />
     <SplatMesh src="chair.glb" scale={2} autoplay loop onLoad={({ detail }) => console.log(detail.url)} />
+    <SplatScene
+      src="walker.onnx"
+      onInputsChange={() => undefined}
+      onGeneratorMemory={({ detail }) => detail.weightBytes satisfies number}
+    />
+    <SplatCut shape="plane" position={[0, 0.8, 0]} hidden />
   </GaussianSplat>
 );
+export const cut: SplatCutProps = { shape: 'sphere', effect: 'tint', color: 'tomato' };
+export const immersive = (
+  <GaussianSplat
+    vr
+    measure
+    onVrStatus={({ detail }) => detail satisfies ImmersiveStatusDetail}
+    onMeasure={({ detail }) => detail satisfies MeasureDetail}
+  />
+);
+/** Events of the parent alone are not declared on children. */
+export const noDeadEvent: Extract<'view-change' | 'measure' | 'vr-status', keyof ChildEventMap> extends never
+  ? true
+  : never = true;
 // @ts-expect-error It is the scene's.
 export const cropped = <SplatMesh crop="0 0 0 1 1 1" />;
 // @ts-expect-error It can only be read.

@@ -1,4 +1,4 @@
-/** All controls of visitors at once, of a generator in a child too: axe in light, dark and forced colours, the keyboard alone, and visitors who ask for less motion. */
+/** All controls of visitors at once, of a generator in a child too: axe in light, dark and forced colors, the keyboard alone, and visitors who ask for less motion. */
 import '@gaussian-splat/element';
 import { GaussianSplatElement } from '@gaussian-splat/element';
 import type { SplatSceneElement } from '@gaussian-splat/element/scenes.js';
@@ -11,7 +11,7 @@ import { FIXTURES } from './support.js';
 GaussianSplatElement.runtimeLocation = '/node_modules/onnxruntime-web/dist/';
 
 const VIEWS = '[{ "name": "Front", "orbit": "0deg 75deg 100%" }, { "name": "Right", "orbit": "90deg 75deg 100%" }]';
-const PARTS = ['reset-button', 'pause-button', 'previous-view', 'next-view', 'controls-panel', 'controls-scene'];
+const PARTS = ['reset-button', 'pause-button', 'previous-view', 'next-view', 'controls-panel', 'controls-group'];
 const partOf = (element: Element, name: string): HTMLElement | null =>
   element.shadowRoot!.querySelector<HTMLElement>(`[part~=${name}]`);
 
@@ -29,9 +29,9 @@ async function showAll(): Promise<{ element: GaussianSplatElement; child: SplatS
   Object.assign(child, { title: 'Ball' });
   for (const [name, value] of Object.entries({ src: `${FIXTURES}state.onnx`, autoplay: '', loop: '' }))
     child.setAttribute(name, value);
-  const told = nextEvent(child, 'inputs-change');
+  const reported = nextEvent(child, 'inputs-change');
   element.append(child);
-  await told;
+  await reported;
   await child.ready;
   await sendTouch('touchStart', [{ x: 100, y: 300 }]);
   for (const x of [80, 60]) await sendTouch('touchMove', [{ x, y: 300 }]);
@@ -45,7 +45,7 @@ afterEach(async () => {
   await emulateMedia({ colorScheme: 'light', forcedColors: 'none', reducedMotion: 'no-preference' });
 });
 
-it('axe finds nothing in them in light, dark and forced colours; the keyboard reaches each, and is in the scene again after the button that goes', async () => {
+it('axe finds nothing in them in light, dark and forced colors; the keyboard reaches each, and is in the scene again after the button that goes', async () => {
   const { element, child } = await showAll();
   document.documentElement.style.colorScheme = 'light dark';
   const looks = [

@@ -42,7 +42,7 @@ interface Inside {
   };
 }
 
-/** Adds a cut, and waits until the code and pipelines of cuts are there. */
+/** Adds a cut, and waits until the code and pipelines of cuts are loaded. */
 async function cut(parent: Element, attributes: Readonly<Record<string, string>>): Promise<HTMLElement> {
   const child = document.createElement('splat-cut');
   for (const [name, value] of Object.entries(attributes)) child.setAttribute(name, value);

@@ -1,4 +1,4 @@
-/** Generators in <gaussian-splat>: declarative inputs, the media clock, faults that keep the picture. */
+/** Generators in <gaussian-splat>: declarative inputs, the media clock, faults that keep the last frame. */
 import '@gaussian-splat/element';
 import { GaussianSplatElement, type ElementError } from '@gaussian-splat/element';
 import {
@@ -29,7 +29,7 @@ const resources = (part: string): number =>
 
 const sizeOf = async (url: string): Promise<number> => (await (await fetch(url)).arrayBuffer()).byteLength;
 
-/** Covered pixels of the picture on the screen, and where their middle is. */
+/** Covered pixels of the screenshot, and their middle. */
 async function imageOf(element: GaussianSplatElement): Promise<{ count: number; x: number; y: number }> {
   return (await screenOf(element)).middleOf(([r, g, b]) => r + g + b < 700) ?? { count: 0, x: 0, y: 0 };
 }
@@ -47,17 +47,17 @@ describe('a generator in the element', () => {
 
   it('has a progress of model, runtime and warming up, that is not full before they are done', async () => {
     const watch = (element: GaussianSplatElement) => {
-      const told: { loaded: number; total: number; share: number; bar: number }[] = [];
+      const reported: { loaded: number; total: number; share: number; bar: number }[] = [];
       element.addEventListener('progress', ({ loaded, total }) => {
         void element.updateComplete.then(() => {
           const bar = element.shadowRoot?.querySelector('[role=progressbar]')?.getAttribute('aria-valuenow');
-          told.push({ loaded, total, share: element.progress, bar: Number(bar ?? NaN) });
+          reported.push({ loaded, total, share: element.progress, bar: Number(bar ?? NaN) });
         });
       });
-      return told;
+      return reported;
     };
     const element = show({ src: BALL });
-    const told = watch(element);
+    const received = watch(element);
     const memories: object[] = [];
     let [arrived, arrivedBefore] = [0, NaN];
     element.addEventListener('progress', (event) => (arrived = event.loaded));
@@ -72,7 +72,7 @@ describe('a generator in the element', () => {
     assertEqual(memories, [{ ...memory, gaussianBytes: true, isLoaded: false }], 'memory');
     const [model, runtime] = [await sizeOf(BALL), 'Suspending' in WebAssembly ? 16_758_545 : 26_781_914];
     assert(arrivedBefore <= model && arrived === model + runtime, `known before the runtime: ${arrivedBefore} bytes`);
-    const known = told.filter(({ total }) => total > 0);
+    const known = received.filter(({ total }) => total > 0);
     assertEqual([...new Set(known.map(({ total }) => total))], [model + runtime], 'bytes in all');
     const between = known.filter(({ loaded }) => loaded > model + runtime / 10 && loaded < runtime);
     assert(between.length > 0, `none while the runtime comes: ${known.map(({ loaded }) => loaded).join(' ')}`);
@@ -83,13 +83,13 @@ describe('a generator in the element', () => {
     const whole = known.filter(({ loaded, total }) => loaded === total);
     assert(whole.length > 0 && whole.every(({ share, bar }) => share === 0.75 && bar === 75), JSON.stringify(whole));
     assertEqual(element.progress, 1, 'in the end');
-    // What is there already is nobody's wait; files beside a model count.
+    // Loaded files delay no request; files beside a model count.
     for (const src of [BALL, `${FIXTURES}external.onnx`]) {
       const next = show({ src });
-      const toldNext = watch(next);
+      const reportedNext = watch(next);
       await next.ready;
       const size = (await sizeOf(src)) + (src === BALL ? 0 : await sizeOf(`${FIXTURES}external.weights`));
-      assertEqual(toldNext.at(-1)?.total, size, `bytes of ${src}`);
+      assertEqual(reportedNext.at(-1)?.total, size, `bytes of ${src}`);
     }
     // It carries no contract.
     claimFault(/external\.onnx: input time is time/);
@@ -172,7 +172,7 @@ describe('a generator in the element', () => {
       'width: 120px; height: 100px; background: white',
     );
     const rest = await imageOf(element);
-    // The fixture shifts all centres by the sum of the pose, along each axis.
+    // The fixture shifts all centers by the sum of the pose, along each axis.
     element.setAttribute('pose', '[[0.3, 0, 0], [0, 0, 0.2]]');
     await element.updateComplete;
     await delay(500);
@@ -245,7 +245,7 @@ describe('a generator in the element', () => {
   });
 
   it('makes no buffer and reads nothing back while it plays', async () => {
-    // With `auto` the times of frames are read back beside them.
+    // The times of frames are also read back if `auto` is set.
     const element = await showLoaded({ src: BALL, quality: 'default' });
     element.loop = true;
     await element.play();

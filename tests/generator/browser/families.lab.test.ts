@@ -1,4 +1,4 @@
-/** One small file of every family that the exporter writes (packages/exporter/tests/write_zoo.py): the GPU against the CPU, in numbers and in pictures. */
+/** One small file of every family that the exporter writes (packages/exporter/tests/write_zoo.py): the GPU against the CPU, in numbers and in images. */
 import { numberToHalf } from '@gaussian-splat/core';
 import { DynamicGaussians, ImageTensor } from '@gaussian-splat/renderer';
 import {
@@ -31,9 +31,9 @@ const HALVES = ['classic', 'classic-view', 'scaffold', 'octree-round', 'hexplane
 );
 
 let device: GPUDevice;
-const pictures = new Map<string, ImageTensor>();
+const images = new Map<string, ImageTensor>();
 
-/** A state that differs with `step`: another camera, time, pose and picture. */
+/** A state that differs with `step`: another camera, time, pose and image. */
 async function stateAt({ header, contract }: GeneratorModel, step: number): Promise<GeneratorState> {
   const sizeOf = (name: string): number =>
     (header.inputs.find((input) => input.name === name)?.dims ?? []).reduce<number>((n, dim) => n * Number(dim), 1);
@@ -61,8 +61,8 @@ async function imageFor(name: string, { inputs }: GeneratorModel['header'], step
     .dims!.slice(2)
     .map(Number);
   const key = `${name} ${width} ${height}`;
-  const tensor = pictures.get(key) ?? new ImageTensor(device, { width, height, dtype: 'float32' });
-  pictures.set(key, tensor);
+  const tensor = images.get(key) ?? new ImageTensor(device, { width, height, dtype: 'float32' });
+  images.set(key, tensor);
   const pixels = new Uint8ClampedArray(4 * width * height).map((_, i) =>
     i % 4 === 3 ? 255 : 128 + 120 * Math.sin(0.13 * i + step + name.length),
   );
@@ -181,7 +181,7 @@ async function compareFrames(
   const renderer = new Renderer(device);
   const live = await DynamicGaussians.create(device, layout);
   const fromCpu = await DynamicGaussians.create(device, layout);
-  // An instance of its own: what a model without inputs has written it does not write again.
+  // Its own instance: a model without inputs does not write its outputs again.
   const instance = await Generator.open({ url: generator.model.url }, device, { onError: reportError });
   instance.sink = live;
   instance.request(await stateAt(generator.model, 9));
@@ -222,7 +222,7 @@ async function assertNothingMade(generator: Generator): Promise<void> {
   generator.sink = gaussians;
   const states: GeneratorState[] = [];
   for (let step = 10; step < 18; step++) states.push(await stateAt(generator.model, step));
-  // Pictures share one tensor, which changes with every upload: only the last of them is new to the model.
+  // Images use one tensor, which changes with every upload: only the last of them is new to the model.
   for (const state of states.slice(0, 3)) await ask(generator, state);
   const { runs } = generator;
   const { createBuffer, mapAsync } = calls;

@@ -1,4 +1,7 @@
-/** What goes wrong on the web, one by one: each is named or mended, the last good frame stays, and the element beside it lives on. */
+/**
+ * Faults of the web, one by one: each is named or recovered from, the last good frame stays, and the element beside it
+ * still works.
+ */
 import '@gaussian-splat/element';
 import { GaussianSplatElement, type ElementError } from '@gaussian-splat/element';
 import { Generator, GaussianModels, setRunLimit, setRuntimeLocation } from '@gaussian-splat/generator';
@@ -26,10 +29,10 @@ const OUTPUTS = { layout: 'packed', gaussians: 'gaussians', color: 'rgb', opacit
 const TIME = { time: { role: 'time', unit: 'seconds' } };
 const contract = (more: object = {}): string => JSON.stringify({ version: 1, inputs: TIME, outputs: OUTPUTS, ...more });
 /** The contract of the model of changing length, with other facts. */
-const halfContract = (nMax: number, least: number): string =>
+const halfContract = (nMax: number, min: number): string =>
   JSON.stringify({
     version: 1,
-    inputs: { share: { role: 'control', range: [least, 2], default: 0.5 } },
+    inputs: { share: { role: 'control', range: [min, 2], default: 0.5 } },
     outputs: { ...OUTPUTS, color: 'sh', shOrder: 'coefficient-major', count: 'count' },
     nMax,
   });
@@ -94,17 +97,17 @@ const REFUSED: Readonly<
 };
 
 describe('a fault that is in the way of the scene', () => {
-  let neighbour: GaussianSplatElement | undefined;
+  let neighbor: GaussianSplatElement | undefined;
 
   for (const [name, [reason, given]] of Object.entries(REFUSED)) {
     it(`${name}: ${reason}`, async () => {
-      neighbour = show({ src: BALL });
+      neighbor = show({ src: BALL });
       const attributes = typeof given === 'function' ? await given() : given;
       const element = show(attributes);
       const { detail } = await nextEvent<CustomEvent<ElementError>>(element, 'error');
       assertNamed(detail, reason);
-      await neighbour.ready;
-      assert(neighbour.loaded, `the element beside it: ${neighbour.error?.message}`);
+      await neighbor.ready;
+      assert(neighbor.loaded, `the element beside it: ${neighbor.error?.message}`);
     });
   }
 
@@ -119,7 +122,7 @@ describe('a fault that is in the way of the scene', () => {
   it('the runtime that is not where it was said to be: named, and found when it is', async () => {
     GaussianSplatElement.runtimeLocation = '/nowhere/';
     try {
-      // Another address, since what is open already needs no other runtime.
+      // Another address, since open files need no other runtime.
       const element = show({ src: `${BALL}?elsewhere` });
       const { detail } = await nextEvent<CustomEvent<ElementError>>(element, 'error');
       assertEqual(detail.code, 'network', detail.message);
@@ -139,7 +142,7 @@ describe('a fault that the scene survives', () => {
 
   it('a run that fails after good ones: contract/run, the last good frame, and back again', async () => {
     const element = await showLoaded({ src: `${FIXTURES}faulty-later.onnx` });
-    const neighbour = await showLoaded({ src: BALL });
+    const neighbor = await showLoaded({ src: BALL });
     const before = await coverOf(element);
     const event = nextEvent<CustomEvent<ElementError>>(element, 'generator-error');
     element.currentTime = 1;
@@ -148,8 +151,8 @@ describe('a fault that the scene survives', () => {
     const seeked = nextEvent(element, 'seeked');
     element.currentTime = 0.5;
     await seeked;
-    const alive = nextEvent(neighbour, 'seeked');
-    neighbour.currentTime = 2;
+    const alive = nextEvent(neighbor, 'seeked');
+    neighbor.currentTime = 2;
     await alive;
   });
 
@@ -167,17 +170,17 @@ describe('a fault that the scene survives', () => {
 
   it('a control that no input has, and one out of its range: named once, the nearest value counts', async () => {
     const element = await showLoaded({ src: HALF, contract: halfContract(100, 0) });
-    const told: ElementError[] = [];
-    element.addEventListener('generator-error', ({ detail }) => told.push(detail));
+    const reported: ElementError[] = [];
+    element.addEventListener('generator-error', ({ detail }) => reported.push(detail));
     element.setAttribute('control-shaer', '0.7');
     element.setAttribute('control-share', '5');
-    await until(() => told.length >= 2, 'two reports');
+    await until(() => reported.length >= 2, 'two reports');
     element.setAttribute('camera-orbit', '10deg 75deg auto');
     await delay(300);
-    assertEqual(told.length, 2, 'reports');
-    for (const error of told) assertNamed(error, 'argument/value');
+    assertEqual(reported.length, 2, 'reports');
+    for (const error of reported) assertNamed(error, 'argument/value');
     assert(
-      told.some(({ message }) => message.includes('share')),
+      reported.some(({ message }) => message.includes('share')),
       'the inputs are listed',
     );
     assert(element.loaded && (await coverOf(element)) > 300, 'a picture');
@@ -185,11 +188,11 @@ describe('a fault that the scene survives', () => {
 
   it('centers that meet in one point are drawn, and no fault', async () => {
     const element = await showLoaded({ src: `${FIXTURES}meeting.onnx` });
-    const told: ElementError[] = [];
-    element.addEventListener('generator-error', ({ detail }) => told.push(detail));
+    const reported: ElementError[] = [];
+    element.addEventListener('generator-error', ({ detail }) => reported.push(detail));
     // Longer than the look at what runs wrote waits for them to rest.
     await delay(1500);
-    assertEqual([told.map(({ message }) => message), element.stats?.dropped], [[], 0], 'reports, rows dropped');
+    assertEqual([reported.map(({ message }) => message), element.stats?.dropped], [[], 0], 'reports, rows dropped');
   });
 
   itInLab('float16 without shader-f16: on the CPU, and said so', async () => {
@@ -208,8 +211,8 @@ describe('a fault that the scene survives', () => {
 
   it('a device lost while a run is on its way: back on a new one', async () => {
     const element = await showLoaded({ src: `${FIXTURES}heavy.onnx` });
-    const neighbour = await showLoaded({ src: COMPASS });
-    const restored = [nextEvent(element, 'contextrestored'), nextEvent(neighbour, 'contextrestored')];
+    const neighbor = await showLoaded({ src: COMPASS });
+    const restored = [nextEvent(element, 'contextrestored'), nextEvent(neighbor, 'contextrestored')];
     element.currentTime = 3;
     await frames(1);
     devices[devices.length - 1].destroy();
@@ -217,18 +220,18 @@ describe('a fault that the scene survives', () => {
     const seeked = nextEvent(element, 'seeked');
     element.currentTime = 5;
     await seeked;
-    assert(element.loaded && neighbour.loaded, 'both are back');
+    assert(element.loaded && neighbor.loaded, 'both are back');
   });
 
   it('an element that leaves while it runs: the others go on', async () => {
     const element = await showLoaded({ src: `${FIXTURES}heavy.onnx` });
-    const neighbour = await showLoaded({ src: BALL });
+    const neighbor = await showLoaded({ src: BALL });
     element.currentTime = 4;
     await frames(1);
     element.remove();
     await delay(GaussianSplatElement.releaseDelay + 200);
-    const seeked = nextEvent(neighbour, 'seeked');
-    neighbour.currentTime = 1;
+    const seeked = nextEvent(neighbor, 'seeked');
+    neighbor.currentTime = 1;
     await seeked;
   });
 
@@ -301,9 +304,9 @@ describe('faults of pages that use the generator by itself', () => {
   itInLab('a model that waits behind one that never ends is not blamed for it, and runs on the GPU', async () => {
     setRuntimeLocation(RUNTIME);
     const [own, other] = [await makeDevice(), await makeDevice()];
-    const told: string[] = [];
-    const onError = (error: unknown): void => void told.push((error as { message: string }).message);
-    const onFallback = (reason: string): void => void told.push(reason);
+    const reported: string[] = [];
+    const onError = (error: unknown): void => void reported.push((error as { message: string }).message);
+    const onFallback = (reason: string): void => void reported.push(reason);
     const endless = await Generator.open({ url: `${FIXTURES}endless.onnx?behind` }, own);
     const waiting = await Promise.all(
       ['first', 'second', 'third'].map(async (name) => {
@@ -326,7 +329,7 @@ describe('faults of pages that use the generator by itself', () => {
     // Ends what still runs.
     own.destroy();
     await Promise.all(waiting.map(({ idle }) => idle));
-    assertEqual([told, waiting.map(({ runs }) => runs)], [[], [2, 1, 1]], 'errors and fallbacks, runs');
+    assertEqual([reported, waiting.map(({ runs }) => runs)], [[], [2, 1, 1]], 'errors and fallbacks, runs');
     assert(
       waiting.every(({ kind }) => kind !== 'wasm'),
       'on the GPU',

@@ -23,7 +23,7 @@ const ROWS = 80;
 /** Numbers of a Gaussian in each of the avatar's outputs. */
 const WIDTHS: Readonly<Record<string, number>> = { positions: 3, covariances: 6, colors: 3, opacities: 1 };
 
-/** Runs of the runtime, whoever asks for them. */
+/** All runs of the runtime. */
 const runs = { count: 0 };
 
 /** The Gaussians of one instance, as numbers. */
@@ -128,7 +128,7 @@ describe('instances of one generator', () => {
     for (let i = 0; i < 4; i++) await frame();
     assertEqual(runs.count - before, 4, 'runs in four frames of three instances');
     assertEqual({ ...calls }, made, 'calls');
-    // What is drawn of the third is what one alone would have drawn.
+    // The third is drawn as it would be drawn alone.
     const single = await open('avatar');
     const scene = (single.sink = await DynamicGaussians.create(device, single.model.layout));
     single.request(stateAt(number - 1));
@@ -247,7 +247,7 @@ describe('instances of one generator', () => {
       [1, 0, 1],
       'frames',
     );
-    // One cannot take what was written for it.
+    // One of them cannot use the other's tensors.
     instances[1].sink = {
       ingest: () => {
         throw new Error('no room');
@@ -281,7 +281,7 @@ describe('instances of one generator', () => {
   itInLab('of the avatar that ships: ten are one run a frame', async () => {
     const url = '/demo/generators/walker/model.onnx';
     const ten = await Promise.all(
-      Array.from({ length: 10 }, () => Generator.open({ url }, device, { onError: reportError, compare: false })),
+      Array.from({ length: 10 }, () => Generator.open({ url }, device, { onError: reportError, gpuCheck: false })),
     );
     const taken = ten.map((generator) => {
       const rows = new Set<number>();

@@ -1,4 +1,4 @@
-/** A camera that turns while a generator takes 300 ms a run: frames are drawn at the page's rate, each from one whole run, and what is shown in the end is new. */
+/** A camera that turns while a generator takes 300 ms a run: frames are drawn at the page's rate, each from one whole run, and the last frame is new. */
 import '@gaussian-splat/element';
 import { GaussianSplatElement } from '@gaussian-splat/element';
 import { assert, assertEqual, atRest, nextEvent, showLoaded } from '../../element/browser/support/harness.js';
@@ -6,13 +6,16 @@ import { screenOf } from '../../element/browser/support/screen.js';
 import { FIXTURES, RUNTIME } from './support.js';
 
 const RUN_MS = 300;
-/** The camera turns at least so long and for so many frames, with and without the slow generator by turns: other work on the machine then weighs on both. */
+/**
+ * Minimum duration and number of frames of a turn, with and without the slow generator alternately: other work on the
+ * machine then affects both.
+ */
 const TURN_MS = 700;
 const TURN_FRAMES = 8;
 
 GaussianSplatElement.runtimeLocation = RUNTIME;
 
-/** Pictures handed to the screen, and runs. */
+/** Frames handed to the screen, and runs. */
 const counts = { frames: 0, runs: 0 };
 let delayMs = 0;
 
@@ -74,13 +77,13 @@ it('turning the camera while a generator takes 300 ms a run draws as many frames
   assert(still.runs <= 2, `${still.runs} runs while nothing plays, but for the last one of each time`);
   assert(slow.runs >= 2 && slow.runs <= slow.ms / RUN_MS + 3, `${slow.runs} runs: one at a time, and none without end`);
   assert(beside >= 0.6 * without, `${beside} frames a second beside the generator, ${without} without`);
-  // What was asked for last is what is on show: the same picture as an element shows that has never known anything else.
+  // The last request is visible: the same image as from a new element.
   const place = { 'camera-orbit': '30deg 75deg 4m' };
   element.setAttribute('camera-orbit', place['camera-orbit']);
   const seeked = nextEvent(element, 'seeked');
   element.currentTime = 2;
   await seeked;
-  // The turn and the seek, one soon after the other, are motion: the true image follows when both are over.
+  // The turn and the seek, one soon after the other, are motion: the full frame follows when both are over.
   await atRest(element);
   const shown = await screenOf(element);
   element.remove();

@@ -1,4 +1,4 @@
-/** Post-processors, chains and pictures in <gaussian-splat>. */
+/** Post-processors, chains and images in <gaussian-splat>. */
 import '@gaussian-splat/element';
 import { GaussianSplatElement, type ElementError } from '@gaussian-splat/element';
 import {
@@ -23,21 +23,21 @@ GaussianSplatElement.runtimeLocation = RUNTIME;
 const BALL = `${FIXTURES}packed.onnx`;
 const STYLE = 'width: 120px; height: 100px; background: white';
 
-/** The colours of all pixels on the screen. */
+/** The colors of all pixels on the screen. */
 async function colorsOf(element: GaussianSplatElement): Promise<Rgb[]> {
   const screen = await screenOf(element);
   const { clientWidth: width, clientHeight: height } = element;
   return Array.from({ length: width * height }, (_, i) => screen.at(i % width, Math.floor(i / width)));
 }
 
-/** Mean of all channels over the picture on the screen, 0..255, and how many pixels the scene covers. */
+/** Mean of all channels over the screenshot, 0..255, and how many pixels the scene covers. */
 async function lightOf(element: GaussianSplatElement): Promise<{ mean: number; covered: number }> {
   const sums = (await colorsOf(element)).map(([r, g, b]) => r + g + b);
   const mean = sums.reduce((total, sum) => total + sum, 0) / sums.length / 3;
   return { mean, covered: sums.filter((sum) => sum < 700).length };
 }
 
-/** Waits until the picture's light fulfils a condition. */
+/** Waits until the image's brightness fulfils a condition. */
 async function untilLight(
   element: GaussianSplatElement,
   holds: (mean: number) => boolean,
@@ -67,7 +67,7 @@ describe('a post-processor in the element', () => {
       element.setAttribute('postprocess', FIXTURES + name);
       await untilLight(element, (mean) => mean < plain.mean - 2, 'a darker picture');
       const dark = await lightOf(element);
-      // Three pictures of its size, eight bytes a pixel, and the tensor for the model.
+      // Three images of its size, eight bytes a pixel, and the tensor for the model.
       assert(element.stats!.bytes.frames > plainBytes + 24 * 120 * 100, 'stats count its pictures');
       assert(dark.covered > 0.5 * plain.covered, `${plain.covered} pixels were covered, now ${dark.covered}`);
       assertEqual((await screenOf(element)).at(1, 1), [255, 255, 255], 'the ground of the page');
@@ -116,14 +116,14 @@ describe('a post-processor in the element', () => {
   });
 
   it('tells of a control that neither it nor the scene has, and of no other', async () => {
-    const told: ElementError[] = [];
+    const reported: ElementError[] = [];
     const attributes = { postprocess: `${FIXTURES}post.onnx`, 'control-gain': '0', 'control-gaim': '1' };
     const element = show({ src: BALL, ...attributes }, STYLE);
-    element.addEventListener('generator-error', ({ detail }) => told.push(detail));
-    await until(() => told.length > 0, 'a report');
+    element.addEventListener('generator-error', ({ detail }) => reported.push(detail));
+    await until(() => reported.length > 0, 'a report');
     await delay(500);
-    assertEqual(told.length, 1, told.map(({ message }) => message).join('; '));
-    assert(/control gaim: expected one of the inputs .*gain/.test(told[0].message), told[0].message);
+    assertEqual(reported.length, 1, reported.map(({ message }) => message).join('; '));
+    assert(/control gaim: expected one of the inputs .*gain/.test(reported[0].message), reported[0].message);
   });
 
   itInLab('is that of the new size after the element has got one', async () => {
@@ -161,13 +161,13 @@ describe('a post-processor in the element', () => {
     const finished = new Promise<undefined>((resolve) => (finish = () => resolve(undefined)));
     GPUQueue.prototype.onSubmittedWorkDone = () => finished;
     try {
-      const most: number[] = [];
+      const max: number[] = [];
       for (let width = 121; width <= 150; width++) {
         element.style.width = `${width}px`;
         await frames(2);
-        most.push(live.size);
+        max.push(live.size);
       }
-      assert(Math.max(...most) <= 20, `textures: ${most.join(' ')}`);
+      assert(Math.max(...max) <= 20, `textures: ${max.join(' ')}`);
     } finally {
       finish();
       Object.assign(GPUQueue.prototype, { onSubmittedWorkDone });
@@ -241,7 +241,7 @@ describe('a chain in the element', () => {
 
 describe('a picture as a control', () => {
   /** Red and blue halves. */
-  async function picture(left: string, right: string): Promise<string> {
+  async function photo(left: string, right: string): Promise<string> {
     const canvas = new OffscreenCanvas(16, 16);
     const context = canvas.getContext('2d');
     assert(context, 'a 2D context');
@@ -253,7 +253,7 @@ describe('a picture as a control', () => {
   }
 
   itInLab('by URL, by image, by ImageBitmap; a wrong one is named and the last stays', async () => {
-    const url = await picture('red', 'blue');
+    const url = await photo('red', 'blue');
     const errors: string[] = [];
     const element = await showLoaded({ src: `${FIXTURES}picture.onnx`, 'control-image': url }, STYLE);
     const count = async (channel: number): Promise<number> => {
@@ -263,7 +263,7 @@ describe('a picture as a control', () => {
     };
     assert((await count(0)) > 100 && (await count(2)) > 100, `${await count(0)} red, ${await count(2)} blue`);
     const image = new Image();
-    image.src = await picture('lime', 'red');
+    image.src = await photo('lime', 'red');
     element.inputValues = { image };
     await until(() => image.complete, 'the image');
     const untilCounts = async (holds: (counts: number[]) => boolean, what: string): Promise<void> => {
@@ -282,7 +282,7 @@ describe('a picture as a control', () => {
     element.inputValues = { image: '/net/status/404' };
     assertEqual((await event).detail.reason, 'network/status');
     assert(element.loaded && (await count(1)) > 100, 'the last picture stays');
-    const bytes = await (await fetch(await picture('blue', 'blue'))).blob();
+    const bytes = await (await fetch(await photo('blue', 'blue'))).blob();
     element.inputValues = { image: await createImageBitmap(bytes) };
     await untilCounts(([, green, blue]) => blue > 200 && green < 20, 'blue');
   });

@@ -1,4 +1,4 @@
-/** Post-processors that see more than the frame: its depth, its camera, and what they made of the frame before. */
+/** Post-processors with more inputs than the frame: its depth, its camera, and their output for the previous frame. */
 import '@gaussian-splat/element';
 import '@gaussian-splat/element/scenes.js';
 import { GaussianSplatElement } from '@gaussian-splat/element';
@@ -21,14 +21,14 @@ GaussianSplatElement.runtimeLocation = RUNTIME;
 const BALL = `${FIXTURES}packed.onnx`;
 const STYLE = 'width: 120px; height: 100px; background: white';
 
-/** The colours of all pixels on the screen. */
+/** The colors of all pixels on the screen. */
 async function colorsOf(element: GaussianSplatElement): Promise<Rgb[]> {
   const screen = await screenOf(element);
   const { clientWidth: width, clientHeight: height } = element;
   return Array.from({ length: width * height }, (_, i) => screen.at(i % width, Math.floor(i / width)));
 }
 
-/** Mean of all channels over the picture on the screen, 0..255, and how many pixels the scene covers. */
+/** Mean of all channels over the screenshot, 0..255, and how many pixels the scene covers. */
 async function lightOf(element: GaussianSplatElement): Promise<{ mean: number; covered: number }> {
   const sums = (await colorsOf(element)).map(([r, g, b]) => r + g + b);
   const mean = sums.reduce((total, sum) => total + sum, 0) / sums.length / 3;

@@ -23,8 +23,8 @@ globalThis.fetch = (input, init) => {
 describe('a post-processor whose runtime cannot be had', () => {
   it('is told of once, costs nothing afterwards, and is tried again when something changes', async () => {
     const element = await showLoaded({ quality: 'default' });
-    const told: ElementError[] = [];
-    element.addEventListener('generator-error', ({ detail }) => told.push(detail));
+    const reported: ElementError[] = [];
+    element.addEventListener('generator-error', ({ detail }) => reported.push(detail));
     const first = nextEvent(element, 'generator-error');
     element.setAttribute('postprocess', `${FIXTURES}post.onnx`);
     await first;
@@ -34,7 +34,7 @@ describe('a post-processor whose runtime cannot be had', () => {
     await delay(1500);
     assertEqual(requests, 1, 'requests');
     assertEqual(submits, frames, 'frames');
-    assertEqual([told.length, told[0].code], [1, 'network']);
+    assertEqual([reported.length, reported[0].code], [1, 'network']);
     assert(element.loaded && element.src === COMPASS, 'the scene stays');
     element.setAttribute('camera-orbit', '30deg 75deg auto');
     element.jumpCameraToGoal();

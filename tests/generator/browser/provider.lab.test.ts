@@ -1,4 +1,4 @@
-/** What is known of ONNX Runtime's WebGPU provider, held against the version that ships: recorded commands, and convolutions. */
+/** Known behavior of ONNX Runtime's WebGPU provider, tested with the version that ships: recorded commands, and convolutions. */
 import { bytesSource, constantOutputs, readOnnxHeader } from '@gaussian-splat/core/onnx';
 import { ImageTensor } from '@gaussian-splat/renderer';
 import { bindInputs, openModel, PostProcessor, type GeneratorState } from '@gaussian-splat/generator';
@@ -64,7 +64,8 @@ describe('recorded commands', () => {
       const poseInput = model.header.inputs.find(({ name }) => model.contract.inputs[name].role === 'pose');
       const poses = (poseInput?.dims ?? []).reduce<number>((product, dim) => product * Number(dim), 1);
       const written: Record<string, Uint8Array[]> = {};
-      // What never changes is read once, and not asked of what is recorded: a copy into an output is made in the first run only.
+      // Constant outputs are read once, and are not part of a recording: a copy into an output is made in the first run
+      // only.
       const constants = constantOutputs(model.header);
       const fixed: LiveSessionModule.FixedOutputs = {};
       for (const kind of ['webgpu', 'captured'] as const) {
@@ -95,7 +96,7 @@ describe('recorded commands', () => {
   }
 });
 
-/** What the WebGPU provider writes, whatever we think of it. */
+/** Actual outputs of the WebGPU provider. */
 async function onProvider(url: string, image: ImageTensor): Promise<number[]> {
   const model = await openModel({ url });
   const session = await OrtSession.create('webgpu', await loadRuntime(), model, device);
@@ -139,22 +140,22 @@ describe('convolutions', () => {
   for (const name of ['conv-8-8', 'conv-6-8', 'conv-9-4', 'conv-18-12']) {
     it(`${name}: on the GPU as on the CPU`, async () => {
       const url = `${FIXTURES}${name}.onnx`;
-      let picture: Promise<Uint8Array> | undefined;
+      let image: Promise<Uint8Array> | undefined;
       const reasons: string[] = [];
       const post = await PostProcessor.open({ url }, device, {
         onError: reportError,
         onFallback: (reason) => reasons.push(reason),
-        onImage: ({ buffer }) => (picture = readBuffer(device, buffer)),
+        onImage: ({ buffer }) => (image = readBuffer(device, buffer)),
       });
       const tensor = new ImageTensor(device, { width: 16, height: 16, dtype: 'float32' });
       const pixels = new Uint8ClampedArray(4 * 256).map((_, i) => (i % 4 === 3 ? 255 : 128 + 100 * Math.sin(0.7 * i)));
       tensor.upload(await createImageBitmap(new ImageData(pixels, 16, 16)));
       post.request(tensor);
       await post.idle;
-      assert(picture, 'a picture');
+      assert(image, 'a picture');
       const data = new Float32Array((await readBuffer(device, tensor.buffer)).buffer as ArrayBuffer, 0, 3 * 256);
       const [{ values }] = Object.values(await runOnCpu(url, {}, { image: { dims: [1, 3, 16, 16], data } }));
-      const error = relativeError(numbersOf(await picture, 'float32').slice(0, values.length), values);
+      const error = relativeError(numbersOf(await image, 'float32').slice(0, values.length), values);
       assert(error < 1e-4, `relative error ${error}`);
       const isTrap = name !== 'conv-8-8';
       assertEqual([post.kind, reasons.length], isTrap ? ['wasm', 1] : ['captured', 0], reasons.join());

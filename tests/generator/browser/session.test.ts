@@ -135,7 +135,7 @@ describe('generators', () => {
       }
       if (device.features.has('shader-f16') === false) assertEqual(generator.kind, kind, 'kind');
       assertEqual(reasons.length, generator.kind === 'wasm' ? 1 : 0, `fallbacks: ${reasons.join()}`);
-      // The state of the first frame may repeat where nothing depends on the time.
+      // The state of the first frame may repeat if nothing depends on the time.
       const { layout } = generator.model;
       const expected = await runOnCpu(FIXTURES + name, states[sink.runs.length - 1]);
       const last = sink.runs[sink.runs.length - 1];
@@ -326,7 +326,7 @@ describe('generators', () => {
     const renderer = new Renderer(device);
     const pixels = await capture(device, renderer, { gaussians, camera: CAMERA });
     assert(pixels.every(Number.isFinite), 'finite pixels');
-    const { unusable, visible } = await renderer.statistics();
+    const { unusable, visible } = await renderer.stats();
     const covered = pixels.filter((x, i) => i % 4 === 3 && x > 0.1).length;
     assert(
       covered > 300,

@@ -1,4 +1,4 @@
-/** Shapes and roles of real models on the GPU; a model that goes on from what it wrote; what the element tells of inputs, and its panel. */
+/** Shapes and roles of real models on the GPU; a model that continues from its output; the element's report of inputs, and its panel. */
 import '@gaussian-splat/element';
 import { GaussianSplatElement } from '@gaussian-splat/element';
 import type { SplatSceneElement } from '@gaussian-splat/element/scenes.js';
@@ -20,7 +20,7 @@ it('batches, matrices, a camera to world and a count of 64 bits: the numbers of 
   const device = await makeDevice();
   const sink = new ReadingSink(device);
   const url = `${FIXTURES}shaped.onnx`;
-  const generator = await Generator.open({ url }, device, { onError: reportError, compare: false });
+  const generator = await Generator.open({ url }, device, { onError: reportError, gpuCheck: false });
   generator.sink = sink;
   const c = Math.cos(1);
   const s = Math.sin(1);
@@ -48,7 +48,7 @@ it('a model goes on from what it wrote in the run before, and begins anew when t
   const device = await makeDevice();
   const sink = new ReadingSink(device);
   const url = `${FIXTURES}state.onnx`;
-  const generator = await Generator.open({ url }, device, { onError: reportError, compare: false });
+  const generator = await Generator.open({ url }, device, { onError: reportError, gpuCheck: false });
   generator.sink = sink;
   const nexts: number[] = [];
   for (const state of [
@@ -62,16 +62,17 @@ it('a model goes on from what it wrote in the run before, and begins anew when t
     nexts.push(numbersOf(await sink.runs.at(-1)!.tensors.next, 'float32')[0]);
   }
   assertEqual(nexts, [0.75, 1, 2, 0.75]);
+  assertEqual(generator.kind, 'captured', 'kind: each run of the start begins with the same state');
   generator.close();
 });
 
 describe('what models take, told to the page', () => {
   it('inputs, an event when they are others, and none of a scene file', async () => {
     const element = show({ src: `${FIXTURES}state.onnx` });
-    let told = 0;
-    element.addEventListener('inputs-change', () => told++);
+    let reported = 0;
+    element.addEventListener('inputs-change', () => reported++);
     await element.ready;
-    await until(() => told === 1, 'the event');
+    await until(() => reported === 1, 'the event');
     assertEqual(element.inputs, [
       { label: 'time', unit: 'seconds', name: 'time', role: 'time', size: 1 } as never,
       { label: 'Push', range: [0, 1], default: 0.25, step: 0.25, name: 'push', role: 'control', size: 1 },
@@ -80,8 +81,12 @@ describe('what models take, told to the page', () => {
     await until(() => element.inputs.some(({ name }) => name === 'pose'), 'the pose');
     const pose = element.inputs.find(({ name }) => name === 'pose');
     assertEqual([pose?.format, pose?.joints, pose?.parents, pose?.size], ['matrix', ['hip', 'knee'], [-1, 0], 18]);
+    const gone = nextEvent(element, 'inputs-change');
+    element.src = null;
+    await gone;
+    assertEqual(element.inputs.length, 0, 'inputs without a scene');
     element.src = COMPASS;
-    await until(() => element.inputs.length === 0, 'no inputs');
+    await until(() => element.loaded && element.inputs.length === 0, 'no inputs');
   });
 
   it('a panel of controls: sliders by their names, joints, a reset, and gone with its attribute', async () => {
@@ -157,11 +162,11 @@ describe('what models take, told to the page', () => {
     const child = document.createElement('splat-scene') as SplatSceneElement;
     child.title = 'Ball';
     child.setAttribute('src', `${FIXTURES}state.onnx`);
-    const told = nextEvent(child, 'inputs-change');
+    const reported = nextEvent(child, 'inputs-change');
     element.append(child);
-    await told;
+    await reported;
     assertEqual([child.inputs.map(({ name }) => name).includes('push'), element.inputs.length], [true, 0]);
-    const group = (): HTMLElement | null => element.shadowRoot!.querySelector('[part=controls-scene]');
+    const group = (): HTMLElement | null => element.shadowRoot!.querySelector('[part=controls-group]');
     await until(() => group() !== null, 'its group');
     assertEqual(group()!.querySelector('legend')!.textContent, 'Ball');
     const slider = group()!.querySelector<HTMLInputElement>('input[type=range]')!;

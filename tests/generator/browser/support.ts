@@ -1,4 +1,6 @@
-/** What the tests of running generators share: a device, sinks that read back, the truth from the CPU, and counters. */
+/**
+ * Utilities for tests of running generators: a device, sinks that read back, the reference from the CPU, and counters.
+ */
 import { halfToNumber, type Camera } from '@gaussian-splat/core';
 import { carriesContract, resolveContract } from '@gaussian-splat/core/contract';
 import { bytesSource, readOnnxHeader } from '@gaussian-splat/core/onnx';
@@ -31,7 +33,7 @@ export async function makeDevice(optional: readonly GPUFeatureName[] = []): Prom
   const { maxStorageBuffersPerShaderStage } = adapter.limits;
   const requiredFeatures = optional.filter((feature) => adapter.features.has(feature));
   const device = await adapter.requestDevice({ requiredFeatures, requiredLimits: { maxStorageBuffersPerShaderStage } });
-  // What the element finds on SwiftShader, which takes seconds to compile the rest.
+  // Variants that the element finds on SwiftShader, which takes seconds to compile the rest.
   const choice = JSON.stringify({
     rasterizer: 'quads',
     accumulation: 'rgba16float',
@@ -97,7 +99,7 @@ function cpuRuntime(): Promise<typeof OnnxRuntime> {
 export async function runOnCpu(
   url: string,
   state: GeneratorState,
-  pictures: Readonly<Record<string, { dims: readonly number[]; data: Float32Array }>> = {},
+  images: Readonly<Record<string, { dims: readonly number[]; data: Float32Array }>> = {},
 ): Promise<Record<string, { dims: readonly number[]; values: number[] }>> {
   const { InferenceSession, Tensor } = await cpuRuntime();
   const bytes = new Uint8Array(await (await fetch(url)).arrayBuffer());
@@ -114,7 +116,7 @@ export async function runOnCpu(
   const feeds = Object.entries(bindInputs(header, contract, state)).map(
     ([name, { dtype, data, dims }]) => [name, new Tensor(dtype, data as never, dims)] as const,
   );
-  for (const [name, { dims, data }] of Object.entries(pictures)) feeds.push([name, new Tensor('float32', data, dims)]);
+  for (const [name, { dims, data }] of Object.entries(images)) feeds.push([name, new Tensor('float32', data, dims)]);
   const results = await session.run(Object.fromEntries(feeds));
   await session.release();
   return Object.fromEntries(
@@ -130,13 +132,13 @@ export function numbersOf(data: unknown, type: string): number[] {
   return Array.from(type === 'int32' ? new Int32Array(bytes) : new Float32Array(bytes));
 }
 
-/** Largest difference as a share of the largest magnitude. */
+/** Largest difference as a fraction of the largest magnitude. */
 export function relativeError(found: readonly number[], expected: readonly number[]): number {
-  const scale = expected.reduce((most, x) => Math.max(most, Math.abs(x)), 1e-12);
+  const scale = expected.reduce((max, x) => Math.max(max, Math.abs(x)), 1e-12);
   return expected.reduce((worst, x, i) => Math.max(worst, Math.abs(x - found[i]) / scale), 0);
 }
 
-/** Calls since the page was opened, for tests of what a frame does not do. */
+/** Calls since the page was opened, for tests that a frame omits them. */
 export const calls = {
   ...{ createBuffer: 0, mapAsync: 0, createBindGroup: 0 },
   ...{ createComputePipeline: 0, createComputePipelineAsync: 0 },

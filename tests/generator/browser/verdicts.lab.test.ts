@@ -31,10 +31,10 @@ describe('the page says the same as both checkers of', () => {
       // The first runs are judged after they are drawn.
       if (found.size === 0) await delay(1500);
       const expected = OTHERWISE[name] ?? codes;
-      const told = `expected ${expected.join(', ') || 'none'}, found ${[...found].join(', ') || 'none'}`;
+      const reported = `expected ${expected.join(', ') || 'none'}, found ${[...found].join(', ') || 'none'}`;
       assert(
         expected.length === 0 ? found.size === 0 && element.loaded : expected.some((code) => found.has(code)),
-        told,
+        reported,
       );
       element.remove();
     });

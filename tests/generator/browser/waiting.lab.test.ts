@@ -1,7 +1,7 @@
 /** A generator that takes an image waits for it: the page sees its inputs, and the first image shows the scene. */
 import '@gaussian-splat/element';
 import { GaussianSplatElement } from '@gaussian-splat/element';
-import { assert, assertEqual, delay, hurry, show, until } from '../../element/browser/support/harness.js';
+import { assert, assertEqual, delay, gated, hurry, show, until } from '../../element/browser/support/harness.js';
 import { screenOf } from '../../element/browser/support/screen.js';
 import { FIXTURES, RUNTIME } from './support.js';
 
@@ -20,9 +20,9 @@ async function redImage(): Promise<Blob> {
 const EVENTS = ['error', 'generator-error', 'load', 'inputs-change', 'preview'] as const;
 
 function listen(element: GaussianSplatElement): string[] {
-  const told: string[] = [];
-  for (const type of EVENTS) element.addEventListener(type, () => told.push(type));
-  return told;
+  const reported: string[] = [];
+  for (const type of EVENTS) element.addEventListener(type, () => reported.push(type));
+  return reported;
 }
 
 for (const [how, set] of [
@@ -35,7 +35,7 @@ for (const [how, set] of [
 ] as const) {
   it(`shows its inputs and a panel without an image, fails in nothing, and loads with the image that ${how} sets`, async () => {
     const element = show({ src: `${FIXTURES}picture.onnx`, 'controls-panel': '' });
-    const told = listen(element);
+    const reported = listen(element);
     await until(() => element.inputs.length > 0, 'inputs');
     assertEqual(
       element.inputs.map(({ name, role }) => [name, role]),
@@ -48,8 +48,8 @@ for (const [how, set] of [
     set(element, await redImage());
     await element.ready;
     assert(element.loaded, String(element.error?.message));
-    await until(() => told.includes('load'), 'load');
-    assertEqual([told.includes('error'), told.includes('generator-error')], [false, false], told.join());
+    await until(() => reported.includes('load'), 'load');
+    assertEqual([reported.includes('error'), reported.includes('generator-error')], [false, false], reported.join());
     assertEqual(element.stats?.splats, 64, 'splats');
     const red = (await screenOf(element)).middleOf(([r, g, b]) => r > 100 && g < 60 && b < 60);
     assert((red?.count ?? 0) > 20, `${red?.count} red pixels`);
@@ -68,4 +68,18 @@ it('is left for another scene while it waits', async () => {
     ['time'],
     'inputs',
   );
+});
+
+it('an image that is replaced before it has arrived neither delays the next one nor is an error', async () => {
+  const { src, open } = gated('compass.ply');
+  const element = show({ src: `${FIXTURES}picture.onnx` });
+  const reported = listen(element);
+  await until(() => element.inputs.length > 0, 'inputs');
+  element.inputValues = { image: src };
+  await delay(300);
+  element.inputValues = { image: await redImage() };
+  await until(() => element.loaded, 'the scene', 3_000);
+  await open();
+  await delay(300);
+  assertEqual(reported.includes('generator-error'), false, 'errors');
 });

@@ -33,7 +33,7 @@ function redOf(sink: ReadingSink, run: number): Promise<number> {
 }
 
 it('a large network of images is released at rest, a small one stays; the next image starts it again', async () => {
-  const options = { onError: reportError, compare: false } as const;
+  const options = { onError: reportError, gpuCheck: false } as const;
   const [heavy, light] = await Promise.all(
     [await large('picture.onnx'), `${FIXTURES}picture.onnx`].map((url) => Generator.open({ url }, device, options)),
   );
@@ -66,7 +66,7 @@ it('a model without inputs runs once and is released', async () => {
   const before = released.count;
   const generator = await Generator.open({ url: '/tests/fixtures/families/classic.onnx' }, device, {
     onError: reportError,
-    compare: false,
+    gpuCheck: false,
   });
   const sink = (generator.sink = new ReadingSink(device));
   generator.request({});

@@ -6,9 +6,8 @@
  * Recipe: asked for 50 losses in the middle of frames, losses while loading and inferring, a lower tier after three. Run so without the tier; inference in
  * tests/generator/browser; crashes of the GPU process in gpu-crash.alone.lab.test.ts.
  *
- * Passes: the device is destroyed again and again, between and within frames and while a scene or a generator loads: each time the same picture is back within 2 s, with
- * one pair of events. More losses in a row than the element forgives are in tests/element/browser/device.test.ts. A crash of the whole GPU process, which is killed, is one loss more. After a second within seconds Chromium refuses the page every device for some minutes: the element reports `device-lost/unrecoverable`, shows its poster, asks ever more rarely and when the page is shown again, and is back without a reload (after 155 s, 2026-11-25). The quality is not lowered after several losses: a
- * picture that changes by itself would be the worse surprise.
+ * Passes: the device is destroyed again and again, between and within frames and while a scene or a generator loads: each time the same image is back within 2 s, with
+ * one pair of events. More losses in a row than the element forgives are in tests/element/browser/device.test.ts. A crash of the whole GPU process, which is killed, is one loss more. After a second within seconds Chromium refuses the page every device for some minutes: the element reports `device-lost/unrecoverable`, shows its poster, asks ever more rarely and when the page is shown again, and is back without a reload (after 155 s, 2026-11-25). The quality is not lowered after several losses: an image that changes on its own would be the worse surprise.
  */
 import '@gaussian-splat/element';
 import {
@@ -25,12 +24,12 @@ import {
 import { screenOf } from '../../element/browser/support/screen.js';
 import { random, sized } from './support.js';
 
-/** Milliseconds; more only where the first start takes longer, too. */
+/** Milliseconds; more only if the first start takes longer, too. */
 const LIMIT_MS = 2_000;
 
 describe('S22: the loss of the device', () => {
   it('again and again, at any moment of a frame: the same picture, soon, and one pair of events each time', async () => {
-    // A page that has no device yet: what a start costs on this machine, with whatever else runs on it.
+    // A page without a device: the cost of a start on this machine, under its current load.
     const began = performance.now();
     const element = await showLoaded({ 'interpolation-decay': '0' });
     const limit = Math.max(LIMIT_MS, performance.now() - began);
@@ -60,19 +59,19 @@ describe('S22: the loss of the device', () => {
       element.style.width = '120px';
       const canvas = element.shadowRoot?.querySelector('canvas');
       await until(() => canvas?.width === 120, 'the size');
-      // The camera has just jumped: what a busy machine draws first may be a picture of the jump.
+      // The camera has just jumped: a busy machine's first frame may show the jump.
       const end = performance.now() + limit;
       let differences;
       do differences = (await screenOf(element)).differences(before);
       while (differences !== 0 && performance.now() < end);
-      assertEqual(differences, 0, `differing colour values after loss ${i}`);
+      assertEqual(differences, 0, `differing color values after loss ${i}`);
     }
     assertEqual(events.length, 2 * losses, `events: ${events.join()}`);
     times.sort((a, b) => a - b);
     console.info(
       `S22  ${losses} losses: back after ${times[losses >> 1].toFixed(0)} ms, at most ${times[losses - 1].toFixed(0)} ms`,
     );
-    // The best of a few in npm test, where other tests and programs share the machine; the median of the whole run.
+    // The best of a few in npm test, since other tests and programs use the machine; the median of the whole run.
     assert(times[sized(0, losses >> 1)] <= limit, `back after ${times.map(Math.round).join(', ')} ms`);
   });
 

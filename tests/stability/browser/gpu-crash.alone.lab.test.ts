@@ -1,8 +1,8 @@
 /**
  * S22, with a real crash: the browser's GPU process is killed.
  *
- * Passes: after the first crash the same picture is back, with one pair of events, and no method gives an empty picture meanwhile. After another within seconds Chromium has no device for some minutes:
- * the element says so, asks ever more rarely, and is back without a reload (whole runs only: it takes minutes, and what is tested next would have no GPU).
+ * Passes: after the first crash the same image is back, with one pair of events, and no method returns an empty image meanwhile. After another within seconds Chromium has no device for some minutes:
+ * the element says so, asks ever more rarely, and is back without a reload (whole runs only: it takes minutes, and later tests would have no GPU).
  */
 import '@gaussian-splat/element';
 import { executeServerCommand } from '@web/test-runner-commands';

@@ -46,7 +46,7 @@ describe('S12: a budget of memory', () => {
   });
 });
 
-/** What the browser says of the machine while something is done: gigabytes, or nothing as in Safari. */
+/** Memory of the machine as the browser reports it during a call: gigabytes, or undefined as in Safari. */
 async function onMachineOf(gigabytes: number | undefined, action: () => Promise<void>): Promise<void> {
   Object.defineProperty(navigator, 'deviceMemory', { configurable: true, value: gigabytes });
   try {
@@ -56,7 +56,7 @@ async function onMachineOf(gigabytes: number | undefined, action: () => Promise<
   }
 }
 
-/** The machine half of whose memory is so many bytes. */
+/** The machine with twice the given number of bytes. */
 const machineFor = (bytes: number): number => bytes / 2 ** 29;
 
 const ledger = (): MemoryLedger => MemoryLedger.of(devices[devices.length - 1]);
@@ -147,7 +147,7 @@ describe('S12: scenes out of sight', () => {
   it('are dropped for others, and come back in sight without an event', async () => {
     const first = await showLoaded();
     const one = ledger().bytes;
-    // A quarter of what the page may hold is less than one scene.
+    // A quarter of the page's limit is less than one scene.
     await onMachineOf(machineFor(3.5 * one), async () => {
       const far = document.createElement('div');
       far.className = 'far';

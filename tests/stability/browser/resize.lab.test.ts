@@ -24,7 +24,7 @@ describe('S18: resize', () => {
     element.style.cssText = 'width: 120px; height: 100px';
     const canvas = element.shadowRoot?.querySelector('canvas');
     await until(() => canvas?.width === 120 && canvas.height === 100, 'the first size');
-    assertEqual((await screenOf(element)).differences(fresh), 0, 'differing colour values');
+    assertEqual((await screenOf(element)).differences(fresh), 0, 'differing color values');
     assertEqual(messages, [], 'errors of the device');
     assert(element.loaded && element.error === null, 'loaded');
   });

@@ -1,4 +1,4 @@
-/** What the rows in Chromium share. */
+/** Utilities for the rows in Chromium. */
 
 export { sized } from '../../support/extent-in-pages.js';
 

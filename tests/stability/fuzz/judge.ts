@@ -7,13 +7,12 @@ import { RULES } from '../../oracle/rules.js';
 import { isSwiftShader } from '../../support/limit.js';
 import { psnr } from '../../support/metrics.js';
 import { toRgba } from '../../oracle/oracle.js';
-import { compareImage, draw, notFinite } from '../support/pictures.js';
+import { compareImage, draw, notFinite } from '../support/images.js';
 import { cameraOfRecipe, cloudOfRecipe, type SceneRecipe } from '../support/random-scene.js';
 
 /**
- * Why a picture may be under 59 dB: `threshold`, pixels in which a splat is within rounding of a rule's limit or of another splat's depth, where
- * float32 and float64 may rightly decide otherwise; `stop`, quads cannot end a pixel whose next splat would leave less than 1e-4 of the light, as the
- * reference does, so that up to 0.5 % of another colour is added to what is nearly opaque; `float16`, rounding of the blend target. `none` is a fault.
+ * Why an image may be under 59 dB: `threshold`, pixels in which a splat is within rounding of a rule's limit or of another splat's depth, so that float32 and float64 may rightly differ; `stop`, quads cannot end a pixel whose next splat would leave less than 1e-4 of the light, as the
+ * reference does, so that up to 0.5 % of another color is added to nearly opaque pixels; `float16`, rounding of the blend target. `none` is a fault.
  */
 export type Cause = 'fine' | 'threshold' | 'stop' | 'float16' | 'none';
 
@@ -29,7 +28,7 @@ export interface Verdict {
 
 export interface Subject {
   readonly device: GPUDevice;
-  /** A device that blends in float32; undefined where there is none. */
+  /** A device that blends in float32; undefined if there is none. */
   readonly precise: GPUDevice | undefined;
   readonly rasterizer: RasterizerName;
 }
@@ -49,7 +48,7 @@ export async function judge(recipe: SceneRecipe, subject: Subject): Promise<Verd
   return judgeView({ cloud: cloudOfRecipe(recipe), camera: cameraOfRecipe(recipe.camera), mode, turning }, subject);
 }
 
-/** What is drawn: `turning` as the `DrawOptions` of the rows have it. */
+/** The scene to draw: `turning` as the `DrawOptions` of the rows have it. */
 export interface JudgedView {
   readonly cloud: GaussianCloud;
   readonly camera: Camera;
@@ -84,19 +83,19 @@ export async function judgeView(view: JudgedView, { device, precise, rasterizer 
 /** The rules without an end to pixels. */
 const ENDLESS: Rules = { ...RULES.gsplat, minTransmittance: 0, stopsAtEquality: false };
 
-/** [pixels] 1 where no rounding decides and a splat is seen, by whichever image. */
+/** [pixels] 1 if no rounding decides and either image shows a splat. */
 function surePixels(cloud: GaussianCloud, camera: Camera, mode: Mode, oracle: OracleImage): Uint8Array {
   const base = toRgba(oracle);
   const sure = new Uint8Array(oracle.transmittance.length).fill(1);
-  for (const image of neighbours(cloud, camera, mode)) {
+  for (const image of neighbors(cloud, camera, mode)) {
     const other = toRgba(image);
     for (let i = 0; i < base.length; i++) if (Math.abs(base[i] - other[i]) > VISIBLE) sure[i >> 2] = 0;
   }
   return sure;
 }
 
-/** What the image would be, had each limit been a rounding lower or higher, and depths a rounding apart. */
-function* neighbours(cloud: GaussianCloud, camera: Camera, mode: Mode): Generator<OracleImage> {
+/** The image as it would be with each limit a rounding lower or higher, and depths a rounding apart. */
+function* neighbors(cloud: GaussianCloud, camera: Camera, mode: Mode): Generator<OracleImage> {
   const { gsplat } = RULES;
   const { near } = camera;
   const limits: Partial<Rules>[] = [-1, 1].flatMap((side) => [
@@ -105,8 +104,8 @@ function* neighbours(cloud: GaussianCloud, camera: Camera, mode: Mode): Generato
   ]);
   for (const limit of limits) yield renderOracle(cloud, camera, { rules: { ...gsplat, ...limit }, mode });
   const places = Array.from({ length: cloud.count }, (_, i) => toCamera(camera, worldPosition(cloud, i)));
-  // A depth near 0 is the difference of large products: what is far aside has the rounding of how far.
-  const reach = places.reduce((most, place) => Math.max(most, Math.hypot(...place)), near);
+  // A depth near 0 is the difference of large products: points far aside have the rounding of their distance.
+  const reach = places.reduce((max, place) => Math.max(max, Math.hypot(...place)), near);
   for (const side of [-1, 1]) {
     yield renderOracle(cloud, { ...camera, near: near + side * DEPTH_ROUNDING * reach }, { rules: 'gsplat', mode });
   }

@@ -5,7 +5,7 @@ import { miscompile, type Miscompilation } from '../../support/miscompilation.js
 
 let full: Promise<GPUDevice> | undefined;
 
-/** One device with all that the renderer can use: blending in float32 where the adapter has it. */
+/** One device with all features of the renderer: blending in float32 if the adapter has it. */
 export function fullDevice(): Promise<GPUDevice> {
   full ??= requestNodeAdapter().then((adapter) => adapter.requestDevice(deviceDescriptor(adapter)));
   return full;

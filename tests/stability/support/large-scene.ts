@@ -1,4 +1,4 @@
-/** Scenes of many millions of splats of which few are in view, packed by hand: no cloud of that size has to be built. */
+/** Scenes of many millions of splats with few in view, packed by hand: no cloud of that size has to be built. */
 import type { GaussianCloud } from '@gaussian-splat/core';
 import { packGaussians, type PackedGaussians } from '@gaussian-splat/renderer';
 import { cloudOf, repeat } from '../../support/clouds.js';
@@ -6,7 +6,7 @@ import { seededRandom } from '../../support/random.js';
 
 /** Splats of a chunk. */
 const CHUNK = 256;
-/** Where the splats are that nobody sees. */
+/** Positions of the splats outside the view. */
 const BEHIND = [0, 0, -100] as const;
 
 /** The part of the scene that is in view, as a small cloud. */
@@ -31,7 +31,7 @@ export function spreadOver(visible: GaussianCloud, count: number): PackedGaussia
   const hidden = packed.geometry.slice(0, width);
   new Float32Array(hidden.buffer).set(BEHIND);
   geometry.set(hidden);
-  // Doubling what is there is the fastest way to fill gigabytes.
+  // Copying the written part repeatedly is the fastest way to fill gigabytes.
   for (let filled = width; filled < geometry.length; filled *= 2) {
     geometry.copyWithin(filled, 0, Math.min(filled, geometry.length - filled));
   }

@@ -1,7 +1,7 @@
 /** Which buffers, textures and query sets of a device live, and their bytes: what `byteLength` of our own objects is held against. */
 
 export interface Ledger {
-  /** Bytes of what was created since the watch began and still lives. */
+  /** Bytes of live resources that were created since the watch began. */
   readonly bytes: number;
   /** Number of such objects. */
   readonly objects: number;

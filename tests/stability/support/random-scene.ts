@@ -9,7 +9,7 @@ export interface SplatRecipe {
   readonly position: readonly number[];
   /** Natural logarithms of the standard deviations; -Infinity is written as null. */
   readonly logScale: readonly (number | null)[];
-  /** Not normalised. */
+  /** Not normalized. */
   readonly rotation: readonly number[];
   readonly opacity: number;
   readonly color: readonly number[];
@@ -23,7 +23,7 @@ export interface CameraRecipe {
   readonly eye: readonly number[];
   readonly target: readonly number[];
   readonly roll: number;
-  /** Principal point, as shares of the image beyond its middle. */
+  /** Principal point, as fractions of the image beyond its middle. */
   readonly shift: readonly number[];
   readonly near: number;
 }
@@ -31,7 +31,7 @@ export interface CameraRecipe {
 /** All that one case of the fuzzer needs. */
 export interface SceneRecipe {
   readonly splats: readonly SplatRecipe[];
-  /** How often the splats are repeated, each time a little aside and in other colours. */
+  /** How often the splats are repeated, each time a little aside and in other colors. */
   readonly copies: number;
   readonly shDegree: ShDegree;
   readonly seed: number;

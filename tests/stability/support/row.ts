@@ -1,4 +1,4 @@
-/** What every row of the catalogue shares: how much of a recipe runs, and figures that are held to a limit and reported. */
+/** Common parts of all rows of the catalog: how much of a recipe runs, and figures that are held to a limit and reported. */
 import assert from 'node:assert/strict';
 import { appendFileSync } from 'node:fs';
 import { test, type TestContext } from 'node:test';
@@ -21,7 +21,7 @@ export interface Limit {
   readonly unit: string;
 }
 
-/** Begins a run in the file of figures: what follows was measured on this adapter. */
+/** Begins a run in the file of figures: the next lines were measured on this adapter. */
 export async function noteAdapter(): Promise<void> {
   if (!process.env.STABILITY_FIGURES) return;
   const { vendor, architecture, device, description } = (await requestNodeAdapter()).info;

@@ -57,7 +57,7 @@ export function transformed(cloud: GaussianCloud, m: Matrix3): GaussianCloud {
   return out;
 }
 
-/** The cloud whose colour along M d is what it was along d, for a rotation M. */
+/** The cloud whose color along M d equals its former color along d, for a rotation M. */
 export function withTurnedHarmonics(cloud: GaussianCloud, rotation: Matrix3): GaussianCloud {
   const size = shCoefficientCount(cloud.shDegree);
   const turn = harmonicsRotation(cloud.shDegree, rotation);

@@ -50,7 +50,7 @@ async function openMap(hasBlock: boolean): Promise<MapLibre> {
   return map;
 }
 
-/** Where the picture is darker than the white ground and is not gray: means of x and y, CSS pixels, and how many. */
+/** Pixels darker than the white background and not gray: means of x and y in CSS pixels, and their number. */
 function splatsIn(map: MapLibre): { x: number; y: number; count: number } {
   const canvas = map.getCanvas();
   const copy = new OffscreenCanvas(canvas.width, canvas.height).getContext('2d')!;

@@ -15,7 +15,7 @@ import { proceduralScenes, resized, thinned } from '../../support/scenes.js';
 
 const SPLATS = 4_000;
 const WIDTH = 160;
-/** Of the rectangle in the host's frame. */
+/** Depth of the rectangle in the host's frame. */
 const [X, Y] = [24, 40];
 const GRAY = 102;
 const REQUEST = { accumulation: 'rgba16float', shDegree: 3, resolutionScale: 1 } as const;
@@ -36,7 +36,7 @@ function context(width: number, height: number, options: WebGLContextAttributes)
   return gl;
 }
 
-/** The picture of the splats alone over a background, by the renderer in a context of its own. */
+/** The image of the splats alone over a background, by the renderer in a context of its own. */
 async function alone(cloud: GaussianCloud, camera: Camera, background: number): Promise<Uint8Array> {
   const gl = context(camera.width, camera.height, { antialias: false, depth: false });
   const packed = packGaussians(cloud);
@@ -187,16 +187,16 @@ describe("splats in a host's frame", () => {
           Math.abs(y + 0.5 - camera.height / 2) < camera.height / 4
         );
       };
-      let [most, hidden] = [0, 0];
+      let [max, hidden] = [0, 0];
       // Antialiased edges of the box show both.
       const isEdge = (i: number): boolean =>
         options.antialias && [-4, 4].some((by) => isInside(i + by * camera.width) !== isInside(i));
       found.forEach((value, i) => {
         if (isEdge(i)) return;
-        most = Math.max(most, Math.abs(value - (isInside(i) ? inside : outside)[i]));
+        max = Math.max(max, Math.abs(value - (isInside(i) ? inside : outside)[i]));
         hidden += isInside(i) ? Math.abs(value - outside[i]) : 0;
       });
-      assert(most <= 2, `${most} of 255 from our own picture with that depth`);
+      assert(max <= 2, `${max} of 255 from our own picture with that depth`);
       assert(hidden > 1000, 'the box hides nothing');
       const untouched = read(gl, 0, 0, { ...camera, width: X, height: Y });
       assert(

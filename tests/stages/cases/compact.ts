@@ -34,7 +34,7 @@ function flagsToBits(pages: readonly boolean[][]): {
   return { bits, offsets, firstGroups };
 }
 
-/** The twin: numbers of the flagged splats, pages counted as whole chunks, in order. */
+/** The twin: indices of the flagged splats, pages counted as whole chunks, in order. */
 function survivorsTwin(pages: readonly boolean[][]): number[] {
   const { firstGroups } = flagsToBits(pages);
   return pages.flatMap((flags, p) => flags.flatMap((flag, i) => (flag ? [firstGroups[p] * CULL_GROUP + i] : [])));

@@ -15,12 +15,12 @@ import { check, randomSource, type Bench, type StageCase } from '../../support/g
 import { miscompiling, type Miscompilation } from '../../support/miscompilation.js';
 import { cameraAt } from '../../support/scenes.js';
 import { pebbles } from '../../support/scenes/pebbles.js';
-import { WITHOUT_LEVERS } from './view.js';
+import { DEFAULT_SETTINGS } from './view.js';
 
 const NOT_WRITTEN = -1;
 
 interface Cut {
-  /** Of each chunk; 0 for those that are not drawn. */
+  /** Value of each chunk; 0 for those that are not drawn. */
   readonly shares: Float32Array;
   readonly listed: ReadonlySet<number>;
   /** Pixels that the budget allows. */
@@ -74,7 +74,7 @@ function viewWords(packed: PackedGaussians, { camera, allowed, fade }: DetailVie
       ...cameraValues(camera, origin),
       ...{ splat_count: count, page: 0, first_group: 0, antialiased: 0, key_bits: 24 },
       ...{ sh_degree: shDegree, sh_cap: 3, sh_encoding: SH_PRECISION[shPrecision] },
-      ...{ ...WITHOUT_LEVERS, has_detail: 1, detail: allowed, detail_fade: fade, splat_budget: budget },
+      ...{ ...DEFAULT_SETTINGS, has_detail: 1, detail: allowed, detail_fade: fade, splat_budget: budget },
     },
     bytes,
   );
@@ -94,7 +94,7 @@ function randomView(random: () => number, k: number): DetailView {
 
 const packed = packWithDetail(pebbles(30_000));
 
-/** The sum of shares along the path of each leaf, as the twin has them where the GPU did not look. */
+/** The sum of weights along the path of each leaf, from the twin for chunks that the GPU skipped. */
 function checkCovered(cut: Cut, view: DetailView, what: string): number {
   const rows = packed.details!;
   const starts = levelStarts(packed);
@@ -106,7 +106,7 @@ function checkCovered(cut: Cut, view: DetailView, what: string): number {
       const twin = shareDrawn(rows, chunk, view);
       const share = cut.listed.has(chunk) ? cut.shares[chunk] : twin;
       if (cut.listed.has(chunk)) looked++;
-      // Where a share changes fast, the rounding of a distance shows.
+      // The rounding of a distance shows when a weight changes fast.
       const slack = 1e-3 / Math.max(view.fade, 0.05);
       const isOnEdge = view.fade < 0.05 && isNear(rows, chunk, view, view.fade + 1e-4);
       check(isOnEdge || Math.abs(share - twin) <= slack, `${what}: chunk ${chunk} has ${share}, expected ${twin}`);
@@ -120,10 +120,14 @@ function checkCovered(cut: Cut, view: DetailView, what: string): number {
   return looked;
 }
 
-/** Octaves by which an error on screen may be rounded: a distance from a sphere is a small difference of large numbers. */
+/**
+ * Rounding error of a screen-space error in octaves: a distance from a sphere is a small difference of large numbers.
+ */
 const ROUNDING = 0.01;
 
-/** What is neither finer nor coarser than where levels fade is drawn wholly or not at all: nothing is looked at in vain. */
+/**
+ * A chunk that is neither finer nor coarser than the fading levels is drawn fully or not at all: no check is wasted.
+ */
 function checkWhole({ listed, shares }: Cut, view: DetailView, what: string): void {
   for (const chunk of listed) {
     if (isNear(packed.details!, chunk, view, view.fade + ROUNDING)) continue;
@@ -131,7 +135,7 @@ function checkWhole({ listed, shares }: Cut, view: DetailView, what: string): vo
   }
 }
 
-/** Whether the error of a chunk, or of the one above it, is within so many octaves of what is allowed. */
+/** Whether the error of a chunk, or of the one above it, is within a number of octaves of the allowed error. */
 function isNear(rows: Float32Array, chunk: number, { camera, allowed }: DetailView, octaves: number): boolean {
   return [false, true].some(
     (above) => Math.abs(Math.log2(screenError(rows, chunk, camera, above) / allowed)) < octaves,
@@ -156,7 +160,9 @@ const ROUNDED_OTHERWISE: readonly Miscompilation[] = [
   },
 ];
 
-/** What a chunk finds for itself is larger by 2^-21 than what is found for the same chunk as the one above another. */
+/**
+ * The value that a chunk computes for itself is larger by 2^-21 than the one computed for the same chunk as a parent.
+ */
 const ROUNDED_APART: readonly Miscompilation[] = [
   { shader: CULL_CHUNKS, from: 'd.error / d.full_error', to: 'd.error * (1.0 / d.full_error)' },
   {
@@ -227,7 +233,7 @@ export const detailCases: readonly StageCase[] = [
           // A chunk at its end may be partly filled, and is counted as such.
           check(splats <= budget + constants.CULL_GROUP, `view ${k}: ${splats} splats for a budget of ${budget}`);
           check(allowed <= last, `view ${k}: budget ${budget} allows ${allowed}, a smaller one ${last}`);
-          // While levels fade into one another both are looked at.
+          // While levels fade into one another, both are checked.
           if (budget > 1.4 * all) check(allowed === 0, `view ${k}: ${allowed} although all ${all} splats have room`);
           last = allowed;
         }

@@ -7,7 +7,7 @@ import { covarianceOf, writeTensors, type TensorSpec, type WrittenTensors } from
 import { edgeOnDiscs, hugeSplats, needles, room, thinned, type Scene } from '../../support/scenes.js';
 
 const SPECS: Readonly<Record<string, TensorSpec>> = {
-  'packed, covariances, colours': spec('packed', 'covariance', 'rgb', 'linear'),
+  'packed, covariances, colors': spec('packed', 'covariance', 'rgb', 'linear'),
   'packed, covariances, harmonics': spec('packed', 'covariance', 'coefficient-major', 'logit'),
   'split, scales': spec('split', 'scale', 'channel-major', 'linear', 'xyzw'),
   'split, logarithms': spec('split', 'log-scale', 'coefficient-major', 'logit', 'wxyz'),
@@ -42,7 +42,7 @@ async function ingestOnGpu(
   const gaussians = await DynamicGaussians.create(bench.device, layout);
   const buffers = Object.entries(tensors).map(([name, words]) => [name, bench.buffer(words)] as const);
   gaussians.ingest(Object.fromEntries(buffers), rows);
-  const [page] = gaussians.pages;
+  const [page] = gaussians.blocks;
   const result = {
     geometry: await bench.read(page.geometry),
     sh: await bench.read(page.sh),
@@ -75,7 +75,7 @@ const product = ([xx, yx, yy, zx, zy, zz]: number[]): number[] => [
 
 /**
  * The twin: every number of every splat, as float64 has it. Packing keeps 14 bits of the factor and 20 of the opacity. Rounded to
- * float16 the covariances of flat and thin splats are often indefinite, and then there is more than one way to mend them: only
+ * float16 the covariances of flat and thin splats are often indefinite, and then there is more than one repair: only
  * their variances are compared.
  */
 function checkAgainstTwin({ geometry, sh }: Ingested, cloud: GaussianCloud, name: string, one: TensorSpec): void {
@@ -99,7 +99,7 @@ function checkAgainstTwin({ geometry, sh }: Ingested, cloud: GaussianCloud, name
     });
     if (hasAxes) {
       scaleRotationFactor(cloud, i, factor);
-      // A thin pivot divides what is left of rounding; its product with the pivot, which Σ is made of, stays small.
+      // A small pivot divides the rounding error; its product with the pivot, which Σ is made of, stays small.
       const pivot = Math.max(1e-3 * Math.sqrt(trace), Math.min(factor[0], factor[2]));
       const slack = 4e-6 * Math.sqrt(trace) + (1e-6 * trace) / pivot;
       factor.forEach((value, k) => {
@@ -154,7 +154,7 @@ const againstTwin: StageCase[] = Object.entries(SPECS).flatMap(([what, one]) =>
   })),
 );
 
-const PLAIN: TensorSpec = SPECS['packed, covariances, colours'];
+const PLAIN: TensorSpec = SPECS['packed, covariances, colors'];
 const COLUMNS = 13;
 
 /** Zero geometry: what `cull` refuses and counts. */
@@ -162,7 +162,7 @@ const isNothing = (geometry: Uint32Array, row: number): boolean =>
   geometry.subarray(8 * row, 8 * row + 8).every((word) => word === 0);
 
 const hostile: StageCase = {
-  name: 'ingest: rows with NaN, infinity or no extent become nothing, and their neighbours stay',
+  name: 'ingest: rows with NaN, infinity or no extent become nothing, and their neighbors stay',
   async run(bench) {
     const { cloud } = smallRoom();
     for (const dtype of ['float32', 'float16'] as const) {
@@ -237,9 +237,9 @@ const paged: StageCase = {
     const gaussians = await DynamicGaussians.create(small, layout);
     const buffers = Object.entries(tensors).map(([name, words]) => [name, bench.buffer(words)] as const);
     gaussians.ingest(Object.fromEntries(buffers), layout.capacity);
-    check(gaussians.pages.length === Math.ceil(cloud.count / 512), `${gaussians.pages.length} pages`);
+    check(gaussians.blocks.length === Math.ceil(cloud.count / 512), `${gaussians.blocks.length} pages`);
     let first = 0;
-    for (const page of gaussians.pages) {
+    for (const page of gaussians.blocks) {
       const geometry = await bench.read(page.geometry, 32 * page.count);
       checkEqual(geometry, whole.geometry.subarray(8 * first, 8 * (first + page.count)), `page from row ${first}`);
       first += page.count;
@@ -252,9 +252,9 @@ const ofInstances: StageCase = {
   name: 'ingest: of several scenes in the same tensors each takes its own rows and its own count, wherever they begin',
   async run(bench) {
     const { cloud } = smallRoom();
-    // Odd, so that no slice begins where a binding may.
+    // Odd, so that no slice starts at a valid offset of a binding.
     const rows = 1333;
-    for (const what of ['packed, covariances, colours', 'split, scales']) {
+    for (const what of ['packed, covariances, colors', 'split, scales']) {
       for (const dtype of ['float32', 'float16'] as const) {
         const { layout, tensors } = writeTensors(cloud, { ...SPECS[what], dtype });
         const whole = await ingestOnGpu(bench, { layout, tensors });
@@ -267,7 +267,7 @@ const ofInstances: StageCase = {
           [2, 1000],
         ]) {
           gaussians.ingest({ ...Object.fromEntries(buffers), count: counts }, rows, instance);
-          const [page] = gaussians.pages;
+          const [page] = gaussians.blocks;
           const geometry = (await bench.read(page.geometry)).subarray(0, 8 * living);
           const harmonics = whole.sh.length / cloud.count;
           const sh = (await bench.read(page.sh)).subarray(0, harmonics * living);

@@ -40,7 +40,7 @@ const floatBits = (x: number): number => new Uint32Array(Float32Array.of(x).buff
 /** A number of ten binary digits behind the first. */
 const tenDigits = (x: number): number => new Float32Array(Uint32Array.of(floatBits(x) & ~0x1fff).buffer)[0];
 
-/** As shaders/shared/splat.wgsl writes it: the upper bits of a float32 from 2⁻²⁸ on, but for codes that are no finite float16. */
+/** As shaders/shared/splat.wgsl writes it: the upper bits of a float32 from 2⁻²⁸ on, except for codes that are no finite float16. */
 function depthCode(depth: number): number {
   const steps = (floatBits(depth) - floatBits(2 ** -28)) >>> 13;
   return steps < 0x7c00 ? steps : steps + 0x400;
@@ -64,7 +64,7 @@ function alphaAt(splat: Splat, { x, y }: Point): number {
   return alpha < ALPHA_MIN ? 0 : alpha;
 }
 
-/** Shares of the light that are left behind the three depths of an answer. */
+/** Fractions of the light that are left behind the three depths of an answer. */
 const LEFT = [0.9, 0.5, 0.1];
 
 /** Opacity, depths or 0, transmittance in front of the point, and how near the light comes to each of the three shares. */
@@ -116,7 +116,7 @@ async function checkProbe(bench: Bench, count: number, maxOpacity: number): Prom
     const near = (actual: number, expected: number, what: string): void =>
       check(Math.abs(actual - expected) < 1e-5, `${what} of point ${i}: ${actual}, expected ${expected}`);
     near(found[WORDS * i + 3], opacity, 'opacity');
-    // If the light comes within a rounding of a share, float32 may name the next splat.
+    // If the light comes within a rounding of a fraction, float32 may name the next splat.
     depths.forEach((depth, k) => {
       if (margins[k] > 1e-5) near(found[WORDS * i + k], depth, `depth at ${LEFT[k]}`);
     });

@@ -27,7 +27,7 @@ import {
   thinned,
   type Scene,
 } from '../../support/scenes.js';
-import { WITHOUT_LEVERS } from './view.js';
+import { DEFAULT_SETTINGS } from './view.js';
 
 const { CULL_GROUP, WORDS_PER_GROUP } = constants;
 
@@ -42,7 +42,7 @@ function uploadScene(
   const flags = {
     antialiased: packed.antialiased ? 1 : 0,
     key_bits: 32,
-    ...WITHOUT_LEVERS,
+    ...DEFAULT_SETTINGS,
   };
   const sh = { sh_degree: packed.shDegree, sh_cap: 3, sh_encoding: SH_PRECISION[packed.shPrecision] };
   writeStruct(layouts.View, { ...cameraValues(camera, packed.origin), ...page, ...sh, ...flags }, bytes);
@@ -54,7 +54,7 @@ function uploadScene(
   };
 }
 
-/** Visibility flags of all splats, how many were refused as unusable, and how many chunks were looked into. */
+/** Visibility flags of all splats, how many were refused as unusable, and the number of visited chunks. */
 export async function cullOnGpu(
   bench: Bench,
   packed: PackedGaussians,
@@ -63,7 +63,7 @@ export async function cullOnGpu(
 ): Promise<{ visible: boolean[]; unusable: number; chunksSeen: number }> {
   const { view, gaussians, chunks } = uploadScene(bench, packed, camera);
   const groups = cullGroups(packed.count);
-  // What `cull` does not write must come from `cull_chunks`: garbage would show.
+  // Values that `cull` does not write must come from `cull_chunks`: garbage would show.
   const bits = bench.buffer(new Uint32Array(WORDS_PER_GROUP * groups).fill(0xffffffff));
   const counts = bench.buffer(new Uint32Array(groups).fill(0xffffffff));
   const cull_stats = bench.buffer(4 * constants.CULL_STATS_WORDS);
@@ -98,7 +98,7 @@ export async function cullOnGpu(
   return { visible, unusable: counters[constants.UNUSABLE], chunksSeen };
 }
 
-/** The twin: does a splat reach the centre of a pixel? `margin` in pixels widens (or narrows) its box. */
+/** The twin: does a splat reach the center of a pixel? `margin` in pixels widens (or narrows) its box. */
 function isVisibleTwin(cloud: GaussianCloud, i: number, camera: Camera, margin: number): boolean {
   const center = toCamera(camera, worldPosition(cloud, i));
   const depth = center[2];
@@ -199,7 +199,7 @@ async function checkProject(bench: Bench, cloud: GaussianCloud, camera: Camera):
     const pixelError = 4 * camera.fx * (scale / center[2]) * 2 ** -22 + 1e-6 * (Math.abs(e.x) + Math.abs(e.y));
     check(
       Math.abs(x - e.x) <= pixelError && Math.abs(y - e.y) <= pixelError,
-      `splat ${i}: centre ${x}, ${y}, expected ${e.x}, ${e.y}`,
+      `splat ${i}: center ${x}, ${y}, expected ${e.x}, ${e.y}`,
     );
     // The factor of the covariance is stored to 14 bits: axes on the screen are off by 2^-15 of the longest.
     const sigmaX = 1 / inverseSigmaX;
@@ -231,10 +231,10 @@ async function checkProject(bench: Bench, cloud: GaussianCloud, camera: Camera):
     // Coefficients are float16: half a unit in the last place of each.
     const shError = coefficients.reduce((sum, c) => sum + Math.abs(c), 0) * 2 ** -11 + 1e-5;
     expected.forEach((c, k) =>
-      check(Math.abs(color[k] - c) <= shError + c * 2 ** -11, `splat ${i}: colour ${color}, expected ${expected}`),
+      check(Math.abs(color[k] - c) <= shError + c * 2 ** -11, `splat ${i}: color ${color}, expected ${expected}`),
     );
     const opacity = cloud.opacities[i] * (cloud.antialiased ? e.compensation : 1);
-    // Compensation is the thin axis against the same axis dilated: what is off in the one shows in the other.
+    // Compensation is the thin axis against the same axis dilated: an error of one shows in the other.
     const thinError = cloud.antialiased ? axisError / (e.compensation * Math.sqrt(conditional)) : 0;
     check(
       relative(asFloat(words[7]), opacity) <= 2e-3 + 100 * depthError + thinError,
@@ -269,7 +269,7 @@ const geometryCases = scenes.flatMap((make) =>
   }),
 );
 
-/** Where the numbers of a packed splat lie: word, and the bits of it that hold the number's highest. */
+/** Positions of the numbers in a packed splat: word, and the bits that hold the number's highest. */
 const PACKED_NUMBERS = [0, 1, 2, 3, 4, 5, 6, 7].map((word) => ({ name: `word ${word}`, word }));
 
 /** A packed scene with a copy of each splat spoilt in one way behind it, as a buffer that no CPU has checked. */
@@ -311,7 +311,7 @@ function withSpoiltCopies(packed: PackedGaussians): { packed: PackedGaussians; f
   return { packed: { ...packed, count, geometry, sh, chunks }, faults: faults.map(({ name }) => name) };
 }
 
-/** A cloud in two far places, of which a camera sees one. */
+/** A cloud in two far places; a camera sees one of them. */
 function twoPlaces(): { cloud: GaussianCloud; camera: Camera } {
   const { cloud, cameras } = room();
   const positions = cloud.positions.slice();

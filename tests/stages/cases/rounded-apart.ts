@@ -1,4 +1,7 @@
-/** Stages that compute a number anew which another has decided by: a compiler may round it differently in each. */
+/**
+ * Stages that compute a number again on which another stage's decision depends: a compiler may round it differently in
+ * each.
+ */
 import { packGaussians } from '@gaussian-splat/renderer';
 import { layouts } from '@gaussian-splat/renderer/stages';
 import { cloudOf, repeat } from '../../support/clouds.js';
@@ -21,7 +24,7 @@ const onTheNearPlane = cloudOf(
 );
 const camera = cameraAt([0, 0, 0], [0, 0, 1], { width: 64, height: 48, near: NEAR });
 
-/** A depth that comes out smaller by some share of the near plane's distance: a rounding, where coordinates are 2^23 times as large. */
+/** A depth that is smaller by a fraction of the near plane's distance: a rounding for coordinates 2^23 times as large. */
 const nearer = (share: number): Miscompilation => ({
   shader: /gs\.project/,
   from: 'in_camera(view, g.position);',

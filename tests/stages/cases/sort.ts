@@ -17,7 +17,7 @@ function planFor(count: number): Uint32Array {
   return plan;
 }
 
-/** Sorts on the GPU; the buffers hold more than the keys, and what lies beyond must stay. */
+/** Sorts on the GPU; the buffers hold more than the keys, and data beyond them must stay. */
 async function sortOnGpu(
   bench: Bench,
   keys: Uint32Array,
@@ -118,8 +118,8 @@ export const sortCases: StageCase[] = [
         [32, 2 * block + 300],
       ]) {
         const random = randomSource(keyBits);
-        const most = 2 ** keyBits;
-        const keys = fill(size, (i) => (i % 3 === 0 ? most - 1 : Math.floor(random() * most)));
+        const max = 2 ** keyBits;
+        const keys = fill(size, (i) => (i % 3 === 0 ? max - 1 : Math.floor(random() * max)));
         await checkSort(bench, keys, threads, keyBits);
       }
     },

@@ -1,5 +1,5 @@
-/** What a `View` says of levers where none is set, of a page without levels of detail, and of a scene that is placed as it is. */
-export const WITHOUT_LEVERS = {
+/** Values of a `View` without settings, for a page without levels of detail, and for a scene without a placement. */
+export const DEFAULT_SETTINGS = {
   has_detail: 0,
   detail: 0,
   detail_fade: 0,

@@ -18,7 +18,7 @@ interface Drop {
   readonly splat: SplatDescription;
 }
 
-/** Shares of the splats that stand still, and that swing; at any time the rest is drops. */
+/** Fractions of the splats that are static, and that swing; at any time the rest is drops. */
 const [GROUND, BODY] = [0.4, 0.45];
 const GRAVITY = 2.4;
 

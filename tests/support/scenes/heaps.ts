@@ -20,7 +20,7 @@ export function heaps(count: number): { levels: LevelScene; clouds: GaussianClou
       );
     return box % 2 === 0 ? [every(40), every(9), every(2), every(1)] : [every(30), every(5), every(1)];
   });
-  // Of the first box nothing can be drawn at its coarsest level.
+  // The first box draws nothing at its coarsest level.
   clouds[0][0].opacities.fill(NaN);
   const sky = pick(pebbles(700, 99), [...Array(700).keys()], 3);
   const parts = [...clouds.map(([coarsest]) => coarsest), sky];

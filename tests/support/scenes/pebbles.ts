@@ -1,9 +1,9 @@
-/** Scenes of many splats on surfaces, in which neighbours can stand for one another: what levels of detail are for. */
+/** Scenes of many splats on surfaces, which suit levels of detail, since neighbors can replace one another. */
 import { add, scale, type GaussianCloud, type Vector3 } from '@gaussian-splat/core';
 import { cloudOf, type SplatDescription } from '../clouds.js';
 import { seededRandom, type Random } from '../random.js';
 
-/** Stones of about 3,000 splats each, scattered over 12 x 12 world units; their colours change slowly over the surface. */
+/** Stones of about 3,000 splats each, scattered over 12 x 12 world units; their colors change slowly over the surface. */
 export function pebbles(count: number, seed = 7): GaussianCloud {
   const random = seededRandom(seed);
   const stones = Array.from({ length: Math.ceil(count / 3000) }, () => ({

@@ -1,4 +1,4 @@
-/** The hardest ordinary case: a camera inside, large faint splats all around it, a sky far outside, colours by direction. */
+/** The hardest ordinary case: a camera inside, large faint splats all around it, a sky far outside, colors by direction. */
 import { scale, type Vector3 } from '@gaussian-splat/core';
 import { cloudOf, repeat, type SplatDescription } from '../clouds.js';
 import { seededRandom, type Quaternion, type Random } from '../random.js';

@@ -1,4 +1,4 @@
-/** What every procedural scene is made of. */
+/** Parts of every procedural scene. */
 import { DEFAULT_FAR, DEFAULT_NEAR, lookAt, type Camera, type GaussianCloud, type Vector3 } from '@gaussian-splat/core';
 
 export interface Scene {
@@ -8,17 +8,17 @@ export interface Scene {
   readonly cameras: readonly Camera[];
 }
 
-/** Up in the picture: y points down in the frame of clouds. */
+/** Up in the image: y points down in the frame of clouds. */
 export const UP: Vector3 = [0, -1, 0];
 
-/** The same view at another width, in pixels: a fraction of the work where a test is not about pixels. */
+/** The same view at another width, in pixels: a fraction of the work for tests that do not measure pixels. */
 export function resized(camera: Camera, width: number): Camera {
   const s = width / camera.width;
   const height = Math.round(camera.height * s);
   return { ...camera, width, height, fx: camera.fx * s, fy: camera.fy * s, cx: camera.cx * s, cy: camera.cy * s };
 }
 
-/** The same scene of fewer splats, taken from all over it: a fraction of the work where a test looks at every number. */
+/** The same scene of fewer splats, taken from all over it: a fraction of the work for tests that read every number. */
 export function thinned({ name, cloud, cameras }: Scene, count: number): Scene {
   const step = Math.max(1, cloud.count / count);
   const kept = Math.min(count, cloud.count);

@@ -51,7 +51,7 @@ export function hugeSplats(): Scene {
     opacity: random.logUniform(0.004, 0.03),
     color: [random.uniform(0, 1), random.uniform(0, 1), random.uniform(0, 1)] as const,
   }));
-  // Centres just beyond the near plane and far off the axis: where the Jacobian explodes unless it is clamped.
+  // Centers just beyond the near plane and far off the axis: so that the Jacobian explodes unless it is clamped.
   const crossing = repeat(100, () => ({
     position: [random.uniform(-3, 3), random.uniform(-2, 2), -4 + 0.2 + random.logUniform(1e-4, 0.5)] as const,
     scale: [random.logUniform(0.01, 2), random.logUniform(0.01, 2), random.logUniform(0.01, 2)] as const,

@@ -1,4 +1,4 @@
-/** Scenes that have what a setting of the renderer acts on: opaque, faint, coincident, thin. Made here, so that they are always there. */
+/** Scenes with the splats that a setting of the renderer affects: opaque, faint, coincident, thin. They are synthetic, so they are always available. */
 import type { Camera, GaussianCloud } from '@gaussian-splat/core';
 import { cloudOf, repeat } from '../clouds.js';
 import { randomSource } from '../gpu.js';
@@ -13,7 +13,7 @@ export interface StressScene {
 /** Opacity of a logit of 14. */
 const OPAQUE = 0.9999992;
 const camera = cameraAt([0, 0, -3], [0, 0, 0], { width: 96, height: 64 });
-const grey = [0.6, 0.3, -0.2] as const;
+const gray = [0.6, 0.3, -0.2] as const;
 
 /** One after the other along the view, `at` from the camera's target on. */
 const layers = (count: number, opacity: number, scale: number, depth = 2) =>
@@ -40,7 +40,7 @@ export const stressScenes = (): StressScene[] => [
   {
     name: 'a pane before an opaque wall',
     cloud: cloudOf([
-      { position: [0, 0, -1], scale: 1.5, opacity: 0.5, color: grey },
+      { position: [0, 0, -1], scale: 1.5, opacity: 0.5, color: gray },
       { position: [0, 0, 1], scale: 3, opacity: OPAQUE, color: [1, 1, 1] },
     ]),
     camera,

@@ -1,17 +1,17 @@
-/** Ordinary shapes with extreme opacities, colours, depths, positions and cameras. */
+/** Ordinary shapes with extreme opacities, colors, depths, positions and cameras. */
 import { add, multiply, type Camera, type Vector3 } from '@gaussian-splat/core';
 import { cloudOf, repeat, type SplatDescription } from '../clouds.js';
 import { seededRandom } from '../random.js';
 import { cameraAt, type Scene } from './scene.js';
 
-/** From nothing to fully opaque, densest where rules bite: 1/255 (skip), 0.99 and 0.999 (caps). */
+/** From nothing to fully opaque, densest near the thresholds: 1/255 (skip), 0.99 and 0.999 (caps). */
 export const OPACITY_STEPS: readonly number[] = [
   ...[0, 1e-30, 1e-6, 0.001, 0.0035, 0.0039, 0.00392, 1 / 255, 0.003922, 0.00393, 0.004, 0.0045, 0.005, 0.01, 0.03],
   ...[0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.98, 0.989, 0.99, 0.991, 0.995, 0.998, 0.999, 0.9995, 1],
 ];
 
 /** Every opacity in a column of its own; each row puts one more splat behind, so that the last rows reach T < 1e-4. */
-export function opacityLadder(): Scene {
+export function opacitySteps(): Scene {
   const random = seededRandom(7);
   const rows = 20;
   const column = (i: number): number => (i - (OPACITY_STEPS.length - 1) / 2) * 0.16;
@@ -29,13 +29,13 @@ export function opacityLadder(): Scene {
     }
   });
   return {
-    name: 'opacityLadder',
+    name: 'opacitySteps',
     cloud: cloudOf(splats),
     cameras: [cameraAt([0, 0, -4], [0, 0, 0], { width: 480, height: 320 })],
   };
 }
 
-/** Colours from far below 0 (cut to 0) to about 4 (not cut), from the constant term and from SH of degree 3. */
+/** Colors from far below 0 (cut to 0) to about 4 (not cut), from the constant term and from SH of degree 3. */
 export function brightColors(): Scene {
   const random = seededRandom(8);
   const splats = repeat(5_000, () => ({
@@ -53,7 +53,7 @@ export function brightColors(): Scene {
   };
 }
 
-/** 100,000 overlapping splats at exactly one depth, in float32 too: only their order in the cloud decides the picture. */
+/** 100,000 overlapping splats at exactly one depth, in float32 too: only their order in the cloud decides the image. */
 export function equalDepthPlane(): Scene {
   const random = seededRandom(9);
   const splats = repeat(100_000, () => ({
@@ -88,7 +88,7 @@ export function offCenter(): Scene {
   };
 }
 
-/** The same scene far from the origin of the world, where float32 positions alone would be coarse. */
+/** The same scene far from the origin of the world, so float32 positions alone would be coarse. */
 export function movedBy(scene: Scene, offset: Vector3): Scene {
   const moved = (camera: Camera): Camera => ({
     ...camera,

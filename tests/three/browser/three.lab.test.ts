@@ -1,4 +1,4 @@
-/** Splats in three.js's own canvas, on its device: as the renderer draws them alone, and hidden by meshes where those are nearer. */
+/** Splats in three.js's own canvas, on its device: as the renderer draws them alone, and hidden by nearer meshes. */
 import { cameraFromProjection, type GaussianCloud } from '@gaussian-splat/core';
 import {
   capture,
@@ -55,7 +55,7 @@ async function renderer3(antialias = false) {
   return { renderer, canvas };
 }
 
-/** What a canvas shows, read in the task in which it was drawn. */
+/** Pixels of a canvas, read in the task that drew it. */
 function shown(canvas: HTMLCanvasElement): Uint8ClampedArray {
   const context = new OffscreenCanvas(WIDTH, HEIGHT).getContext('2d')!;
   context.drawImage(canvas, 0, 0);
@@ -66,9 +66,9 @@ const at = (pixels: ArrayLike<number>, x: number, y: number): number[] =>
   [0, 1, 2].map((k) => pixels[4 * (WIDTH * y + x) + k]);
 
 const worst = (a: ArrayLike<number>, b: ArrayLike<number>): number => {
-  let most = 0;
-  for (let i = 0; i < a.length; i++) if (i % 4 < 3) most = Math.max(most, Math.abs(a[i] - b[i]));
-  return most;
+  let max = 0;
+  for (let i = 0; i < a.length; i++) if (i % 4 < 3) max = Math.max(max, Math.abs(a[i] - b[i]));
+  return max;
 };
 
 /** Many frames: room is learnt. */
@@ -109,7 +109,7 @@ describe('splats in a three.js scene', () => {
           height: HEIGHT,
         });
         const alone = new Viewpoint(device, world, { settings: how });
-        const expected = await capture(device, alone, { camera: view, over: [...BACKGROUND, 1] });
+        const expected = await capture(device, alone, { camera: view, background: [...BACKGROUND, 1] });
         for (let k = 0; k < FRAMES; k++) splats.render(scene, camera);
         const found = shown(canvas);
         const bytes = expected.map((value) => Math.round(255 * Math.min(1, value)));
@@ -135,9 +135,9 @@ describe('splats in a three.js scene', () => {
       bar.visible = false;
       splats.render(scene, perspective);
       const wallAlone = shown(canvas);
-      const isNear = (a: number[], b: number[], most: number): boolean => a.every((v, k) => Math.abs(v - b[k]) <= most);
+      const isNear = (a: number[], b: number[], max: number): boolean => a.every((v, k) => Math.abs(v - b[k]) <= max);
       const y = HEIGHT / 2;
-      // With rotation.y the end at -x comes towards the viewer or goes away; whichever it is, one is in front.
+      // The end at -x moves towards the viewer or away with rotation.y; in either case one is in front.
       const [left, right] = [WIDTH / 2 - 30, WIDTH / 2 + 30];
       const [front, back] = isNear(at(crossed, left, y), at(barAlone, left, y), 1) ? [left, right] : [right, left];
       assert(isNear(at(barAlone, front, y), [255, 32, 0], 2), `the bar is there: ${at(barAlone, front, y)}`);
@@ -163,7 +163,7 @@ describe('splats in a three.js scene', () => {
       assert(isNear(at(shown(canvas), x, above), at(wallAlone, x, above), 2), `splats: ${at(shown(canvas), x, above)}`);
       renderer.toneMapping = NoToneMapping;
 
-      // Hiding, and a second camera, cost the first one nothing of its picture.
+      // Hiding, and a second camera, do not change the first one's image.
       bar.visible = true;
       splats.render(scene, parallel);
       splats.render(scene, perspective);

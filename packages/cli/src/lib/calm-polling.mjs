@@ -1,25 +1,25 @@
 /**
- * Dawn's Node module polls the driver in consecutive `setImmediate` calls while any work is in progress. This keeps a
- * CPU core busy, and with a software adapter (SwiftShader) took a third to a half of all CPU time. After half a
- * millisecond, polling is limited to once a millisecond.
+ * Limits the polling of Dawn's Node module. Dawn polls the driver in consecutive `setImmediate` calls while work is in
+ * progress. This occupies a CPU core, and with a software adapter (SwiftShader) a third to a half of all CPU time. After
+ * {@link EAGER_MS}, polling is limited to once in {@link PAUSE_MS}.
  */
 const EAGER_MS = 0.5;
 const PAUSE_MS = 1;
 
 /**
- * Detects native functions: nothing else in our programs passes one to `setImmediate`, and a bound function would only
- * be called a millisecond later.
+ * Whether a callback is a native function. Only Dawn passes one to `setImmediate` in the commands of this package; a bound
+ * function would only be called a millisecond later.
  */
 const isNative = (callback) => /\{\s*\[native code\]\s*\}$/.test(Function.prototype.toString.call(callback));
 
-/** Must be called before Dawn is created. */
+/** Replaces `setImmediate` by a function that limits the polling of Dawn. Call it before Dawn is created. */
 export function calmPolling() {
   const soon = globalThis.setImmediate;
   let isAsking = false;
   let since = 0;
   const calm = (callback, ...args) => {
     if (typeof callback !== 'function' || !isNative(callback)) return soon(callback, ...args);
-    // A polling function schedules its next call during a call.
+    // If a polling function schedules its next call during a call, the same polling continues.
     if (!isAsking) since = performance.now();
     const ask = () => {
       isAsking = true;
@@ -31,6 +31,6 @@ export function calmPolling() {
     };
     return performance.now() - since < EAGER_MS ? soon(ask) : setTimeout(ask, PAUSE_MS);
   };
-  // Keeps the variant for `util.promisify`.
+  // The properties include the variant for `util.promisify`.
   globalThis.setImmediate = Object.defineProperties(calm, Object.getOwnPropertyDescriptors(soon));
 }

@@ -1,9 +1,9 @@
-/** One moment of a clip, `.gsv` or `.4dgs`, as a cloud. */
+/** Reader of a frame of a clip, `.gsv` or `.4dgs`, as a cloud. */
 import { clipFrame, clipGroupAt, frameAt, LoadBudget, parseClip, readClipPart } from '@gaussian-splat/formats';
 
 export const isClip = (name) => /\.(gsv|4dgs)$/i.test(name);
 
-/** Throws GaussianSplatError as the readers do. */
+/** Returns the splats of a clip at a time in seconds. @throws GaussianSplatError as the readers of clips do */
 export async function clipMoment(bytes, name, seconds) {
   if (/\.4dgs$/i.test(name)) {
     const { FourDgsClip } = await import('@gaussian-splat/formats/4dgs');

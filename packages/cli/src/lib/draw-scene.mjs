@@ -1,15 +1,15 @@
-/** Shared by the commands that draw: reads a scene, opens its renderer and writes its images. */
+/** Functions of the commands that draw a scene: reading, rendering, and encoding of images. */
 import { dirname, join, resolve } from 'node:path';
 import { PNG } from 'pngjs';
 import { SPLAT_FILTERS } from '@gaussian-splat/core';
 import { readScene } from '@gaussian-splat/formats';
 import { capture, deviceDescriptor, GaussianBuffers, packGaussians, Viewpoint, World } from '@gaussian-splat/renderer';
 import { clipMoment, isClip } from './clip-frame.mjs';
-import { from, UsageError } from './command.mjs';
+import { CommandError, UsageError } from './command.mjs';
 import { readWhole } from './input-file.mjs';
 import { requestNodeAdapter } from './node-gpu.mjs';
 
-/** Options of how a scene is drawn, for `parseArgs`. */
+/** Command-line options that control the rendering of a scene, for `parseArgs`. */
 export const DRAW_OPTIONS = {
   filter: { type: 'string' },
   mode: { type: 'string' },
@@ -18,7 +18,7 @@ export const DRAW_OPTIONS = {
   background: { type: 'string' },
 };
 
-/** Checks the values of {@link DRAW_OPTIONS}. @throws UsageError */
+/** Validates the values of {@link DRAW_OPTIONS}, and converts the background to RGBA. @throws UsageError */
 export function readDrawOptions({ filter, mode, raster, accumulation, background }) {
   const checked = { filter: filter ?? mode, raster, accumulation, background: readBackground(background) };
   oneOf('--filter', checked.filter, [undefined, 'classic', 'antialiased', 'mip']);
@@ -42,20 +42,22 @@ function readBackground(text) {
 }
 
 /**
- * Reads a scene. Its other files are in the folder of the named one.
- * @param seconds time of the frame of a clip
+ * Reads a scene. Paths of other files are relative to the folder of the scene.
+ * @param name Path of the scene.
+ * @param seconds Time in seconds of the frame of a clip.
  */
 export async function readSceneFile(name, seconds = 0) {
-  const path = resolve(from, name);
+  const path = resolve(name);
   if (isClip(name)) return clipMoment(await readWhole(path), name, seconds);
   const openFile = (part) => readWhole(join(dirname(path), part));
   return readScene(await readWhole(path), { name, openFile });
 }
 
 /**
- * A renderer of one scene.
- * @param options of {@link readDrawOptions}
- * @returns `draw(camera)`: float32 premultiplied RGBA, row by row from the top. Rejects with the errors of WebGPU's validation.
+ * Opens a renderer of a scene.
+ * @param options Result of {@link readDrawOptions}.
+ * @returns The renderer. `draw(camera)` resolves to float32 premultiplied RGBA, [height, width, 4], top row first. It
+ * rejects if WebGPU's validation has reported an error.
  */
 export async function openSceneRenderer(cloud, options) {
   const { antialiased, filterVariance } = options.filter === undefined ? cloud : SPLAT_FILTERS[options.filter];
@@ -74,8 +76,8 @@ export async function openSceneRenderer(cloud, options) {
     mode: antialiased ? 'antialiased' : 'classic',
     adapterName: adapter.info.description || adapter.info.vendor,
     async draw(camera) {
-      const pixels = await capture(device, viewpoint, { camera, over: options.background });
-      if (validationErrors.length > 0) throw new Error(`WebGPU: ${validationErrors.join('\n')}`);
+      const pixels = await capture(device, viewpoint, { camera, background: options.background });
+      if (validationErrors.length > 0) throw new CommandError(`WebGPU: ${validationErrors.join('\n')}`);
       return pixels;
     },
   };
@@ -86,7 +88,7 @@ function chooseAccumulation(asked, device) {
   return device.features.has('float32-blendable') ? 'rgba32float' : 'rgba16float';
 }
 
-/** 8-bit RGBA with straight alpha, rounded to nearest. */
+/** Converts premultiplied RGBA in float32 to bytes of RGBA with straight alpha. */
 export function toBytes(pixels) {
   const bytes = new Uint8Array(pixels.length);
   const toByte = (value) => Math.round(255 * Math.min(1, Math.max(0, value)));
@@ -98,7 +100,7 @@ export function toBytes(pixels) {
   return bytes;
 }
 
-/** A PNG of {@link toBytes}. */
+/** Encodes bytes of {@link toBytes} as PNG. */
 export function encodePng(bytes, width, height) {
   const png = new PNG({ width, height });
   png.data.set(bytes);

@@ -1,34 +1,35 @@
-/** Encoders that commands pass to the packages: raw deflate, and lossless WebP. */
+/** Encoders that commands pass to @gaussian-splat/economise: raw deflate, and lossless WebP. */
 import { readFileSync } from 'node:fs';
 import { createRequire } from 'node:module';
+import { dirname, join } from 'node:path';
 import { constants, deflateRawSync } from 'node:zlib';
 import encode, { init } from '@jsquash/webp/encode.js';
 
 const STRATEGIES = [constants.Z_DEFAULT_STRATEGY, constants.Z_HUFFMAN_ONLY, constants.Z_FILTERED];
 
-/** A section of a raw deflate stream: it ends with a sync flush, so that others can be appended. */
+/** Compresses bytes to a section of a raw deflate stream. A sync flush ends it, so that sections can be concatenated. */
 const deflatedBy = (bytes, options) => deflateRawSync(bytes, { ...options, finishFlush: constants.Z_SYNC_FLUSH });
 
-/** Such a section, with the strategy that makes it smallest. */
+/** Compresses bytes to a section of a raw deflate stream, with the strategy of the smallest result. */
 export function deflate(bytes) {
   const pieces = STRATEGIES.map((strategy) => deflatedBy(bytes, { strategy, level: 9, memLevel: 9 }));
   return pieces.reduce((best, piece) => (piece.length < best.length ? piece : best));
 }
 
-/** Fast variant for temporary data. */
+/** Compresses bytes to a section of a raw deflate stream at the fastest level, for temporary files. */
 export const deflateQuickly = (bytes) => deflatedBy(bytes, { level: 1 });
 
-/** Lossless WebP by libwebp, in WebAssembly. */
+/** Path of libwebp's WebAssembly in its package. Every supported version of Node has SIMD. */
 const CODEC = 'codec/enc/webp_enc_simd.wasm';
 let loading;
 
-/** Node's fetch does not read files, so the module is read here; every supported version of Node has SIMD. */
+/** Compiles libwebp. The module is read from its file, because `fetch` of Node does not read files. */
 function load() {
-  const folder = new URL('.', `file://${createRequire(import.meta.url).resolve('@jsquash/webp/encode.js')}`);
-  return init(new WebAssembly.Module(readFileSync(new URL(CODEC, folder))));
+  const folder = dirname(createRequire(import.meta.url).resolve('@jsquash/webp/encode.js'));
+  return init(new WebAssembly.Module(readFileSync(join(folder, CODEC))));
 }
 
-/** See `EncodeWebp` of @gaussian-splat/economise. */
+/** Encodes lossless WebP, as `EncodeWebp` of @gaussian-splat/economise specifies. */
 export async function encodeWebp(data, width, height, effort) {
   await (loading ??= load());
   const options = { lossless: 1, exact: 1, quality: 100 * effort, method: Math.round(6 * effort) };

@@ -1,26 +1,26 @@
-/** Videos by ffmpeg, a program that is installed apart. */
+/** Encoder of videos by the program ffmpeg, which must be installed separately. */
 import { spawn, spawnSync } from 'node:child_process';
 import { renameSync, rmSync } from 'node:fs';
 import { extname } from 'node:path';
-import { UsageError } from './command.mjs';
+import { CommandError, UsageError } from './command.mjs';
 
 /** Arguments of ffmpeg by the extension of the file. */
 const FORMATS = {
   '.mp4': { codec: ['-c:v', 'libx264', '-preset', 'slow', '-movflags', '+faststart'], needsEven: true },
   '.webm': { codec: ['-c:v', 'libvpx-vp9', '-b:v', '0', '-row-mt', '1', '-auto-alt-ref', '0'], hasAlpha: true },
 };
-/** Constant quality: 0 is the best of both codecs. */
+/** Constant quality (CRF) of both codecs; 0 is the best quality. */
 const QUALITY = ['-crf', '16'];
-/** Without it, players would show the colors of another matrix. */
+/** Declaration of the color space. Without it, players would assume another matrix. */
 const COLORS = ['-colorspace', 'bt709', '-color_primaries', 'bt709', '-color_trc', 'bt709', '-color_range', 'tv'];
 
-/** Whether a file is a video, by its name. */
+/** Whether a path has the extension of a video. */
 export const isVideo = (path) => extname(path).toLowerCase() in FORMATS;
 
-/** Whether a file of this name keeps the alpha of its frames. */
+/** Whether a video with the extension of a path can contain alpha. */
 export const keepsAlpha = (path) => FORMATS[extname(path).toLowerCase()].hasAlpha === true;
 
-/** @throws UsageError without ffmpeg, and for a size that the format cannot have */
+/** Checks that ffmpeg is installed, and that the format supports the size in pixels. @throws UsageError */
 export function checkVideo(path, width, height) {
   const extension = extname(path).toLowerCase();
   if (FORMATS[extension].needsEven && (width % 2 !== 0 || height % 2 !== 0))
@@ -32,8 +32,8 @@ export function checkVideo(path, width, height) {
 }
 
 /**
- * A video that frames are written to, one after another. Its file appears once it is whole.
- * @param size.isOpaque all alpha is 1
+ * Opens a video for frames that are written in sequence. The file exists only after `finish` resolves.
+ * @param options.isOpaque Whether alpha is 1 in all pixels.
  */
 export function openVideo(path, { width, height, frameRate, isOpaque }) {
   const { codec } = FORMATS[extname(path).toLowerCase()];
@@ -49,15 +49,20 @@ export function openVideo(path, { width, height, frameRate, isOpaque }) {
     program.once('error', reject);
     program.once('close', (code) => {
       if (code === 0) return resolve();
-      rmSync(part, { force: true });
-      reject(new Error(`ffmpeg ended with ${code}: ${complaint.trim()}`));
+      reject(new CommandError(`ffmpeg ended with ${code}: ${complaint.trim()}`));
     });
   });
-  // The next write reports it.
+  // This handler prevents an unhandled rejection. `write` and `finish` report the error.
   ended.catch(() => undefined);
   program.stdin.on('error', () => undefined);
+  const abort = async () => {
+    program.kill();
+    await ended.catch(() => undefined);
+    rmSync(part, { force: true });
+  };
+  for (const signal of ['SIGINT', 'SIGTERM']) process.once(signal, () => abort().finally(() => process.exit(1)));
   return {
-    /** @param bytes RGBA with straight alpha */
+    /** Writes a frame. @param bytes [height, width, 4] RGBA with straight alpha. */
     async write(bytes) {
       if (program.stdin.write(bytes)) return;
       await Promise.race([new Promise((resolve) => program.stdin.once('drain', resolve)), ended]);
@@ -67,8 +72,7 @@ export function openVideo(path, { width, height, frameRate, isOpaque }) {
       await ended;
       renameSync(part, path);
     },
-    abort() {
-      program.kill();
-    },
+    /** Ends the program and removes the partial file. */
+    abort,
   };
 }

@@ -1,13 +1,14 @@
 import { existsSync, readFileSync, realpathSync } from 'node:fs';
 import { basename, dirname, extname, join, posix, sep } from 'node:path';
 
-/** Keys of JSON descriptions that contain file names: SOG, streamed SOG, LOD pages, sequences. */
+/** Keys whose values are file names in the JSON of SOG, streamed SOG, LOD pages and sequences. */
 const KEYS = new Set(['files', 'filenames', 'environment', 'file', 'frames']);
 
 /**
- * Companion files of a scene or a model, as paths from its folder: buffers and images of a glTF, weights and contract
- * of a model, files in a JSON description and in nested ones. `missing`: files that do not exist or lie outside the
- * folder, with the reason. A damaged file has none: the page reports the fault. Requires built packages.
+ * Finds the files that a scene or a model refers to: buffers and images of a glTF, weights and contract of a model, and
+ * files in JSON and in nested JSON. A damaged file refers to none; the page reports its fault. Requires built packages.
+ * @returns `found`: paths relative to the folder of the scene. `missing`: paths of files that do not exist or are outside
+ * the folder, with the reason.
  */
 export async function filesBeside(scene) {
   const { isInside } = await import('@gaussian-splat/core/contract');
@@ -31,7 +32,7 @@ export async function filesBeside(scene) {
   return { found: [...found], missing: [...missing].map(([file, why]) => `${file} (${why})`) };
 }
 
-/** Untrusted archives and clones may contain links to any file of this machine. */
+/** Whether a link leads out of the scene's folder. Untrusted archives may contain links to any file of the machine. */
 const leadsOut = (scene, file) => {
   const folder = realpathSync(dirname(scene));
   return !realpathSync(join(folder, file)).startsWith(folder.endsWith(sep) ? folder : folder + sep);
@@ -39,7 +40,7 @@ const leadsOut = (scene, file) => {
 
 const isJson = (path) => extname(path).toLowerCase() === '.json';
 
-/** A model may have none, so it is not reported as missing. */
+/** Returns the name of a model's contract; undefined for other files. A model may have none. */
 const sidecarOf = (scene, { sidecarName }) =>
   extname(scene).toLowerCase() === '.onnx' ? sidecarName(basename(scene)) : undefined;
 
@@ -51,7 +52,7 @@ async function namedBy(file) {
 async function buffersOf(file) {
   const { buffers = [], images = [] } = JSON.parse(readFileSync(file, 'utf8'));
   return [...buffers, ...images].flatMap(({ uri }) =>
-    // A query is for servers.
+    // The path of a file does not include the query of its URI.
     uri === undefined || /^[a-z]+:/i.test(uri) ? [] : [decodeURIComponent(uri.replace(/[?#].*$/, ''))],
   );
 }

@@ -1,13 +1,14 @@
-/** Input files of commands. */
+/** Readers of the input files of commands. */
 import { readFileSync } from 'node:fs';
 import { open } from 'node:fs/promises';
+import { CommandError, UsageError } from './command.mjs';
 
-/** Bytes of one read: Node's thread pool then shares the work, and no read exceeds its limit. */
+/** Maximum bytes of a read, so that the threads of Node's pool read in parallel, and no read exceeds the limit of Node. */
 const PIECE = 1 << 26;
 
 /**
- * Reads a file's bytes asynchronously: many times as fast as `readFile` of `node:fs/promises`, which reads half a
- * megabyte at a time.
+ * Returns the bytes of a file. This is many times as fast as `readFile` of `node:fs/promises`, which reads half a megabyte
+ * at a time.
  */
 export async function readWhole(path) {
   const file = await open(path);
@@ -22,16 +23,22 @@ export async function readWhole(path) {
   }
 }
 
-/** Fills the array from a file. */
+/** Fills an array with bytes of a file, from the offset `from` on. Throws if the file ends before. */
 async function fill(file, bytes, from) {
   for (let at = 0; at < bytes.length;) {
     const { bytesRead } = await file.read(bytes, at, bytes.length - at, from + at);
-    if (bytesRead === 0) throw new Error(`the file ended at byte ${from + at}: it has changed while it was read`);
+    if (bytesRead === 0)
+      throw new CommandError(`the file ended at byte ${from + at}: it has changed while it was read`);
     at += bytesRead;
   }
 }
 
-/** Parses a JSON file, with or without the byte-order mark that some editors and shells add. */
+/** Parses a JSON file, which may begin with a byte-order mark. @throws UsageError for other text */
 export function readJson(path) {
-  return JSON.parse(readFileSync(path, 'utf8').replace(/^\ufeff/, ''));
+  const text = readFileSync(path, 'utf8').replace(/^\ufeff/, '');
+  try {
+    return JSON.parse(text);
+  } catch (error) {
+    throw new UsageError(`${path} is no JSON: ${error.message}`);
+  }
 }

@@ -1,2 +1,2 @@
-/** An adapter of Dawn in Node, or an error that says what is missing. Run under `gpuEnvironment()`. */
+/** Returns an adapter of Dawn in Node. Throws an error that describes the remedy if there is none. */
 export function requestNodeAdapter(options?: { readonly isTrusted?: boolean }): Promise<GPUAdapter>;

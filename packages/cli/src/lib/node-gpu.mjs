@@ -1,17 +1,18 @@
-/** A WebGPU adapter in Node, through Dawn. Run under `gpuEnvironment()`. */
+/** Access to WebGPU in Node by Dawn. The process must have the environment of `gpuEnvironment()`. */
 import { create, globals } from 'webgpu';
 import { calmPolling } from './calm-polling.mjs';
+import { CommandError } from './command.mjs';
 
 Object.assign(globalThis, globals);
 calmPolling();
 
-/** Dawn instances by options. They must not be garbage-collected while one of their devices lives. */
+/** Instances of Dawn by their options. An instance must not be garbage-collected while one of its devices is used. */
 const made = new Map();
 
 /**
- * Returns an adapter, or throws an error that describes the missing part.
- * @param options.isTrusted Disables Dawn's own validation, for commands whose work is tested with it. Validating an
- * indirect dispatch takes longer than most of these dispatches.
+ * Returns an adapter. Throws an error that describes the remedy if there is none.
+ * @param options.isTrusted Whether to disable Dawn's validation, for commands that are tested with validation. Validating
+ * an indirect dispatch takes longer than most of these dispatches.
  */
 export async function requestNodeAdapter({ isTrusted = false } = {}) {
   const options = [
@@ -23,9 +24,10 @@ export async function requestNodeAdapter({ isTrusted = false } = {}) {
   made.set(key, gpu);
   const adapter = await gpu.requestAdapter();
   if (adapter === null) {
-    throw new Error(
-      'No WebGPU adapter in Node: expected a Vulkan driver or Chromium’s SwiftShader, found neither. ' +
-        'Install Debian’s package chromium, or set GAUSSIAN_SPLAT_GPU=system on a machine with a Vulkan driver.',
+    throw new CommandError(
+      'No WebGPU adapter in Node: expected a Vulkan driver, found none. ' +
+        'Install one: Debian’s package mesa-vulkan-drivers also draws without a GPU. ' +
+        'In a checkout, Chromium’s SwiftShader is used (package chromium), or with GAUSSIAN_SPLAT_GPU=system such a driver.',
     );
   }
   return adapter;

@@ -1,8 +1,9 @@
-/** Output files of commands: never partial, and never over an input file. */
+/** Writer of the output files of commands, which are never partial and never replace an input file. */
 import { accessSync, constants, existsSync, realpathSync, renameSync, rmSync, statSync, writeFileSync } from 'node:fs';
-import { dirname } from 'node:path';
+import { dirname, resolve } from 'node:path';
+import { UsageError } from './command.mjs';
 
-/** Whether two paths refer to one file, also through links. */
+/** Whether two paths refer to the same file, directly or by links. */
 export function isSameFile(a, b) {
   if (a === b) return true;
   if (!existsSync(a) || !existsSync(b)) return false;
@@ -10,12 +11,33 @@ export function isSameFile(a, b) {
   return one.dev === other.dev && one.ino === other.ino;
 }
 
-/** Describes why a file cannot be written, or returns undefined, to be reported before the work. */
+/** Returns a description of why a file cannot be written; undefined if it can. */
 export function obstacleTo(path) {
   const folder = dirname(path);
   if (!existsSync(folder)) return `the folder ${folder} does not exist`;
   if (existsSync(path) && statSync(path).isDirectory()) return `${path} is a folder`;
   if (!mayWrite(existsSync(path) ? path : folder)) return `${path} may not be written`;
+}
+
+/** Returns a description of why files cannot be written to a folder, which need not exist; undefined if they can. */
+export function obstacleToFolder(path) {
+  if (!existsSync(path)) return obstacleToFolder(dirname(path));
+  if (!statSync(path).isDirectory()) return `${path} is no folder`;
+  if (!mayWrite(path)) return `${path} may not be written`;
+}
+
+/**
+ * Checks before the work that an output can be written, and that it is none of the inputs.
+ * @param inputs {Record<string, string | undefined>} Paths of the files that the command reads, by their names in messages.
+ * @param obstacleOf {(path: string) => string | undefined} {@link obstacleTo}, or a function like it.
+ * @throws UsageError
+ */
+export function checkOutput(option, path, inputs, obstacleOf = obstacleTo) {
+  for (const [name, input] of Object.entries(inputs))
+    if (input !== undefined && isSameFile(resolve(path), resolve(input)))
+      throw new UsageError(`--${option}: expected another file than ${name}, which is never changed`);
+  const obstacle = obstacleOf(resolve(path));
+  if (obstacle) throw new UsageError(`--${option}: ${obstacle}`);
 }
 
 function mayWrite(path) {
@@ -27,7 +49,7 @@ function mayWrite(path) {
   }
 }
 
-/** Writes a file completely or not at all: an existing file stays until the new one is on the disk. */
+/** Writes a file completely or not at all. An existing file remains until the new file is complete. */
 export function writeWhole(path, content) {
   const target = existsSync(path) ? realpathSync(path) : path;
   // Pipes, devices, and files in read-only folders are written directly.

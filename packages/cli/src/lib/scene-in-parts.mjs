@@ -4,9 +4,10 @@ import { HEADER_BYTES, splatRanges } from '@gaussian-splat/formats';
 import { readInThread } from './scene-thread.mjs';
 
 /**
- * Starts to read a scene file as a cloud in shared memory on other threads: on all threads of the pool if its splats
- * can be read in ranges, as those of a large PLY. The work then continues even if this thread is busy.
- * @returns {Promise<{cloud: Promise<GaussianCloud>}>} Both reject as `readScene` does, or with a file system error.
+ * Starts to read a scene file on other threads, as a cloud in shared memory. If its splats can be read in ranges, as those
+ * of a large PLY, all threads of the pool read them. The work continues even if this thread is busy.
+ * @returns {Promise<{cloud: Promise<GaussianCloud>}>} Resolves after the start. Both promises reject as `readScene` does,
+ * or with a file system error.
  */
 export async function startReading(path, pool) {
   const found = pool.size > 1 ? await rangesOf(path) : undefined;
@@ -22,8 +23,8 @@ function readRows(path, { head, ranges }, parts, to, pool) {
 }
 
 /**
- * Location of the rows of a complete file, and the bytes before them. Faults of a file are reported when it is read as
- * a whole.
+ * Returns the location of the rows of a file, and the bytes before them. Undefined if the file is incomplete, invalid, or
+ * cannot be read in ranges; reading the whole file then reports its faults.
  */
 async function rangesOf(path) {
   const { beginning, size } = readBeginning(path);

@@ -1,4 +1,4 @@
-/** Reads a scene file on a separate thread: see {@link readInThread}. */
+/** Module of a thread that reads a scene file, and {@link readInThread}, which starts this thread. */
 import { dirname, join } from 'node:path';
 import { isMainThread, parentPort, Worker, workerData } from 'node:worker_threads';
 import { readScene } from '@gaussian-splat/formats';
@@ -6,8 +6,8 @@ import { readWhole } from './input-file.mjs';
 import { packError, unpackError } from './thread-errors.mjs';
 
 /**
- * Reads a scene file on another thread as a cloud in shared memory. Rejects as `readScene` does, or with a file system
- * error.
+ * Reads a scene file on another thread, and resolves to a cloud in shared memory. Rejects as `readScene` does, or with a
+ * file system error.
  */
 export function readInThread(path) {
   return new Promise((resolve, reject) => {
@@ -30,7 +30,7 @@ async function answer(path) {
   }
 }
 
-/** Copies a cloud to memory that threads share. */
+/** Returns a copy of a cloud whose arrays are in shared memory. */
 function shared(cloud) {
   const entries = Object.entries(cloud).map(([name, value]) => {
     if (!(value instanceof Float32Array)) return [name, value];

@@ -1,6 +1,6 @@
 /**
- * A static file server for the demo and the tests: correct MIME types, byte ranges, no caching, nothing outside its
- * root.
+ * Static file server for the command `page`, the demo and the tests. It supports byte ranges, does not allow caching, and
+ * serves no file outside its folders.
  */
 import { createReadStream, statSync } from 'node:fs';
 import { createServer } from 'node:http';
@@ -23,8 +23,9 @@ const TYPES = {
 };
 
 /**
- * Serves the folders of `mounts` (URL prefix to folder, the longest prefix wins).
- * @returns The listening server; its address contains the port.
+ * Serves folders.
+ * @param mounts Folder of each URL prefix; the longest prefix that matches applies.
+ * @returns A promise of the listening server, whose `address()` contains the port.
  */
 export function serve(mounts, { port = 0, host = '127.0.0.1', headers = {} } = {}) {
   const prefixes = Object.keys(mounts).sort((a, b) => b.length - a.length);
@@ -83,6 +84,6 @@ function sendFile(request, response, { path, size }, extraHeaders) {
   if (range) headers['content-range'] = `bytes ${start}-${end}/${size}`;
   response.writeHead(range ? 206 : 200, { ...headers, 'content-length': end - start + 1 });
   if (request.method === 'HEAD' || size === 0) response.end();
-  // An aborted request closes its file.
+  // `pipeline` closes the file if the request is aborted.
   else pipeline(createReadStream(path, { start, end }), response, () => {});
 }

@@ -1,4 +1,4 @@
-/** A thread of a `ThreadPool`: runs one task after another. */
+/** Module of a thread of a `ThreadPool`, which runs tasks in sequence. */
 import { closeSync, openSync, readSync } from 'node:fs';
 import { parentPort } from 'node:worker_threads';
 import { readBlocks, tasks } from '@gaussian-splat/economise/parts';
@@ -19,9 +19,9 @@ async function answer({ name, input }) {
 parentPort.on('message', (task) => (last = last.then(() => answer(task))));
 
 /**
- * The task of scene-in-parts.mjs: reads some rows of a PLY file into columns. Each read is treated as a separate file:
- * the header, followed by some rows.
- * @param head The file up to its first row.
+ * Task of scene-in-parts.mjs: reads a range of the rows of a PLY file into the arrays of a cloud. Each block of rows is
+ * read as a separate file: the header, followed by the rows.
+ * @param head Bytes of the file up to its first row.
  */
 async function readFilePart({ path, head, rowBytes, part, to }) {
   const file = openSync(path);

@@ -1,5 +1,5 @@
 /**
- * Threads for the tasks of `@gaussian-splat/economise`, with shared memory: a `TaskPool`, see
+ * Pool of threads with shared memory for the tasks of `@gaussian-splat/economise`. It implements `TaskPool` of
  * packages/economise/src/parts/task-pool.ts.
  */
 import { existsSync } from 'node:fs';
@@ -8,25 +8,25 @@ import { fileURLToPath } from 'node:url';
 import { Worker } from 'node:worker_threads';
 import { unpackError } from './thread-errors.mjs';
 
-/** Maximum number of threads: more hardly help, because most of the work is memory bound. */
+/** Maximum default number of threads. More threads have little effect, because the work is memory bound. */
 const MAX_THREADS = 16;
-/** One thread for each CPU core, up to the maximum. */
+/** Returns the default number of threads: one for each CPU core, up to {@link MAX_THREADS}. */
 export const usualThreads = () => Math.min(MAX_THREADS, availableParallelism());
 
 /**
- * Smaller work is done before threads have started and been compiled; measured on two cores, when the start of each
- * took a tenth of a second of CPU time (a third of that now).
+ * Minimum number of splats for using threads. Fewer splats are processed before threads have started. The limit
+ * was measured on two cores.
  */
 const MIN_SPLATS = 1 << 18;
 
 /**
- * The script of a thread as one file: loading a hundred modules, on each of sixteen threads, takes five times as long
- * to start.
+ * Script of a thread, and its bundle in one file. Without the bundle, each thread loads a hundred modules, and takes five
+ * times as long to start.
  */
 const SOURCE = new URL('./task-thread.mjs', import.meta.url);
 const BUNDLE = new URL('../../../../.cache/threads/task-thread.mjs', import.meta.url);
 
-/** The bundle of the last build, else the source. */
+/** Returns the URL of the bundle if the last build has written it, otherwise of the source. */
 const threadScript = () => (existsSync(BUNDLE) ? BUNDLE : SOURCE);
 
 export class ThreadPool {
@@ -34,8 +34,8 @@ export class ThreadPool {
   #threads = [];
 
   /**
-   * @param size Number of threads; they are started by the first tasks, or by `start`.
-   * @param minSplats Minimum number of splats for using them.
+   * @param size Number of threads. The first call of `run`, or `start`, starts them.
+   * @param minSplats Minimum number of splats that callers process by the pool.
    */
   constructor(size = usualThreads(), minSplats = MIN_SPLATS) {
     this.size = size;
@@ -69,7 +69,7 @@ export class ThreadPool {
   }
 }
 
-/** A thread that answers in the order of its tasks. */
+/** A thread that runs its tasks in sequence, and returns their results in the same order. */
 class TaskThread {
   #worker = new Worker(threadScript());
   #open = [];
@@ -101,7 +101,7 @@ class TaskThread {
   }
 }
 
-/** Bundles the script of a thread, once the packages are built. */
+/** Bundles the script of a thread. The packages must have been built. */
 export async function bundleThreadScript() {
   const { build } = await import('esbuild');
   await build({

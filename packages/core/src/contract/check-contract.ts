@@ -17,9 +17,9 @@ import {
 } from './tensor-rules.js';
 
 /**
- * Checks the header of a file against a contract, before any runtime is loaded: names, shapes, element types, numbers
- * of Gaussians, opsets, operators, external files.
- * @returns Every fault; empty if the file satisfies the contract.
+ * Checks the header of a file against a contract, without a runtime: names, shapes, element types, numbers of Gaussians,
+ * opsets, operators and external files.
+ * @returns All faults; empty if the file satisfies the contract.
  */
 export function checkContract(file: OnnxHeader, contract: Contract, options: CheckFileOptions = {}): ContractFault[] {
   const header = oneInstance(file, contract);
@@ -72,7 +72,7 @@ function missingInputs(header: OnnxHeader, { inputs }: Contract): ContractFault[
     );
 }
 
-/** Only post-processors receive the depth of a frame, and only generators the Gaussians of the one before them. */
+/** Rejects inputs with the role `depth` in generators, and inputs with the role `gaussians` in post-processors. */
 function inputsOfOtherModels({ inputs, outputs }: Contract): ContractFault[] {
   const isPost = outputs.layout === 'image';
   const role = isPost ? 'gaussians' : 'depth';
@@ -90,7 +90,7 @@ function inputsOfOtherModels({ inputs, outputs }: Contract): ContractFault[] {
     }));
 }
 
-/** ONNX allows callers to override such a default, but onnxruntime-web rejects that. */
+/** Fault of an input whose default is an initializer: ONNX allows callers to override it, but onnxruntime-web does not. */
 const optionalInput = (name: string, role: string): ContractFault => ({
   code: 'contract/missing-tensor',
   tensor: name,
@@ -117,7 +117,7 @@ function missingTensor(
   };
 }
 
-/** Checks shape and element type of one tensor. */
+/** Checks the shape and the element type of one tensor. */
 function checkTensor(tensor: OnnxTensor, rule: TensorRule, where: string): ContractFault[] {
   const faults: ContractFault[] = [];
   const common = { tensor: tensor.name, where };
@@ -154,7 +154,7 @@ function checkTensor(tensor: OnnxTensor, rule: TensorRule, where: string): Contr
 const CONTROL_DTYPES: TensorRule['dtypes'] = ['float32', 'int32', 'int64'];
 const STATE_DTYPES: TensorRule['dtypes'] = ['float32', 'float16', 'int32'];
 
-/** The output that feeds the next run must match the input. */
+/** Checks that the output that feeds a state has the shape and element type of its input. */
 function checkState(
   input: OnnxTensor,
   { output }: StateInput,
@@ -173,7 +173,10 @@ function checkState(
   return [{ code: 'contract/shape', tensor: output, where, expected, found, remedy }];
 }
 
-/** The default and both ends of an integer range must be integers that fit int32. */
+/**
+ * Checks that the range and the default of an integer control are integers: within int32, or safe integers of JavaScript
+ * for int64.
+ */
 function checkWhole(
   { name, dtype }: OnnxTensor,
   { range, default: initial }: ControlInput,
@@ -194,12 +197,12 @@ function checkWhole(
 }
 
 function checkAnyShape(input: OnnxTensor, where: string, dtypes: TensorRule['dtypes']): ContractFault[] {
-  // The rule expects the shape of the tensor, if all its sizes are fixed.
+  // The rule is the shape of the tensor itself, which fits only if all its sizes are fixed.
   const shape = input.dims?.map((dim) => (typeof dim === 'number' && dim > 0 ? dim : 'size'));
   return checkTensor(input, { shapes: [shape ?? ['any fixed sizes']], dtypes }, where);
 }
 
-/** The number of defaults and of names must match the elements of the tensor. */
+/** Checks that the lists of a binding (defaults, names, joints, parents) have the lengths that the tensor requires. */
 function checkDefault({ name, dims }: OnnxTensor, binding: InputBinding, where: string): ContractFault[] {
   const size = elementCount(dims ?? []);
   const lengths: [field: string, length: number | undefined, expected: number][] = [];
@@ -249,7 +252,7 @@ function checkOutputTensors(header: OnnxHeader, outputs: OutputBinding): Contrac
   });
 }
 
-/** Checks the consistency of all tensors of Gaussians: their number, element type, and degree of harmonics. */
+/** Checks that all Gaussian outputs agree in rows and element type, and have the declared degree of harmonics. */
 function checkGaussians(header: OnnxHeader, contract: Contract): ContractFault[] {
   const { outputs } = contract;
   const tensors = tensorNames(outputs).flatMap(([field, name]) => {
@@ -323,7 +326,7 @@ function checkShDegree(tensors: readonly GaussianOutput[], { outputs, shDegree }
       tensor: tensor?.name,
       where: tensor ? `output ${tensor.name}` : 'shDegree',
       expected: `harmonics of degree ${shDegree}, as the contract declares`,
-      found: tensor ? `degree ${found} (${describeTensor(tensor)})` : 'plain colours',
+      found: tensor ? `degree ${found} (${describeTensor(tensor)})` : 'plain colors',
       remedy: 'correct shDegree in the contract, or leave it out',
     },
   ];

@@ -5,18 +5,18 @@ import type { ContractFault } from './contract-error.js';
 /** Versions that ONNX Runtime 1.30 supports. */
 export const RUNTIME_LIMITS = { irVersion: 13, oldestOpset: 7, newestOpset: 26 } as const;
 
-/** Operator domains that onnxruntime-web has kernels for, besides ONNX's own. */
+/** Domains besides ONNX's own for whose operators onnxruntime-web has kernels. */
 const RUNTIME_DOMAINS = ['com.microsoft', 'ai.onnx.ml'];
 
 export interface CheckFileOptions {
   /**
-   * Sizes in bytes of the available external files, by the location in the model. If undefined, missing files are not
-   * reported.
+   * Sizes in bytes of the available external files, by their location in the model. Undefined: missing and incomplete
+   * files are not reported.
    */
   readonly files?: ReadonlyMap<string, number>;
 }
 
-/** Checks that do not depend on the contract: versions, operators, external data. */
+/** Returns the faults of a file that do not depend on its contract: versions, operators, casts, external data. */
 export function checkFile(header: OnnxHeader, { files }: CheckFileOptions): ContractFault[] {
   return [
     ...checkVersions(header),
@@ -40,7 +40,7 @@ function checkVersions({ irVersion, opsets, operators }: OnnxHeader): ContractFa
       remedy: 'save the model with an older IR version (model.ir_version in Python)',
     });
   }
-  // A file with operators of other domains only need not declare it.
+  // A file whose operators are all from other domains need not declare the opset of ai.onnx.
   const isNeeded = [...operators.keys()].some((name) => !name.includes(':'));
   if (opset === undefined ? isNeeded : opset < oldestOpset || opset > newestOpset) {
     faults.push({
@@ -68,8 +68,8 @@ function checkOperators({ operators, functions }: OnnxHeader): ContractFault[] {
 }
 
 /**
- * PyTorch's own exporter, when asked for opset 17, writes reductions of opset 18 into the file, which ONNX Runtime
- * rejects: detected here before any runtime is loaded.
+ * Finds an attribute of a later opset than the file declares, which ONNX Runtime rejects. PyTorch's exporter writes
+ * reductions of opset 18 into files of opset 17.
  */
 function checkAttributes({ nodes, opsets }: OnnxHeader): ContractFault[] {
   const opset = opsets.get('ai.onnx') ?? Infinity;
@@ -115,7 +115,7 @@ function checkExternalFile({ location, byteLength }: ExternalFile, files: CheckF
     : fault(`at least ${byteLength} bytes`, `${size}`, 'copy the file again; it is incomplete');
 }
 
-/** Whether a relative path stays inside its folder, on any system. */
+/** Whether a relative path stays inside its folder on every operating system. */
 export function isInside(location: string): boolean {
   const parts = location.split(/[/\\]/);
   return location !== '' && !/^[a-z][a-z0-9+.-]*:/i.test(location) && parts[0] !== '' && !parts.includes('..');

@@ -12,21 +12,21 @@ export type { OutputTensor };
 
 /** Result of {@link checkOutputs}. */
 export interface OutputReport {
-  /** Every fault; values of the same kind in one tensor are one fault that names the first row and their number. */
+  /** All faults. Invalid values of one kind in one attribute are one fault, with the first row and the number of rows. */
   readonly faults: readonly ContractFault[];
-  /** Rows of the tensors. */
+  /** Number of rows of the tensors; 0 if their shapes are invalid, and for an image. */
   readonly rows: number;
-  /** Live rows: `count` if it is written, else all. Only these are checked. */
+  /** Number of live rows, which are checked: the value of `count` if the contract names one, else {@link rows} up to `nMax`. */
   readonly live: number;
-  /** Box of the live, finite centers in world units; undefined if there are none. */
+  /** Box of the finite centers of live rows with an opacity of 1/255 or more, in world units; undefined if there are none. */
   readonly bounds: { readonly min: Vector3; readonly max: Vector3 } | undefined;
 }
 
 /**
- * Checks the output of one run of a generator: shapes, live count, finite numbers, covariances positive semi-definite,
- * scales and opacities in range. A pure function over arrays, which runs in browsers and in Node.
+ * Checks the outputs of one run: shapes, the live count, that numbers are finite, that covariances are positive
+ * semi-definite, and that scales and opacities are in range. Values are checked only if all shapes are valid.
  *
- * @param outputs Outputs of the run, by the names in the file.
+ * @param outputs Outputs of the run, by their names in the file.
  */
 export function checkOutputs(contract: Contract, outputs: Readonly<Record<string, OutputTensor>>): OutputReport {
   const faults = checkShapes(contract, outputs);
@@ -54,8 +54,8 @@ export function checkOutputs(contract: Contract, outputs: Readonly<Record<string
 }
 
 /**
- * Whether the centers of a run lie within the bounds that the contract declares, up to rounding. Bounds hold for all
- * times and views, with default controls, poses and shapes: other runs may exceed them.
+ * Returns a fault if centers of a run lie outside the bounds that the contract declares, except for rounding. Call it
+ * for runs with default controls, poses and shapes: other runs may exceed the bounds.
  */
 export function checkBounds({ bounds: declared, outputs, dtype }: Contract, { bounds }: OutputReport): ContractFault[] {
   if (!declared || !bounds) return [];
@@ -74,14 +74,14 @@ export function checkBounds({ bounds: declared, outputs, dtype }: Contract, { bo
       code: 'contract/conflict',
       tensor,
       where: `output ${tensor}, positions`,
-      expected: `centres within the declared bounds, ${show(declared)}`,
+      expected: `centers within the declared bounds, ${show(declared)}`,
       found: show(bounds),
       remedy: 'widen bounds in the contract',
     },
   ];
 }
 
-/** Compares a second run with the same inputs: every output must hold the same numbers, bit for bit. */
+/** Returns a fault for each output that differs between two runs with the same inputs; none if an input is a seed. */
 export function compareRuns(
   contract: Contract,
   first: Readonly<Record<string, OutputTensor>>,
@@ -117,8 +117,8 @@ function firstDifference(a: OutputTensor, b: OutputTensor): number {
 const columnsOf = (dims: readonly number[]): number => dims.slice(1).reduce((product, dim) => product * dim, 1);
 
 /**
- * Dimensions without leading ones; undefined if they do not match the rule. Zero Gaussians are valid; otherwise N is
- * positive.
+ * Returns the dimensions of an output without leading dimensions of 1; undefined if they do not match the rule. N may
+ * be 0 in an output without elements.
  */
 function writtenDims({ dims, data }: OutputTensor, rule: TensorRule): readonly number[] | undefined {
   const isEmpty = data.length === 0 && dims.includes(0);
@@ -126,10 +126,10 @@ function writtenDims({ dims, data }: OutputTensor, rule: TensorRule): readonly n
   return (bareDims(filled, rule) as readonly number[] | undefined)?.map((dim) => (isEmpty && dim === EMPTY ? 0 : dim));
 }
 
-/** Marks zero rows; no other dimension has this size. */
+/** Replaces N = 0 in comparisons with a rule, which require N > 0. No dimension has this size. */
 const EMPTY = 2 ** 31;
 
-/** Checks presence, shape and row counts of the outputs; values can be read only if these are valid. */
+/** Checks that the outputs exist, and that their shapes and numbers of rows are valid, so that values can be read. */
 function checkShapes(
   { outputs: binding, nMax }: Contract,
   outputs: Readonly<Record<string, OutputTensor>>,
@@ -172,7 +172,7 @@ function liveRows(
   rows: number,
 ): { live: number; countFaults: ContractFault[] } {
   if (name === undefined) return { live: rows, countFaults: [] };
-  // An int64 is a BigInt.
+  // An int64 tensor contains BigInts.
   const count = Number(outputs[name].data[0]);
   if (Number.isInteger(count) && count >= 0 && count <= rows) return { live: count, countFaults: [] };
   const fault: ContractFault = {
@@ -186,7 +186,7 @@ function liveRows(
   return { live: Math.min(Math.max(0, Math.trunc(count) || 0), rows), countFaults: [fault] };
 }
 
-/** Reads one attribute of any row as numbers, for any element type. */
+/** Returns a reader of one attribute. It converts float16 bits to numbers. */
 function readerOf(slice: AttributeSlice, { dtype, data }: OutputTensor): RowReader {
   const isBits = dtype === 'float16' && data instanceof Uint16Array;
   const { offset, rowStride } = slice;
@@ -196,7 +196,7 @@ function readerOf(slice: AttributeSlice, { dtype, data }: OutputTensor): RowRead
   return { ...slice, isHalf: dtype === 'float16', read };
 }
 
-/** Checks all live rows and reports one fault for each kind and tensor. */
+/** Checks all live rows. Returns one fault for each attribute and kind of fault, with the number of its rows. */
 function collectRowFaults(readers: readonly RowReader[], live: number): ContractFault[] {
   const kinds = new Map<string, { fault: RowFault; reader: RowReader; row: number; count: number }>();
   for (const reader of readers) {
@@ -219,10 +219,10 @@ function collectRowFaults(readers: readonly RowReader[], live: number): Contract
   }));
 }
 
-/** Opacities below this are not drawn: they change no pixel of 8 bits. */
+/** Minimum opacity of a splat that is drawn: a lower one changes no 8-bit pixel. */
 const MIN_OPACITY = 1 / 255;
 
-/** Corners around the finite centers of the rows that are drawn. */
+/** Returns the box of the finite centers of the rows that are drawn; undefined if there are none. */
 function boundsOf({ read }: RowReader, opacities: RowReader, live: number): OutputReport['bounds'] {
   const lowest = opacities.activation === 'logit' ? Math.log(MIN_OPACITY / (1 - MIN_OPACITY)) : MIN_OPACITY;
   const min: [number, number, number] = [Infinity, Infinity, Infinity];

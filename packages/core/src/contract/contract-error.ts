@@ -1,12 +1,11 @@
 import { GaussianSplatError, type ContractErrorCode, type ErrorData } from '../errors.js';
 
-/** A single fault. Fields are phrases without a trailing full stop. */
+/** One fault of a file, its contract or its outputs. Texts are phrases without a trailing full stop. */
 export interface ContractFault {
-  /** Stable code. */
   readonly code: ContractErrorCode;
-  /** Name of the input or output; undefined if the fault concerns none. */
+  /** Name of the input or output; undefined if the fault does not concern a single one. */
   readonly tensor?: string;
-  /** Place in the contract or in the file, for display. */
+  /** Location in the contract or in the file, for display. */
   readonly where: string;
   readonly expected: string;
   readonly found: string;
@@ -18,15 +17,15 @@ export interface ContractErrorData extends ErrorData {
   readonly faults: readonly ContractFault[];
 }
 
-/** Maximum number of faults in the message of an error; all of them are in its `faults`. */
+/** Maximum number of faults in the message of a {@link ContractError}; its `faults` contain all. */
 const MESSAGE_FAULTS = 20;
 
-/** All faults of a file, its contract or its values. Code and phrases are those of the first fault. */
+/** All faults of a file, its contract or its outputs. The code and the texts of the error are those of the first fault. */
 export class ContractError extends GaussianSplatError {
   override readonly name = 'ContractError';
   readonly faults: readonly ContractFault[];
 
-  /** @param faults At least one. */
+  /** @param faults One or more faults. */
   constructor(faults: readonly ContractFault[]) {
     super(faults[0].code, faults[0]);
     this.faults = faults;

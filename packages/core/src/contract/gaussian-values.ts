@@ -14,23 +14,24 @@ export interface RowFault {
   readonly remedy: string;
 }
 
-/** Relative rounding error of one number: half a unit in the last place. */
+/** Relative rounding error of a float16: half a unit in the last place. */
 const HALF_ROUNDING = 2 ** -11;
+/** Relative rounding error of a float32: half a unit in the last place. */
 const FLOAT_ROUNDING = 2 ** -24;
 /** Absolute rounding error of float16 numbers near zero. */
 const HALF_SMALLEST = 2 ** -25;
-/** A covariance R·S·Sᵀ·Rᵀ computed in the precision of its numbers accumulates about ten roundings in each of them. */
+/** Tolerance of a covariance R·S·Sᵀ·Rᵀ, in roundings: computing it takes about ten for each number. */
 const COVARIANCE_ROUNDINGS = 16;
 
-/** Largest scale whose square is still a float32 covariance. */
+/** Maximum standard deviation in world units: its square, a variance, must fit float32. */
 const MAX_SCALE = 1e18;
 
-/** Checks one attribute of one row; undefined if it is valid. */
+/** Returns the fault of one attribute in one row; undefined if its values are valid. */
 export function checkRow(reader: RowReader, row: number): RowFault | undefined {
   const { attribute, activation, components, read } = reader;
   for (let i = 0; i < components; i++) {
     const value = read(row, i);
-    // Infinite logits and the logarithm of a zero scale mean opacities 0 and 1 and a flat disc.
+    // Infinite logits are opacities of 0 and 1, and the logarithm -Infinity is a scale of 0, as in a flat disc.
     const isAllowed = activation === 'logit' ? !Number.isNaN(value) : activation === 'log' && value === -Infinity;
     if (!Number.isFinite(value) && !isAllowed) return notFinite(value);
   }
@@ -88,7 +89,7 @@ function checkRotation({ read }: RowReader, row: number): RowFault | undefined {
   };
 }
 
-/** Indices in a matrix of three rows. */
+/** Indices of xx, xy, xz, yy, yz, zz in a row-major 3x3 matrix. */
 const UPPER_TRIANGLE = [0, 1, 2, 4, 5, 8];
 
 function checkCovariance({ read, isHalf, components }: RowReader, row: number): RowFault | undefined {
@@ -107,7 +108,7 @@ function checkCovariance({ read, isHalf, components }: RowReader, row: number): 
   };
 }
 
-/** Smallest eigenvalue of the symmetric matrix xx, xy, xz, yy, yz, zz, by the trigonometric solution of the cubic. */
+/** Returns the smallest eigenvalue of the symmetric matrix xx, xy, xz, yy, yz, zz (trigonometric solution of the cubic). */
 export function smallestEigenvalue([xx, xy, xz, yy, yz, zz]: readonly number[]): number {
   const mean = (xx + yy + zz) / 3;
   const [a, b, c] = [xx - mean, yy - mean, zz - mean];

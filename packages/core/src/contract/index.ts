@@ -17,3 +17,4 @@ export {
   type ResolvedContract,
 } from './resolve-contract.js';
 export { CONTRACT_SCHEMA } from './schema.js';
+export { bareDims, inputRule, shOrderOf } from './tensor-rules.js';

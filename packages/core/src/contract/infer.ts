@@ -1,15 +1,16 @@
 import type { OnnxHeader, OnnxTensor } from '../onnx/header.js';
 import { ContractError, type ContractFault } from './contract-error.js';
 import type { Contract, InputBinding, OutputBinding } from './contract.js';
+import { shOrderOf } from './tensor-rules.js';
 import { inferVisionary } from './visionary.js';
 
-/** An inferred contract, with its assumptions in sentences without a full stop. */
+/** An inferred contract. `notes` state its assumptions, in sentences without a full stop. */
 export interface InferredContract {
   readonly contract: Contract;
   readonly notes: readonly string[];
 }
 
-/** Roles by the names of inputs. */
+/** Bindings of inputs by their canonical names. */
 const CANONICAL_INPUTS: Readonly<Record<string, (input: OnnxTensor) => InputBinding>> = {
   view: () => ({ role: 'view', order: 'row-major', axes: 'RDF' }),
   projection: () => ({ role: 'projection', order: 'row-major', axes: 'RDF' }),
@@ -19,20 +20,28 @@ const CANONICAL_INPUTS: Readonly<Record<string, (input: OnnxTensor) => InputBind
   time: () => ({ role: 'time', unit: 'seconds' }),
   frame: () => ({ role: 'frame' }),
   seed: () => ({ role: 'seed' }),
-  pose: ({ dims }) => inferPose(dims?.length === 2 ? dims[1] : undefined),
+  pose: inferPose,
   shape: () => ({ role: 'shape' }),
   image: () => ({ role: 'image' }),
 };
 
-function inferPose(lastDim: unknown): InputBinding {
-  if (lastDim === 3) return { role: 'pose', format: 'axis-angle' };
-  if (lastDim === 4) return { role: 'pose', format: 'quaternion', quaternionOrder: 'wxyz' };
-  return { role: 'pose', format: 'parameters' };
+function inferPose({ dims = [] }: OnnxTensor): InputBinding {
+  const [, ...joint] = dims.length > 2 && dims[0] === 1 ? dims.slice(1) : dims;
+  switch (joint.join()) {
+    case '3':
+      return { role: 'pose', format: 'axis-angle' };
+    case '4':
+      return { role: 'pose', format: 'quaternion', quaternionOrder: 'wxyz' };
+    case '3,3':
+      return { role: 'pose', format: 'matrix' };
+    default:
+      return { role: 'pose', format: 'parameters' };
+  }
 }
 
 /**
- * Infers a contract from canonical names of inputs and outputs, or from Visionary's.
- * @throws ContractError `contract/inference`, one for each input and for the outputs whose meaning is ambiguous.
+ * Infers a contract from the names of inputs and outputs: canonical names, or those of Visionary's exporters.
+ * @throws ContractError `contract/inference` with a fault for each input that has another name, and one for the outputs.
  */
 export function inferContract(header: OnnxHeader): InferredContract {
   const visionary = inferVisionary(header);
@@ -55,7 +64,7 @@ function inferOutputs({ outputs }: OnnxHeader): OutputBinding | undefined {
   const count = named('count') ? { count: 'count' } : {};
   const gaussians = named('gaussians');
   if (gaussians) {
-    const isPlain = gaussians.dims?.[1] === 13;
+    const isPlain = gaussians.dims?.at(-1) === 13;
     const color = isPlain ? ({ color: 'rgb' } as const) : ({ color: 'sh', shOrder: 'coefficient-major' } as const);
     return { layout: 'packed', gaussians: 'gaussians', ...color, opacityActivation: 'linear', ...count };
   }
@@ -76,9 +85,7 @@ function inferSplit(
     ...(isFactored
       ? { scales: 'scales', scaleActivation: 'linear', rotations: 'rotations', rotationOrder: 'wxyz' }
       : { covariances: 'covariances' }),
-    ...(sh
-      ? { sh: 'sh', shOrder: sh.dims?.length === 3 && sh.dims[2] !== 3 ? 'channel-major' : 'coefficient-major' }
-      : { colors: 'colors' }),
+    ...(sh ? { sh: 'sh', shOrder: shOrderOf(sh) } : { colors: 'colors' }),
     opacities: 'opacities',
     opacityActivation: 'linear',
     ...count,

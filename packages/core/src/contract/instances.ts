@@ -3,32 +3,32 @@ import type { ContractFault } from './contract-error.js';
 import type { Contract } from './contract.js';
 import { tensorNames } from './parse-contract.js';
 
-/** One output of a run. */
+/** Value of one output of a run. */
 export interface OutputTensor {
   readonly dtype: string;
   readonly dims: readonly number[];
-  /** Numbers in row-major order; float16 as bits in a `Uint16Array`, or as a `Float16Array` if the browser has it. */
+  /** Elements in row-major order. Float16 is a `Uint16Array` of bits, or a `Float16Array` if the browser supports it. */
   readonly data: ArrayLike<number>;
 }
 
-/** Inputs from another model or from an image: all instances of a run share them. */
+/** Roles of inputs that cannot have an axis of instances. */
 const SHARED_ROLES: readonly string[] = ['gaussians', 'image', 'depth', 'state'];
 
-/** Whether a tensor has a row for each instance: its first dimension is then the axis that the contract names. */
+/** Whether the first dimension of a tensor is the axis of instances of the contract. */
 export function hasInstances({ dims }: Pick<OnnxTensor, 'dims'>, { instances }: Contract): boolean {
   return instances !== undefined && dims?.[0] === instances.axis;
 }
 
 /**
- * Returns the header of one instance, without the axis of instances. The rules of roles and layouts apply to it.
- * @returns The header itself if the contract declares no instances.
+ * Returns the header of one instance, to which the rules of roles and layouts apply: shapes without the axis of instances.
+ * Returns the header itself if the contract declares no instances.
  */
 export function oneInstance(header: OnnxHeader, contract: Contract): OnnxHeader {
   if (contract.instances === undefined) return header;
   return withAxis(header, contract, (rest) => rest);
 }
 
-/** Returns the header of a run of `count` instances: the axis is that number. */
+/** Returns the header of a run of `count` instances: that number replaces the axis in shapes. */
 export function ofInstances(header: OnnxHeader, contract: Contract, count: number): OnnxHeader {
   return withAxis(header, contract, (rest) => [count, ...rest]);
 }
@@ -39,7 +39,7 @@ function withAxis(header: OnnxHeader, contract: Contract, change: (rest: OnnxDim
   return { ...header, inputs: header.inputs.map(changed), outputs: header.outputs.map(changed) };
 }
 
-/** Returns the outputs of one instance of a run, as a run without that axis would write them. */
+/** Returns the outputs of one instance of a run, without the axis of instances. @param instance Index of the instance. */
 export function outputsOfInstance(
   outputs: Readonly<Record<string, OutputTensor>>,
   instance: number,
@@ -52,14 +52,15 @@ export function outputsOfInstance(
   return Object.fromEntries(parts);
 }
 
-/** Returns a view if the numbers are in a typed array. */
+/** Returns the elements from `start` to `end`: a view of a typed array, or a copy of another list. */
 function partOf(data: ArrayLike<number>, start: number, end: number): ArrayLike<number> {
   return ArrayBuffer.isView(data) ? (data as Float32Array).subarray(start, end) : Array.from(data).slice(start, end);
 }
 
 /**
- * Checks that the axis comes first in every output that the contract names and in at least one input, and occurs in no
- * other place.
+ * Returns the faults of a contract's instances. The axis must be the first dimension of every output that the contract
+ * names and of at least one input, and must occur nowhere else. The other dimensions of outputs must be numbers. Images,
+ * states and inputs from other models cannot have instances.
  */
 export function checkInstances(header: OnnxHeader, contract: Contract): ContractFault[] {
   const { instances, outputs, inputs } = contract;
@@ -91,7 +92,7 @@ export function checkInstances(header: OnnxHeader, contract: Contract): Contract
         const remedy = `export it with the symbolic axis ${axis} before all others`;
         return fault(`output ${name}`, `${axis} as its first dimension`, `[${dims!.join(', ')}]`, remedy, name);
       }),
-    // The slices of one instance have the same offset in every run.
+    // Fixed sizes give each instance the same offset in every run.
     ...written
       .filter(
         (output) => hasInstances(output, contract) && output.dims!.slice(1).some((dim) => typeof dim !== 'number'),

@@ -9,8 +9,8 @@ import type { OnnxDim } from '../onnx/header.js';
 import { tensorNames } from './parse-contract.js';
 
 /**
- * Location of one attribute of a Gaussian: row i of `tensor` has it in the elements i·rowStride + offset … + components
- * - 1. All layouts of the contract are converted to these.
+ * Location of one attribute in an output. Row i of the output contains it in the `components` elements from
+ * i · `rowStride` + `offset`. All layouts of the contract are converted to slices.
  */
 export interface AttributeSlice {
   readonly attribute: GaussianAttribute;
@@ -22,11 +22,11 @@ export interface AttributeSlice {
   readonly components: number;
   /** Number of elements in a row. */
   readonly rowStride: number;
-  /** Activation to invert: `logit` opacities, `log` scales. */
+  /** Encoding of the numbers, which the reader must invert: `logit` of opacities, `log` of scales. */
   readonly activation: 'linear' | 'logit' | 'log';
-  /** Of rotations. */
+  /** Order of the quaternions' components; only for rotations. */
   readonly quaternionOrder?: QuaternionOrder;
-  /** Only for spherical harmonics. */
+  /** Order of the coefficients; only for spherical harmonics. */
   readonly shOrder?: ShOrder;
 }
 
@@ -34,23 +34,23 @@ export interface AttributeSlice {
 export interface GaussianLayout {
   /** Maximum number of live rows in a run of one instance: N, or `nMax` if that is less or N is symbolic. */
   readonly capacity: number;
-  /** Rows of the tensors, if padding makes them more than {@link capacity}. */
+  /** Number of rows of the tensors if it is more than {@link capacity}, because of padding. */
   readonly paddedRows?: number;
   /** Whether the number of rows may differ between runs. */
   readonly isDynamic: boolean;
   readonly dtype: 'float32' | 'float16';
-  /** Undefined for plain colors. */
+  /** Degree of the spherical harmonics; undefined for plain colors. */
   readonly shDegree: ShDegree | undefined;
   readonly attributes: readonly AttributeSlice[];
-  /** Output with the number of live rows: [1] int32, or int64, whose lower half is read. */
+  /** Name of the output with the number of live rows, undefined if there is none: [1] int32, or int64 whose low word is read. */
   readonly count: string | undefined;
-  /** Default int32. */
+  /** Element type of {@link count}. Default: int32. */
   readonly countDtype?: 'int32' | 'int64';
 }
 
 /**
- * Returns the location of each attribute of the Gaussians in the outputs of a file.
- * @returns Undefined for a post-processor, which writes an image.
+ * Returns the location of each attribute of the Gaussians in the outputs of a file; undefined for a post-processor, whose
+ * output is an image.
  * @throws ContractError if the file violates the contract.
  */
 export function gaussianLayout(header: OnnxHeader, contract: Contract): GaussianLayout | undefined {
@@ -83,7 +83,7 @@ export function gaussianLayout(header: OnnxHeader, contract: Contract): Gaussian
   };
 }
 
-/** Returns the location of each attribute. @param columnsOf Number of elements in a row of an output. */
+/** Returns the location of each attribute. @param columnsOf Returns the number of elements in a row of an output. */
 export function attributeSlices(outputs: OutputBinding, columnsOf: (tensor: string) => number): AttributeSlice[] {
   switch (outputs.layout) {
     case 'image':
@@ -119,7 +119,7 @@ function packedSlices(outputs: OutputBinding & { layout: 'packed' }, rowStride: 
   });
 }
 
-/** Encoding of the numbers of each attribute. */
+/** Returns the properties of each attribute that the encoding determines. */
 function activationsOf({
   scaleActivation = 'linear',
   rotationOrder,

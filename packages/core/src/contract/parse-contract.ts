@@ -7,9 +7,9 @@ import { describe, validate } from './validate.js';
 export const CONTRACT_VERSION = 1;
 
 /**
- * Parses a contract.
+ * Parses and validates a contract.
  *
- * @param json Its JSON text, or the parsed value.
+ * @param json JSON text of the contract, or the parsed value.
  * @param where Name of the contract in messages, for example a file name.
  * @throws ContractError with every fault: `contract/json`, `contract/version`, `contract/schema`, `contract/conflict`.
  */
@@ -56,7 +56,7 @@ function unknownVersion(version: number, where: string): ContractFault {
   };
 }
 
-/** Finds contradictions between fields that are valid on their own. */
+/** Returns the contradictions between fields that are each valid. */
 function conflictsOf(contract: Contract, where: string): ContractFault[] {
   const conflict = (place: string, expected: string, found: string, remedy: string): ContractFault => ({
     code: 'contract/conflict',
@@ -97,7 +97,7 @@ function inputConflicts(binding: InputBinding, { duration }: Contract): Conflict
   switch (binding.role) {
     case 'time':
       return binding.unit === 'normalized' && duration === undefined
-        ? [['unit', 'the duration that normalized time is a share of', 'no duration', 'declare duration in seconds']]
+        ? [['unit', 'the duration that normalized time is a fraction of', 'no duration', 'declare duration in seconds']]
         : [];
     case 'control':
       return controlConflicts(binding);
@@ -135,7 +135,7 @@ function skeletonConflicts({ joints, parents }: InputBinding & { role: 'pose' })
       ];
 }
 
-/** A row must hold each attribute of a Gaussian exactly once. */
+/** Returns the faults of `columns`, which must contain each attribute of a Gaussian exactly once. */
 function columnConflicts(outputs: OutputBinding): Conflict[] {
   if (outputs.layout !== 'packed' || outputs.columns === undefined) return [];
   const { columns, color, scaleActivation, rotationOrder } = outputs;
@@ -155,7 +155,8 @@ function columnConflicts(outputs: OutputBinding): Conflict[] {
 }
 
 /**
- * Roles that a page sets once: two inputs of the same role are an error. Controls and images are distinguished by name.
+ * Returns the inputs that repeat a role, which is a fault. Controls, images and states may repeat, because their names
+ * distinguish them; matrices may repeat in different conventions.
  */
 function repeatedRoles({ inputs }: Contract): [place: string, expected: string, found: string][] {
   const seen = new Map<string, string>();
@@ -172,7 +173,7 @@ function repeatedRoles({ inputs }: Contract): [place: string, expected: string, 
   });
 }
 
-/** Returns every field of an output binding that names a tensor. */
+/** Returns each field of an output binding that names an output, with that name. */
 export function tensorNames(outputs: OutputBinding): [field: string, tensor: string][] {
   const fields = [
     'gaussians',

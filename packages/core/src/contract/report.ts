@@ -6,13 +6,16 @@ import { tensorNames } from './parse-contract.js';
 import type { ResolvedContract } from './resolve-contract.js';
 import { findTensor } from './tensor-rules.js';
 
-/** A table for display: rows of cells, all rows of a section with the same number of cells. */
+/** A table for display: all rows have the same number of cells. */
 export interface ReportSection {
   readonly title: string;
   readonly rows: readonly (readonly string[])[];
 }
 
-/** Describes a file and its contract as tables: the CLI prints them, the page shows them. */
+/**
+ * Returns tables that describe a file and its contract, for the command line and pages.
+ * @param resolved Contract of the file; undefined if it has no valid one.
+ */
 export function contractReport(header: OnnxHeader, resolved: ResolvedContract | undefined): ReportSection[] {
   return [
     { title: 'File', rows: fileRows(header) },
@@ -39,7 +42,7 @@ function fileRows(header: OnnxHeader): string[][] {
   return rows;
 }
 
-/** Bytes of the weights, and of the tensors between nodes as far as the file declares their sizes. */
+/** Returns the memory of a model as text: bytes of its weights, and of its computed tensors of known size. */
 function memoryOf(header: OnnxHeader): string {
   const { weightBytes, largestKnownTensorBytes, unknownTensors } = modelMemory(header);
   const facts = [`weights ${grouped(weightBytes)} bytes`];
@@ -67,7 +70,7 @@ function contractRows({ contract, source, notes }: ResolvedContract): string[][]
   ];
 }
 
-/** Activations and orders; names of tensors are in the table of outputs. */
+/** Returns a field of the outputs as text if it is an encoding; names of tensors are in the table of outputs. */
 function describeDetail([key, value]: [string, unknown]): string[] {
   return /^(color|.*Activation|.*Order)$/.test(key) ? [`${key} ${String(value)}`] : [];
 }

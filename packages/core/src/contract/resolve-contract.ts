@@ -6,16 +6,16 @@ import { parseContract } from './parse-contract.js';
 /** Key of `metadata_props` under which an ONNX file contains its own contract, as JSON. */
 export const CONTRACT_METADATA_KEY = 'gaussian_contract';
 
-/** Source of a contract. */
+/** Source of a contract: the caller, a file beside the model, the model's metadata, or inference from names. */
 export type ContractSource = 'explicit' | 'sidecar' | 'metadata' | 'inferred';
 
 export interface ContractSources {
   readonly header: OnnxHeader;
-  /** Contract of the page or the caller: JSON text, or the object. */
+  /** Contract of the caller: JSON text, or the parsed object. */
   readonly explicit?: unknown;
   /**
-   * Content of the file beside the model that {@link sidecarName} names: JSON text, or the object. Needed only if
-   * {@link carriesContract} is false.
+   * Content of the file beside the model that {@link sidecarName} names: JSON text, or the parsed object. Needed only if
+   * {@link carriesContract} returns false.
    */
   readonly sidecar?: unknown;
 }
@@ -23,14 +23,14 @@ export interface ContractSources {
 export interface ResolvedContract {
   readonly contract: Contract;
   readonly source: ContractSource;
-  /** Inferences, for a warning; empty for a written contract. Sentences without a full stop. */
+  /** Assumptions of an inferred contract, for a warning: sentences without a full stop. Empty for other sources. */
   readonly notes: readonly string[];
 }
 
 /**
- * Returns the contract of a file: the explicit one, else that of its metadata, else its sidecar, else one inferred from
- * canonical names. The first available one is used, even if it is invalid: a broken contract is never ignored silently.
- * @throws ContractError with every fault of that contract's JSON; `contract/inference` if the names are ambiguous.
+ * Returns the contract of a file from the first available source: the caller, the file's metadata, its sidecar, or
+ * inference from names. An invalid contract throws, and later sources are not tried.
+ * @throws ContractError with all faults of the contract's JSON; `contract/inference` if the names are ambiguous.
  */
 export function resolveContract({ header, explicit, sidecar }: ContractSources): ResolvedContract {
   const written = (source: ContractSource, json: unknown, where: string): ResolvedContract => ({

@@ -1,10 +1,10 @@
 /**
- * The JSON Schema of contracts, the single definition of valid contract JSON: `parseContract` follows it, and
- * contract.schema.json is its copy for other languages (`node scripts/write-contract-schema.mjs`).
+ * The JSON Schema of contracts: the single definition of valid contract JSON, which `parseContract` applies.
+ * contract.schema.json is a copy for other languages (`node scripts/write-contract-schema.mjs`).
  */
 import { SPLAT_FILTERS, type SplatFilter } from '../gaussian-cloud.js';
 
-/** The part of JSON Schema (draft 2020-12) that the contract uses. */
+/** A schema, with the keywords of JSON Schema (draft 2020-12) that the contract uses. */
 export interface Schema {
   readonly $schema?: string;
   readonly $id?: string;
@@ -25,8 +25,8 @@ export interface Schema {
   readonly required?: readonly string[];
   readonly dependentRequired?: Readonly<Record<string, readonly string[]>>;
   /**
-   * Alternatives that are distinguished by a property with `const`; or objects with `required` alone: exactly one must
-   * match.
+   * Alternatives, of which exactly one must match. Either a property with `const` distinguishes them, or each has only
+   * `required`.
    */
   readonly oneOf?: readonly Schema[];
   readonly anyOf?: readonly Schema[];
@@ -46,7 +46,7 @@ const numbers = (description: string, length?: number): Schema => ({
 });
 const texts = (description: string): Schema => ({ type: 'array', items: { type: 'string' }, description });
 
-/** If `key` has this value, the other properties are required. */
+/** Returns a rule that requires the other properties if `key` has this value. */
 const requiredWhere = (key: string, value: string, ...others: string[]): Schema => ({
   if: { properties: { [key]: { const: value } }, required: [key] },
   then: { required: others },
@@ -68,7 +68,7 @@ const shOrder = choice(
   'coefficient-major',
   'channel-major',
 );
-const color = choice('What the colour columns hold', 'rgb', 'sh');
+const color = choice('Content of the color columns', 'rgb', 'sh');
 const count = output('[1] int32 or int64 that says how many rows live');
 
 function variant(
@@ -97,7 +97,7 @@ const input: Schema = {
       'role',
       'intrinsics',
       '[3,3] float32, row-major, or [4]: fx, fy, cx, cy',
-      { unit: choice('Pixels, or shares of width and height', 'pixels', 'normalized') },
+      { unit: choice('Pixels, or fractions of width and height', 'pixels', 'normalized') },
       { required: ['unit'] },
     ),
     variant('role', 'projection', '[4,4] float32: camera to clip, depth 0..1', { order, axes }),
@@ -108,7 +108,7 @@ const input: Schema = {
       'role',
       'time',
       'One float32',
-      { unit: choice('Seconds, or a share 0..1 of the duration', 'seconds', 'normalized') },
+      { unit: choice('Seconds, or a fraction 0..1 of the duration', 'seconds', 'normalized') },
       { required: ['unit'] },
     ),
     variant('role', 'frame', 'One int32 or int64: index of a frame'),
@@ -118,7 +118,7 @@ const input: Schema = {
       'pose',
       '[J,3] axis-angle, [J,4] quaternions, [J,3,3] matrices, any of them flat, or [P] parameters; float32',
       {
-        format: choice('What the numbers are', 'axis-angle', 'quaternion', 'matrix', 'parameters'),
+        format: choice('Format of the pose', 'axis-angle', 'quaternion', 'matrix', 'parameters'),
         quaternionOrder,
         joints: texts('Names of the joints, in the order of the tensor'),
         parents: {
@@ -179,7 +179,7 @@ const input: Schema = {
     variant(
       'role',
       'state',
-      'What the model wrote in the run before: any fixed shape of float32, float16 or int32',
+      'Output of the previous run: any fixed shape of float32, float16 or int32',
       { output: output('that the next run takes'), default: { type: 'number', description: 'Before the first run' } },
       { required: ['output'] },
     ),
@@ -202,7 +202,7 @@ const outputs: Schema = {
     variant(
       'layout',
       'packed',
-      'One tensor [N, D]: position 3, covariance 6, colour 3 or harmonics 3(d+1)^2, opacity 1; or as columns says',
+      'One tensor [N, D]: position 3, covariance 6, color 3 or harmonics 3(d+1)^2, opacity 1; or as columns says',
       {
         gaussians: output('with everything'),
         color,
@@ -214,7 +214,7 @@ const outputs: Schema = {
             'An attribute',
             ...['positions', 'covariances', 'scales', 'rotations', 'colors', 'sh', 'opacities'],
           ),
-          description: 'What a row holds, in order',
+          description: 'Attributes of a row, in order',
         },
         scaleActivation,
         rotationOrder: quaternionOrder,
@@ -227,13 +227,13 @@ const outputs: Schema = {
       'split',
       'One tensor for each attribute',
       {
-        positions: output('[N,3] of centres'),
+        positions: output('[N,3] of centers'),
         covariances: output('[N,6] of covariances xx, xy, xz, yy, yz, zz, or [N,3,3]'),
         scales: output('[N,3] of scales, or [N,1] for all three axes'),
         scaleActivation,
         rotations: output('[N,4] of quaternions'),
         rotationOrder: quaternionOrder,
-        colors: output('[N,3] of colours in 0..1, or [N,4], whose fourth is not read'),
+        colors: output('[N,3] of colors in 0..1, or [N,4], whose fourth is not read'),
         sh: output('of spherical harmonics, [N,(d+1)^2,3] or [N,3,(d+1)^2]'),
         shOrder,
         opacities: output('[N] or [N,1] of opacities'),
@@ -253,10 +253,10 @@ const outputs: Schema = {
     variant(
       'layout',
       'visionary',
-      'Two tensors as Visionary has them: [N,10] position, opacity, covariance; and colours or harmonics',
+      'Two tensors as Visionary has them: [N,10] position, opacity, covariance; and colors or harmonics',
       {
         gaussians: output('[N,10]'),
-        colors: output('[N,4] or [N,3] of colours'),
+        colors: output('[N,4] or [N,3] of colors'),
         sh: output('[N,3(d+1)^2] of harmonics'),
         count,
       },
@@ -272,12 +272,12 @@ const outputs: Schema = {
   ],
 };
 
-/** JSON Schema, draft 2020-12, of a contract of version 1. */
+/** JSON Schema (draft 2020-12) of contracts of version 1. */
 export const CONTRACT_SCHEMA: Schema = {
   $schema: 'https://json-schema.org/draft/2020-12/schema',
   $id: 'urn:gaussian-splat:contract:1',
   title: 'Gaussian Generator contract, version 1',
-  description: 'What the inputs of an ONNX file mean and how it writes Gaussians',
+  description: 'Meaning of the inputs of an ONNX file, and the layout of the Gaussians that it writes',
   type: 'object',
   properties: {
     $schema: text('Address of this schema'),
@@ -289,12 +289,12 @@ export const CONTRACT_SCHEMA: Schema = {
       description: 'The role of each input of the ONNX file, by its name',
     },
     outputs,
-    nMax: { type: 'integer', minimum: 1, description: 'Most Gaussians that one run writes' },
+    nMax: { type: 'integer', minimum: 1, description: 'Maximum number of Gaussians that one run writes' },
     instances: {
       type: 'object',
       properties: {
         axis: text('Name of the symbolic dimension that stands first in outputs, and in inputs that may differ'),
-        most: { type: 'integer', minimum: 1, description: 'Most instances that one run takes' },
+        most: { type: 'integer', minimum: 1, description: 'Maximum number of instances in one run' },
       },
       required: ['axis', 'most'],
       additionalProperties: false,
@@ -310,7 +310,7 @@ export const CONTRACT_SCHEMA: Schema = {
       },
       required: ['min', 'max'],
       additionalProperties: false,
-      description: 'Box around all centres at all times, with controls, poses and shapes at their defaults',
+      description: 'Box around all centers at all times, with controls, poses and shapes at their defaults',
     },
     duration: positive('Seconds that the input time or frame plays'),
     fps: positive('Frames to a second of the input frame'),

@@ -8,15 +8,16 @@ import type {
   OutputBinding,
   PackedOutputs,
   PoseInput,
+  ShOrder,
 } from './contract.js';
 
 /**
- * One dimension of a shape: a number; `N`, the number of Gaussians, which may stay symbolic; `H` or `W`, image sizes,
- * which may stay symbolic, too; or another letter, any size that the file must fix.
+ * Rule for one dimension of a shape. A number is the required size. `N` (Gaussians), `H` and `W` (image sizes) allow any
+ * size, also a symbolic one. Another letter allows any size that the file fixes.
  */
 export type DimRule = number | string;
 
-/** Required shapes and element types of a tensor: one of each must match. */
+/** Allowed shapes and element types of a tensor. */
 export interface TensorRule {
   readonly shapes: readonly (readonly DimRule[])[];
   readonly dtypes: readonly OnnxDtype[];
@@ -25,16 +26,16 @@ export interface TensorRule {
 const FLOATS: readonly OnnxDtype[] = ['float32', 'float16'];
 const INTEGERS: readonly OnnxDtype[] = ['int32', 'int64'];
 const SH_DEGREES: readonly ShDegree[] = [0, 1, 2, 3];
-/** Position, covariance and opacity of a packed row. */
+/** Number of elements of position, covariance and opacity in a packed row. */
 export const PACKED_FIXED_COLUMNS = 10;
 
-/** Coefficients of all three channels: 3(d+1)². */
+/** Returns the number of spherical-harmonics coefficients of all three channels: 3(d+1)². */
 export const shColumns = (degree: ShDegree): number => 3 * (degree + 1) ** 2;
 
 const one = (dtypes: readonly OnnxDtype[]): TensorRule => ({ shapes: [[1], []], dtypes });
 const fixed = (dtypes: readonly OnnxDtype[], ...shapes: (readonly DimRule[])[]): TensorRule => ({ shapes, dtypes });
 
-/** Returns the rule for the input of a role; undefined if any fixed shape is valid. */
+/** Returns the rule for an input; undefined for controls and states, which may have any fixed shape. */
 export function inputRule(binding: InputBinding): TensorRule | undefined {
   switch (binding.role) {
     case 'view':
@@ -70,7 +71,7 @@ export function inputRule(binding: InputBinding): TensorRule | undefined {
   }
 }
 
-/** Red, green and blue planes, optionally with alpha. */
+/** Shapes of one image: planes of red, green, blue and optionally alpha. */
 const IMAGE_SHAPES: readonly (readonly DimRule[])[] = [
   [1, 3, 'H', 'W'],
   [1, 4, 'H', 'W'],
@@ -78,7 +79,7 @@ const IMAGE_SHAPES: readonly (readonly DimRule[])[] = [
   [4, 'H', 'W'],
 ];
 
-/** A row for each joint, or all of them flattened. */
+/** Shapes of each format of poses: one row for each joint, or flat. */
 const POSE_SHAPES: Readonly<Record<PoseInput['format'], readonly (readonly DimRule[])[]>> = {
   'axis-angle': [['J', 3], ['P']],
   quaternion: [['J', 4], ['P']],
@@ -86,7 +87,7 @@ const POSE_SHAPES: Readonly<Record<PoseInput['format'], readonly (readonly DimRu
   parameters: [['P']],
 };
 
-/** Numbers for each joint; 1 for model-specific parameters. */
+/** Number of elements for each joint; 1 for model-specific parameters, which have no joints. */
 export const POSE_NUMBERS: Readonly<Record<PoseInput['format'], number>> = {
   'axis-angle': 3,
   quaternion: 4,
@@ -95,8 +96,8 @@ export const POSE_NUMBERS: Readonly<Record<PoseInput['format'], number>> = {
 };
 
 /**
- * Returns the rule for a tensor of Gaussians. @param fixedColumns Number of columns of a packed tensor other than
- * colors.
+ * Returns the rule for a tensor of Gaussians.
+ * @param fixedColumns Number of elements in a packed row without colors or harmonics.
  */
 export function gaussianRule(
   tensor: GaussianTensor,
@@ -134,12 +135,18 @@ export function gaussianRule(
   }
 }
 
-/** Number of elements in a row of a packed tensor other than colors. */
+/** Returns the order of harmonics that the shape of their tensor allows; coefficient-major if it allows both. */
+export function shOrderOf({ dims }: Pick<OnnxTensor, 'dims'>): ShOrder {
+  const isFit = dims === undefined || shapeFits(dims, gaussianRule('sh', { shOrder: 'coefficient-major' }));
+  return isFit ? 'coefficient-major' : 'channel-major';
+}
+
+/** Returns the number of elements in a packed row without colors or harmonics. */
 export function fixedColumnsOf({ columns }: Pick<PackedOutputs, 'columns'>): number {
   return columns?.reduce((sum, attribute) => sum + PACKED_WIDTHS[attribute], 0) ?? PACKED_FIXED_COLUMNS;
 }
 
-/** Number of elements of each attribute in a packed row; colors take the rest of the row. */
+/** Number of elements of each attribute in a packed row; 0 for colors and harmonics, which take the rest of the row. */
 export const PACKED_WIDTHS: Readonly<Record<GaussianAttribute, number>> = {
   positions: 3,
   covariances: 6,
@@ -161,15 +168,14 @@ export function outputRule(binding: OutputBinding, field: string): TensorRule {
   return fixed(FLOATS, ...SH_DEGREES.map((degree) => ['N', shColumns(degree)]));
 }
 
-/** Whether the dimensions of a file match one of the shapes, except for leading ones. */
+/** Whether the dimensions of a tensor match a shape of the rule, except for leading dimensions of 1. */
 export function shapeFits(dims: readonly OnnxDim[], rule: TensorRule): boolean {
   return bareDims(dims, rule) !== undefined;
 }
 
 /**
- * Returns the dimensions of a tensor without leading ones, as in one of the shapes. Such ones, a batch of one, change
- * no byte; as few as necessary are removed.
- * @returns Undefined if no shape matches.
+ * Returns the dimensions of a tensor after removing as few leading dimensions of 1 as necessary to match a shape of the
+ * rule. Such a dimension, a batch of one, does not affect the order of the elements. Undefined if no shape matches.
  */
 export function bareDims(dims: readonly OnnxDim[], { shapes }: TensorRule): readonly OnnxDim[] | undefined {
   const fits = shapes.some((shape) => shape.length === dims.length && shape.every((rule, i) => dimFits(dims[i], rule)));
@@ -183,12 +189,12 @@ function dimFits(dim: OnnxDim, rule: DimRule): boolean {
   return typeof dim === 'number' && dim > 0;
 }
 
-/** Formats the shapes of a rule: `[N, 3] or [N, 4]`. */
+/** Returns the shapes of a rule as text: `[N, 3] or [N, 4]`. */
 export function describeShapes({ shapes }: TensorRule): string {
   return shapes.map((shape) => `[${shape.join(', ')}]`).join(' or ');
 }
 
-/** Degree of the harmonics in a tensor with a valid shape; undefined if it holds none. */
+/** Returns the degree of the harmonics in a tensor with a valid shape; undefined if the tensor contains none. */
 export function shDegreeOf(binding: OutputBinding, dims: readonly OnnxDim[]): ShDegree | undefined {
   if (binding.layout === 'image') return undefined;
   if (binding.layout === 'packed') {
@@ -201,6 +207,6 @@ function degreeOfColumns(columns: number): ShDegree | undefined {
   return SH_DEGREES.find((degree) => shColumns(degree) === columns);
 }
 
-/** Finds a tensor by its name; undefined if the file lacks it. */
+/** Returns the tensor with a name; undefined if there is none. */
 export const findTensor = (tensors: readonly OnnxTensor[], name: string): OnnxTensor | undefined =>
   tensors.find((tensor) => tensor.name === name);

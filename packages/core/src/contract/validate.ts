@@ -2,9 +2,18 @@ import type { ContractErrorCode } from '../errors.js';
 import type { ContractFault } from './contract-error.js';
 import type { Schema } from './schema.js';
 
+/** Number of faults after which the rest of a list or object is not validated. */
+const MAX_FAULTS = 60_000;
+
+/** Appends faults one by one, because browsers limit the number of arguments of a call. */
+function append(faults: ContractFault[], more: readonly ContractFault[]): void {
+  for (const fault of more) faults.push(fault);
+}
+
 /**
- * Validates a parsed JSON value against a schema and reports every fault. If alternatives are distinguished by a
- * property (`role`, `layout`), faults are those of the selected alternative.
+ * Returns all faults of a parsed JSON value under a schema. If a property (`role`, `layout`) distinguishes alternatives,
+ * the faults are those of the selected alternative.
+ * @param where Name of the value in faults.
  */
 export function validate(value: unknown, schema: Schema, where: string): ContractFault[] {
   if (schema.oneOf) return [...validateOneOf(value, schema, where), ...validateOwn(value, schema, where)];
@@ -19,7 +28,7 @@ function validateOwn(value: unknown, schema: Schema, where: string): ContractFau
   return [];
 }
 
-/** Describes the expected value if the value itself violates a keyword; undefined if it is valid. */
+/** Returns the expected value as text if the value itself violates a keyword; undefined if it does not. */
 function mismatchOf(value: unknown, schema: Schema): string | undefined {
   const { type, const: only, enum: choices, minLength, minimum, maximum, exclusiveMinimum, anyOf } = schema;
   if (only !== undefined && value !== only) return JSON.stringify(only);
@@ -65,16 +74,21 @@ function hasType(value: unknown, type: NonNullable<Schema['type']>): boolean {
 }
 
 function validateItems(values: readonly unknown[], { items }: Schema, where: string): ContractFault[] {
-  return items ? values.flatMap((value, i) => validate(value, items, `${where}[${i}]`)) : [];
+  const faults: ContractFault[] = [];
+  if (items)
+    for (let i = 0; i < values.length && faults.length < MAX_FAULTS; i++)
+      append(faults, validate(values[i], items, `${where}[${i}]`));
+  return faults;
 }
 
 function validateObject(value: Record<string, unknown>, schema: Schema, where: string): ContractFault[] {
   const { properties = {}, additionalProperties, required = [], dependentRequired = {} } = schema;
   const faults: ContractFault[] = [];
   for (const [key, inner] of Object.entries(value)) {
+    if (faults.length >= MAX_FAULTS) return faults;
     const place = `${where}${/^[\w$]{1,60}$/.test(key) ? `.${key}` : `[${describe(key)}]`}`;
-    if (Object.hasOwn(properties, key)) faults.push(...validate(inner, properties[key], place));
-    else if (additionalProperties) faults.push(...validate(inner, additionalProperties, place));
+    if (Object.hasOwn(properties, key)) append(faults, validate(inner, properties[key], place));
+    else if (additionalProperties) append(faults, validate(inner, additionalProperties, place));
     else if (additionalProperties === false) faults.push(unknownField(place, key, Object.keys(properties), value));
   }
   const missing = new Set(required.filter((key) => !Object.hasOwn(value, key)));
@@ -83,7 +97,7 @@ function validateObject(value: Record<string, unknown>, schema: Schema, where: s
       others.filter((other) => !Object.hasOwn(value, other)).forEach((o) => missing.add(o));
   }
   for (const key of missing) faults.push(missingField(where, key, properties[key]));
-  faults.push(...validateConditions(value, schema, where));
+  append(faults, validateConditions(value, schema, where));
   return faults;
 }
 
@@ -97,7 +111,7 @@ function validateConditions(value: Record<string, unknown>, schema: Schema, wher
   });
 }
 
-/** Alternatives with a distinguishing property, or exactly one of several properties. */
+/** Validates `oneOf`: alternatives that a property distinguishes, or of which exactly one property must be present. */
 function validateOneOf(value: unknown, { oneOf = [], description }: Schema, where: string): ContractFault[] {
   const key = discriminatorOf(oneOf[0]);
   if (key === undefined) {
@@ -115,7 +129,7 @@ function validateOneOf(value: unknown, { oneOf = [], description }: Schema, wher
   return [fault(`${where}.${key}`, `one of ${choices}`, found, { description })];
 }
 
-/** The property whose `const` distinguishes alternatives. */
+/** Returns the property whose `const` distinguishes alternatives; undefined if there is none. */
 function discriminatorOf({ properties = {} }: Schema): string | undefined {
   return Object.keys(properties).find((key) => properties[key].const !== undefined);
 }
@@ -159,7 +173,7 @@ function schemaFault(where: string, expected: string, found: string, remedy: str
 const isObject = (value: unknown): value is Record<string, unknown> =>
   typeof value === 'object' && value !== null && !Array.isArray(value);
 
-/** Formats a value for messages, truncated. */
+/** Returns a value as JSON of at most 60 characters, for messages. */
 export function describe(value: unknown): string {
   let json: string | undefined;
   try {

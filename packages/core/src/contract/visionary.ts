@@ -2,11 +2,13 @@ import type { OnnxHeader, OnnxTensor } from '../onnx/header.js';
 import { ContractError } from './contract-error.js';
 import type { Contract, InputBinding, VisionaryOutputs } from './contract.js';
 import type { InferredContract } from './infer.js';
+import { shapeFits } from './tensor-rules.js';
 
 /**
- * Files exported for Visionary carry no contract. Their outputs are recognized by name: `gauss…` [N,10], one with
- * `color`, `rgb` or `sh` in its name, `num_points`. Their camera looks along +z with x left and y up, their matrices
- * are column-major, and their time is a fraction of a cycle of 2.5 s.
+ * Infers the contract of a file that was exported for Visionary; undefined for other files. The outputs are recognized by
+ * name: `gauss…` [N,10], one with `color`, `rgb` or `sh` in its name, and optionally `num_points`. The camera looks along
+ * +z with x left and y up, matrices are column-major, and time is a fraction of a cycle of 2.5 s.
+ * @throws ContractError `contract/inference` with a fault for each input whose name is unknown.
  */
 export function inferVisionary(header: OnnxHeader): InferredContract | undefined {
   const outputs = visionaryOutputs(header);
@@ -44,10 +46,13 @@ export function inferVisionary(header: OnnxHeader): InferredContract | undefined
 const VISIONARY_CYCLE_SECONDS = 2.5;
 
 function visionaryOutputs({ outputs }: OnnxHeader): VisionaryOutputs | undefined {
-  const gaussians = outputs.find(({ name, dims }) => /^gauss/i.test(name) && dims?.length === 2 && dims[1] === 10);
+  const gaussians = outputs.find(
+    ({ name, dims }) =>
+      /^gauss/i.test(name) && dims !== undefined && shapeFits(dims, { shapes: [['N', 10]], dtypes: [] }),
+  );
   const color = outputs.find(({ name }) => name !== gaussians?.name && /color|sh|rgb/i.test(name));
   if (gaussians === undefined || color === undefined) return undefined;
-  const columns = color.dims?.[1];
+  const columns = color.dims?.at(-1);
   const isPlain = columns === 4 || (columns === 3 && /rgb/i.test(color.name));
   return {
     layout: 'visionary',
@@ -58,8 +63,8 @@ function visionaryOutputs({ outputs }: OnnxHeader): VisionaryOutputs | undefined
 }
 
 /**
- * Role of an input by its name. Visionary tests for `matrix` before `proj`, and so feeds the camera to
- * `projection_matrix`; here such an input gets the projection.
+ * Returns the binding of an input by its name; undefined if the name is unknown. An input `projection_matrix` gets the
+ * projection; Visionary itself feeds it the camera, because it tests for `matrix` before `proj`.
  */
 function visionaryInput(name: string): InputBinding | undefined {
   const lower = name.toLowerCase();
@@ -69,6 +74,6 @@ function visionaryInput(name: string): InputBinding | undefined {
 }
 
 function describeOutputs({ gaussians, colors, sh, count }: VisionaryOutputs): string {
-  const color = colors === undefined ? `harmonics ${sh}` : `colours ${colors}`;
+  const color = colors === undefined ? `harmonics ${sh}` : `colors ${colors}`;
   return `outputs are ${gaussians} and ${color}${count ? `, count ${count}` : ', no count'}`;
 }

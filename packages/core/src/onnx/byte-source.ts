@@ -1,16 +1,16 @@
-/** A file that can be read in ranges, at any location. */
+/** A file in any location that can be read in ranges. */
 export interface ByteSource {
   /** Name for messages: a file name or an address. */
   readonly name: string;
   /** Length in bytes. */
   readonly size: number;
-  /** Suggested size of a read: all bytes in memory, some kilobytes over a network. */
+  /** Suggested number of bytes of a read: the whole file in memory, some kilobytes over a network. */
   readonly chunk: number;
-  /** Returns `length` bytes from `offset` on, or fewer at the end of the file. */
+  /** Resolves to `length` bytes from `offset` on, or fewer at the end of the file. */
   read(offset: number, length: number): Promise<Uint8Array>;
 }
 
-/** A file in memory. Nothing is copied. */
+/** Returns the source of a file in memory, whose bytes are not copied. */
 export function bytesSource(bytes: Uint8Array, name = 'model.onnx'): ByteSource {
   return {
     name,
@@ -20,7 +20,7 @@ export function bytesSource(bytes: Uint8Array, name = 'model.onnx'): ByteSource 
   };
 }
 
-/** A `File` that was dropped on a page, or any `Blob`: only the requested ranges are read. */
+/** Returns the source of a `File` or any other `Blob`. Only the requested ranges are read. */
 export function blobSource(blob: Blob, name = 'name' in blob ? String(blob.name) : 'model.onnx'): ByteSource {
   return {
     name,

@@ -1,6 +1,6 @@
 import { GaussianSplatError, type ErrorCode } from '../errors.js';
 
-/** A kind of file that is recognized only for an error message. */
+/** A kind of file that is recognized only to describe it in an error message. */
 interface ForeignKind {
   readonly code: ErrorCode;
   readonly found: string;
@@ -18,7 +18,7 @@ const other = (found: string, fits: ForeignKind['fits'], remedy = GIVE_ONNX): Fo
   fits,
 });
 
-/** The first match wins. Text is one character for each byte. */
+/** Known kinds; the first whose `fits` is true applies. The text given to `fits` has one character for each byte. */
 const KINDS: readonly ForeignKind[] = [
   other('an empty file', (text) => text === '', 'export or download the model again'),
   {
@@ -32,7 +32,7 @@ const KINDS: readonly ForeignKind[] = [
     found: 'a web page (HTML)',
     remedy: CHECK_URL,
     fits: (text) =>
-      /^[\s\u00ef\u00bb\u00bf]*(<!--[^]*?-->\s*)*<(!doctype\s+html|html|head|body|script|title)\b/i.test(text),
+      /^[\s\u00ef\u00bb\u00bf]*(<!--((?!-->)[^])*-->\s*)*<(!doctype\s+html|html|head|body|script|title)\b/i.test(text),
   },
   other(
     'an XML document, as storage servers send for missing or private files',
@@ -63,10 +63,12 @@ const KINDS: readonly ForeignKind[] = [
   other('a text', (text) => /^[\t\n\r -~]{8,}$/.test(text)),
 ];
 
-/** Number of leading bytes that the signatures need. */
+/** Number of bytes at the beginning of a file that the signatures need. */
 export const SIGNATURE_BYTES = 512;
 
-/** Returns the error for a file with another signature than an ONNX model; undefined if it may be one. */
+/**
+ * Returns the error for a file whose signature is that of another kind of file; undefined if it may be an ONNX model.
+ */
 export function diagnoseForeignFile(head: Uint8Array, name: string, size: number): GaussianSplatError | undefined {
   const text = new TextDecoder('latin1').decode(head.subarray(0, SIGNATURE_BYTES));
   const kind = KINDS.find(({ fits }) => fits(text));

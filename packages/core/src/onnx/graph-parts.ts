@@ -12,25 +12,26 @@ import { FieldCursor, type Span } from './protobuf.js';
 
 /** Maximum length of a name in bytes. */
 export const NAME_LIMIT = 65_536;
-/** Maximum rank of a stored tensor whose dimensions are kept; no rule needs more. */
+/** Maximum number of kept dimensions of a stored tensor, and of elements of an integer list. No rule needs more. */
 const KEPT_RANK = 8;
-/** Maximum length of a tensor of 64-bit integers that is read: shapes for Reshape are that short. */
+/** Maximum bytes of a tensor of 64-bit integers whose values are read, such as a shape for Reshape. */
 const SHAPE_BYTES = 8 * KEPT_RANK;
-/** Maximum rank of a tensor. */
+/** Maximum rank of an input, an output or an intermediate value. A file with a higher rank is corrupt. */
 const RANK_LIMIT = 64;
-/** Maximum nesting of subgraphs, as in `If` and `Loop`, before a file counts as hostile. */
+/** Maximum nesting of subgraphs, as in `If` and `Loop`. A file with deeper nesting is corrupt. */
 const DEPTH_LIMIT = 32;
 
-/** Parts of a graph for the header, collected over all nesting levels. */
+/** Parts of a graph for the header, collected from all levels of nesting. */
 export interface Harvest {
   readonly operators: string[];
   readonly externalFiles: ExternalFile[];
-  /** Names of initializers of the outermost graph. */
+  /** Names of the initializers of the outermost graph. */
   readonly initializers: string[];
-  /** Nodes of this level and below, in the order of the file. */
+  /** Nodes of this level and of nested levels, in the order of the file. */
   readonly nodes: OnnxNode[];
-  /** Stored tensors of any level, by name. */
+  /** Stored tensors of all levels, by name. */
   readonly stored: Map<string, OnnxValue>;
+  /** Number of bytes of weights in the file. */
   initializerBytes: number;
 }
 
@@ -45,7 +46,7 @@ export const emptyHarvest = (): Harvest => ({
 
 // Field numbers are those of https://github.com/onnx/onnx/blob/main/onnx/onnx.proto
 
-/** `ValueInfoProto`: name and type of an input or output. */
+/** Reads a `ValueInfoProto`: name and type of an input or output. */
 export function readValueInfo(bytes: LoadedBytes, span: Span): OnnxTensor {
   let name = '';
   let type: Pick<OnnxTensor, 'dtype' | 'dims'> = { dtype: 'unknown', dims: undefined };
@@ -111,7 +112,10 @@ function readDim(bytes: LoadedBytes, span: Span): OnnxDim {
   return dim;
 }
 
-/** `NodeProto`: its operator, inputs, outputs, and attributes. */
+/**
+ * Reads a `NodeProto`, and adds its operator, inputs, outputs, attributes and subgraphs to the harvest.
+ * @param depth Nesting of the node in subgraphs; 1 for a function.
+ */
 export function readNode(bytes: LoadedBytes, span: Span, harvest: Harvest, depth = 0): void {
   let operator = '';
   let domain = '';
@@ -133,14 +137,21 @@ export function readNode(bytes: LoadedBytes, span: Span, harvest: Harvest, depth
   harvest.nodes.push({ name, operator: full, inputs, outputs, isInner: depth > 0, ...attributes });
 }
 
-type NodeAttributes = { -readonly [Key in 'numbers' | 'lists' | 'value']?: OnnxNode[Key] };
+interface NodeAttributes {
+  numbers?: Record<string, number>;
+  lists?: Record<string, readonly number[]>;
+  value?: OnnxValue;
+}
 
-/** `MatMul` for ONNX's own domain, `com.example:Name` for others. */
+/** Returns the name of an operator: `MatMul` for ONNX's own domain, `com.example:Name` for others. */
 export function operatorName(domain: string, operator: string): string {
   return domain === '' || domain === 'ai.onnx' ? operator : `${domain}:${operator}`;
 }
 
-/** `AttributeProto`: integers, lists of integers and tensors are kept; subgraphs are collected. */
+/**
+ * Reads an `AttributeProto`. Integers, lists of integers and tensors are kept in `found`; subgraphs are added to the
+ * harvest.
+ */
 function readAttribute(bytes: LoadedBytes, span: Span, harvest: Harvest, found: NodeAttributes, depth: number): void {
   let name = '';
   let whole: number | undefined;
@@ -153,12 +164,12 @@ function readAttribute(bytes: LoadedBytes, span: Span, harvest: Harvest, found: 
     if (!field.isDelimited) continue;
     if (field.number === 1) name = field.text(NAME_LIMIT);
     else if (field.number === 5 || field.number === 10) value = readTensor(bytes, field, harvest).value;
-    else if (field.number === 8) list.push(...packedVarints(bytes, field, KEPT_RANK));
+    else if (field.number === 8 && list.length < KEPT_RANK) list.push(...packedVarints(bytes, field, KEPT_RANK));
     else if (field.number === 22 || field.number === 23) readSparseTensor(bytes, field, harvest);
     else if (field.number === 6 || field.number === 11) readSubgraph(bytes, field, harvest, depth + 1);
   }
-  if (whole !== undefined) found.numbers = { ...found.numbers, [name]: whole };
-  if (list.length > 0) found.lists = { ...found.lists, [name]: list };
+  if (whole !== undefined) (found.numbers ??= {})[name] = whole;
+  if (list.length > 0) (found.lists ??= {})[name] = list;
   if (value !== undefined && name === 'value') found.value = value;
 }
 
@@ -176,8 +187,8 @@ function readSubgraph(bytes: LoadedBytes, span: Span, harvest: Harvest, depth: n
 }
 
 /**
- * `TensorProto`: name, type, shape, external files and size; the weights are skipped, except for shapes of other
- * tensors.
+ * Reads a `TensorProto`. Returns its name, type and shape, and adds it to the harvest. Weights are skipped, except for
+ * short vectors of int64, which may be shapes of other tensors.
  */
 export function readTensor(bytes: LoadedBytes, span: Span, harvest: Harvest): { name: string; value: OnnxValue } {
   let name = '';
@@ -191,7 +202,7 @@ export function readTensor(bytes: LoadedBytes, span: Span, harvest: Harvest): { 
     else if (field.number === 2 && field.isVarint) dtype = ONNX_DTYPES[field.value] ?? 'unknown';
     else if (field.number === 7 && field.isVarint && integers.length < KEPT_RANK) integers.push(field.value);
     if (!field.isDelimited) continue;
-    if (field.number === 1) dims.push(...packedVarints(bytes, field, KEPT_RANK));
+    if (field.number === 1 && dims.length < KEPT_RANK) dims.push(...packedVarints(bytes, field, KEPT_RANK));
     else if (field.number === 7) integers = packedVarints(bytes, field, KEPT_RANK);
     else if (field.number === 8) name = field.text(NAME_LIMIT);
     else if (field.number === 9 && dtype === 'int64') integers = rawIntegers(bytes, field);
@@ -206,7 +217,7 @@ export function readTensor(bytes: LoadedBytes, span: Span, harvest: Harvest): { 
   return { name, value };
 }
 
-/** Integers in one packed field; none if there are more than `most`. */
+/** Returns the integers of a packed field; empty if there are more than `max`. */
 function packedVarints(bytes: LoadedBytes, span: Span, max: number): number[] {
   if (span.end - span.start > 10 * max) return [];
   const numbers: number[] = [];
@@ -223,7 +234,7 @@ function packedVarints(bytes: LoadedBytes, span: Span, max: number): number[] {
   return numbers.length > max ? [] : numbers;
 }
 
-/** `raw_data` of 64-bit integers, if it is short. */
+/** Returns the 64-bit integers of `raw_data`; empty if the data are longer than {@link SHAPE_BYTES}. */
 function rawIntegers(bytes: LoadedBytes, { start, end }: Span): number[] {
   if (end - start > SHAPE_BYTES || (end - start) % 8 !== 0) return [];
   return Array.from({ length: (end - start) / 8 }, (_, i) => {
@@ -233,7 +244,7 @@ function rawIntegers(bytes: LoadedBytes, { start, end }: Span): number[] {
   });
 }
 
-/** `SparseTensorProto`: values and indices are tensors; the name is that of the values. */
+/** Reads a `SparseTensorProto`, whose values and indices are tensors. Returns the name of the values. */
 export function readSparseTensor(bytes: LoadedBytes, span: Span, harvest: Harvest): string {
   let name = '';
   const field = new FieldCursor(bytes, span);
@@ -245,7 +256,7 @@ export function readSparseTensor(bytes: LoadedBytes, span: Span, harvest: Harves
   return name;
 }
 
-/** Required length of an external file for one tensor, in bytes. */
+/** Returns the minimum bytes of the external file that contains a tensor: its offset plus its length; 0 if unknown. */
 function externalEnd(entries: ReadonlyMap<string, string>): number {
   const number = (key: string): number => {
     const value = Number(entries.get(key) ?? 0);
@@ -254,7 +265,7 @@ function externalEnd(entries: ReadonlyMap<string, string>): number {
   return number('offset') + number('length');
 }
 
-/** `StringStringEntryProto`. */
+/** Reads a `StringStringEntryProto` into `entries`. @param valueLimit Maximum length of the value in bytes. */
 export function readEntry(bytes: LoadedBytes, span: Span, entries: Map<string, string>, valueLimit: number): void {
   let key = '';
   let value = '';
@@ -266,7 +277,7 @@ export function readEntry(bytes: LoadedBytes, span: Span, entries: Map<string, s
   entries.set(key, value);
 }
 
-/** `OperatorSetIdProto`. */
+/** Reads an `OperatorSetIdProto`. The domain of ONNX itself, which may be empty in the file, is `ai.onnx`. */
 export function readOpset(bytes: LoadedBytes, span: Span): [domain: string, version: number] {
   let domain = '';
   let version = 0;
@@ -278,7 +289,7 @@ export function readOpset(bytes: LoadedBytes, span: Span): [domain: string, vers
   return [domain || 'ai.onnx', version];
 }
 
-/** `FunctionProto`: name, and its operators. */
+/** Reads a `FunctionProto`, and adds its operators to the harvest. Returns its name. */
 export function readFunction(bytes: LoadedBytes, span: Span, harvest: Harvest): string {
   let name = '';
   let domain = '';

@@ -30,44 +30,45 @@ export const ONNX_DTYPES = [
 export type OnnxDtype =
   (typeof ONNX_DTYPES)[number] | 'sequence' | 'map' | 'optional' | 'sparse tensor' | 'opaque' | 'unknown';
 
-/** A dimension: a number, a symbol of the file, or null if the file does not declare it. */
+/** A dimension: its size, its symbol in the file, or null if the file does not declare it. */
 export type OnnxDim = number | string | null;
 
 /** An input or output of the graph. */
 export interface OnnxTensor {
   readonly name: string;
   readonly dtype: OnnxDtype;
-  /** Undefined if the file does not even declare the rank. */
+  /** Dimensions; undefined if the file does not declare the rank. */
   readonly dims: readonly OnnxDim[] | undefined;
 }
 
-/** A file beside the model with some of its weights. */
+/** A file beside the model that contains some of its weights. */
 export interface ExternalFile {
-  /** Path relative to the model's folder, as in the model. */
+  /** Path relative to the model's folder, as stated in the model. */
   readonly location: string;
   /** Minimum length of the file in bytes; 0 if the model does not declare it. */
   readonly byteLength: number;
 }
 
-/** A tensor stored in the file: its type and shape, and its numbers if it is the shape of another. */
+/** A tensor stored in the file: its type and shape, and its integers if it is the shape of another tensor. */
 export interface OnnxValue {
   readonly dtype: OnnxDtype;
   readonly dims: readonly number[];
-  /** Only for short vectors of int64. */
+  /** Values of a short vector of int64; undefined for other tensors. */
   readonly integers?: readonly number[];
 }
 
 /** A node of the graph, without its weights. */
 export interface OnnxNode {
   readonly name: string;
-  /** As in {@link OnnxHeader.operators}. */
+  /** Name of the operator, as in {@link OnnxHeader.operators}. */
   readonly operator: string;
   readonly inputs: readonly string[];
   readonly outputs: readonly string[];
   /** Whether the node is within a subgraph or a function. */
   readonly isInner: boolean;
-  /** Attributes that are integers, and lists of integers. */
+  /** Attributes that are integers, by name. */
   readonly numbers?: Readonly<Record<string, number>>;
+  /** Attributes that are lists of integers, by name. */
   readonly lists?: Readonly<Record<string, readonly number[]>>;
   /** Tensor of the attribute `value`, as in `Constant`. */
   readonly value?: OnnxValue;
@@ -80,39 +81,43 @@ export interface OnnxHeader {
   /** Length of the file in bytes. */
   readonly byteLength: number;
   readonly irVersion: number;
-  /** Program that wrote the file, with its version, or empty. */
+  /** Name and version of the program that wrote the file; may be empty. */
   readonly producer: string;
   readonly graphName: string;
-  /** Operator sets by domain; that of ONNX itself is `ai.onnx`. */
+  /** Version of the operator set of each domain; the domain of ONNX itself is `ai.onnx`. */
   readonly opsets: ReadonlyMap<string, number>;
-  /** `metadata_props`. */
+  /** Values of `metadata_props`, by key. */
   readonly metadata: ReadonlyMap<string, string>;
-  /** Inputs that a caller must provide: initializers have a default and are excluded. */
+  /** Inputs that a caller must provide. Initializers, which have a default, are excluded. */
   readonly inputs: readonly OnnxTensor[];
   /**
-   * Names of inputs that are initializers, too: their stored value is used, because ONNX Runtime Web accepts no other.
+   * Names of inputs that are also initializers. Their stored value is used, because ONNX Runtime Web does not accept
+   * another.
    */
   readonly optionalInputs: readonly string[];
   readonly outputs: readonly OnnxTensor[];
   /**
-   * Number of occurrences of each operator, subgraphs included: `MatMul`, or `com.example:Name` outside ONNX's own
-   * domain.
+   * Number of nodes of each operator, including those of subgraphs. Keys are `MatMul` in ONNX's own domain, and
+   * `com.example:Name` in others.
    */
   readonly operators: ReadonlyMap<string, number>;
-  /** All nodes in the order of the file, those of subgraphs and functions before the node that contains them. */
+  /**
+   * All nodes in the order of the file, including those of functions. Nodes of a subgraph precede the node that
+   * contains it.
+   */
   readonly nodes: readonly OnnxNode[];
   /** Tensors stored in the file, by name. */
   readonly stored: ReadonlyMap<string, OnnxValue>;
-  /** Declared types and shapes of intermediate values. */
+  /** Declared types and shapes of intermediate values, by name. */
   readonly values: ReadonlyMap<string, OnnxTensor>;
   /** Operators that the file itself defines, named as in {@link operators}. */
   readonly functions: ReadonlySet<string>;
   readonly externalFiles: readonly ExternalFile[];
-  /** Bytes of weights within the file. */
+  /** Number of bytes of weights in the file itself. */
   readonly initializerBytes: number;
 }
 
-/** Formats a tensor's type and shape: `float32 [N, 13]`. */
+/** Formats the type and shape of a tensor, for example `float32 [N, 13]`. */
 export function describeTensor({ dtype, dims }: Pick<OnnxTensor, 'dtype' | 'dims'>): string {
   return `${dtype} ${dims ? `[${dims.map((dim) => dim ?? '?').join(', ')}]` : 'of unknown shape'}`;
 }

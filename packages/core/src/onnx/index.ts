@@ -1,4 +1,5 @@
 export { blobSource, bytesSource, type ByteSource } from './byte-source.js';
+export { externalUrl } from './external-url.js';
 export {
   describeTensor,
   type ExternalFile,

@@ -2,7 +2,8 @@ import { GaussianSplatError } from '../errors.js';
 import type { ByteSource } from './byte-source.js';
 
 /**
- * Thrown by a read of bytes that are not in memory yet; {@link LoadedBytes.load} loads them, then the read is repeated.
+ * Thrown by a read of bytes that are not in memory. The caller loads them with {@link LoadedBytes.load}, and repeats
+ * the read.
  */
 export class NotLoaded {
   readonly offset: number;
@@ -20,14 +21,14 @@ interface Segment {
 
 const utf8 = new TextDecoder();
 
-/** The ranges of a file that are in memory, with synchronous reads that throw {@link NotLoaded} for others. */
+/** Ranges of a file that are in memory. Synchronous reads of other ranges throw {@link NotLoaded}. */
 export class LoadedBytes {
   readonly source: ByteSource;
   #segments: Segment[] = [];
   #current: Segment = { start: 0, end: 0, bytes: new Uint8Array(0) };
   #fieldsLeft: number;
 
-  /** @param fieldLimit Maximum total number of fields to read, so that hostile files terminate. */
+  /** @param fieldLimit Maximum number of fields to read from the file, so that hostile files terminate. */
   constructor(source: ByteSource, fieldLimit: number) {
     this.source = source;
     this.#fieldsLeft = fieldLimit;
@@ -55,7 +56,10 @@ export class LoadedBytes {
     return utf8.decode(bytes);
   }
 
-  /** Loads the range at an offset into memory. */
+  /**
+   * Loads a chunk of the source, from an offset on, into memory. Rejects with `decode/truncated` at the end of the
+   * file.
+   */
   async load(offset: number): Promise<void> {
     const length = Math.min(this.source.chunk, this.size - offset);
     const bytes = await this.source.read(offset, length);
@@ -63,7 +67,7 @@ export class LoadedBytes {
     this.#segments.push({ start: offset, end: offset + bytes.length, bytes });
   }
 
-  /** Discards ranges that end at or before an offset: they will not be read again. */
+  /** Discards the ranges that end at or before an offset, which will not be read again. */
   forget(offset: number): void {
     if (this.#segments.length > 1) this.#segments = this.#segments.filter(({ end }) => end > offset);
   }

@@ -1,27 +1,30 @@
 import { GraphValues } from './graph-values.js';
 import type { OnnxDtype, OnnxHeader } from './header.js';
 
-/** Memory of a model as its file declares it. A run takes more: the runtime keeps several tensors at a time. */
+/** Memory of a model as its file declares it. A run needs more, because the runtime keeps several tensors at a time. */
 export interface ModelMemory {
   /** Bytes of all weights and constants, including those in files beside the model. */
   readonly weightBytes: number;
   /**
-   * Bytes of the largest tensor that the nodes compute, among those of known size: a lower bound while `unknownTensors` is
-   * not 0. null if no size is known.
+   * Number of bytes of the largest tensor of known size that the nodes compute; null if no size is known. It is a lower
+   * bound while `unknownTensors` is not 0.
    */
   readonly largestKnownTensorBytes: number | null;
   /** Number of computed tensors whose size only a run determines. */
   readonly unknownTensors: number;
 }
 
-/** Bits of an element, by type. Strings and complex numbers have none: models of Gaussians do not compute them. */
+/**
+ * Number of bits of an element of each type. Strings and complex numbers are missing, because models of Gaussians do
+ * not compute them.
+ */
 const BITS: Readonly<Partial<Record<OnnxDtype, number>>> = {
   ...{ float64: 64, int64: 64, uint64: 64, float32: 32, int32: 32, uint32: 32 },
   ...{ float16: 16, bfloat16: 16, int16: 16, uint16: 16, int8: 8, uint8: 8, bool: 8 },
   ...{ float8e4m3fn: 8, float8e4m3fnuz: 8, float8e5m2: 8, float8e5m2fnuz: 8, int4: 4, uint4: 4, float4e2m1: 4 },
 };
 
-/** Reads the memory of a model from its header, without its weights. */
+/** Returns the memory of a model from its header, without its weights. */
 export function modelMemory(header: OnnxHeader): ModelMemory {
   const values = new GraphValues(header);
   let weightBytes = 0;
@@ -30,10 +33,11 @@ export function modelMemory(header: OnnxHeader): ModelMemory {
   let unknownTensors = 0;
   for (const { operator, outputs, isInner, value } of header.nodes) {
     if (value) weightBytes += bytesOf(value.dtype, value.dims) ?? 0;
-    // Its output is the constant itself. Other tensors that depend only on constants take memory of their own.
+    // The output of a `Constant` is the constant itself. Other tensors that depend only on constants have memory of
+    // their own.
     if (operator === 'Constant') continue;
     for (const name of outputs) {
-      // Tensors of subgraphs and functions have shapes for each call.
+      // Tensors of subgraphs and functions have a different shape in each call.
       if (name === '' || isInner) continue;
       const bytes = bytesOf(values.dtypeOf(name), values.dimsOf(name));
       if (bytes === undefined) unknownTensors++;
@@ -43,7 +47,7 @@ export function modelMemory(header: OnnxHeader): ModelMemory {
   return { weightBytes, largestKnownTensorBytes, unknownTensors };
 }
 
-/** Undefined if the type or a dimension is unknown. */
+/** Returns the bytes of a tensor; undefined if its type or a dimension is unknown. */
 function bytesOf(dtype: OnnxDtype | undefined, dims: readonly (number | null)[] | undefined): number | undefined {
   const bits = dtype && BITS[dtype];
   if (bits === undefined || dims === undefined) return undefined;

@@ -6,24 +6,28 @@ const FIXED64 = 1;
 const LENGTH_DELIMITED = 2;
 const FIXED32 = 5;
 
-/** A byte range of the file: a message, or the payload of a field. */
+/** A byte range of a file: a message, or the payload of a field. */
 export interface Span {
   readonly start: number;
   readonly end: number;
 }
 
-/** Iterates over the fields of one protobuf message. Payloads are not read: a cursor skips gigabytes by their length. */
+/**
+ * Iterates over the fields of one protobuf message. Payloads are not read: the cursor skips them by their length, even
+ * gigabytes.
+ */
 export class FieldCursor implements Span {
   readonly #bytes: LoadedBytes;
   readonly #limit: number;
-  /** Offset of the next field; a cursor that starts here continues. */
+  /** Byte offset of the next field. */
   offset: number;
-  /** Field number. */
+  /** Number of the current field. */
   number = 0;
-  /** Value of a varint field; otherwise 0. */
+  /** Value of the current field if it is a varint; otherwise 0. */
   value = 0;
-  /** Payload of a length-delimited field; otherwise empty. */
+  /** Offset of the payload of a length-delimited field; otherwise 0. */
   start = 0;
+  /** Offset after the payload of a length-delimited field; otherwise 0. */
   end = 0;
   #wireType = 0;
 
@@ -33,17 +37,20 @@ export class FieldCursor implements Span {
     this.#limit = end;
   }
 
-  /** True if the current field is a string, bytes or a message. */
+  /** Whether the current field is a string, bytes or a message. */
   get isDelimited(): boolean {
     return this.#wireType === LENGTH_DELIMITED;
   }
 
-  /** True if the current field is a number in varint form. */
+  /** Whether the current field is a varint. */
   get isVarint(): boolean {
     return this.#wireType === VARINT;
   }
 
-  /** Steps to the next field; false at the end of the message. If it throws `NotLoaded`, it can be called again. */
+  /**
+   * Advances to the next field. @returns False at the end of the message. After `NotLoaded` is thrown, the call can be
+   * repeated.
+   */
   next(): boolean {
     if (this.offset >= this.#limit) return false;
     this.#bytes.countField(this.offset);
@@ -56,7 +63,10 @@ export class FieldCursor implements Span {
     return true;
   }
 
-  /** Returns the current field's payload as text. */
+  /**
+   * Returns the payload of the current field as text. @param limit Maximum length in bytes; longer text is
+   * `decode/corrupt`.
+   */
   text(limit: number): string {
     if (!this.isDelimited) throw this.#corrupt(`a number where a text belongs (field ${this.number})`);
     const length = this.end - this.start;
@@ -64,7 +74,7 @@ export class FieldCursor implements Span {
     return this.#bytes.textAt(this.start, length);
   }
 
-  /** Returns the end of the current field's payload and records its location. */
+  /** Records the payload of the current field, and returns the offset after it. */
   #payload(start: number): number {
     switch (this.#wireType) {
       case VARINT: {
@@ -90,7 +100,7 @@ export class FieldCursor implements Span {
   #within(start: number, length: number): number {
     const end = start + length;
     if (length >= 0 && end <= this.#limit) return end;
-    // The outermost message ends with the file.
+    // The outermost message ends at the end of the file.
     if (this.#limit === this.#bytes.size && length >= 0) {
       const found = `the end of the file at byte ${this.#bytes.size}`;
       throw this.#bytes.fault('decode/truncated', start, `${length} bytes of field ${this.number}`, found);
@@ -98,7 +108,10 @@ export class FieldCursor implements Span {
     throw this.#corrupt(`a length of ${length} bytes for field ${this.number}, beyond the message that holds it`);
   }
 
-  /** A varint: 7 bits in each byte, low bits first, read as a signed 64-bit integer. */
+  /**
+   * Reads a varint as a signed 64-bit integer: 7 bits in each byte, low bits first. Returns its value and the offset
+   * after it.
+   */
   #varint(start: number): { value: number; end: number } {
     let value = 0;
     let factor = 1;
@@ -113,7 +126,7 @@ export class FieldCursor implements Span {
       const byte = this.#bytes.byteAt(at);
       value += (byte % 128) * factor;
       factor *= 128;
-      // Negative numbers use all ten bytes; below -2^53 a few low bits are lost, which affects no field that is read
+      // Negative numbers take all ten bytes. Below -2^53 a few low bits are lost, which affects no field that is read
       // here.
       if (byte < 128) return { value: i === 9 ? value - 2 ** 64 : value, end: at + 1 };
     }

@@ -17,12 +17,12 @@ import type { ExternalFile, OnnxHeader, OnnxNode, OnnxTensor, OnnxValue } from '
 import { LoadedBytes, NotLoaded } from './loaded-bytes.js';
 import { FieldCursor } from './protobuf.js';
 
-/** Longest value of `metadata_props` that is read, in bytes. */
+/** Maximum length in bytes of a value of `metadata_props`. */
 const METADATA_LIMIT = 2 ** 22;
-/** Maximum number of fields in a file: about a second of work. */
+/** Maximum number of fields in a file, which take about a second to read. */
 const FIELD_LIMIT = 10_000_000;
 
-/** State of the parse. Each step adds one field or, if bytes are missing, leaves it unchanged. */
+/** Parts of the header that have been read. A field whose bytes are missing leaves them unchanged. */
 interface Draft {
   irVersion: number;
   producerName: string;
@@ -44,13 +44,13 @@ interface Draft {
 }
 
 /**
- * Reads the description of an ONNX file: inputs, outputs, opsets, metadata, operators, external files. Weights are
- * skipped: for a file of hundreds of megabytes over HTTP Range, two requests fetch the beginning and the end, plus one
- * for every tensor between that is larger than the source's `chunk`.
+ * Reads the description of an ONNX file: inputs, outputs, opsets, metadata, operators and external files. Weights are
+ * skipped. For a file of hundreds of megabytes over HTTP Range, two requests fetch the beginning and the end. Each
+ * tensor between them that is larger than the source's `chunk` needs one more request.
  *
- * @throws GaussianSplatError `decode/html`, `decode/lfs-pointer` and `decode/unknown-format` for files of other kinds,
- * `decode/truncated` and `decode/corrupt` for damaged ones, `decode/unsupported` for the format ORT and for implausibly
- * large files; also errors of the source.
+ * @throws GaussianSplatError `decode/html`, `decode/lfs-pointer` and `decode/unknown-format` for files of other kinds;
+ * `decode/truncated` and `decode/corrupt` for damaged ones; `decode/unsupported` for the format ORT and for implausibly
+ * large files; errors of the source.
  */
 export async function readOnnxHeader(source: ByteSource): Promise<OnnxHeader> {
   const head = await source.read(0, Math.min(SIGNATURE_BYTES, source.size));
@@ -87,7 +87,10 @@ const emptyDraft = (): Draft => ({
   initializerBytes: 0,
 });
 
-/** Every exporter writes the IR version first; random bytes rarely contain a plausible one. */
+/**
+ * Whether a file may be a model. Every exporter writes the IR version first, and random bytes rarely contain a
+ * plausible one.
+ */
 const looksLikeModel = ({ irVersion }: Draft): boolean => irVersion >= 1 && irVersion < 100;
 
 async function readModel(bytes: LoadedBytes, draft: Draft): Promise<void> {
@@ -105,9 +108,9 @@ async function readModel(bytes: LoadedBytes, draft: Draft): Promise<void> {
 }
 
 /**
- * Iterates over a message and reads each field; a field whose bytes are not in memory yet is read again once they are.
- * @param read Returns true to stop after the field.
- * @returns True if it was stopped, false at the end of the message.
+ * Calls `read` for each field of a message. If bytes of a field are missing, they are loaded and the call is repeated.
+ * @param read Reads the current field. Returns true to stop after it.
+ * @returns Whether `read` stopped the iteration; false at the end of the message.
  */
 async function readFields(bytes: LoadedBytes, field: FieldCursor, read: () => boolean | void): Promise<boolean> {
   let isPending = false;

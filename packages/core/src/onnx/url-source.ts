@@ -3,28 +3,30 @@ import { bytesOf, fetchPatiently, SilenceError } from '../patient-fetch.js';
 import { type ByteSource } from './byte-source.js';
 
 export interface UrlSourceOptions {
-  /** `cors` (default) or `same-origin`. */
+  /** Mode of requests, as in `RequestInit`. Default: `cors`. */
   readonly mode?: 'cors' | 'same-origin';
-  /** Cookies policy of requests; default `same-origin`. */
+  /** Credentials mode of requests, as in `RequestInit`. Default: `same-origin`. */
   readonly credentials?: 'omit' | 'same-origin' | 'include';
   /** Aborts every request; reads then reject with the signal's reason. */
   readonly signal?: AbortSignal;
-  /** Bytes of one Range request; default 65,536. */
+  /** Bytes of one Range request. Default: 65,536. */
   readonly chunk?: number;
   /**
-   * Maximum number of Range requests before the rest is fetched at once; default 32. Many small requests take longer
-   * than one large.
+   * Maximum number of requests. A read after that fetches the whole file, because many small requests take longer than
+   * one large request. Default: 32.
    */
   readonly maxRequests?: number;
+  /** Maximum bytes of a response. A longer one is `out-of-memory/budget`. Default: no limit. */
+  readonly maxBytes?: number | undefined;
 }
 
-/** A file on a server. */
+/** A file on a server, which is read by HTTP Range if possible. */
 export interface UrlSource extends ByteSource {
-  /** Requests made until now. */
+  /** Number of requests that have been sent. */
   readonly requests: number;
-  /** Bytes of bodies received until now. */
+  /** Total bytes of the bodies that have been received. */
   readonly bytesReceived: number;
-  /** The whole file, if the server sent it at once. */
+  /** Bytes of the whole file if it has been fetched as a whole; otherwise undefined. */
   readonly whole: Uint8Array | undefined;
 }
 
@@ -38,9 +40,9 @@ const RANGE_REFUSALS = [400, 405, 412, 416, 501];
  * fetched. A server that does not respond for 30 s is abandoned; a connection with less than 1 KiB in 30 s counts as
  * broken.
  *
- * @param url Absolute, or relative to the page.
- * @throws GaussianSplatError `network/url`, `network/unreachable`, `network/status` or `network/interrupted`; the
- * reason of the signal.
+ * @param url Address of the file, absolute or relative to the page.
+ * @throws GaussianSplatError `network/url`, `network/unreachable`, `network/status`, `network/interrupted` or
+ * `out-of-memory/budget`; the reason of the signal.
  */
 export async function openUrl(url: string | URL, options: UrlSourceOptions = {}): Promise<UrlSource> {
   const file = new RemoteFile(parseUrl(url), options);
@@ -58,7 +60,7 @@ class RemoteFile implements UrlSource {
   bytesReceived = 0;
   size = 0;
   whole: Uint8Array | undefined;
-  /** The first range, from opening the file. */
+  /** The first {@link chunk} bytes, which opening the file has fetched. */
   #head: Uint8Array | undefined;
 
   constructor(address: URL, options: UrlSourceOptions) {
@@ -91,7 +93,7 @@ class RemoteFile implements UrlSource {
     return this.whole!.subarray(offset, end);
   }
 
-  /** Fetches one range; undefined if the whole file should be fetched. */
+  /** Fetches the bytes from `offset` to `end`. Returns undefined if the whole file must be fetched instead. */
   async #fetchPiece(offset: number, end: number): Promise<Uint8Array | undefined> {
     if (this.requests >= this.#maxRequests) return undefined;
     const response = await this.#requestRange(offset, end);
@@ -102,7 +104,10 @@ class RemoteFile implements UrlSource {
     return piece.length === end - offset && (total ?? this.size) === this.size ? piece : undefined;
   }
 
-  /** The response to a Range request; undefined if Range is rejected; the whole file is kept if the server sends it. */
+  /**
+   * Returns the response to a Range request; undefined if the server rejects Range, or responds with the whole file,
+   * which is then kept.
+   */
   async #requestRange(offset: number, end: number): Promise<Response | undefined> {
     let response: Response;
     try {
@@ -124,7 +129,10 @@ class RemoteFile implements UrlSource {
     throw this.#badStatus(response);
   }
 
-  /** Cross-origin, Content-Range is often hidden from scripts, but Content-Length is not. */
+  /**
+   * Requests the size of the file by HEAD; undefined if the response does not contain it. Across origins, Content-Range is
+   * often hidden from scripts, but Content-Length is not.
+   */
   async #sizeByHead(): Promise<number | undefined> {
     const response = await this.#request({ method: 'HEAD' });
     const length = response.headers.get('Content-Length');
@@ -164,7 +172,7 @@ class RemoteFile implements UrlSource {
   }
 
   async #body(response: Response): Promise<Uint8Array> {
-    const { signal } = this.#options;
+    const { signal, maxBytes } = this.#options;
     const failed = (cause: unknown): unknown =>
       signal?.aborted
         ? signal.reason
@@ -175,7 +183,16 @@ class RemoteFile implements UrlSource {
             remedy: 'load the model again; the connection broke off',
             cause,
           });
-    const bytes = await bytesOf(response, failed);
+    const bytes = await bytesOf(response, failed, maxBytes).catch((cause: unknown) => {
+      if (!(cause instanceof RangeError)) throw cause;
+      throw new GaussianSplatError('out-of-memory/budget', {
+        where: this.name,
+        expected: `at most ${String(maxBytes)} bytes`,
+        found: 'more',
+        remedy: 'use a smaller model, or allow for more',
+        cause,
+      });
+    });
     this.bytesReceived += bytes.length;
     return bytes;
   }
@@ -196,7 +213,7 @@ function sizeFromContentRange(response: Response): number | undefined {
   return match ? Number(match[1]) : undefined;
 }
 
-/** Lengths and ranges of an encoded transfer differ from those of the file. */
+/** Whether a response has no content encoding: lengths and ranges of an encoded response differ from the file's. */
 function isPlain(response: Response): boolean {
   return /^\s*(identity)?\s*$/i.test(response.headers.get('Content-Encoding') ?? '');
 }

@@ -3,8 +3,8 @@ import type { OnnxDtype, OnnxHeader, OnnxNode } from './header.js';
 import { WEBGPU_RULES as RULES } from './webgpu-rules.js';
 
 /**
- * Types that no Cast of onnxruntime-web's builds with WebGPU (1.30.0, JSPI and Asyncify) reads or writes, not even on
- * the CPU, so that no session can be created.
+ * Element types that Cast does not support in onnxruntime-web's builds with WebGPU (1.30.0, JSPI and Asyncify), not even
+ * on the CPU. No session can be created for a model with such a Cast.
  */
 const UNCASTABLE: readonly OnnxDtype[] = ['uint16', 'int16', 'float64'];
 
@@ -22,7 +22,7 @@ export interface GpuFinding {
   readonly remedy: string;
 }
 
-/** A convolution with known weights. */
+/** A convolution whose weights have a known shape. */
 export interface Convolution {
   readonly inputs: number;
   readonly outputs: number;
@@ -31,7 +31,7 @@ export interface Convolution {
   readonly group: number;
 }
 
-/** Types in a file's casts that browsers cannot cast, and bfloat16, which they cannot even store. */
+/** Returns the element types of a file's casts that browsers cannot cast, and bfloat16 if any tensor has it. */
 export function uncastableTypes(header: OnnxHeader): OnnxDtype[] {
   const values = new GraphValues(header);
   const used = new Set<OnnxDtype | undefined>();
@@ -43,9 +43,9 @@ export function uncastableTypes(header: OnnxHeader): OnnxDtype[] {
 }
 
 /**
- * Convolutions that ONNX Runtime's WebGPU provider computes wrongly without an error (onnxruntime-web 1.30.0,
- * onnxruntime-webgpu 1.27.0; tests/generator/browser/provider.lab.test.ts checks whether it still does). The list saves
- * the time of a failed check: outputs on the GPU are compared with those on the CPU in any case.
+ * Returns the convolutions that ONNX Runtime's WebGPU provider computes wrongly without an error (onnxruntime-web
+ * 1.30.0, onnxruntime-webgpu 1.27.0; tests/generator/browser/provider.lab.test.ts verifies the fault). The list only
+ * saves the time of a failed check: outputs on the GPU are compared with those on the CPU in any case.
  */
 export function miscomputedConvolutions(header: OnnxHeader): Convolution[] {
   const values = new GraphValues(header);
@@ -56,8 +56,8 @@ export function miscomputedConvolutions(header: OnnxHeader): Convolution[] {
 }
 
 /**
- * One or two dimensions, one group; from 6, 9, 15, 18 ... channels, a multiple of 3 but not of 4, to a multiple of 4;
- * not pointwise.
+ * Whether the provider computes a convolution wrongly: it has one or two dimensions, one group, and a kernel or stride
+ * above 1; its input channels are a multiple of 3 above 3 but not of 4, and its output channels a multiple of 4.
  */
 function isMiscomputed({ inputs, outputs, kernel, strides, group }: Convolution): boolean {
   const isPointwise = [...kernel, ...strides].every((size) => size === 1);
@@ -79,9 +79,9 @@ function convolutionOf(
 }
 
 /**
- * Products that ONNX Runtime's optimizer fuses wrongly (onnxruntime 1.30 and 1.31, CPU): a transposed matrix times a
- * vector, as in a camera position, loses its transposition in the fusion. Sessions of such files are created without
- * fusions.
+ * Returns the outputs of the products that ONNX Runtime's optimizer fuses wrongly (onnxruntime 1.30 and 1.31, CPU). A
+ * transposed matrix times a vector, as in a camera position, loses its transposition in the fusion. Sessions of files
+ * with such products are created without fusions.
  */
 export function misfusedProducts(header: OnnxHeader): string[] {
   const values = new GraphValues(header);
@@ -94,7 +94,7 @@ const isMisfused = ({ operator, inputs }: OnnxNode, values: GraphValues): boolea
   !values.isConstant(inputs[0]) &&
   values.dimsOf(inputs[1])?.length === 1;
 
-/** Outputs that are equal in every run because they depend only on constants. */
+/** Returns the names of the outputs that are equal in every run, because they depend only on constants. */
 export function constantOutputs(header: OnnxHeader): Set<string> {
   const values = new GraphValues(header);
   return new Set(header.outputs.map(({ name }) => name).filter((name) => values.isConstant(name)));
@@ -103,8 +103,8 @@ export function constantOutputs(header: OnnxHeader): Set<string> {
 type Rule = (node: OnnxNode, opset: number, values: GraphValues, header: OnnxHeader) => Iterable<GpuFinding>;
 
 /**
- * Everything that would keep a file from running entirely on the GPU with graph capture; empty if nothing does. The
- * exporter's `gpu_findings` applies the same rules.
+ * Returns the reasons that a file cannot run entirely on the GPU with graph capture; empty if it can. The exporter's
+ * `gpu_findings` applies the same rules.
  */
 export function gpuFindings(header: OnnxHeader): GpuFinding[] {
   const values = new GraphValues(header);
@@ -118,19 +118,21 @@ export function gpuFindings(header: OnnxHeader): GpuFinding[] {
   return [...found, ...ofCopies(header, values)];
 }
 
-/** The findings for display: sentences without a full stop. */
+/** Returns the findings of a file for display: sentences without a full stop, one for each kind, operator and reason. */
 export function gpuNotes(header: OnnxHeader): string[] {
-  const notes = gpuFindings(header).map(({ kind, operator, tensor, reason, remedy }) => {
-    const what = ['file', 'shape', 'type'].includes(operator) ? '' : `${operator} (${tensor}): `;
-    return `${kind}: ${what}${reason}; ${remedy}`;
+  const known = new Set<string>();
+  return gpuFindings(header).flatMap(({ kind, operator, tensor, reason, remedy }) => {
+    const isOfFile = ['file', 'shape', 'type'].includes(operator);
+    const said = `${reason}; ${remedy}`;
+    // One finding is enough for repeated uses of an operator.
+    const key = `${kind}: ${isOfFile ? '' : operator} ${said}`;
+    if (known.has(key)) return [];
+    known.add(key);
+    return [`${kind}: ${isOfFile ? '' : `${operator} (${tensor}): `}${said}`];
   });
-  // One finding is enough for repeated uses of an operator.
-  return notes.filter((note, i) => notes.findIndex((other) => withoutTensor(other) === withoutTensor(note)) === i);
 }
 
-const withoutTensor = (note: string): string => note.replace(/ \([^)]*\):/, ':');
-
-/** The axis of instances is a number in every session. */
+/** Returns the axis of instances in the file's own contract, if any: its size is fixed when a session is created. */
 function axisOfInstances({ metadata }: OnnxHeader): string | undefined {
   try {
     const contract = JSON.parse(metadata.get('gaussian_contract') ?? '{}') as { instances?: { axis?: string } };
@@ -165,8 +167,8 @@ function* ofFile(header: OnnxHeader, opset: number): Iterable<GpuFinding> {
 }
 
 /**
- * Outputs that are views of another result, which no kernel writes. A file without inputs runs once and is unaffected;
- * constants are read once, and the rest is captured.
+ * Finds outputs that are views of another tensor, so that no kernel writes them and a recording does not repeat their
+ * copy. A file without inputs runs once and is not affected; constant outputs are read once.
  */
 function* ofCopies({ inputs, outputs }: OnnxHeader, values: GraphValues): Iterable<GpuFinding> {
   for (const { name: tensor } of inputs.length > 0 ? outputs : []) {
@@ -243,7 +245,7 @@ const sizeRule: Rule = function* (node, _, values) {
   }
   if (isMisfused(node, values)) {
     const reason =
-      "ONNX Runtime's optimiser loses the transposition of a matrix times a vector, so pages load the file without fusions";
+      "ONNX Runtime's optimizer loses the transposition of a matrix times a vector, so pages load the file without fusions";
     yield of('slow', node, reason, 'make the vector a matrix of one column: (R.T @ t[:, None])[:, 0]');
   }
   if (operator === 'CumSum') {

@@ -1,10 +1,10 @@
 /**
- * Capabilities of ONNX Runtime's WebGPU provider, as data: the rules of this checker and of the Python exporter, which
- * has a copy (`node scripts/write-webgpu-rules.mjs`). Measured for each operator with onnxruntime-webgpu 1.27.0 and
+ * Capabilities of ONNX Runtime's WebGPU provider, for the rules of `gpuFindings` and of the Python exporter, which has a
+ * copy (`node scripts/write-webgpu-rules.mjs`). Each operator was tested with onnxruntime-webgpu 1.27.0 and
  * onnxruntime-web 1.30.0.
  */
 export const WEBGPU_RULES = {
-  /** Operators of ONNX itself that have a kernel for float32, or need none. */
+  /** Operators of ONNX's own domain that have a kernel for float32, or need none. */
   kernels:
     `Abs Acos Acosh Add And ArgMax ArgMin Asin Asinh Atan Atanh AveragePool BatchNormalization Cast Ceil Clip Concat Constant Conv ConvTranspose Cos
     Cosh CumSum DepthToSpace Div Einsum Elu Equal Erf Exp Expand Flatten Floor Gather GatherElements GatherND Gelu Gemm GlobalAveragePool
@@ -14,7 +14,7 @@ export const WEBGPU_RULES = {
     Sigmoid Sin Sinh Slice Softmax Softplus Split Sqrt Squeeze Sub Tan Tanh ThresholdedRelu Tile TopK Transpose Trilu Unsqueeze Where`.split(
       /\s+/,
     ),
-  /** Replacements for operators that are common in generators. */
+  /** Replacements of operators without a kernel that are common in generators. */
   instead: {
     Compress: 'keep every row and write opacity 0 into the dead ones',
     NonZero: 'keep every row and write opacity 0 into the dead ones',
@@ -41,20 +41,18 @@ export const WEBGPU_RULES = {
   controlFlow: ['If', 'Loop', 'Scan'],
   /** Operators whose outputs are views of their input, so that no kernel writes them. */
   aliases: ['Reshape', 'Squeeze', 'Unsqueeze', 'Flatten', 'Identity'],
-  /**
-   * Operators that accept 64-bit integers without a kernel: {@link makers} produce them, and {@link indexed} use them
-   * as indices.
-   */
+  /** Operators that may produce 64-bit integers, although WebGPU has no kernels for them. */
   makers: ['Cast', 'ArgMax', 'ArgMin', 'TopK', 'Shape'],
+  /** Operators that accept 64-bit integers as indices. */
   indexed: ['Gather', 'GatherElements', 'GatherND', 'ScatterND', 'ScatterElements'],
   newestOpset: 26,
   newestIr: 13,
   /** The last opset whose GridSample has a kernel. */
   gridSampleOpset: 19,
-  /** A Split binds a buffer for its input and one for each output; some adapters have 10 for each shader. */
+  /** Maximum outputs of a Split: it binds one buffer for each and one for its input; some adapters allow 10 in a shader. */
   maxSplitOutputs: 9,
-  /** CumSum lets each thread sum its whole prefix. */
+  /** Maximum elements of a CumSum, whose kernel takes quadratic time: each thread sums its whole prefix. */
   longestCumSum: 4096,
-  /** Export opset that satisfies all rules above. */
+  /** Opset for the export that satisfies all rules above. */
   exportOpset: 18,
 } as const;

@@ -4,6 +4,7 @@ import {
   ANIMATED_ATTRIBUTE_NAMES,
   readScene,
   type ClipPartContent,
+  type Fades,
   type Lives,
   type AnimatedAttributeName,
 } from '@gaussian-splat/formats';
@@ -20,11 +21,12 @@ import {
 import type { Deflate } from '../pages/page-planes.js';
 import { splatsOf } from '../reduce.js';
 import type { Encoding } from '../write/index.js';
+import { takeFades } from './fades.js';
 import { followedWithin } from './partial-curves.js';
 import { changesOfTracks } from './track-changes.js';
 import type { Tracks } from './tracks.js';
 
-/** A part of a group as stored in the file. */
+/** An encoded part of a group of frames, and its entry in the index of the clip. */
 export interface WrittenClipPart {
   readonly splats: number;
   readonly planes: number;
@@ -34,8 +36,8 @@ export interface WrittenClipPart {
 }
 
 /**
- * Some tracks of a group: their splats as a scene, and the curves of their motion, which can be quantized with any
- * step.
+ * Some tracks of a group: their splats as an encoded scene, and the curves of their motion, which can be quantized with
+ * any steps.
  */
 export class TrackedPart {
   readonly #scene: Uint8Array;
@@ -59,10 +61,11 @@ export class TrackedPart {
   }
 
   /**
-   * @param whole The splats of all tracks.
-   * @param chosen The tracks of this part.
-   * @param encoding Encoding of their scene.
-   * @param finest Lower limits of the quantization steps of motion.
+   * Encodes the scene of a part, and finds the curves of its motion.
+   * @param whole Splats of all tracks.
+   * @param chosen Indices of the tracks of this part.
+   * @param encoding Encoding of the scene.
+   * @param finest Minimum quantization steps of motion with which the part will be used.
    */
   static async of(
     tracks: Tracks,
@@ -84,21 +87,29 @@ export class TrackedPart {
     const livesOf = (own: Uint16Array): Uint16Array => Uint16Array.from(order, (i) => own[chosen[i]]);
     const lives = { first: livesOf(tracks.lives.first), end: livesOf(tracks.lives.end) };
     const frames = tracks.frames.length;
-    // Relative to the written scene: static splats then have no motion, and rounding counts in the scene's fraction of
-    // the error.
+    // Changes are relative to the source in the order of the file, so that static splats have no motion. The error of
+    // rounding the scene is part of the scene's fraction of the allowed error.
+    let fades: Fades | undefined;
     const find = (name: AnimatedAttributeName): Followed | undefined => {
       const changes = changesOfTracks(tracks, { cloud: source, placeOf }, name);
       const span = (row: number): readonly [number, number] => [
         lives.first[row % cloud.count],
         lives.end[row % cloud.count],
       ];
+      if (changes && name === 'opacity') fades = takeFades(changes, frames, source.opacities, lives);
       return changes && followedWithin(changes, frames, span, minCurve(finest[name]));
     };
     const found = Object.fromEntries(ANIMATED_ATTRIBUTE_NAMES.map((name) => [name, find(name)]));
-    return new TrackedPart(scene, cloud, lives, frames, found as Record<AnimatedAttributeName, Followed | undefined>);
+    return new TrackedPart(
+      scene,
+      cloud,
+      { ...lives, fades },
+      frames,
+      found as Record<AnimatedAttributeName, Followed | undefined>,
+    );
   }
 
-  /** Returns the decoded content with these quantization steps of motion. */
+  /** Returns the content that a reader decodes if motion is quantized with the given steps. */
   contentAt(steps: MotionSteps): ClipPartContent {
     const parts = Object.fromEntries(
       ANIMATED_ATTRIBUTE_NAMES.map((name) => {
@@ -131,7 +142,7 @@ export class TrackedPart {
   }
 }
 
-/** Indices of the splats in the order of a file: formats keep the given order, or sort splats as packing does. */
+/** Returns the indices in `given` of the splats of a file. Formats keep the order, or sort splats as packing does. */
 function orderIn(read: GaussianCloud, given: GaussianCloud): Uint32Array {
   const orders = [Uint32Array.from({ length: given.count }, (_, i) => i), packedOrder(given)];
   const apart = orders.map((order) => {
@@ -143,7 +154,7 @@ function orderIn(read: GaussianCloud, given: GaussianCloud): Uint32Array {
   return orders[apart[0] <= apart[1] ? 0 : 1];
 }
 
-/** Drops the curves that splats follow by less, on average. */
+/** Returns the curves, with their weights, whose root mean square weight is above `min`. */
 function strongest({ rows, frames, curves, shares }: Followed, min: number): Followed {
   const isStrong = shares.map((own) => {
     let sum = 0;

@@ -2,14 +2,15 @@ import type { GaussianCloud } from '@gaussian-splat/core';
 import { packedOrder } from '@gaussian-splat/renderer/tools';
 import type { Tracks } from './tracks.js';
 
-/** One of at least this many neighboring splats is in the coarse part, so that every region is represented. */
+/** Minimum number of neighboring splats for each splat of the coarse part. */
 const COARSE_RUN = 8;
-/** Splats of the coarse part at most, approximately: at 30 bytes each the first frame arrives within 1.7 s at 2 Mbit/s. */
+/** Approximate maximum number of splats of the coarse part. At 30 bytes each, it arrives within 1.7 s at 2 Mbit/s. */
 const MAX_COARSE = 12_000;
 
 /**
- * Divides tracks into the coarse part, which gives an image on its own, and the rest.
- * @param cloud Their splats.
+ * Divides tracks into a coarse part with splats from all regions of the scene, and the rest.
+ * @param cloud Splats of the tracks.
+ * @returns Indices of the tracks of each part that is not empty.
  */
 export function coarseAndRest(cloud: GaussianCloud, { lives, frames }: Tracks): readonly Uint32Array[] {
   const order = packedOrder(cloud);

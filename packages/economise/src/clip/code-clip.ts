@@ -5,6 +5,7 @@ import {
   ANIMATED_ATTRIBUTES,
   ANIMATED_ATTRIBUTE_NAMES,
   readScene,
+  upright,
   writeClipHead,
   type ClipHead,
   type ClipPartContent,
@@ -20,51 +21,56 @@ import type { Encoding } from '../write/index.js';
 import { tuneSog } from '../write/tune-sog.js';
 import { TrackedPart, type WrittenClipPart } from './clip-part.js';
 import { coarseAndRest } from './coarse-part.js';
+import { cutTracks } from './cut-tracks.js';
 import { cloudOfTracks, followSplats, type Tracks } from './tracks.js';
 
 export interface CodeClipOptions extends Omit<CodeSequenceOptions, 'openFrame' | 'framesPerFile'> {
-  /** Reads a frame; frames may have different splats. */
+  /** Reads a frame by its index. Frames may have different splats. */
   readonly openFrame: (frame: number) => Promise<GaussianCloud>;
   readonly framesPerSecond: number;
   readonly framesPerGroup: number;
   /**
-   * Upper limit of the bit rate of any group in megabits per second; `worstPsnr` of the result shows its cost. Default:
-   * no limit.
+   * Maximum bit rate of each group in megabits per second; default no limit. It takes precedence over `minPsnr`, and
+   * `worstPsnr` of the result shows its effect.
    */
   readonly maxMbps?: number;
   /**
-   * Fixed quantization, instead of one that is found by measurement: then no device is needed, and nothing is measured.
+   * Fixed quantization. Then images are not measured, and no GPU device is used. By default, measurements determine the
+   * quantization.
    */
   readonly rounding?: { readonly encoding: Encoding; readonly steps: MotionSteps };
 }
 
 export interface CodedClip {
   readonly bytes: Uint8Array<ArrayBuffer>;
-  /** Bytes until the first frame can be shown. */
+  /** Number of bytes that must arrive before the first frame can be shown. */
   readonly firstBytes: number;
   readonly groups: number;
-  /** Splats over all groups, and those that are missing in some frames of their groups. */
+  /** Number of splats over all groups. */
   readonly splats: number;
+  /** Number of splats that do not exist in some frames of their group. */
   readonly passing: number;
-  /** PSNR of all measured frames together, and of their worst view. */
-  readonly decibels: number;
-  readonly worstDecibels: number;
+  /** PSNR of all measured frames together in dB; NaN if none was measured. */
+  readonly psnr: number;
+  /** PSNR of the view with the largest error in dB; NaN if none was measured. */
+  readonly worstPsnr: number;
 }
 
-/** Fraction of the error that scenes of groups may use; motion uses the rest. */
+/** Fraction of the allowed error that the scenes of groups may cause; motion may cause the rest. */
 const SCENE_SHARE = 0.4;
 const MAX_TRIES = 5;
 const NEAR_ENOUGH = 0.85;
-/** Maximum ratio between the first group's quantization steps of motion and finer ones. */
+/** Ratio of the current steps of motion to the finest ones, for finding curves. */
 const FINER = 16;
-/** Measured frames of a group, as fractions of its duration, and views of each. */
+/** Frames of a group that are measured, as fractions of its duration. */
 const JUDGED = [0.2, 0.75];
 const VIEWS = 2;
 const GROWTHS = [1, 1.25, 1.6, 2, 2.5, 3.2, 4];
 
 /**
- * Encodes frames with arbitrary splats as a clip. Quantization is as coarse as images of some frames, in held-out
- * views, allow.
+ * Encodes frames with arbitrary splats as a clip. Quantization is as coarse as `minPsnr` allows, in held-out views of
+ * some frames. Frames with an up direction other than (0, -1, 0) are rotated, as in all formats without one.
+ * @throws GaussianSplatError `argument/value` if frames have different degrees of spherical harmonics.
  */
 export async function codeClip(options: CodeClipOptions): Promise<CodedClip> {
   const coder = new ClipCoder(options);
@@ -74,7 +80,7 @@ export async function codeClip(options: CodeClipOptions): Promise<CodedClip> {
   return coder.finish();
 }
 
-/** An encoded group, and its measured errors. */
+/** An encoded group. `errors` has the mean squared error of each measured view. */
 interface WrittenGroup {
   readonly frames: number;
   readonly parts: readonly WrittenClipPart[];
@@ -95,15 +101,15 @@ class ClipCoder {
 
   constructor(options: CodeClipOptions) {
     this.#options = options;
-    this.#target = meanSquareOf(options.minDecibels);
+    this.#target = meanSquareOf(options.minPsnr);
   }
 
   async add(begin: number, end: number): Promise<void> {
     const { openFrame, onStep = () => undefined } = this.#options;
     const sources: GaussianCloud[] = [];
-    for (let frame = begin; frame < end; frame++) sources.push(await openFrame(frame));
+    for (let frame = begin; frame < end; frame++) sources.push(upright(await openFrame(frame)));
     requireOneDegree(sources, this.#facts?.shDegree);
-    const tracks = followSplats(sources);
+    const tracks = cutTracks(followSplats(sources));
     const whole = cloudOfTracks(tracks);
     const passing = tracks.lives.first.filter((first, i) => first > 0 || tracks.lives.end[i] < end - begin).length;
     this.#splats += tracks.count;
@@ -143,12 +149,12 @@ class ClipCoder {
       bytes,
       firstBytes: head.length + groups[0].parts[0].bytes.length,
       ...{ groups: groups.length, splats: this.#splats, passing: this.#passing },
-      decibels: errors.length > 0 ? decibels(mean(errors)) : NaN,
-      worstDecibels: errors.length > 0 ? decibels(Math.max(...errors)) : NaN,
+      psnr: errors.length > 0 ? decibels(mean(errors)) : NaN,
+      worstPsnr: errors.length > 0 ? decibels(Math.max(...errors)) : NaN,
     };
   }
 
-  /** Views are placed by the group with the most splats. */
+  /** Sets the properties of the clip. Its bounds, which determine views, are those of the group with the most splats. */
   #note(frame: GaussianCloud, whole: GaussianCloud): void {
     if (whole.count <= this.#largest) return;
     this.#largest = whole.count;
@@ -159,11 +165,11 @@ class ClipCoder {
       origin,
       antialiased,
       filterVariance,
-      bounds: { ...boundsOf(whole), up: frame.hints?.up },
+      bounds: boundsOf(whole),
     };
   }
 
-  /** Finds the quantization steps of scenes with a frame of the first group. */
+  /** Returns an encoding of scenes whose steps are measured with a frame of the first group. */
   async #tune(cloud: GaussianCloud): Promise<Encoding> {
     const { device, encodeWebp, onStep = () => undefined } = this.#options;
     const judge = await judgeOf(device, cloud, 3, 1);
@@ -212,8 +218,8 @@ class ClipCoder {
   }
 
   /**
-   * Finds the steps that reach the target in a frame of the first group, with equal error reduction per byte in all
-   * attributes.
+   * Finds the steps of motion that reach the target in a frame of the first group, balanced between attributes by
+   * {@link findSteps}.
    */
   async #findSteps(
     parts: readonly TrackedPart[],
@@ -261,7 +267,7 @@ const usualSteps = (cloud: GaussianCloud): MotionSteps => ({
 const bytesOf = ({ parts }: Pick<WrittenGroup, 'parts'>): number =>
   parts.reduce((sum, part) => sum + part.bytes.length, 0);
 
-/** A frame of a group, and the evaluator that compares others with it. */
+/** Index of a frame in a group, and an evaluator that compares clouds with this frame. */
 interface FrameJudge {
   readonly frame: number;
   readonly judge: GpuEvaluator;
@@ -283,7 +289,7 @@ async function errorsIn(judges: readonly FrameJudge[], parts: readonly ClipPartC
   return errors;
 }
 
-/** Finds the enlargement with which splats of the coarse part represent all best. */
+/** Returns the factor of the scales of the coarse part's splats with the smallest error against all splats. */
 async function growthIn({ judge, frame }: FrameJudge, [coarse]: readonly ClipPartContent[]): Promise<number> {
   const cloud = frameOf([coarse], frame);
   let [best, min] = [1, Infinity];

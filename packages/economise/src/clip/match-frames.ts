@@ -2,39 +2,41 @@ import { shCoefficientCount, type GaussianCloud } from '@gaussian-splat/core';
 import { PlaceGrid } from './place-grid.js';
 
 /**
- * Units that make the differences of a match comparable; a pair of splats matches at a cost of {@link MAX_COST} or
- * less.
+ * Differences of color (constant coefficients), size (natural logarithm), opacity and shape that add 1 to the cost of a
+ * match. Splats match at a cost of {@link MAX_COST} or less.
  */
 const COLOR_UNIT = 0.25;
 const SIZE_UNIT = 0.5;
 const OPACITY_UNIT = 0.35;
 const SHAPE_UNIT = 0.3;
 const MAX_COST = 6;
-/** A match below this cost ends the search. */
+/** Cost of a match below which the search ends. */
 const SURE = 0.01;
-/** Search radius, in typical distances between neighbors. */
+/** Search radius in typical distances between neighbors. */
 const RADIUS = 3;
-/** Number of rounds: splats whose best match was taken search again in the next. */
+/** Number of rounds. Splats whose best match belongs to another splat search again in the next round. */
 const ROUNDS = 3;
-/** Fraction of splats with equal indices that must match for indices to identify splats. */
+/** Minimum fraction of matching splats with equal indices, so that indices identify splats. */
 const SAME_NUMBERS = 0.9;
-/** A pair is doubtful if its cost of looks is above this multiple of the median, and above a minimum. */
+/** Multiple of the median {@link lookCost} above which a pair is doubtful. */
 const DOUBT = 9;
 const MIN_DOUBT = 0.1;
 /**
- * Passes over the unmatched splats, with a radius from their own distances, and the maximum cost of their pairs. All but
- * the last find pairs of the same looks.
+ * Number of passes over the unmatched splats. All passes except the last find only pairs of the same appearance.
  */
 const SPARSE_PASSES = 3;
+/** Search radius of these passes, in typical distances between unmatched splats. */
+const SPARSE_RADIUS = 7.5;
+/** Maximum cost of a pair in these passes. */
 const SPARSE_COST = 2;
 const MIN_SIZE = 1e-12;
 
-/** Features for matching splats. */
+/** Features that the matching of splats compares. */
 export interface Features {
   readonly count: number;
-  /** [N, 3] in world units, relative to the origin of the sequence. */
+  /** [N, 3] positions in units of the scene, relative to the origin of the sequence. */
   readonly positions: Float32Array;
-  /** [N, 11]: constant coefficients, size, opacity and shape, each divided by its unit. */
+  /** [N, 11] constant coefficients (3), size, opacity and shape (6), each divided by its unit. */
   readonly looks: Float32Array;
 }
 
@@ -61,7 +63,7 @@ export function featuresOf(cloud: GaussianCloud, origin: readonly number[]): Fea
   return { count, positions, looks };
 }
 
-/** Covariance scaled to trace 1, which does not depend on the order of the axes. */
+/** Writes the shape of splat `i`: its covariance scaled to trace 1, which does not depend on the order of its axes. */
 function putShape({ rotations, scales }: GaussianCloud, i: number, looks: Float32Array, at: number): void {
   const [w, x, y, z] = [rotations[4 * i], rotations[4 * i + 1], rotations[4 * i + 2], rotations[4 * i + 3]];
   const axes = [
@@ -82,9 +84,9 @@ function putShape({ rotations, scales }: GaussianCloud, i: number, looks: Float3
 }
 
 /**
- * Matches the splats of a frame with those of the previous one.
- * @param before Its positions are those expected in the next frame.
- * @returns [splats of `next`] index in `before`, or -1 for a new splat.
+ * Matches the splats of a frame with those of the previous frame.
+ * @param before Splats of the previous frame at the positions that are expected in the next frame.
+ * @returns [splats of `next`] index of the match in `before`, or -1 for a new splat.
  */
 export function matchFrames(before: Features, next: Features): Int32Array {
   const grid = PlaceGrid.of(next.positions, next.count, RADIUS);
@@ -95,7 +97,7 @@ export function matchFrames(before: Features, next: Features): Int32Array {
   byPlace(before, next, { grid, looking, found, max: MAX_COST });
   const { doubtful, limit } = doubtfulOf(before, next, found);
   for (const { j } of doubtful) found[j] = -1;
-  // Fast and sparse splats, such as spray, move farther than the typical distance of neighbors.
+  // Fast and sparse splats, such as spray, move farther than the typical distance between neighbors.
   for (let pass = 0; pass < SPARSE_PASSES; pass++) {
     const open = whichOf(found, (owner) => owner < 0);
     looking = whichOf(matchedIn(found, before.count), (is) => is === 0);
@@ -103,7 +105,7 @@ export function matchFrames(before: Features, next: Features): Int32Array {
     const rest = featuresAt(next, open);
     const own = new Int32Array(open.length).fill(-1);
     byPlace(before, rest, {
-      ...{ grid: PlaceGrid.of(rest.positions, rest.count, RADIUS), looking, found: own },
+      ...{ grid: PlaceGrid.of(rest.positions, rest.count, SPARSE_RADIUS), looking, found: own },
       max: SPARSE_COST,
       maxLooks: pass < SPARSE_PASSES - 1 ? limit : Infinity,
     });
@@ -114,23 +116,23 @@ export function matchFrames(before: Features, next: Features): Int32Array {
   return found;
 }
 
-/** [count] 1 for each splat of the previous frame that has a partner. */
+/** Returns which of the `count` splats of the previous frame have a match: 1, otherwise 0. */
 function matchedIn(found: Int32Array, count: number): Uint8Array {
   const isMatched = new Uint8Array(count);
   for (const owner of found) if (owner >= 0) isMatched[owner] = 1;
   return isMatched;
 }
 
-/** Indices of a splat of the previous frame and of its partner in the next one. */
+/** A match: index `i` of a splat in the previous frame, and index `j` in the next frame. */
 interface Pair {
   readonly i: number;
   readonly j: number;
 }
 
 /**
- * Pairs whose looks differ by much more than those of most pairs: the true partner may have moved farther than the
- * search went, as after a birth, when the velocity is unknown. They search again, and return to one another if neither
- * finds another partner.
+ * Returns the pairs whose appearance differs much more than that of most pairs, and the limit of {@link lookCost} for
+ * this. Their correct matches may be beyond the search radius, as after a birth, when the velocity is unknown. Both splats
+ * search again, and the pair remains if neither finds another match.
  */
 function doubtfulOf(before: Features, next: Features, found: Int32Array): { doubtful: readonly Pair[]; limit: number } {
   const apart = new Float32Array(next.count).fill(-1);
@@ -148,7 +150,7 @@ function doubtfulOf(before: Features, next: Features, found: Int32Array): { doub
   };
 }
 
-/** Cost of different colors, sizes and shapes; opacity is left out, because births and deaths are fades. */
+/** Returns the cost of different colors, sizes and shapes. Opacity is excluded, because births and deaths are fades. */
 function lookCost(a: Features, i: number, b: Features, j: number): number {
   let cost = 0;
   for (let k = 0; k < LOOKS; k++) if (k !== OPACITY) cost += (a.looks[LOOKS * i + k] - b.looks[LOOKS * j + k]) ** 2;
@@ -170,7 +172,7 @@ function featuresAt({ positions, looks }: Features, chosen: Uint32Array): Featur
   return { count: chosen.length, ...own };
 }
 
-/** Cost of a match, or any number of at least `enough`. */
+/** Returns the cost of a match; any number of at least `enough` if the cost is larger. @param unit Unit of distances. */
 function costOf(a: Features, i: number, b: Features, j: number, unit: number, enough = Infinity): number {
   let cost = 0;
   for (let k = 0; k < 3; k++) cost += ((a.positions[3 * i + k] - b.positions[3 * j + k]) / unit) ** 2;
@@ -178,7 +180,7 @@ function costOf(a: Features, i: number, b: Features, j: number, unit: number, en
   return cost;
 }
 
-/** Matches by index if enough splats keep theirs; undefined otherwise. */
+/** Matches splats by index, if enough splats with equal indices match. Undefined otherwise. */
 function byNumber(before: Features, next: Features, unit: number): Int32Array | undefined {
   if (before.count !== next.count) return undefined;
   const found = new Int32Array(next.count).fill(-1);
@@ -193,16 +195,20 @@ function byNumber(before: Features, next: Features, unit: number): Int32Array | 
 
 interface Search {
   readonly grid: PlaceGrid;
-  /** Splats of the previous frame that search a match. */
+  /** Indices of the splats in the previous frame that search a match. */
   readonly looking: Uint32Array;
-  /** [splats of the next frame] index in the previous one, or -1; written. */
+  /** [splats of the next frame] index of the match in the previous frame, or -1. The search sets it. */
   readonly found: Int32Array;
+  /** Maximum cost of a match. */
   readonly max: number;
-  /** Maximum cost of looks; default: no limit. */
+  /** Maximum {@link lookCost} of a match; default no limit. */
   readonly maxLooks?: number;
 }
 
-/** Finds the cheapest pairs: if several splats choose the same one, the nearest gets it, and the others search again. */
+/**
+ * Finds the matches with the smallest cost. If several splats choose the same match, the one with the smallest cost gets
+ * it, and the others search again.
+ */
 function byPlace(before: Features, next: Features, { grid, found, max, maxLooks = Infinity, ...search }: Search): void {
   const costs = new Float32Array(next.count);
   let { looking } = search;

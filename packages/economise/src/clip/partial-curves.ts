@@ -1,60 +1,83 @@
 import { mainCurves } from '../motion/main-curves.js';
 import { followed, type Followed } from '../motion/write-motion.js';
 
-/** Range of valid frames of a row. */
+/** Returns the range of valid frames of a row: from `first` to `end`, excluding `end`. */
 export type Span = (row: number) => readonly [first: number, end: number];
 
 const ROUNDS = 2;
-/** Missing frames are predicted from at most this number of curves. */
+/** Maximum number of curves that predict missing frames. */
 const MAX_CURVES = 10;
 /** Maximum number of curves for a row with missing frames, because the cost of a fit grows with its third power. */
 const MAX_FITTED = 20;
-/** Minimum fraction of valid frames for fitting a parabola. */
+/** Minimum fraction of valid frames of the rows that estimate the typical weights of parabolas. */
 const LONG = 0.3;
-/** Minimum noise, as a fraction of the typical power of rows: limits the weights that short lifetimes determine. */
-const MIN_NOISE = 1e-6;
-/** Sampled rows for the typical weight of each curve. */
+/** Minimum noise of a fit, as a fraction of the typical power of rows. It limits weights of rows with few frames. */
+const MIN_NOISE = 1e-10;
+/** Approximate number of rows that are sampled for the typical weight of each curve. */
 const SAMPLES = 4000;
 
 /**
- * Finds the curves that rows follow most in their valid frames, and their weights for each row; in the other frames
- * rows are replaced by the continuation of the curves.
- * @param changes [rows, frames]; invalid entries are overwritten.
- * @param least See `minCurve`.
+ * Finds the curves that approximate rows best in their valid frames, and their weights for each row. Rows that are valid
+ * in all frames have different curves than other rows, because they rarely move alike. A weight of 0 needs almost no bits.
+ * @param changes [rows, frames] changes; those of invalid frames are overwritten.
+ * @param min Minimum root mean square weight of a curve; see `minCurve`.
  */
 export function followedWithin(changes: Float32Array, frames: number, span: Span, min: number): Followed {
   const rows = changes.length / frames;
-  const partial: number[] = [];
+  const [staying, passing]: [number[], number[]] = [[], []];
   for (let row = 0; row < rows; row++) {
     const [first, end] = span(row);
-    if (end - first < frames) partial.push(row);
+    (end - first < frames ? passing : staying).push(row);
   }
+  if (passing.length === 0) return followed(changes, frames, min);
+  if (staying.length === 0) return followedPartly(changes, frames, span, min);
+  const found = [staying, passing].map((own) => {
+    const picked = new Float32Array(frames * own.length);
+    own.forEach((row, k) => picked.set(changes.subarray(frames * row, frames * (row + 1)), frames * k));
+    // A part of the rows has these curves, so that their mean weight over all rows is smaller.
+    const ownMin = min * Math.sqrt(rows / own.length);
+    if (own === staying) return followed(picked, frames, ownMin);
+    return followedPartly(picked, frames, (k) => span(own[k]), ownMin);
+  });
+  // A file has at most as many curves as frames.
+  if (found.reduce((sum, { curves }) => sum + curves.length, 0) > frames)
+    return followedPartly(changes, frames, span, min);
+  const spread = (own: readonly number[], shares: Float32Array): Float32Array => {
+    const all = new Float32Array(rows);
+    own.forEach((row, k) => (all[row] = shares[k]));
+    return all;
+  };
+  return {
+    ...{ rows, frames },
+    curves: found.flatMap(({ curves }) => curves),
+    shares: found.flatMap(({ shares }, kind) => shares.map((own) => spread([staying, passing][kind], own))),
+  };
+}
+
+/** Finds curves of rows with missing frames. Repeatedly predicts missing frames from curves, and finds the curves again. */
+function followedPartly(changes: Float32Array, frames: number, span: Span, min: number): Followed {
+  const rows = changes.length / frames;
   const complete = (curves: readonly Float64Array[], powers: readonly number[]): void => {
     const fit = new RowFit(curves, powers, min);
-    for (const row of partial) {
+    for (let row = 0; row < rows; row++) {
       const own = changes.subarray(frames * row, frames * (row + 1));
       const [first, end] = span(row);
       const shares = fit.of(own, first, end);
       for (let f = 0; f < frames; f++) if (f < first || f >= end) own[f] = sumOf(curves, shares, f);
     }
   };
-  if (partial.length > 0) {
-    const polynomials = parabolas(frames);
-    complete(polynomials, longPowers(changes, frames, span, polynomials));
-  }
-  for (let round = 0; partial.length > 0 && round < ROUNDS; round++) {
+  const polynomials = parabolas(frames);
+  complete(polynomials, longPowers(changes, frames, span, polynomials));
+  for (let round = 0; round < ROUNDS; round++) {
     const curves = mainCurves(changes, frames, min).slice(0, MAX_CURVES);
     complete(curves, powersOf(changes, frames, curves));
   }
   const found = followed(changes, frames, min);
-  const { curves, shares } = found;
-  if (partial.length > 0 && curves.length > 0) {
-    const main = curves.slice(0, MAX_FITTED);
-    const fit = new RowFit(main, powersOf(changes, frames, main), min);
-    for (const row of partial) {
-      const own = fit.of(changes.subarray(frames * row, frames * (row + 1)), ...span(row));
-      shares.forEach((share, k) => (share[row] = own[k] ?? 0));
-    }
+  const main = found.curves.slice(0, MAX_FITTED);
+  const fit = new RowFit(main, powersOf(changes, frames, main), min);
+  for (let row = 0; row < rows && main.length > 0; row++) {
+    const own = fit.of(changes.subarray(frames * row, frames * (row + 1)), ...span(row));
+    found.shares.forEach((share, k) => (share[row] = own[k] ?? 0));
   }
   return found;
 }
@@ -66,8 +89,8 @@ const sumOf = (curves: readonly Float64Array[], shares: Float64Array, frame: num
 };
 
 /**
- * Legendre polynomials up to degree two over the frames, each with a root mean square of about 1, because thrown
- * objects follow them.
+ * Returns the Legendre polynomials of degree 0 to 2 over the frames, with a root mean square of about 1. Thrown objects
+ * move along such parabolas.
  */
 function parabolas(frames: number): Float64Array[] {
   const of = (value: (x: number) => number): Float64Array =>
@@ -75,7 +98,7 @@ function parabolas(frames: number): Float64Array[] {
   return [of(() => 1), of((x) => Math.sqrt(3) * x), of((x) => Math.sqrt(5) * (1.5 * x * x - 0.5))];
 }
 
-/** Mean squared weight of each curve over rows with enough frames. */
+/** Returns the mean squared weight of each curve over rows with enough valid frames. */
 function longPowers(changes: Float32Array, frames: number, span: Span, curves: readonly Float64Array[]): number[] {
   const rows = changes.length / frames;
   const fit = new RowFit(
@@ -97,7 +120,7 @@ function longPowers(changes: Float32Array, frames: number, span: Span, curves: r
   return sums.map((sum) => sum / Math.max(1, used));
 }
 
-/** Mean squared weight of each curve over the rows. */
+/** Returns the mean squared weight of each curve over rows without missing frames. */
 function powersOf(changes: Float32Array, frames: number, curves: readonly Float64Array[]): number[] {
   const rows = changes.length / frames;
   const stride = Math.max(1, Math.floor(rows / SAMPLES));
@@ -112,7 +135,7 @@ function powersOf(changes: Float32Array, frames: number, curves: readonly Float6
   });
 }
 
-/** Least squares fit of rows with missing frames; the weights of unusual curves are regularized towards 0. */
+/** Least squares fit of rows with missing frames. Regularization reduces the weights of curves with little power. */
 class RowFit {
   readonly #curves: readonly Float64Array[];
   readonly #weights: readonly number[];
@@ -128,7 +151,7 @@ class RowFit {
     this.#solution = new Float64Array(curves.length);
   }
 
-  /** Weights of a row's curves, fitted to the frames from `first` on, before `end`. The array is reused. */
+  /** Returns the weight of each curve, fitted to the frames `first` to `end` of a row. The next call reuses the array. */
   of(row: Float32Array, first: number, end: number): Float64Array {
     const [curves, matrix, solution] = [this.#curves, this.#matrix, this.#solution];
     const size = curves.length;
@@ -147,7 +170,10 @@ class RowFit {
   }
 }
 
-/** Solves a symmetric positive definite system with a Cholesky factorization; only the lower triangle is given. */
+/**
+ * Solves a symmetric positive definite system by a Cholesky factorization of the lower triangle of `matrix`, in place.
+ * @param solution Right side of the system; becomes its solution.
+ */
 function solveInPlace(matrix: Float64Array, solution: Float64Array, size: number): void {
   for (let a = 0; a < size; a++) {
     for (let b = 0; b <= a; b++) {

@@ -1,18 +1,19 @@
-/** The distance between neighbors is estimated from this number of splats. */
+/** Maximum number of splats that estimate the typical distance between neighbors. */
 const SAMPLES = 200;
 
-/** A hash grid of points, for finding those near a position without visiting the others. */
+/** A hash grid of points, which finds the points near a position. */
 export class PlaceGrid {
-  /** Side of a cell in world units; points farther away may not be found. */
+  /** Side of a cell in units of the scene. Points farther away may not be found. */
   readonly cell: number;
-  /** [N, 3] cells of the points, in the order of `#points`. */
+  /** [N, 3] cell of each point, in the order of `#points`. */
   readonly #cells: Int32Array;
   readonly #mask: number;
-  /** Index of the first point in each bucket. */
+  /** For each bucket, index in `#points` of its first point. */
   readonly #starts: Uint32Array;
+  /** [N] indices of the points, sorted by bucket. */
   readonly #points: Uint32Array;
 
-  /** @param cells Side of a cell, in typical distances between neighbors. */
+  /** Returns a grid of points, [N, 3]. @param cells Side of a cell in typical distances between neighbors. */
   static of(positions: Float32Array, count: number, cells: number): PlaceGrid {
     return new PlaceGrid(positions, count, cells * spacingOf(positions, count));
   }
@@ -41,8 +42,8 @@ export class PlaceGrid {
   }
 
   /**
-   * Visits each point in the 27 cells around point `i` of other positions, those of its own cell first, until a call
-   * returns true.
+   * Calls `isEnough` with each point in the 27 cells around row `i` of `positions`, until a call returns true. Points in
+   * the central cell come first.
    */
   forEachNear(positions: Float32Array, i: number, isEnough: (point: number) => boolean): void {
     const x = Math.floor(positions[3 * i] / this.cell);
@@ -73,8 +74,8 @@ export class PlaceGrid {
 }
 
 /**
- * Median distance of a sampled splat to its nearest neighbor among all others, searched along the axis with the largest
- * extent.
+ * Returns the typical distance between neighbors: the median, over a sample, of the distance to the nearest other point.
+ * 1 for fewer than two points.
  */
 function spacingOf(positions: Float32Array, count: number): number {
   if (count < 2) return 1;
@@ -95,7 +96,11 @@ function spacingOf(positions: Float32Array, count: number): number {
   return Math.max(distances[distances.length >> 1], 1e-6 * (spread[axis] || 1));
 }
 
-/** Distance to the nearest other point, by a sweep along an axis in both directions. */
+/**
+ * Returns the distance to the nearest other point, by a sweep along an axis in both directions.
+ * @param order Indices of all points, sorted along the axis.
+ * @param place Index in `order` of the point.
+ */
 function nearest(positions: Float32Array, order: Uint32Array, place: number, axis: number): number {
   const own = order[place];
   let min = Infinity;

@@ -3,18 +3,18 @@ import { ANIMATED_ATTRIBUTES, type AnimatedAttributeName } from '@gaussian-splat
 import { turnBetween } from '../motion/write-motion.js';
 import type { Tracks } from './tracks.js';
 
-/** Some of the splats of tracks. */
+/** Splats of some tracks. */
 export interface TrackedSplats {
   readonly cloud: GaussianCloud;
-  /** [tracks] index of a track in the cloud, or -1 if it is not included. */
+  /** [tracks] index in the cloud of each track's splat, or -1 if the cloud does not have it. */
   readonly placeOf: Int32Array;
 }
 
 const EPSILON = 1e-12;
 
 /**
- * [width · splats, frames] difference of each number of an attribute from the cloud; constant before and after a
- * splat's lifetime. Undefined if nothing differs.
+ * Returns the difference of each number of an attribute from the cloud over the frames, [numbers · splats, frames]. It is
+ * constant before and after the lifetime of a splat. Undefined if no number changes.
  */
 export function changesOfTracks(
   tracks: Tracks,
@@ -51,7 +51,7 @@ export function changesOfTracks(
   return changes;
 }
 
-/** Writes the numbers of splat `i` of a frame minus those of splat `place` of the cloud. */
+/** Writes the differences of splat `i` of a frame from splat `place` of the cloud, in the units of `AnimatedAttribute`. */
 type Read = (frame: GaussianCloud, i: number, place: number, out: Float64Array) => void;
 
 function numbersOf(name: Exclude<AnimatedAttributeName, 'rotation'>, cloud: GaussianCloud): Read {
@@ -75,7 +75,7 @@ function numbersOf(name: Exclude<AnimatedAttributeName, 'rotation'>, cloud: Gaus
   return reads[name];
 }
 
-/** Rotation vectors, each in the branch nearest to that of the previous frame. */
+/** Returns a function that writes rotation vectors. Of the vectors of a rotation, it selects that nearest to the last. */
 function turnsOf({ cloud }: TrackedSplats): Read {
   const last = new Float64Array(4 * cloud.count);
   const turn = new Float64Array(4);
@@ -89,7 +89,7 @@ function turnsOf({ cloud }: TrackedSplats): Read {
     turnBetween(from, to, 0, turn);
     let cosine = 0;
     for (let k = 0; k < 4; k++) cosine += last[4 * place + k] * turn[k];
-    // For a splat without a previous frame, the smaller of both angles.
+    // For a splat without a previous frame, the vector with the smaller angle is selected.
     const sign = (cosine || turn[0]) < 0 ? -1 : 1;
     for (let k = 0; k < 4; k++) last[4 * place + k] = turn[k] *= sign;
     const length = Math.hypot(turn[1], turn[2], turn[3]);

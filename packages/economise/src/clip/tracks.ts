@@ -3,18 +3,18 @@ import type { Lives } from '@gaussian-splat/formats';
 import { alignAxes } from '../motion/near-axes.js';
 import { featuresOf, matchFrames, type Features } from './match-frames.js';
 
-/** Splats that are tracked from frame to frame. */
+/** Tracks of a group of frames. A track is a splat that is identified in consecutive frames. */
 export interface Tracks {
   readonly count: number;
-  /** Frames with a consistent order of axes for each splat. */
+  /** Frames with a consistent order of axes for the splats of each track. */
   readonly frames: readonly GaussianCloud[];
-  /** [frames] of [splats of the frame]: index of the track. */
+  /** For each frame, the track of each splat, [splats of the frame]. */
   readonly of: readonly Int32Array[];
   /** Lifetime of each track. */
   readonly lives: Lives;
 }
 
-/** Tracks splats through frames: unmatched splats start a track, and tracks without a match end. */
+/** Finds the tracks of frames by {@link matchFrames}. Unmatched splats begin a track, and tracks without a match end. */
 export function followSplats(sources: readonly GaussianCloud[]): Tracks {
   const { origin } = sources[0];
   const frames: GaussianCloud[] = [sources[0]];
@@ -53,7 +53,7 @@ function velocitiesOf(before: Features, next: Features, matches: Int32Array): Fl
   return velocities;
 }
 
-/** Squared differences of logarithms and of quaternions above which the axes of a splat may have been reordered. */
+/** Sum of squared differences of scales' logarithms and quaternions above which a splat's axes may be reordered. */
 const SAME_AXES = 0.05;
 
 function withAxesOf(cloud: GaussianCloud, before: GaussianCloud, matches: Int32Array): GaussianCloud {
@@ -72,7 +72,7 @@ function withAxesOf(cloud: GaussianCloud, before: GaussianCloud, matches: Int32A
   return isSame ? cloud : alignAxes(cloud, { ...cloud, rotations, scales });
 }
 
-/** The splats of all tracks, each from the frame of its largest opacity. */
+/** Returns a cloud with a splat for each track, copied from the frame of its largest opacity. */
 export function cloudOfTracks({ count, frames, of }: Tracks): GaussianCloud {
   const [model] = frames;
   const shNumbers = 3 * shCoefficientCount(model.shDegree);

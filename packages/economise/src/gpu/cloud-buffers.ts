@@ -18,14 +18,14 @@ import {
 
 const { CULL_GROUP, SHAPE_SCALE, COLOR_COEFFICIENT_MAJOR } = constants;
 
-/** Numbers of each attribute of a cloud for a splat. */
+/** Returns the count of numbers of each attribute for a splat. */
 function widthsOf(degree: ShDegree) {
   return { positions: 3, scales: 3, rotations: 4, sh: 3 * shCoefficientCount(degree), opacities: 1 } as const;
 }
 
 /**
- * A cloud on the GPU, packed by the stage for generator outputs in a tenth of the CPU time. Splats keep the order of
- * the cloud, so that a slot is a splat's index; harmonics are float16. Unusable splats are not drawn.
+ * A cloud on the GPU. The stage for generator outputs packs it, in a tenth of the CPU time of other scenes. Splats keep
+ * the order of the cloud, so that a slot is the index of a splat. Harmonics are float16. Unusable splats are not drawn.
  */
 export class CloudBuffers implements GaussianScene {
   readonly count: number;
@@ -35,7 +35,7 @@ export class CloudBuffers implements GaussianScene {
   readonly filterVariance: number | undefined;
   readonly origin: GaussianScene['origin'];
   readonly version = 0;
-  readonly pages: readonly GaussianBlock[];
+  readonly blocks: readonly GaussianBlock[];
   readonly #memory: GpuMemory;
 
   private constructor(device: GPUDevice, cloud: GaussianCloud, memory: GpuMemory, pageSplats: number) {
@@ -55,12 +55,12 @@ export class CloudBuffers implements GaussianScene {
       pack(device, cloud, first, page);
       pages.push(page);
     }
-    this.pages = pages;
+    this.blocks = pages;
   }
 
   /**
    * Uploads and packs a cloud.
-   * @param pageSplats Maximum number of splats in a block; default: the limits of the device.
+   * @param pageSplats Maximum number of splats in a block. By default, only the limits of the device apply.
    * @throws GaussianSplatError `argument/cloud` if the arrays do not match `count` and `shDegree`; `out-of-memory/*`
    */
   static async upload(device: GPUDevice, cloud: GaussianCloud, pageSplats = Infinity): Promise<CloudBuffers> {
@@ -80,7 +80,7 @@ export class CloudBuffers implements GaussianScene {
   }
 }
 
-/** An empty block for the stage `ingest`. */
+/** Allocates a block of `count` splats, which the stage `ingest` fills. */
 export function pageOf(memory: GpuMemory, degree: ShDegree, count: number): GaussianBlock {
   const { storage, copySource } = BUFFER_USAGE;
   const buffer = (name: string, bytes: number): GPUBuffer =>
@@ -93,7 +93,7 @@ export function pageOf(memory: GpuMemory, degree: ShDegree, count: number): Gaus
   };
 }
 
-/** Packs the splats of a block, from `first` on. The memory of the uploaded arrays is freed afterwards. */
+/** Uploads and packs the splats of a block, from index `first` of the cloud on. Frees the uploaded arrays afterwards. */
 function pack(device: GPUDevice, cloud: GaussianCloud, first: number, page: GaussianBlock): void {
   const passing = new GpuMemory(device);
   try {
@@ -120,7 +120,7 @@ function pack(device: GPUDevice, cloud: GaussianCloud, first: number, page: Gaus
   }
 }
 
-/** `Ingest` parameters of rows that are all live. */
+/** Returns a uniform buffer of `Ingest` for `count` rows. Each row is a splat. */
 function uniformOf(memory: GpuMemory, degree: ShDegree, count: number): GPUBuffer {
   const bytes = new ArrayBuffer(Ingest.size);
   const { positions, scales, rotations, sh, opacities } = widthsOf(degree);

@@ -10,17 +10,23 @@ import type { ScenePart, SceneParts } from './scene-parts.js';
 const DEGREES = 4;
 
 /**
- * A copy of a scene on the GPU that cuts are applied to: removed splats become transparent, and colors lose bands.
- * Chunks keep their bounds.
+ * A copy of a scene on the GPU that cuts modify. Removed splats become transparent, and colors lose bands. The
+ * bounds of chunks do not change.
  */
 export class CutScene implements GaussianScene {
-  readonly pages: readonly GaussianBlock[];
+  readonly count: number;
+  readonly shDegree: GaussianScene['shDegree'];
+  readonly shPrecision: GaussianScene['shPrecision'];
+  readonly antialiased: boolean;
+  readonly filterVariance: number | undefined;
+  readonly origin: GaussianScene['origin'];
+  readonly blocks: readonly GaussianBlock[];
   readonly #device: GPUDevice;
   readonly #scene: SceneParts;
   readonly #memory: GpuMemory;
   readonly #uniforms: readonly GPUBuffer[];
   readonly #kept: GPUBuffer;
-  /** For each part: the degree that each splat keeps, or GONE. */
+  /** For each part of the scene, the degree that each splat keeps, or GONE if it is removed. */
   readonly #choices: readonly GPUBuffer[];
   readonly #bindings: readonly GPUBindGroup[];
   #version = 0;
@@ -28,11 +34,19 @@ export class CutScene implements GaussianScene {
   private constructor(device: GPUDevice, scene: SceneParts, memory: GpuMemory) {
     this.#device = device;
     this.#scene = scene;
+    ({
+      count: this.count,
+      shDegree: this.shDegree,
+      shPrecision: this.shPrecision,
+      antialiased: this.antialiased,
+      filterVariance: this.filterVariance,
+      origin: this.origin,
+    } = scene.gaussians);
     this.#memory = memory;
     const { uniform, storage, copySource, copyDestination } = BUFFER_USAGE;
     const copyOf = (name: string, buffer: GPUBuffer): GPUBuffer =>
       memory.buffer(`gs.economise.cut_${name}`, buffer.size, storage | copySource);
-    this.pages = scene.parts.map(({ page }) => ({
+    this.blocks = scene.parts.map(({ page }) => ({
       ...page,
       geometry: copyOf('geometry', page.geometry),
       sh: copyOf('sh', page.sh),
@@ -47,7 +61,7 @@ export class CutScene implements GaussianScene {
     this.#bindings = scene.parts.map((part, p) => this.#bind(part, p));
   }
 
-  /** @throws GaussianSplatError `out-of-memory/*` */
+  /** Allocates the copy of a scene. @throws GaussianSplatError `out-of-memory/*` */
   static async of(device: GPUDevice, scene: SceneParts): Promise<CutScene> {
     const memory = new GpuMemory(device);
     try {
@@ -59,36 +73,17 @@ export class CutScene implements GaussianScene {
     }
   }
 
-  get count(): number {
-    return this.#scene.gaussians.count;
-  }
-  get shDegree(): GaussianScene['shDegree'] {
-    return this.#scene.gaussians.shDegree;
-  }
-  get shPrecision(): GaussianScene['shPrecision'] {
-    return this.#scene.gaussians.shPrecision;
-  }
-  get antialiased(): boolean {
-    return this.#scene.gaussians.antialiased;
-  }
-
-  get filterVariance(): number | undefined {
-    return this.#scene.gaussians.filterVariance;
-  }
-  get origin(): GaussianScene['origin'] {
-    return this.#scene.gaussians.origin;
-  }
   get version(): number {
     return this.#version;
   }
 
-  /** Applies a cut to the whole scene. Splats must have been scored. */
+  /** Applies a cut to the original scene, and writes the result to the copy. Splats must have been scored before. */
   apply({ minContribution = 0, removalPrice = 0, colorPrice = 0 }: Cut): void {
     const kernel = rareKernelOf(this.#device, economiseCut);
     const bytes = new ArrayBuffer(layouts.Cut.size);
     const prices = {
       min_contribution: minContribution,
-      // WGSL has no infinity.
+      // WGSL has no infinity. UNJUDGED is its substitute in scores.
       removal_price: Math.min(removalPrice, UNJUDGED),
       color_price: colorPrice,
     };
@@ -105,13 +100,16 @@ export class CutScene implements GaussianScene {
     this.#version++;
   }
 
-  /** [4] number of splats after the last cut, by the degree that they keep. */
+  /** Returns the number of splats of each degree after the last cut, [4]. */
   async degrees(): Promise<number[]> {
     const [counts] = await readBack(this.#device, [{ buffer: this.#kept, byteLength: 4 * DEGREES }]);
     return [...new Uint32Array(counts)];
   }
 
-  /** Result of the last cut: indices of remaining splats, and the degree of each of the scene's splats. */
+  /**
+   * Returns the result of the last cut: ascending indices of the remaining splats, and for all splats of the scene the
+   * degree that they keep (0 for removed ones).
+   */
   async choice(): Promise<{ staying: Uint32Array; degrees: Uint8Array }> {
     const parts = this.#scene.parts.map(({ page }, p) => ({ buffer: this.#choices[p], byteLength: 4 * page.count }));
     const staying = new Uint32Array(this.count);
@@ -132,7 +130,7 @@ export class CutScene implements GaussianScene {
   }
 
   #bind({ page, scores, lowered }: ScenePart, p: number): GPUBindGroup {
-    const { geometry, sh } = this.pages[p];
+    const { geometry, sh } = this.blocks[p];
     return rareKernelOf(this.#device, economiseCut).bind({
       ...{ cut: this.#uniforms[p], gaussians: page.geometry, sh: page.sh, scores, lowered },
       ...{ cut_gaussians: geometry, cut_sh: sh, kept: this.#kept, choices: this.#choices[p] },

@@ -2,7 +2,7 @@ import type { GaussianCloud } from '@gaussian-splat/core';
 import type { Viewpoint } from '@gaussian-splat/renderer';
 import { isOfPlanes, rareKernelOf } from '@gaussian-splat/renderer/stages';
 import { readBack } from '@gaussian-splat/renderer/tools';
-import type { SplatVisibility } from '../pages/seen-splats.js';
+import type { SplatVisibility } from '../pages/splat-visibility.js';
 import type { CutFigures, Evaluator, EvaluationViews } from '../evaluator.js';
 import * as shaders from '../generated/shaders.js';
 import { stayingInOrder } from '../order.js';
@@ -18,32 +18,32 @@ import { putLowered } from './put-lowered.js';
 import { SceneParts, loweredNumbers } from './scene-parts.js';
 import { SceneScorer } from './scene-scorer.js';
 import { exactViewpoint } from './show.js';
-import { seenIn } from './seen-splats.js';
+import { seenIn } from './splat-visibility.js';
 
 export interface GpuEvaluatorOptions {
-  /** Maximum number of splats that are bound at once, for tests; default: the limits of the device. */
+  /** Maximum number of splats of a binding, for tests. By default, only the limits of the device apply. */
   readonly partSplats?: number;
-  /** Number of views whose energies are stored until they are added to the moments of color, default 32. */
+  /** Number of views whose energies are stored before they are added to the moments of color; default 32. */
   readonly viewsAtOnce?: number;
-  /** Extracts the remaining splats from the cloud in parallel; default {@link inline}. */
+  /** Pool that extracts the remaining splats from the cloud in parallel; default {@link inline}. */
   readonly pool?: TaskPool;
-  /** Called with the number of scored views. */
+  /** Called with the number of views that have been scored, and the number of all scoring views. */
   readonly onScored?: (views: number, all: number) => void;
 }
 
-/** Shaders whose pipelines are created once for a device. */
+/** Shaders whose pipelines are compiled once for each device. */
 const STAGES = [
   ...[shaders.economiseScore, shaders.economiseMoments, shaders.economiseLower, shaders.economiseCut],
   ...[shaders.economiseTake, shaders.imageError, shaders.imageErrorSum],
 ];
 
-/** Their size is then a fourth of that of the moments. */
+/** Default of `viewsAtOnce`, with which the size of energies is a fourth of the size of moments. */
 const VIEWS_AT_ONCE = 32;
 
 /**
- * Scores and compares on the GPU. The scene is uploaded and packed once; a cut is applied to a copy there, and only the
- * errors of its images are read back. For each splat of degree 3 it takes 256 bytes of GPU memory for the scene and its
- * copy, and 872 for scores and colors, and 16 for each pixel of the views for measuring errors.
+ * Evaluator that scores and compares scenes on the GPU. The scene is uploaded and packed once. Cuts are applied to a copy
+ * on the GPU, and only the errors of its images are read back. GPU memory for each splat of degree 3: 256 bytes for the
+ * scene and its copy, and 872 bytes for scores and colors. Each pixel of the views that measure errors needs 16 bytes.
  */
 export class GpuEvaluator implements Evaluator {
   readonly #device: GPUDevice;
@@ -56,8 +56,10 @@ export class GpuEvaluator implements Evaluator {
   readonly #onScored: GpuEvaluatorOptions['onScored'];
   readonly #errors = new Map<EvaluationViews, ImageErrors>();
   #ranking: Ranking | undefined;
-  /** All splats, most visible first, computed by a thread meanwhile. Undefined without threads. */
+  /** Order of all splats by descending visibility, which a thread computes. Undefined without threads. */
   #order: Promise<Uint32Array> | undefined;
+  /** Measured cuts by views and thresholds. A search for several targets measures many cuts again. */
+  readonly #cuts = new Map<string, CutFigures>();
 
   private constructor(
     device: GPUDevice,
@@ -78,16 +80,16 @@ export class GpuEvaluator implements Evaluator {
     this.#viewpoint = exactViewpoint(device);
   }
 
-  /** Compiles the pipelines of {@link create} and later steps, while the caller waits for a cloud. */
+  /** Starts the compilation of all pipelines, so that they are ready when the caller has a cloud. */
   static prepare(device: GPUDevice): void {
     for (const stage of STAGES) rareKernelOf(device, stage).prepare();
     exactViewpoint(device).destroy();
   }
 
   /**
-   * Uploads a cloud.
-   * @param views Three disjoint sets, because parts of the scene that the first misses would also seem unneeded in the
-   * second.
+   * Creates an evaluator, and uploads a cloud.
+   * @param views Three disjoint sets of views. If scoring views do not show a part of the scene, other views must, because
+   * the part would otherwise seem unimportant.
    * @throws GaussianSplatError `out-of-memory/*`
    */
   static async create(
@@ -118,8 +120,7 @@ export class GpuEvaluator implements Evaluator {
       }));
       this.#ranking = this.#rankingOf(await readBack(this.#device, parts));
       this.#order = this.#orderAhead(this.#ranking);
-      // Measured now, while the viewpoint still has the capacity for this scene: for each other one it has to grow
-      // again.
+      // Reference images are drawn at once, because the viewpoint has the capacity for this scene.
       for (const views of ['searched', 'heldOut'] as const) await this.#errorsIn(views);
       return this.#ranking;
     } finally {
@@ -128,8 +129,9 @@ export class GpuEvaluator implements Evaluator {
   }
 
   /**
-   * [N] energy of each splat in one of the last scoring views that were drawn together: the sum of its squared weights
-   * over the pixels of the image, estimated from peak and size.
+   * Returns the energy of each splat in a scoring view, [N]: the sum of its squared weights over the pixels of the image,
+   * estimated from its maximum weight and its size.
+   * @param view Index of one of the last `viewsAtOnce` scoring views.
    */
   async energiesIn(view: number): Promise<Float32Array> {
     const parts = this.#scene.parts.map(({ energies, row, page }) => ({
@@ -146,7 +148,7 @@ export class GpuEvaluator implements Evaluator {
     return found;
   }
 
-  /** Visibility of the splats in the scoring views, which determines their quantization. */
+  /** Returns the visibility of the splats in the scoring views, which determines their quantization. */
   async seen(): Promise<SplatVisibility> {
     if (this.#ranking === undefined) throw new Error('GpuEvaluator: rank() comes before seen()');
     return seenIn(this.#device, this.#scene, this.#views.scored.length);
@@ -165,11 +167,17 @@ export class GpuEvaluator implements Evaluator {
   }
 
   async cut(cut: Cut, views: EvaluationViews, signal?: AbortSignal): Promise<CutFigures> {
+    signal?.throwIfAborted();
+    const key = JSON.stringify([views, cut]);
+    const known = this.#cuts.get(key);
+    if (known) return known;
     const errors = await this.#errorsIn(views);
     signal?.throwIfAborted();
     this.#cutScene.apply(cut);
     const [found, degrees] = await Promise.all([errors.measure(this.#cutScene), this.#cutScene.degrees()]);
-    return { errors: found, degrees };
+    const figures = { errors: found, degrees };
+    this.#cuts.set(key, figures);
+    return figures;
   }
 
   async reduce(cut: Cut, signal?: AbortSignal): Promise<ReducedCloud> {
@@ -223,12 +231,12 @@ export class GpuEvaluator implements Evaluator {
     const pool = poolFor(this.#pool, count, [scales]);
     if (pool === inline || isOfPlanes(positions)) return undefined;
     const order = pool.run('orderAll', [{ scales, contribution }]).then(([all]) => all);
-    // The caller that awaits it receives the error.
+    // The caller that awaits `order` receives its error; this handler prevents an unhandled rejection.
     order.catch(() => undefined);
     return order;
   }
 
-  /** Scores by splat. */
+  /** Converts the scores of all parts to a ranking. */
   #rankingOf(parts: readonly ArrayBuffer[]): Ranking {
     const stride = layouts.Score.size / 4;
     const { contribution: at, removal } = layouts.Score.fields;
@@ -263,5 +271,5 @@ export class GpuEvaluator implements Evaluator {
   }
 }
 
-/** Converts the GPU's substitute for infinity, which WGSL lacks. */
+/** Returns Infinity for UNJUDGED, its substitute in WGSL; otherwise the error. */
 const judged = (error: number): number => (error >= shaders.UNJUDGED ? Infinity : error);

@@ -6,16 +6,16 @@ import * as generated from '../generated/shaders.js';
 import { show } from './show.js';
 
 const { ERROR_TILE, imageError: imageError, imageErrorSum: imageErrorSum, ImageErrors: layout } = generated;
-/** A sum of squares and a count of pixels. */
+/** Bytes of a sum of squares and a number of pixels. */
 const SUM_BYTES = 8;
 const COUNTS_BYTES = 16;
-/** Bindings are aligned to 256 bytes. */
+/** Divisor of the number of tiles of each view, because bindings are aligned to 256 bytes. */
 const ALIGNED_TILES = 256 / SUM_BYTES;
 
-/** Awaited between two images. */
+/** Function that is awaited between two images. */
 export type Pause = () => Promise<void>;
 
-/** A view, and its reference image. */
+/** A view, and its reference image. `columns` and `rows` are its number of tiles. */
 export interface Exhibit {
   readonly camera: Camera;
   readonly reference: GPUTexture;
@@ -25,14 +25,14 @@ export interface Exhibit {
 }
 
 /**
- * Errors of images of a scene against those of a reference scene in the same views. Images never leave the GPU: for
- * each a sum of squares and a number of pixels are read back, all in one read.
+ * Measures errors of images of a scene against images of a reference scene in the same views. Images remain on the GPU.
+ * For each image, only a sum of squares and a number of pixels are read back, in one read for all images.
  */
 export class ImageErrors {
   readonly #device: GPUDevice;
   readonly #viewpoint: Viewpoint;
   readonly #memory: GpuMemory;
-  /** Target textures by size. */
+  /** Target textures by their size in pixels. */
   readonly #targets = new Map<string, GPUTexture>();
   readonly #exhibits: readonly Exhibit[];
   #covered: readonly number[] = [];
@@ -63,8 +63,9 @@ export class ImageErrors {
   }
 
   /**
-   * Draws the reference images.
-   * @param pause Awaited between two images, to yield to other tasks.
+   * Allocates textures, and draws the reference images.
+   * @param gaussians Reference scene.
+   * @param pause Function that is awaited between two images, to yield to other tasks.
    */
   static async of(
     device: GPUDevice,
@@ -84,17 +85,20 @@ export class ImageErrors {
     }
   }
 
-  /** The views, and their reference images. */
+  /** Views, and their reference images. */
   get exhibits(): readonly Exhibit[] {
     return this.#exhibits;
   }
 
-  /** [views] number of pixels that the references cover. */
+  /** Number of pixels that each reference image covers, [views]. */
   get covered(): readonly number[] {
     return this.#covered;
   }
 
-  /** Mean squared error of the colors, peak 1, over the pixels that the reference covers, for each view with any. */
+  /**
+   * Returns the mean squared error of colors, peak 1, over the pixels that the reference image covers. Views whose
+   * reference covers no pixel are omitted.
+   */
   async measure(gaussians: GaussianScene, pause?: Pause): Promise<number[]> {
     const sums = new Float32Array(await this.#draw(gaussians, ({ camera }) => this.targetOf(camera), pause));
     return this.#covered.flatMap((pixels, k) => (pixels === 0 ? [] : [sums[2 * k] / (3 * pixels)]));
@@ -117,7 +121,7 @@ export class ImageErrors {
     };
   }
 
-  /** Returns the target texture for a view. */
+  /** Returns the target texture for the size of a view. */
   targetOf(camera: Camera): GPUTexture {
     const key = `${camera.width} x ${camera.height}`;
     const target = this.#targets.get(key) ?? this.#texture(camera, 'gs.economise.picture');
@@ -135,7 +139,10 @@ export class ImageErrors {
     });
   }
 
-  /** Draws all views, again if some did not fit. @returns The sums of their errors. */
+  /**
+   * Draws all views, and repeats this if the capacity was not sufficient.
+   * @returns For each view, a sum of squares and a number of pixels, float32.
+   */
   async #draw(
     gaussians: GaussianScene,
     targetOf: (exhibit: Exhibit) => GPUTexture,
@@ -152,7 +159,7 @@ export class ImageErrors {
       this.#addUp();
       const [found, counts] = await readBack(this.#device, [{ buffer: this.#errors }, { buffer: this.#counts }]);
       sums = found;
-      // Each call also records the missing capacity of its view.
+      // All views are tested, because each call also records the missing capacity of its view.
       const hadRoom = this.#exhibits.map((_, k) =>
         this.#viewpoint.hadRoom(new Uint32Array(counts, COUNTS_BYTES * k, 4)),
       );

@@ -1,6 +1,6 @@
 import { Cut, Lowering, MomentViews, RefineStep, RefineView, Score, Take } from '../generated/shaders.js';
 
-/** Fields of a `View` that the shaders of this package do not use. */
+/** Default values of the fields of `View` that the shaders of this package do not use. */
 export const NO_VIEW = {
   ...{ page: 0, first_group: 0, sh_degree: 0, sh_cap: 0, sh_encoding: 0, key_bits: 0 },
   ...{ has_detail: 0, detail: 0, detail_fade: 0, splat_budget: 0 },

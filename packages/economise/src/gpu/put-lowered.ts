@@ -7,17 +7,18 @@ import type { ReducedCloud } from '../reduce.js';
 import { layouts } from './layouts.js';
 import type { ScenePart, SceneParts } from './scene-parts.js';
 
-/** Splats of a part that keep the same degree, below that of the scene. */
+/** Splats of a part that keep the same degree, which is below the degree of the scene. */
 interface LoweredSplats {
   readonly part: ScenePart;
   readonly degree: ShDegree;
-  /** Their indices in the reduced cloud. */
+  /** Indices of these splats in the reduced cloud. */
   readonly places: Uint32Array;
 }
 
 /**
- * Writes the coefficients of the splats that keep a lower degree. Only these are read back from the GPU.
- * @param kept Indices in the scene of the reduced cloud's splats.
+ * Writes the coefficients of the splats that keep a lower degree to a reduced cloud. Only these are read back from the
+ * GPU.
+ * @param kept [N] index in the scene of each splat of the reduced cloud.
  */
 export async function putLowered(
   device: GPUDevice,
@@ -46,7 +47,7 @@ export async function putLowered(
   }
 }
 
-/** Splats of a part by degree, without unused degrees. */
+/** Returns the splats of a part that keep a lower degree, grouped by their degree. */
 function loweredSplatsOf(part: ScenePart, shDegree: ShDegree, kept: Uint32Array, degrees: Uint8Array): LoweredSplats[] {
   const end = part.first + part.page.count;
   const places = Array.from({ length: shDegree }, () => new Uint32Array(kept.length));
@@ -60,7 +61,7 @@ function loweredSplatsOf(part: ScenePart, shDegree: ShDegree, kept: Uint32Array,
     .filter((list) => list.places.length > 0);
 }
 
-/** Copies the coefficients of some splats to a dense buffer. */
+/** Copies the coefficients of some splats to a contiguous buffer on the GPU. */
 function take(
   device: GPUDevice,
   memory: GpuMemory,
@@ -89,7 +90,7 @@ function take(
   return { buffer: taken, byteLength: 4 * count };
 }
 
-/** Copies numbers to memory that tasks share. */
+/** Copies float32 numbers to memory of the pool. */
 function numbersIn(bytes: ArrayBuffer, pool: TaskPool): Float32Array {
   const numbers = new Float32Array(pool.allocate(bytes.byteLength));
   numbers.set(new Float32Array(bytes));

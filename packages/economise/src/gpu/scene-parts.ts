@@ -7,27 +7,27 @@ import { layouts } from './layouts.js';
 const CHUNK = 256;
 const FLOAT_BYTES = 4;
 
-/** A block of the scene, and the results for its splats. */
+/** A block of the scene, and the buffers with results for its splats. */
 export interface ScenePart {
   readonly page: GaussianBlock;
-  /** Index of its first splat among all, which is a multiple of 256. */
+  /** Slot of the part's first splat, which is a multiple of 256. */
   readonly first: number;
-  /** Splats in whole chunks: the stride between rows of `energies`. */
+  /** Number of splats rounded up to chunks of 256, which is the length of a row in the buffers below. */
   readonly row: number;
-  /** array<Score> */
+  /** `array<Score>`, an element for each splat. */
   readonly scores: GPUBuffer;
-  /** array<f32>: a row for each view of the batch. */
+  /** `array<f32>` with a row for each view that is scored at once: the energy of each splat. */
   readonly energies: GPUBuffer;
-  /** array<f32>: a row for each entry of the moments of color: see shaders/shared/moments.wgsl. */
+  /** `array<f32>` with a row for each entry of the moments of color; see shaders/shared/moments.wgsl. */
   readonly moments: GPUBuffer;
-  /** array<f32>: {@link loweredNumbers} for each splat. */
+  /** `array<f32>` with {@link loweredNumbers} numbers for each splat. */
   readonly lowered: GPUBuffer;
 }
 
 /**
- * Numbers before the coefficients of a lower degree in the data of each splat: an error for each lower degree, and the
- * coefficients of the degrees below. For the scene's own degree it is their total. Same as `lowered_numbers` of the
- * shaders.
+ * Returns the offset of the coefficients of degree `lower` in the data of each splat. The data are an error for each lower
+ * degree, and then the coefficients of each lower degree. For the degree of the scene, it is the length of the data. Same
+ * as `lowered_numbers` of the shaders.
  */
 export function loweredNumbers(degree: ShDegree, lower: number = degree): number {
   let numbers: number = degree;
@@ -35,19 +35,19 @@ export function loweredNumbers(degree: ShDegree, lower: number = degree): number
   return numbers;
 }
 
-/** Entries in the lower triangle of a matrix of basis functions; none without a lower degree. */
+/** Returns the number of entries in the lower triangle of a matrix of all basis functions; 0 for degree 0. */
 function momentNumbers(degree: ShDegree): number {
   const size = shCoefficientCount(degree);
   return degree === 0 ? 0 : (size * (size + 1)) / 2;
 }
 
-/** A cloud on the GPU, in parts that fit a binding with all their results. */
+/** A cloud on the GPU, in parts whose buffers do not exceed the maximum size of a binding. */
 export class SceneParts {
   readonly gaussians: CloudBuffers;
   readonly parts: readonly ScenePart[];
-  /** Splats of the scene, with every part rounded up to whole chunks. */
+  /** Number of splats of the scene, with each part rounded up to chunks of 256. */
   readonly slots: number;
-  /** Capacity of `energies` in views. */
+  /** Number of views whose energies the buffers can contain. */
   readonly views: number;
   readonly #memory: GpuMemory;
 
@@ -56,7 +56,7 @@ export class SceneParts {
     this.gaussians = gaussians;
     this.views = views;
     let first = 0;
-    this.parts = gaussians.pages.map((page) => {
+    this.parts = gaussians.blocks.map((page) => {
       const part = partOf(memory, page, first, views, gaussians.shDegree);
       first += part.row;
       return part;
@@ -65,8 +65,9 @@ export class SceneParts {
   }
 
   /**
+   * Uploads a cloud, and allocates the buffers of results.
    * @param views Number of views that are scored at once.
-   * @param maxSplats Maximum of a part; default: the limits of the device.
+   * @param maxSplats Maximum number of splats of a part. By default, only the limits of the device apply.
    * @throws GaussianSplatError `out-of-memory/*`
    */
   static async upload(

@@ -19,13 +19,13 @@ import type { SceneParts } from './scene-parts.js';
 import { show } from './show.js';
 
 /**
- * Assumed squared difference of a splat's color from the colors behind it, for each channel: on the low side of the
- * means of captured scenes (0.05 to 0.16). It affects only the first try, because the cost of a cut is measured in
+ * Assumed squared difference of a splat's color from the colors behind it, for each channel, peak 1. It is smaller than the
+ * means of captured scenes (0.05 to 0.16). It affects only the first try, because the error of a cut is measured in
  * images.
  */
 const USUAL_CONTRAST = 0.02;
 /**
- * Number of views, spread over all, that are drawn before the scoring: the cost of a pair is measured at the first,
+ * Number of views, evenly spaced, that are drawn before scoring. The renderer measures the time of a pair in the first,
  * second, fourth and eighth frame.
  */
 const REHEARSED = 8;
@@ -34,8 +34,8 @@ const FLOAT_BYTES = 4;
 const VIEW_STRIDE = 256 * Math.ceil(rendererLayouts.View.size / 256);
 
 /**
- * Scores a scene from all views and keeps the results on the GPU: the compute rasterizer records the largest weight of
- * each splat, and sums accumulate in buffers. Only the overflow counts are read back, at the end.
+ * Scores the splats of a scene in all views. The compute rasterizer records the maximum weight of each splat, and buffers
+ * of {@link SceneParts} accumulate the results on the GPU. Only overflow counts are read back, at the end.
  */
 export class SceneScorer {
   readonly #device: GPUDevice;
@@ -43,14 +43,14 @@ export class SceneScorer {
   readonly #scene: SceneParts;
   readonly #views: readonly Camera[];
   readonly #memory: GpuMemory;
-  /** The largest weights in the current view, by slot. */
+  /** Maximum weight of each splat in the current view, by slot. */
   readonly #peaks: GPUBuffer;
   readonly #counts: GPUBuffer;
-  /** Eyes of the views, in block-local coordinates. */
+  /** Eyes of the views, relative to the origin of the scene. */
   readonly #eyes: GPUBuffer;
   readonly #targets = new Map<string, GPUTexture>();
 
-  /** @param viewpoint Must use the rasterizer `tiles`. */
+  /** @param viewpoint Viewpoint that draws the views. It must use the rasterizer `tiles`. */
   constructor(device: GPUDevice, viewpoint: Viewpoint, scene: SceneParts, views: readonly Camera[]) {
     this.#device = device;
     this.#viewpoint = viewpoint;
@@ -80,8 +80,8 @@ export class SceneScorer {
   }
 
   /**
-   * Draws a few views and waits for each. The viewpoint then has the capacity for the others, and knows that they need
-   * few submissions: more would take more CPU time than GPU time.
+   * Draws a few views, and waits for each. Afterwards the viewpoint has the capacity for all views. It has also measured
+   * the time of pairs, so that it uses few submissions, because they take CPU time.
    */
   async #rehearse(signal: AbortSignal | undefined): Promise<void> {
     const step = Math.max(1, Math.floor(this.#views.length / REHEARSED));
@@ -98,7 +98,7 @@ export class SceneScorer {
     }
   }
 
-  /** Draws a view and records the largest weights in it. */
+  /** Draws a view, and records the maximum weights of splats. */
   #paint(camera: Camera): void {
     const target = this.#targetOf(camera);
     const auxiliary = new AuxiliaryOutputs({ contributions: this.#peaks });
@@ -106,7 +106,10 @@ export class SceneScorer {
     this.#viewpoint.draw(camera, { target, auxiliary });
   }
 
-  /** @returns Whether every view fitted the capacity; if not, the next try has enough. */
+  /**
+   * Scores the splats in all views.
+   * @returns Whether the capacity was sufficient for each view. If false, the next call has more.
+   */
   async #look(signal: AbortSignal | undefined, onScored?: (views: number, all: number) => void): Promise<boolean> {
     const uniforms = this.#writeViews();
     const encoder = this.#device.createCommandEncoder({ label: 'gs.economise.clear' });
@@ -123,7 +126,7 @@ export class SceneScorer {
       const isLast = k === this.#views.length - 1;
       if (!isLast && (k + 1) % this.#scene.views !== 0) continue;
       this.#gather(k - (k % this.#scene.views), k + 1);
-      // Meanwhile the viewpoint reads its own counts back.
+      // During this wait, the viewpoint can read its own counts back.
       await this.#device.queue.onSubmittedWorkDone();
       onScored?.(k + 1, this.#views.length);
     }
@@ -134,7 +137,7 @@ export class SceneScorer {
     return !hadRoom.includes(false);
   }
 
-  /** `View` of each view and part. */
+  /** Returns a buffer with a `View` for each view and part. */
   #writeViews(): GPUBuffer {
     const { parts, gaussians } = this.#scene;
     const bytes = new ArrayBuffer(VIEW_STRIDE * parts.length * this.#views.length);
@@ -155,7 +158,7 @@ export class SceneScorer {
     return buffer;
   }
 
-  /** Adds the results of the last view. */
+  /** Adds the results of view `k`, which has been drawn, to scores and energies. */
   #note(uniforms: GPUBuffer, k: number): void {
     const kernel = rareKernelOf(this.#device, economiseScore);
     const encoder = this.#device.createCommandEncoder({ label: 'gs.economise.score' });
@@ -194,7 +197,7 @@ export class SceneScorer {
     this.#device.queue.submit([encoder.finish()]);
   }
 
-  /** Converts sums to scores and colors, one submission for each part. */
+  /** Converts sums to scores and colors at lower degrees, in one submission for each part. */
   #lower(): void {
     const kernel = rareKernelOf(this.#device, economiseLower);
     for (const { page, row, scores, moments, lowered } of this.#scene.parts) {
@@ -234,7 +237,7 @@ export class SceneScorer {
   }
 }
 
-/** [views, 4] eyes relative to the scene's origin; the fourth number is padding. */
+/** Returns the eyes of views relative to the scene's origin, float32 [views, 4]. The fourth number is padding. */
 function eyesOf(views: readonly Camera[], { gaussians }: SceneParts): Uint32Array {
   const places = views.flatMap(({ worldToCamera }) => [
     ...eyeOf(worldToCamera).map((value, axis) => value - gaussians.origin[axis]),

@@ -1,12 +1,12 @@
 import { World, Viewpoint, type FrameSettings, type GaussianScene } from '@gaussian-splat/renderer';
 
-/** Exact settings, so that rounding is not mistaken for an effect of a change. */
+/** Settings of exact images, so that errors do not include rounding of the renderer. */
 const EXACT: FrameSettings = { quality: 'reference' };
 
-/** A viewpoint for one scene at a time, see {@link show}, with the rasterizer `tiles`. */
+/** Returns a viewpoint with the rasterizer `tiles`, for one scene at a time; see {@link show}. */
 export const exactViewpoint = (device: GPUDevice): Viewpoint => new Viewpoint(device, new World(), { settings: EXACT });
 
-/** Makes this the only scene of the viewpoint. The current scene keeps its capacity. */
+/** Makes `scene` the only scene of a viewpoint. If it is already shown, the viewpoint keeps its capacity. */
 export function show({ world }: Viewpoint, scene: GaussianScene): void {
   const [shown] = world.placements;
   if (shown?.scene === scene) return;

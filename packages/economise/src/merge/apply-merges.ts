@@ -8,10 +8,10 @@ const { joinMoments, ROW, X, XX, XY, XZ, Y, YY, YZ, Z, ZZ } = splatRows;
 const NOWHERE = -1;
 
 /**
- * Applies all merges up to a price to a reduced cloud. If one splat of a pair has been dropped, the other stays
- * unchanged, so that nothing is counted twice. A merged splat keeps the higher number of color bands of the two, and
- * takes the earlier position in the order. The source is not modified.
- * @param price Maximum mean squared error of an image from a single merge.
+ * Returns a reduced cloud after all merges up to a price. If one splat of a pair has been dropped, the other does not
+ * change. A merged splat keeps the higher degree of both, and the earlier position in the order. The argument is not
+ * modified.
+ * @param price Maximum of {@link Merges.prices}, a mean squared error.
  */
 export function applyMerges(reduced: ReducedCloud, merges: Merges, price: number): ReducedCloud {
   const { cloud, kept } = reduced;
@@ -20,12 +20,12 @@ export function applyMerges(reduced: ReducedCloud, merges: Merges, price: number
   const [opacities, sh, degrees] = [cloud.opacities.slice(), cloud.sh.slice(), reduced.degrees.slice()];
   const numbers = 3 * shCoefficientCount(cloud.shDegree);
   const [isMerged, isGone, isClosed] = [0, 1, 2].map(() => new Uint8Array(cloud.count));
-  // Position of each merged splat: the first of its sources.
+  // For each splat, the earliest index of the splats that are merged into it.
   const leads = Uint32Array.from(kept.keys());
   for (let k = 0; k < merges.prices.length; k++) {
     const [i, j] = [places[merges.into[k]], places[merges.from[k]]];
     if (i === NOWHERE || j === NOWHERE || isClosed[i] || isClosed[j] || merges.prices[k] > price) {
-      // Later merges that contain these splats become invalid.
+      // Later merges of these splats depend on this merge, and are not applied.
       if (i !== NOWHERE) isClosed[i] = 1;
       if (j !== NOWHERE) isClosed[j] = 1;
       continue;
@@ -51,7 +51,7 @@ export function applyMerges(reduced: ReducedCloud, merges: Merges, price: number
   };
 }
 
-/** [N] index of each source splat in the reduced cloud, with N large enough for all merges. */
+/** Returns the index in the reduced cloud of each splat of the source, or -1. It has entries for all splats of merges. */
 function placesOf(kept: Uint32Array, { into, from }: Merges): Int32Array {
   const max = [kept, into, from].reduce((max, list) => list.reduce((a, b) => Math.max(a, b), max), 0);
   const places = new Int32Array(max + 1).fill(NOWHERE);
@@ -59,7 +59,11 @@ function placesOf(kept: Uint32Array, { into, from }: Merges): Int32Array {
   return places;
 }
 
-/** A cloud with new centers and shapes for some of its splats. @param isChosen [N] 1 for those. */
+/**
+ * Returns a cloud whose chosen splats have the centers and covariances of `rows`.
+ * @param rows [N, ROW] rows as in splat-rows.ts of the renderer.
+ * @param isChosen [N] 1 for chosen splats.
+ */
 function shapesFrom(rows: Float64Array, isChosen: Uint8Array, cloud: GaussianCloud): GaussianCloud {
   const [positions, scales, rotations] = [cloud.positions.slice(), cloud.scales.slice(), cloud.rotations.slice()];
   for (let i = 0, p = 0; i < cloud.count; i++, p += ROW) {

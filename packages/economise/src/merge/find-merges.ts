@@ -3,37 +3,37 @@ import { ascendingOrder } from '../order.js';
 import type { Ranking } from '../score.js';
 import { inline, partsOf, poolFor, type TaskPool } from '../parts/task-pool.js';
 import { treeOf } from './neighbours.js';
-import { FAVOURITES } from './pair-candidates.js';
+import { FAVORITES } from './pair-candidates.js';
 import { PairCosts, pairState, type PairState } from './pair-costs.js';
 
 /**
- * Number of views for evaluating pairs: with half as many wrong pairs are chosen, with three times as many the result
- * does not improve.
+ * Number of views that evaluate pairs. With half as many views, wrong pairs are chosen. Three times as many do
+ * not improve the result.
  */
 const VIEWS = 16;
-/** Rounds of merging pairs, which may include splats merged before. */
+/** Maximum number of rounds. Each round merges pairs, which may include merged splats of previous rounds. */
 const MAX_ROUNDS = 6;
-/** Equivalent cost of evaluating a splat's pairs, in splats to copy. */
+/** Time to evaluate the pairs of a splat, as a number of splats that are copied in the same time. */
 const MOVES = 32;
 /**
- * Maximum fraction of the pairs of a round that are merged, cheapest first: others may find better partners in the
- * next.
+ * Maximum fraction of the pairs of a round that are merged, cheapest first. The others may find better partners in the
+ * next round.
  */
 const PART = 0.5;
 
-/** Possible merges in order of application: `from[k]` is merged into `into[k]`. */
+/** Possible merges in the order of application. Arrays are [merges]; splat `from[k]` is merged into splat `into[k]`. */
 export interface Merges {
   readonly into: Uint32Array;
   readonly from: Uint32Array;
-  /** Weight of the splat at `into` in the means of both, 0..1. */
+  /** Weight of the splat `into` in the averages over both splats, 0..1. */
   readonly shares: Float32Array;
-  /** Opacity of the merged splat. */
+  /** Opacity of the merged splat, 0..1. */
   readonly opacities: Float32Array;
-  /** Mean squared error of an image from a single merge, and at least that of the merges that it depends on. */
+  /** Estimated mean squared error of an image from this merge; at least that of the merges on which it depends. */
   readonly prices: Float32Array;
 }
 
-/** Pairs of one round, cheapest first. */
+/** Pairs of splats, and the estimated error of merging each pair. */
 interface Pairs {
   readonly first: Uint32Array;
   readonly second: Uint32Array;
@@ -41,12 +41,12 @@ interface Pairs {
 }
 
 /**
- * Finds pairs of neighbors that resemble a single splat, by Ward's method (1963): the cheapest pairs are merged, and
- * all splats are paired again, until the estimated error exceeds the limit. Estimates are too low by a factor of about
- * ten, but in the right order.
- * @param views Sixteen of them, evenly spaced, are used to evaluate pairs.
- * @param maxError Limit of the mean squared error of images.
- * @param pool Evaluates pairs; its size does not affect the result.
+ * Finds pairs of neighbors that resemble a single splat, by Ward's method (1963). Each round merges the cheapest pairs, and
+ * the next round pairs all splats again, until the estimated error exceeds the limit. Estimates are too low by a factor of
+ * about 10, but have the correct order.
+ * @param views Scoring views; 16 of them, evenly spaced, evaluate pairs.
+ * @param maxError Limit of the sum of estimates, a mean squared error.
+ * @param pool Pool that evaluates pairs. Its size does not affect the result.
  */
 export async function findMerges(
   cloud: GaussianCloud,
@@ -92,13 +92,13 @@ export async function findMerges(
   };
 }
 
-/** Evenly spaced views, at most this many. */
+/** Returns at most `max` of the views, evenly spaced. */
 function evenly(views: readonly Camera[], max: number): Camera[] {
   const step = views.length / Math.min(max, views.length);
   return Array.from({ length: Math.min(max, views.length) }, (_, k) => views[Math.floor(k * step)]);
 }
 
-/** Selects disjoint pairs greedily, cheapest first. */
+/** Selects disjoint pairs greedily, and returns them in ascending order of costs. */
 function pairsOf(candidates: Pairs, count: number): Pairs {
   const isTaken = new Uint8Array(count);
   const pairs: [number, number, number][] = [];
@@ -115,26 +115,26 @@ function pairsOf(candidates: Pairs, count: number): Pairs {
   };
 }
 
-/** Pairs of each splat with its most similar neighbors. */
+/** Returns the pairs of each splat with its most similar neighbors, by parallel tasks. */
 async function candidatesOf(state: PairState, slots: Uint32Array, pool: TaskPool): Promise<Pairs> {
   const allocate = (bytes: number): ArrayBufferLike => pool.allocate(bytes);
   const count = state.visible.length;
   const positions = new PairCosts(state).positions(new Float32Array(allocate(12 * count), 0, 3 * count));
   const tree = treeOf(positions, slots, allocate);
-  const room = FAVOURITES * slots.length;
+  const room = FAVORITES * slots.length;
   const partners = new Uint32Array(allocate(4 * room), 0, room);
   const costs = new Float32Array(allocate(4 * room), 0, room);
   const parts = partsOf(MOVES * slots.length, pool);
   const inputs = parts.map((part) => {
     const [first, end] = [part.first, part.end].map((move) => Math.round(move / MOVES));
-    const [from, to] = [FAVOURITES * first, FAVOURITES * end];
+    const [from, to] = [FAVORITES * first, FAVORITES * end];
     const own = { partners: partners.subarray(from, to), costs: costs.subarray(from, to) };
     return { state, tree, slots: slots.slice(first, end), ...own };
   });
   await pool.run('findPartners', inputs);
   const found = Uint32Array.from(costs.keys()).filter((k) => Number.isFinite(costs[k]));
   return {
-    first: found.map((k) => slots[Math.floor(k / FAVOURITES)]),
+    first: found.map((k) => slots[Math.floor(k / FAVORITES)]),
     second: found.map((k) => partners[k]),
     costs: Float32Array.from(found, (k) => costs[k]),
   };

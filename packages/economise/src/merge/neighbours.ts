@@ -1,24 +1,24 @@
-/** Points in a leaf, which are compared one by one. */
+/** Approximate maximum number of points in a leaf. */
 const LEAF = 12;
 
-/** Numbers of a box: minimum x, y, z and maximum. */
+/** Count of numbers of a box: minimum x, y, z and maximum x, y, z. */
 const BOX = 6;
 
-/** A k-d tree of points, in arrays that threads can share. */
+/** A k-d tree of points, in arrays that threads can access. */
 export interface PointTree {
-  /** [N, 3] */
+  /** [N, 3] positions of all points. */
   readonly positions: Float32Array;
-  /** Indices of the points, with those of a leaf adjacent. */
+  /** Indices of the points in the tree. Those of a leaf are adjacent. */
   readonly order: Uint32Array;
-  /** Bounds of the nodes: of the root, and of the children of node n in 2n + 1 and 2n + 2. */
+  /** [nodes, BOX] bounds of the nodes. The root is node 0; the children of node n are 2n + 1 and 2n + 2. */
   readonly boxes: Float32Array;
 }
 
 /**
  * Builds a tree of points.
- * @param positions [N, 3]
- * @param points Indices of the points to include.
- * @param allocate Allocates the tree's own arrays.
+ * @param positions [N, 3] positions of all points.
+ * @param points Indices of the points that the tree contains.
+ * @param allocate Allocates the memory of `order` and `boxes`.
  */
 export function treeOf(
   positions: Float32Array,
@@ -36,9 +36,9 @@ export function treeOf(
 
 /**
  * Finds the nearest neighbors of points in a tree.
- * @param points Indices of points.
- * @param most Number of neighbors of each point.
- * @returns [points, most] indices of the neighbors, nearest first; -1 if there are fewer.
+ * @param points Indices of the points whose neighbors are searched.
+ * @param max Number of neighbors of each point.
+ * @returns [points, max] indices of the neighbors, nearest first; -1 if there are fewer.
  */
 export function nearestNeighbors(tree: PointTree, points: Uint32Array, max: number): Int32Array {
   const found = new Int32Array(max * points.length).fill(-1);
@@ -50,7 +50,10 @@ export function nearestNeighbors(tree: PointTree, points: Uint32Array, max: numb
   return found;
 }
 
-/** Sorts points into the order of a k-d tree: each box is split at the median of its longest side. */
+/**
+ * Computes the box of a node with the points `first` to `end` of the order. Splits the points at the median of its longest
+ * side, and does the same for both children.
+ */
 function putBox(tree: PointTree, node: number, first: number, end: number): void {
   const { positions, order, boxes } = tree;
   const at = BOX * node;
@@ -72,7 +75,10 @@ function putBox(tree: PointTree, node: number, first: number, end: number): void
   putBox(tree, 2 * node + 2, middle, end);
 }
 
-/** Hoare's selection (1961): smaller elements end up before the median, larger ones after it. */
+/**
+ * Reorders the points `first` to `end` so that points with smaller coordinates on an axis are before the middle, and
+ * larger ones after it (Hoare's selection, 1961).
+ */
 function halve(positions: Float32Array, order: Uint32Array, first: number, end: number, axis: number): void {
   const middle = (first + end) >> 1;
   let [low, high] = [first, end - 1];
@@ -94,9 +100,11 @@ function halve(positions: Float32Array, order: Uint32Array, first: number, end: 
 }
 
 /**
- * Searches a subtree for nearer points.
+ * Searches a subtree for points that are nearer than those found before.
  * @param node Index of the node, whose points are those from `first` to `end` of the order.
+ * @param point Index of the point whose neighbors are searched.
  * @param distances Squared distances of the points in `found`, ascending.
+ * @param found Indices of the nearest points.
  */
 function search(
   tree: PointTree,
@@ -137,7 +145,7 @@ function search(
   }
 }
 
-/** Squared distance of a point to a box. */
+/** Returns the squared distance of a point to the box of a node; 0 within the box. */
 function distanceTo({ positions, boxes }: PointTree, node: number, point: number): number {
   let sum = 0;
   for (let axis = 0; axis < 3; axis++) {

@@ -1,23 +1,25 @@
 import { nearestNeighbors, type PointTree } from './neighbours.js';
 import { PairCosts, type PairState } from './pair-costs.js';
 
-/** Candidate neighbors for merging, and the number of them that are evaluated in all views instead of in every fourth. */
+/** Number of the nearest neighbors of a splat that are evaluated in every {@link GLANCE}-th view. */
 const NEIGHBORS = 10;
-export const FAVOURITES = 4;
+/** Number of these neighbors that are evaluated in all views. */
+export const FAVORITES = 4;
 const GLANCE = 4;
 
-/** A task to find the partners of some splats. */
+/** Input of {@link findPartners}. */
 export interface Partnering {
   readonly state: PairState;
   readonly tree: PointTree;
-  /** Indices of the splats. */
+  /** Indices of the splats whose partners are searched. */
   readonly slots: Uint32Array;
-  /** [slots, FAVOURITES] resulting partners, and the costs of merging: Infinity for none. */
+  /** [slots, FAVORITES] found partners; undefined if `costs` is Infinity. */
   readonly partners: Uint32Array;
+  /** [slots, FAVORITES] costs of merging with the found partners, as {@link PairCosts.cost}; Infinity without one. */
   readonly costs: Float32Array;
 }
 
-/** Finds the most similar neighbors of each splat. */
+/** Finds the neighbors of each splat with the smallest costs of merging, and writes `partners` and `costs`. */
 export function findPartners({ state, tree, slots, partners, costs: found }: Partnering): void {
   const costs = new PairCosts(state);
   const neighbors = nearestNeighbors(tree, slots, NEIGHBORS);
@@ -27,12 +29,12 @@ export function findPartners({ state, tree, slots, partners, costs: found }: Par
     const i = slots[k];
     const own = neighbors.subarray(NEIGHBORS * k, NEIGHBORS * (k + 1));
     for (let n = 0; n < NEIGHBORS; n++) glances[n] = own[n] < 0 ? Infinity : costs.cost(i, own[n], GLANCE);
-    for (let n = 0; n < FAVOURITES; n++) {
+    for (let n = 0; n < FAVORITES; n++) {
       const best = glances.indexOf(Math.min(...glances));
       if (!Number.isFinite(glances[best])) break;
       glances[best] = Infinity;
-      partners[FAVOURITES * k + n] = own[best];
-      found[FAVOURITES * k + n] = costs.cost(i, own[best]);
+      partners[FAVORITES * k + n] = own[best];
+      found[FAVORITES * k + n] = costs.cost(i, own[best]);
     }
   }
 }

@@ -1,11 +1,14 @@
 import { shCoefficientCount, type Camera, type GaussianCloud } from '@gaussian-splat/core';
 import { splatRows, scaleRotationFactor } from '@gaussian-splat/renderer/stages';
 import { DILATION } from './project.js';
-import { AMPLITUDE, SEEN, seenSplats, U, UU, UV, V, VV } from './seen-splats.js';
+import { AMPLITUDE, SEEN, seenSplats, U, UU, UV, V, VV } from './splat-visibility.js';
 
 const root = new Float64Array(6);
 
-/** Writes center and covariance of a splat to its row, in the renderer's layout for merging. @param rows [N, ROW] */
+/**
+ * Writes the center and the covariance of splat `i` to its row.
+ * @param rows [N, ROW] rows in the layout of splat-rows.ts of the renderer.
+ */
 export function writeRow(cloud: GaussianCloud, i: number, rows: Float64Array): void {
   const p = splatRows.ROW * i;
   scaleRotationFactor(cloud, i, root);
@@ -16,23 +19,24 @@ export function writeRow(cloud: GaussianCloud, i: number, rows: Float64Array): v
 }
 
 const { joinMoments, MASS, ROW, X, Y, Z } = splatRows;
-/** Squared difference of a splat's color from the colors behind it, for each channel: the mean of captured scenes. */
+/** Mean squared difference of a splat's color from the colors behind it in captured scenes, for each channel. */
 const CONTRAST = 0.05;
-/** Minimum number of views that must show a pair. */
+/** Minimum number of views that must show both splats of a pair. */
 const MIN_VIEWS = 4;
-/** ∫ Y² over the sphere is 1, so a squared coefficient divided by this is the mean square of its contribution. */
+/** Area of the unit sphere. Because ∫ Y² = 1, a squared coefficient divided by it is a mean square over directions. */
 const SPHERE = 4 * Math.PI;
 
-/** State of the mergeable splats: plain arrays, which threads can share. */
+/** State of splats that may be merged, in arrays that threads can access. */
 export interface PairState {
-  /** [N] see splat-rows.ts of the renderer. */
+  /** [N, ROW] centers, covariances and weights: splat-rows.ts of the renderer. */
   readonly rows: Float64Array;
-  /** [N, views] projections: seen-splats.ts. */
+  /** [N, views, SEEN] projections: splat-visibility.ts. */
   readonly seen: Float32Array;
-  /** [N] visible fraction of a splat's opacity at its most visible place. */
+  /** [N] fraction of each splat's opacity that is visible in the view that shows it best, 0..1. */
   readonly visible: Float32Array;
-  /** [N, numbers] */
+  /** [N, numbers] coefficients of spherical harmonics. */
   readonly sh: Float32Array;
+  /** Count of coefficients of a splat, over all channels. */
   readonly numbers: number;
   readonly views: number;
   /** Mean number of pixels of the views. */
@@ -42,9 +46,10 @@ export interface PairState {
 }
 
 /**
- * @param contribution [N] largest weight in a pixel, see {@link Ranking}.
- * @param views Views from all around, because a pair may resemble one splat from one side only.
- * @param allocate Allocates the state, 0.4 kB for each splat plus its harmonics.
+ * Computes the state of all splats of a cloud.
+ * @param contribution [N] as {@link Ranking.contribution}.
+ * @param views Views from all sides, because a pair may resemble one splat from one side only.
+ * @param allocate Allocates the arrays: 0.4 kB for each splat plus its harmonics.
  */
 export function pairState(
   cloud: GaussianCloud,
@@ -74,13 +79,14 @@ export function pairState(
 }
 
 /**
- * Costs of merging splats. A merged splat has the first two moments of both, weighted by their visibility, the mean
- * color with the same weights, and the opacity that covers the same area in the views. A slot holds a splat of the
- * cloud, or the splat that it was merged into.
+ * Estimates the errors of merging splats, and merges them. A merged splat has the mean, the covariance and the color of
+ * both splats together, weighted by their visibility. Its opacity covers the same area in the views. Splats are
+ * identified by slots; a slot has a splat of the cloud, or a merged splat.
  */
 export class PairCosts {
-  /** For the last evaluated pair: the weight of the first splat, and the merged opacity. */
+  /** Weight of the first splat of the last evaluated pair, 0..1. */
   share = 1;
+  /** Opacity of the merged splat of the last evaluated pair, 0..1. */
   opacity = 0;
   readonly #state: PairState;
   readonly #rows: Float64Array;
@@ -98,7 +104,7 @@ export class PairCosts {
     ({ sh: this.#sh, numbers: this.#numbers, antialiased: this.#antialiased, filterVariance: this.#variance } = state);
   }
 
-  /** Writes the positions of the splats to `found`, [N, 3]. */
+  /** Writes the positions of all splats to `found`, [N, 3], and returns it. */
   positions(found: Float32Array): Float32Array {
     const count = this.#rows.length / ROW;
     for (let i = 0; i < count; i++) for (const axis of [X, Y, Z]) found[3 * i + axis] = this.#rows[ROW * i + axis];
@@ -106,11 +112,13 @@ export class PairCosts {
   }
 
   /**
-   * Mean squared error of a view's image, peak 1, from merging two splats; Infinity if they cannot be merged. With
-   * weights w in a view, the two differ from the merged one by w₁G₁ + w₂G₂ − wG against the background, and by the
-   * differences of their colors from the mean; the squares of Gaussians have closed-form integrals, ∫ G₁ G₂ = 2π √|Σ₁|
-   * √|Σ₂| / √|Σ₁ + Σ₂| · exp(−δᵀ (Σ₁ + Σ₂)⁻¹ δ / 2).
-   * @param step Evaluates only every n-th view.
+   * Returns the mean squared error of a view's image, peak 1, from merging two splats. Infinity if they cannot be merged.
+   * With weights w in a view, both splats differ from the merged splat by w₁G₁ + w₂G₂ − wG against the background, and by
+   * the differences of their colors from the mean color. Products of Gaussians have closed-form integrals: ∫ G₁ G₂ = 2π
+   * √|Σ₁| √|Σ₂| / √|Σ₁ + Σ₂| · exp(−δᵀ (Σ₁ + Σ₂)⁻¹ δ / 2).
+   * @param i Slot of the first splat.
+   * @param j Slot of the second splat.
+   * @param step Only every `step`-th view is evaluated.
    */
   cost(i: number, j: number, step = 1): number {
     const rows = this.#rows;
@@ -120,8 +128,8 @@ export class PairCosts {
     if (!(p >= 0)) return Infinity;
     const [seeI, seeJ] = [this.#visible[i], this.#visible[j]];
     const visible = p * seeI + q * seeJ;
-    // Sums over views, all areas in units of 2π: of the coverage and its product with that of the merged splat, and of
-    // squares and products of the weights.
+    // Sums over views, with areas in units of 2π: products of both coverages with that of the merged splat, squares of
+    // the latter, and squares and products of weights.
     let [covered, ownSquare, squares, products, own, apart, views] = [0, 0, 0, 0, 0, 0, 0];
     const stride = SEEN * step;
     let b = SEEN * this.#views * j;
@@ -165,7 +173,7 @@ export class PairCosts {
     return (2 * Math.PI * square) / (views * this.#state.pixels);
   }
 
-  /** Merges the last evaluated pair, `i` and `j`, into slot `i`. */
+  /** Merges the last evaluated pair, slots `i` and `j`, into slot `i`. */
   join(i: number, j: number): void {
     const { share: p, opacity } = this;
     const rows = this.#rows;
@@ -194,7 +202,7 @@ export class PairCosts {
     }
   }
 
-  /** Mean squared difference of the colors of two splats over all directions, for each channel. */
+  /** Returns the mean squared difference of the colors of two splats, over all directions and channels. */
   #colorDifference(i: number, j: number): number {
     let sum = 0;
     for (let k = 0, a = this.#numbers * i, b = this.#numbers * j; k < this.#numbers; k++) {
@@ -205,7 +213,7 @@ export class PairCosts {
   }
 }
 
-/** Writes the weight of a splat in means: its visible coverage, over all views. */
+/** Sets `visible` and the weight (mass) of splat `i`, which is its visible area summed over all views. */
 function weigh({ rows, seen, visible, views }: PairState, i: number, contribution: number): void {
   let [max, cover] = [0, 0];
   for (let view = 0; view < views; view++) {
@@ -219,13 +227,16 @@ function weigh({ rows, seen, visible, views }: PairState, i: number, contributio
   rows[ROW * i + MASS] = visible[i] * cover;
 }
 
-/** ∫ G₁ G₂ over 2π √|Σ₁| √|Σ₂|, from the sum of the covariances and the distance of the centers. */
+/**
+ * Returns ∫ G₁ G₂ divided by 2π √|Σ₁| √|Σ₂|, from the sum of the covariances (uu, uv, vv) and the difference of the
+ * centers (du, dv).
+ */
 function overlap(uu: number, uv: number, vv: number, du: number, dv: number): number {
   const determinant = uu * vv - uv * uv;
   return Math.exp((-0.5 * (vv * du * du - 2 * uv * du * dv + uu * dv * dv)) / determinant) / Math.sqrt(determinant);
 }
 
-/** Factor of a splat's opacity that compensates the dilation contained in the covariance. */
+/** Returns the factor of a splat's opacity that compensates for the filter variance in its covariance, 0..1. */
 function compensation(uu: number, uv: number, vv: number, variance: number): number {
   const determinant = uu * vv - uv * uv;
   return Math.sqrt(Math.max(0, (uu - variance) * (vv - variance) - uv * uv) / determinant);

@@ -1,23 +1,23 @@
 import type { Camera, GaussianCloud } from '@gaussian-splat/core';
 
-/** Screen-space dilation of 3D Gaussian Splatting, px². */
+/** Filter variance of 3D Gaussian Splatting in px². */
 export const DILATION = 0.3;
-/** Minimum alpha that renderers draw. */
+/** Minimum alpha of a splat in a pixel that renderers draw. */
 export const ALPHA_MIN = 1 / 255;
 const JACOBIAN_MARGIN = 0.3;
 
-/** Projected splats, one array for each quantity. */
+/** Projections of the `count` visible splats. `source` has their indices in the cloud, and `depths` the distances. */
 export interface Projected {
   readonly count: number;
   readonly source: Uint32Array;
   readonly depths: Float32Array;
-  /** [count, 6]: center x and y, conic xx, xy, yy, opacity. */
+  /** [count, 6] center x and y in pixels, conic xx, xy and yy in 1/px², opacity. */
   readonly ellipses: Float32Array;
-  /** [count]: half the height of the box with alpha of at least 1/255. */
+  /** [count] half the height in pixels of the bounding box of alpha 1/255 or more. */
   readonly halfHeights: Float32Array;
 }
 
-/** R·S of every splat, [N, 9], row-major. */
+/** Returns the matrix R·S of each splat, row-major, [N, 9]. */
 export function factors({ count, rotations, scales }: GaussianCloud): Float32Array {
   const out = new Float32Array(9 * count);
   for (let i = 0; i < count; i++) {
@@ -37,7 +37,7 @@ export function factors({ count, rotations, scales }: GaussianCloud): Float32Arr
   return out;
 }
 
-/** Projects the splats of a cloud that may be visible to a camera; `roots` are its {@link factors}. */
+/** Projects the splats of a cloud that may be visible to a camera. @param roots Result of {@link factors} for the cloud. */
 export function project(cloud: GaussianCloud, roots: Float32Array, camera: Camera): Projected {
   const { count, positions, opacities, origin, antialiased, filterVariance = DILATION } = cloud;
   const { fx, fy, cx, cy, width, height, near, far, worldToCamera: m } = camera;

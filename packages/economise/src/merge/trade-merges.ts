@@ -2,21 +2,23 @@ import type { Trades } from '../fit.js';
 import type { Cut } from '../reduce.js';
 import type { TradeCurve } from '../search.js';
 
-/** Mean squared error of a cut, and the numbers of the file that it saves. */
+/** Mean squared error of a cut, and the count of numbers that it saves in the file. */
 export interface MeasuredCut {
   readonly error: number;
   readonly saved: number;
 }
 
-/** Fractions of the error that are tried for merges. */
+/** Fractions of the allowed error that are tried for merges. */
 const MERGE_SHARES = [0, 0.25, 0.5, 0.75, 0.9, 1];
-/** Cuts that are tried for each of them, until the error is near the limit. */
+/** Maximum number of cuts that are tried for each fraction, until the error is near the limit. */
 const TRIES = 3;
 const NEAR_ENOUGH = 0.97;
 
 /**
- * Divides the error between merges and other cuts. Dropped and merged splats are often the same ones, so their combined
- * saving is measured, in the search views, instead of added.
+ * Finds the division of the allowed error between merges and other cuts that saves the most. Dropped and merged splats are
+ * often the same, so that their combined saving is measured instead of added.
+ * @param budget Allowed mean squared error.
+ * @param measure Measures a cut in the searched views.
  */
 export async function tradeMerges(
   others: Trades,

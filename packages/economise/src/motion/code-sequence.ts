@@ -6,6 +6,7 @@ import {
   ANIMATED_ATTRIBUTE_NAMES,
   readMotion,
   readScene,
+  upright,
   type AnimatedAttributeName,
 } from '@gaussian-splat/formats';
 import { packedOrder } from '@gaussian-splat/renderer/tools';
@@ -22,45 +23,47 @@ import { writeMotion, type MotionSteps } from './write-motion.js';
 
 export interface CodeSequenceOptions {
   readonly frameCount: number;
-  /** Reads a frame: all have the same splats in the same order. */
+  /** Reads a frame by its index. All frames must have the same splats in the same order. */
   readonly openFrame: (frame: number) => Promise<GaussianCloud>;
   readonly framesPerFile: number;
-  /** PSNR of frames against their sources over covered pixels, dB. */
-  readonly minDecibels: number;
+  /** Target PSNR of frames against their sources in dB, over covered pixels. */
+  readonly minPsnr: number;
   readonly device: GPUDevice;
   readonly encodeWebp: EncodeWebp;
   readonly deflate: Deflate;
-  /** Compresses temporary data for measurements; default: `deflate`. */
+  /** Compresses temporary files that are only measured; default `deflate`. */
   readonly deflateQuickly?: Deflate;
   /** Called with a sentence about each step. */
   readonly onStep?: (step: string) => void;
 }
 
 export interface CodedSequence {
-  /** The first frame as SOG. */
+  /** First frame as SOG. */
   readonly first: Uint8Array<ArrayBuffer>;
-  /** Files of motion with `framesPerFile` frames each. */
+  /** Motion files with `framesPerFile` frames each; the last may have fewer. */
   readonly files: readonly Uint8Array<ArrayBuffer>[];
-  /** PSNR of all measured frames together, and of their worst view. */
-  readonly decibels: number;
-  readonly worstDecibels: number;
+  /** PSNR of all measured frames together in dB. */
+  readonly psnr: number;
+  /** PSNR of the view with the largest error in dB. */
+  readonly worstPsnr: number;
 }
 
-/** Fraction of the error that the first frame may use; motion uses the rest. */
+/** Fraction of the allowed error that the first frame may cause; motion may cause the rest. */
 const FIRST_SHARE = 0.5;
 const MAX_TRIES = 4;
 const NEAR_ENOUGH = 0.85;
-/** Number of frames that are measured at the end. */
+/** Approximate number of frames that are measured in the written files. */
 const JUDGED = 3;
 
 /**
- * Encodes a sequence with corresponding splats: the first frame as a scene, and its motion. Quantization is as coarse
- * as images of some frames allow.
- * @throws GaussianSplatError `argument/value` for frames with another number of splats
+ * Encodes a sequence whose frames have corresponding splats, as a scene of the first frame and motion files. Quantization
+ * is as coarse as `minPsnr` allows in images of some frames. Frames with an up direction other than (0, -1, 0) are
+ * rotated, because SOG has none.
+ * @throws GaussianSplatError `argument/value` for frames with different counts of splats
  */
 export async function codeSequence(options: CodeSequenceOptions): Promise<CodedSequence> {
-  const { frameCount, framesPerFile, minDecibels, device, deflate, onStep = () => undefined } = options;
-  const target = meanSquareOf(minDecibels);
+  const { frameCount, framesPerFile, minPsnr, device, deflate, onStep = () => undefined } = options;
+  const target = meanSquareOf(minPsnr);
   const { first, bytes, openOrdered } = await codeFirst(options, FIRST_SHARE * target);
   onStep(`first frame: ${bytes.length} bytes`);
   const groupAt = async (begin: number): Promise<GaussianCloud[]> => {
@@ -70,7 +73,7 @@ export async function codeSequence(options: CodeSequenceOptions): Promise<CodedS
     }
     return frames;
   };
-  if (frameCount === 1) return { first: bytes, files: [], decibels: Infinity, worstDecibels: Infinity };
+  if (frameCount === 1) return { first: bytes, files: [], psnr: Infinity, worstPsnr: Infinity };
   let steps = await findMotionSteps(first, await groupAt(1), target, options);
   for (let tries = 1; ; tries++) {
     const files: Uint8Array<ArrayBuffer>[] = [];
@@ -88,22 +91,25 @@ export async function codeSequence(options: CodeSequenceOptions): Promise<CodedS
       judge.destroy();
     }
     const error = errors.length > 0 ? mean(errors) : 0;
-    const found = { decibels: decibels(error), worstDecibels: decibels(Math.max(0, ...errors)) };
-    onStep(`${found.decibels.toFixed(2)} dB in ${errors.length} held-out views of frames`);
+    const found = { psnr: decibels(error), worstPsnr: decibels(Math.max(0, ...errors)) };
+    onStep(`${found.psnr.toFixed(2)} dB in ${errors.length} held-out views of frames`);
     if (error <= target || tries === MAX_TRIES) return { first: bytes, files, ...found };
     steps = scaledSteps(steps, 0.95 * Math.sqrt(target / error));
   }
 }
 
-/** Compares other clouds with a frame, in `count` views. */
+/** Returns an evaluator that compares clouds with `cloud` in `count` views; `heldOut` and `searched` views are the same. */
 export function judgeOf(device: GPUDevice, cloud: GaussianCloud, count: number, seed: number): Promise<GpuEvaluator> {
   const views = viewsAround(boundsOf(cloud), count, { seed });
   return GpuEvaluator.create(device, cloud, { scored: views.slice(0, 1), searched: views, heldOut: views });
 }
 
-/** The first frame as SOG, its splats after reading it back, and other frames in the order of its file. */
+/**
+ * Encodes the first frame as SOG. Returns the bytes, the splats decoded from them, and a function that opens a frame
+ * with its splats in the order of this file.
+ */
 async function codeFirst({ openFrame, device, encodeWebp }: CodeSequenceOptions, target: number) {
-  const source = await openFrame(0);
+  const source = upright(await openFrame(0));
   const judge = await judgeOf(device, source, 3, 1);
   const whole = { cloud: source, degrees: new Uint8Array(source.count).fill(source.shDegree) };
   const read = (bytes: Uint8Array): Promise<GaussianCloud> => readScene(bytes, { name: 'first.sog' });
@@ -113,7 +119,7 @@ async function codeFirst({ openFrame, device, encodeWebp }: CodeSequenceOptions,
   judge.destroy();
   const order = packedOrder(source);
   const openOrdered = async (frame: number): Promise<GaussianCloud> => {
-    const cloud = await openFrame(frame);
+    const cloud = upright(await openFrame(frame));
     if (cloud.count !== source.count) throw notCorresponding(frame, source.count, cloud.count);
     return splatsOf(cloud, order);
   };
@@ -121,8 +127,8 @@ async function codeFirst({ openFrame, device, encodeWebp }: CodeSequenceOptions,
 }
 
 /**
- * Finds the steps that reach the target in a frame of a file of motion, with equal error reduction per byte in all
- * attributes.
+ * Finds the steps of motion that reach the target in a frame of a motion file, balanced between attributes by
+ * {@link findSteps}.
  */
 async function findMotionSteps(
   first: GaussianCloud,
@@ -150,7 +156,7 @@ async function findMotionSteps(
   return steps;
 }
 
-/** Median over the splats of their middle standard deviation. */
+/** Returns the median, over all splats, of their middle standard deviation. */
 export function typicalSize({ scales, count }: GaussianCloud): number {
   const middle = (i: number): number => [...scales.subarray(3 * i, 3 * i + 3)].sort((a, b) => a - b)[1];
   return Float64Array.from({ length: count }, (_, i) => middle(i)).sort()[count >> 1];
@@ -164,7 +170,7 @@ const ARRAYS = {
   color: 'sh',
 } as const;
 
-/** Numbers of a splat for each animated attribute. */
+/** Returns the count of a splat's numbers for each attribute that changes between two of the frames. */
 function numbersOf(frames: readonly GaussianCloud[]): Partial<Steps<AnimatedAttributeName>> {
   const [one, other] = [frames[0], frames[frames.length >> 1]];
   const changes = (name: AnimatedAttributeName): boolean =>
@@ -172,7 +178,7 @@ function numbersOf(frames: readonly GaussianCloud[]): Partial<Steps<AnimatedAttr
   return Object.fromEntries(ANIMATED_ATTRIBUTE_NAMES.filter(changes).map((name) => [name, ANIMATED_ATTRIBUTES[name]]));
 }
 
-/** Reads back a frame of a file of motion. */
+/** Decodes a frame of a motion file. */
 async function frameOf(first: GaussianCloud, bytes: Uint8Array, frames: number, frame: number): Promise<GaussianCloud> {
   const budget = (): LoadBudget => new LoadBudget(2 ** 40);
   const motion = await readMotion({ bytes, name: 'motion', splats: first.count, frames, budget: budget() });

@@ -1,11 +1,11 @@
-/** Curves are computed from at most this number of rows, because more hardly change the result. */
+/** Approximate maximum number of rows that determine curves. More rows have little effect. */
 const MAX_ROWS = 30_000;
 const MAX_SWEEPS = 30;
 
 /**
- * Principal components (about 0) of the rows as curves, each with a root mean square of 1, strongest first.
- * @param rows [N, length]
- * @param least Root mean square weight below which a curve is dropped.
+ * Returns the principal components (without centering) of rows as curves with a root mean square of 1, strongest first.
+ * @param rows [N, length] rows.
+ * @param min Root mean square weight below which a curve is dropped.
  */
 export function mainCurves(rows: Float32Array, length: number, min: number): Float64Array[] {
   const count = rows.length / length;
@@ -30,7 +30,7 @@ export function mainCurves(rows: Float32Array, length: number, min: number): Flo
     .map(({ curve }) => curve.map((part) => part * Math.sqrt(length)));
 }
 
-/** Eigenvalues and eigenvectors of a symmetric matrix, by Jacobi's rotations. The matrix is destroyed. */
+/** Returns the eigenvalues and eigenvectors of a symmetric matrix, by Jacobi's rotations. Modifies the matrix. */
 function eigen(matrix: Float64Array, size: number): { values: number[]; vectors: Float64Array[] } {
   const vectors = Array.from({ length: size }, (_, k) =>
     Float64Array.from({ length: size }, (_, i) => (i === k ? 1 : 0)),

@@ -1,13 +1,13 @@
 import type { GaussianCloud } from '@gaussian-splat/core';
 
 const HALF = Math.SQRT1_2;
-/** Lower limit of scales, so that they have logarithms. */
+/** Minimum scale, so that logarithms are finite. */
 const EPSILON = 1e-12;
-/** The identity, and half turns about each axis: they only change signs. */
+/** Quaternions of the identity and of half turns about each axis, which only change the signs of axes. */
 const HALF_TURNS = [0, 1, 2, 3].map((axis) => [0, 1, 2, 3].map((k) => (k === axis ? 1 : 0)));
 /**
- * Quaternions that permute the axes, and the resulting first, second and third axis: all axis orders of an ellipsoid.
- * The first is the identity.
+ * All rotations that permute the axes of an ellipsoid: the quaternion `turn`, and the indices of the axes that become the
+ * first, second and third axis. The first rotation is the identity.
  */
 const RENAMINGS: readonly { readonly turn: readonly number[]; readonly axes: readonly number[] }[] = [
   { turn: [1, 0, 0, 0], axes: [0, 1, 2] },
@@ -28,14 +28,14 @@ function product([w, x, y, z]: readonly number[], [a, b, c, d]: readonly number[
 }
 
 /**
- * Squared difference to the previous frame, in radians and in logarithms, below which the order of axes is certainly
- * unchanged.
+ * Squared difference from the previous frame, in radians and natural logarithms, below which the order of axes has not
+ * changed.
  */
 const NEAR = 0.1;
 
 /**
- * Reorders the axes of splats so that rotations and scales are nearest to those of another frame, because tools that
- * decompose covariances sort axes by length, and the order changes as splats deform.
+ * Returns a cloud whose splats have their axes in the order that is nearest to the rotations and scales of `near`. Tools
+ * that decompose covariances sort axes by length, so that their order changes when splats deform.
  */
 export function alignAxes(cloud: GaussianCloud, near: GaussianCloud): GaussianCloud {
   const [rotations, scales] = [cloud.rotations.slice(), cloud.scales.slice()];

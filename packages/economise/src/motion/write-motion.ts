@@ -1,6 +1,7 @@
 import { concatenated } from '../concatenated.js';
 import { GaussianSplatError, shCoefficientCount, type GaussianCloud } from '@gaussian-splat/core';
 import {
+  FADE_NAMES,
   MOTION_MODES,
   MOTION_VERSION,
   ANIMATED_ATTRIBUTES,
@@ -14,8 +15,8 @@ import type { Steps } from '../steps.js';
 import { mainCurves } from './main-curves.js';
 
 /**
- * Quantization steps: `position` in world units, `rotation` in radians, `scale` in natural logarithms, `opacity` and
- * `color` (the constant coefficient) in their own units.
+ * Quantization steps of motion: `position` in units of the scene, `rotation` in radians, `scale` in natural logarithms.
+ * `opacity` and `color` (constant coefficients) have the units of these attributes.
  */
 export type MotionSteps = Steps<AnimatedAttributeName>;
 
@@ -24,35 +25,34 @@ export interface MotionOptions {
   readonly deflate: Deflate;
 }
 
-/** Codes below this fraction of a step become 0, because zeros cost almost no bits. */
+/** Fraction of a step below which weights become 0, because zeros need almost no bits. */
 const DEAD_ZONE = 0.6;
-/** Curves with typical weights below this fraction of a step are dropped. */
+/** Fraction of a step below which the root mean square weight of a curve is too small to keep the curve. */
 const MIN_CURVE = 0.12;
 const MAX_CODE = 32_767;
-/** An empty last block of a deflate stream. */
+/** Empty last block of a deflate stream. */
 const END = Uint8Array.of(3, 0);
 
-/** Motion of one attribute as written. */
+/** Quantized motion of an attribute, as a file contains it. */
 export type WrittenPart = AnimatedAttribute;
 
-/** The principal curves of an attribute's numbers, strongest first. */
+/** Principal curves of an attribute's numbers, strongest first. A row is a number of a splat over the frames. */
 export interface Followed {
-  /** [width · splats] animated numbers. */
+  /** Count of rows: numbers of the attribute times splats. */
   readonly rows: number;
   readonly frames: number;
-  /** [frames] each. */
+  /** Values of each curve, [frames]. */
   readonly curves: readonly Float64Array[];
-  /** [rows] for each curve: its weight for each number. */
+  /** For each curve, its weight for each row, [rows]. */
   readonly shares: readonly Float32Array[];
 }
 
 /**
- * Writes a file of motion: the differences of frames from the first frame of their sequence, with corresponding splats.
- * The principal curves of each attribute are computed over the frames of the file; the weights of each splat are
- * stored.
- * @param first As read back from its file.
- * @param frames With the axis order of the first frame: see `alignAxes`.
- * @throws GaussianSplatError `argument/value` for frames with other splats.
+ * Writes a motion file: the differences of frames from the first frame of a sequence with corresponding splats. The file
+ * has the principal curves of each attribute over its frames, and the weights of the curves for each splat.
+ * @param first First frame, as read from its file.
+ * @param frames Frames of the file, with the order of axes of the first frame: see `alignAxes`.
+ * @throws GaussianSplatError `argument/value` for frames with a different number of splats.
  */
 export function writeMotion(
   first: GaussianCloud,
@@ -69,7 +69,7 @@ export function writeMotion(
   return motionFile({ splats: first.count, frames: frames.length, parts, deflate });
 }
 
-/** Writes a file of motion with {@link ANIMATED_ATTRIBUTE_NAMES}, in their order. */
+/** Returns the bytes of a motion file. `parts` has the motion of each of {@link ANIMATED_ATTRIBUTE_NAMES}, in order. */
 export function motionFile({
   splats,
   frames,
@@ -83,7 +83,7 @@ export function motionFile({
   lives?: Lives;
   deflate: Deflate;
 }): Uint8Array<ArrayBuffer> {
-  const version = lives ? MOTION_VERSION.lives : MOTION_VERSION.everywhere;
+  const version = lives ? MOTION_VERSION[lives.fades ? 'fades' : 'lives'] : MOTION_VERSION.everywhere;
   const head = new DataView(new ArrayBuffer(12 + 8 * parts.length));
   [version, splats, frames].forEach((number, k) => head.setUint32(4 * k, number, true));
   parts.forEach(({ rank, step }, k) => {
@@ -96,16 +96,21 @@ export function motionFile({
   const modes = Uint8Array.from(planes, ({ mode }) => mode);
   const begin = concatenated([bytesOf(head), bytesOf(curves), modes]);
   const lifetimes = lives ? [lives.first, lives.end].flatMap((words) => halvesOf(words).map(deflate)) : [];
+  const { fades } = lives ?? {};
+  if (fades) lifetimes.push(...FADE_NAMES.map((name) => deflate(fades[name])));
   return concatenated([deflate(begin), ...lifetimes, ...planes.map(({ bytes }) => bytes), END]);
 }
 
-/** The low bytes of words, and the high ones. */
+/** Returns the low bytes of 16-bit words, and their high bytes. */
 const halvesOf = (words: Uint16Array): readonly Uint8Array[] => [
   Uint8Array.from(words, (word) => word & 255),
   Uint8Array.from(words, (word) => word >> 8),
 ];
 
-/** [width · splats, frames] difference of each number from the first frame; undefined if all are unchanged. */
+/**
+ * Returns the difference of each number of an attribute from the first frame, [numbers · splats, frames]. Undefined if no
+ * number changes.
+ */
 function changesOf(
   first: GaussianCloud,
   frames: readonly GaussianCloud[],
@@ -146,7 +151,7 @@ function numbersOf(
   }[name];
 }
 
-/** Rotation vectors, each in the branch nearest to that of the previous frame. */
+/** Writes rotation vectors from the first frame. Of the vectors of a rotation, selects that nearest to the previous frame. */
 function putTurns(
   first: GaussianCloud,
   frames: readonly GaussianCloud[],
@@ -169,7 +174,10 @@ function putTurns(
   }
 }
 
-/** The quaternion that rotates one orientation to another. */
+/**
+ * Writes to `turn` the quaternion that rotates one orientation to another, to · from⁻¹.
+ * @param at Index of the first component in both arrays.
+ */
 export function turnBetween(from: Float32Array, to: Float32Array, at: number, turn: Float64Array): void {
   const [w, x, y, z] = [from[at], -from[at + 1], -from[at + 2], -from[at + 3]];
   const [a, b, c, d] = [to[at], to[at + 1], to[at + 2], to[at + 3]];
@@ -181,19 +189,20 @@ export function turnBetween(from: Float32Array, to: Float32Array, at: number, tu
 
 export const UNCHANGED: WrittenPart = { rank: 0, step: 1, curves: new Float32Array(0), codes: [] };
 
-/** Minimum typical weight of a curve at a step. */
+/** Returns the minimum root mean square weight of a curve for a quantization step. */
 export const minCurve = (step: number): number => MIN_CURVE * step;
 
 /**
- * @param changes [rows, frames]
- * @param least See {@link minCurve}.
+ * Returns the principal curves of rows, and their weights.
+ * @param changes [rows, frames] differences.
+ * @param min Minimum root mean square weight of a curve; see {@link minCurve}.
  */
 export function followed(changes: Float32Array, frames: number, min: number): Followed {
   const curves = mainCurves(changes, frames, min);
   return { rows: changes.length / frames, frames, curves, shares: curves.map((curve) => sharesOf(changes, curve)) };
 }
 
-/** [rows] weight of a curve for each row. */
+/** Returns the weight of a curve for each row, [rows]. @param changes [rows, frames] differences. */
 export function sharesOf(changes: Float32Array, curve: Float64Array): Float32Array {
   const frames = curve.length;
   const shares = new Float32Array(changes.length / frames);
@@ -205,7 +214,10 @@ export function sharesOf(changes: Float32Array, curve: Float64Array): Float32Arr
   return shares;
 }
 
-/** Quantizes with a step, or with a larger one if codes would overflow; drops curves that become unused. */
+/**
+ * Quantizes weights with a step, or with a larger step if codes would overflow 16 bits. Drops curves whose codes are all
+ * 0.
+ */
 export function roundedPart(
   { rows, frames, curves: found, shares }: Followed,
   asked: number,
@@ -227,7 +239,7 @@ export function roundedPart(
   return { rank, step, curves, codes: Array.from({ length: width }, (_, number) => ofNumber(number)).flat() };
 }
 
-/** Codes as two planes of bytes, in the smaller of both codings. */
+/** Returns the compressed low and high bytes of codes, plain or as differences, whichever is smaller. */
 function smaller(codes: Int16Array, deflate: MotionOptions['deflate']): { mode: number; bytes: Uint8Array } {
   const differences = codes.map((code, i) => code - (i > 0 ? codes[i - 1] : 0));
   const [plain, changed] = [codes, differences].map((own) => {

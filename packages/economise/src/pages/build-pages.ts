@@ -33,31 +33,31 @@ import { shellOrder } from './shell-order.js';
 
 const { CULL_GROUP } = constants;
 
-/** A page without a name. */
+/** A page of a tree, without the name of its file. */
 export interface BuiltPage {
   readonly chunks: number;
-  /** Number of its first chunks that have their parent in another page or none. */
+  /** Number of the page's first chunks whose parent is in another page, or that have no parent. */
   readonly upper: number;
-  /** Page of the tree that holds the parent, and the index of the parent chunk in it. */
+  /** Page of the tree that contains the parent, and index of the parent chunk in that page. */
   readonly parent?: readonly [page: number, chunk: number];
-  /** Level and index of each chunk. */
+  /** Level of each chunk of the page (0 is the finest), and its index in the level. */
   readonly holds: readonly (readonly [level: number, chunk: number])[];
 }
 
-/** Levels of a scene or of a part of it, ready to be divided into pages. */
+/** Levels of detail of a scene, or of a part of it, before the division into pages. Level 0 is the finest. */
 export interface DetailTree {
-  /** Number of splats of the finest level, without padding. */
+  /** Number of splats of the finest level, without padding splats. */
   readonly splats: number;
   readonly levels: readonly SplatLevel[];
-  /** `Chunk` rows of each level. */
+  /** Rows of the struct `Chunk` for each level. */
   readonly chunks: readonly Float32Array[];
   readonly errors: readonly ChunkErrors[];
   readonly shPrecision: ShPrecision;
   readonly geometry?: 'quantized';
   readonly antialiased: boolean;
-  /** Variance in px² of the screen-space low-pass filter of training; undefined is the classic 0.3. */
+  /** Filter variance of training in px²; undefined is 0.3. */
   readonly filterVariance?: number | undefined;
-  /** See `CloudHints.order`. */
+  /** Sort order of splats in training: `pixel` for per-pixel order. See `CloudHints.order`. */
   readonly order?: 'pixel' | undefined;
   readonly origin: Vector3;
   readonly bounds: Bounds;
@@ -65,14 +65,14 @@ export interface DetailTree {
 
 export interface DetailTreeOptions {
   /**
-   * `quantized`: half the bytes for centers, shapes and opacities. Default: same precision as scenes that are not
-   * streamed.
+   * Precision of the geometry. `quantized` halves the bytes of centers, shapes and opacities. By default, they have the precision of scenes
+   * that are not streamed.
    */
   readonly geometry?: 'quantized';
 }
 
 /**
- * Builds the levels of detail of a cloud. A scene with an up direction other than (0, -1, 0) is rotated.
+ * Builds the levels of detail of a cloud. A scene with a direction up other than (0, -1, 0) is rotated.
  * @throws GaussianSplatError `argument/cloud` if the arrays do not match `count` and `shDegree`.
  */
 export function buildDetailTree(given: GaussianCloud, { geometry }: DetailTreeOptions = {}): DetailTree {
@@ -96,7 +96,7 @@ export function buildDetailTree(given: GaussianCloud, { geometry }: DetailTreeOp
   return { ...treeOf([leaves, ...levelsAbove(leaves)], geometry), ...facts };
 }
 
-/** The finest level; for chunk-relative coordinates its chunks have a limited extent. */
+/** Returns the finest level. For quantized geometry, {@link shellOrder} limits the extent of its chunks. */
 function leavesOf(cloud: GaussianCloud, kept: Uint32Array, geometry: DetailTree['geometry']): SplatLevel {
   if (geometry === undefined) return leafLevel(cloud, kept);
   const { order, fillers } = shellOrder(cloud.positions, kept);
@@ -105,7 +105,7 @@ function leavesOf(cloud: GaussianCloud, kept: Uint32Array, geometry: DetailTree[
   return leaves;
 }
 
-/** Computes bounds and errors of levels; `leaves` are the errors of the finest. */
+/** Computes bounds and errors of levels. @param leaves Errors of the finest level; by default computed. */
 export function treeOf(
   levels: readonly SplatLevel[],
   geometry: DetailTree['geometry'],
@@ -119,9 +119,10 @@ export function treeOf(
 }
 
 /**
- * Divides a tree into pages, parents before children: the first holds the coarsest chunk and its children, each other
- * one the children of a chunk, and their children.
- * @param withTop False to leave the coarsest chunk to another tree: the first page then starts with its children.
+ * Divides a tree into pages, with parents before children. The first page has the coarsest chunk and its children. Each
+ * other page has the children of a chunk, and their children.
+ * @param withTop Whether pages include the coarsest chunk. If false, it belongs to another tree, and the first page begins
+ * with its children.
  */
 export function cutPages({ levels }: Pick<DetailTree, 'levels'>, withTop = true): BuiltPage[] {
   const pages: BuiltPage[] = [];
@@ -146,14 +147,14 @@ export function cutPages({ levels }: Pick<DetailTree, 'levels'>, withTop = true)
     });
   };
   const top = levels.length - 1;
-  // If the number of levels is odd, the first page has only one, so that pages of the finest, the most numerous, are
-  // full.
+  // If the number of levels is odd, the first page has only one level, so that the pages of the finest level, the most
+  // numerous ones, have two levels.
   if (withTop) add(top, [0], undefined, top % 2 === 0);
   else if (top > 0) add(top - 1, below(top - 1, [0]), undefined, top % 2 === 1);
   return pages;
 }
 
-/** Packs the words of a page's file: see docs/lod-format.md. */
+/** Returns the 32-bit words of a page's file, which docs/lod-format.md describes. */
 export function packPage(tree: DetailTree, { holds, chunks }: BuiltPage): Uint32Array<ArrayBuffer> {
   const { levels, shPrecision, geometry: kind } = tree;
   const layout = pageLayout({ shDegree: levels[0].shDegree, shPrecision, geometry: kind }, chunks);
@@ -191,7 +192,11 @@ function rowOf({ errors }: DetailTree, level: number, chunk: number): Float32Arr
   return detailRows(one(errors[level], chunk), above && one(above, chunk >> 2));
 }
 
-/** Returns the manifest of a scene with one tree. */
+/**
+ * Returns the manifest of a scene with one tree.
+ * @param fileOf Returns the path of a page's file, by the index of the page.
+ * @param coding Coding of the files; undefined for uncompressed words.
+ */
 export function manifestOf(
   tree: DetailTree,
   pages: readonly BuiltPage[],
@@ -223,7 +228,7 @@ export function manifestOf(
   };
 }
 
-/** Removes the fields of a coding that only its writer needs. */
+/** Returns a coding without the fields that only its writer needs. */
 const statedOf = ({ size, directions, opacity, color, chroma, scale }: PageCoding): PageCoding => ({
   ...{ size, directions, opacity, color, chroma, scale },
 });

@@ -24,53 +24,54 @@ import {
 import type { BuiltPage, DetailTree } from './build-pages.js';
 import { headOf, joined, Planes, type Deflate } from './page-planes.js';
 import { differencesOf, HarmonicRounder } from './round-harmonics.js';
-import type { SplatVisibility } from './seen-splats.js';
+import type { SplatVisibility } from './splat-visibility.js';
 import { numberOf, SplatWeights } from './splat-weights.js';
 
 const { CULL_GROUP, ALPHA_MIN, QUANTIZED_OPAQUE, QUANTIZED_T_ZERO, QUANTIZED_UV_ZERO } = constants;
 const MAX_PLACES = 65_535;
 const MAX_SIZES = 255;
 const MAX_COLOR = 32_000;
-/** Rank of the splat size, as a fraction of a chunk's splats, that determines the coordinate step. */
+/** Rank of the splat size that determines the step of coordinates, as a fraction of a chunk's splats. */
 const SIZE_RANK = 0.35;
 /**
- * Additional octaves of the steps above the finest level, because such levels are far away, and their merging error is
- * much larger than their rounding error.
+ * Binary logarithms of the factors of steps in levels above the finest. Such levels are far away, and the error of merging
+ * is much larger than that of rounding.
  */
 const COARSE: Octaves = { place: 4, size: 2, direction: 2, opacity: 2, color: 1, harmonics: 2 };
 const FINEST: Octaves = { place: 0, size: 0, direction: 0, opacity: 0, color: 0, harmonics: 0 };
 
 type Octaves = Readonly<Record<'place' | 'size' | 'direction' | 'opacity' | 'color' | 'harmonics', number>>;
 
-/** Quantization steps, in different units. */
+/** Quantization steps of pages. */
 export interface PageSteps {
-  /** Step of coordinates, relative to the splat size at a low rank of the chunk. */
+  /** Step of coordinates, as a fraction of the splat size at `SIZE_RANK` of the chunk. */
   readonly place: number;
-  /** Octaves. */
+  /** Step of the binary logarithm of sizes. */
   readonly size: number;
-  /** Step of the direction maps. */
+  /** Step of the coordinates that represent directions. */
   readonly direction: number;
   readonly opacity: number;
-  /** Steps of the constant coefficient, and of its color differences. */
+  /** Step of the luma of the constant coefficient. */
   readonly color: number;
+  /** Step of the color differences of the constant coefficient. */
   readonly chroma: number;
-  /** Step of the other coefficients, for the most visible splats. */
+  /** Step of the coefficients above the constant one, for the most visible splats. */
   readonly harmonics: number;
 }
 
-/** Default steps for an unknown scene: about 45 to 50 dB. */
+/** Default steps, with which scenes have a PSNR of about 45 to 50 dB. */
 export const DEFAULT_STEPS: PageSteps = {
   ...{ place: 0.15, size: 1 / 16, direction: 1 / 48, opacity: 1 / 90, color: 1 / 28, chroma: 1 / 14 },
   harmonics: 1 / 40,
 };
 
-/** Additional parameters of a writer. */
+/** Coding of pages, with the parameters that only a writer needs. */
 export interface WrittenCoding extends PageCoding {
-  /** Step of coordinates, relative to the size of the chunk's splats. */
+  /** See {@link PageSteps.place}. */
   readonly place: number;
 }
 
-/** Returns the nearest steps that files can represent. */
+/** Returns the coding with the nearest steps that files can represent. */
 export function codingFor(steps: PageSteps): WrittenCoding {
   const odd = 2 * Math.round((1 / steps.direction - 1) / 2) + 1;
   const scale = Math.round(SCALE_STEPS * (Math.log2(127 * steps.harmonics) + SCALE_BIAS));
@@ -87,16 +88,16 @@ export function codingFor(steps: PageSteps): WrittenCoding {
 
 /** Options of {@link PageEncoder} besides a tree and its coding. */
 export interface PageEncoderOptions {
-  /** Compresses a block of a file. */
+  /** Compresses a section of a file. */
   readonly deflate: Deflate;
   /**
-   * Visibility of the splats of the tree's cloud: less visible ones are quantized more coarsely. Default: estimated
-   * from opacities and sizes.
+   * Visibility of the splats of the tree's cloud. Less visible splats have larger steps. By default, visibility is
+   * estimated from opacities and sizes.
    */
   readonly seen?: SplatVisibility | undefined;
 }
 
-/** Writes coded files of pages: see docs/lod-format.md. */
+/** Encoder of the files of pages, which docs/lod-format.md describes. */
 export class PageEncoder {
   readonly #tree: DetailTree;
   readonly #coding: WrittenCoding;
@@ -105,19 +106,19 @@ export class PageEncoder {
   readonly #rounder: HarmonicRounder;
   readonly #weights: SplatWeights;
 
-  /** @param coding Coding of all files of the folder. */
+  /** @param coding Coding of all files of a folder. */
   constructor(tree: DetailTree, coding: WrittenCoding, { deflate, seen }: PageEncoderOptions) {
     const [leaves] = tree.levels;
     this.#tree = tree;
     this.#coding = coding;
     this.#deflate = deflate;
-    // Splats of planes keep the order of the file: see mortonOrder.
+    // Scenes of planes keep the order of the file; see mortonOrder.
     this.#keepsOrder = isOfPlanes(leaves.positions);
     this.#rounder = new HarmonicRounder(shNumbers(leaves.shDegree) / 3, seen);
     this.#weights = new SplatWeights(leaves, seen?.energies);
   }
 
-  /** Encodes the file of a page. */
+  /** Returns the encoded file of a page. */
   encode({ holds, chunks }: BuiltPage): Uint8Array<ArrayBuffer> {
     const { levels, errors } = this.#tree;
     const { shDegree } = levels[0];
@@ -148,7 +149,7 @@ export class PageEncoder {
     return level === this.#tree.levels[0] ? FINEST : COARSE;
   }
 
-  /** Writes splats to planes. @returns Their reach, as in boundLevel. */
+  /** Writes splats to planes. @returns Maximum reach of the splats in units of the scene, as in boundLevel. */
   #putSplats(level: SplatLevel, { splats }: Ordered, min: number, planes: Planes): number {
     const octaves = this.#octavesOf(level);
     let [fine, coarse, reach] = [0, 0, 0];
@@ -180,7 +181,7 @@ export class PageEncoder {
     });
   }
 
-  /** @returns Correction of the constant coefficient. */
+  /** Writes the coefficients above the constant one. @returns Number to subtract from the constant coefficient. */
   #putHarmonics(level: SplatLevel, i: number, octaves: Octaves, planes: Planes): readonly number[] {
     const rounder = this.#rounder;
     const number = numberOf(level, i);
@@ -196,7 +197,7 @@ export class PageEncoder {
     return rounder.constantShift();
   }
 
-  /** Sorts the splats of a chunk along a curve, so that consecutive coordinates differ little. */
+  /** Returns the splats of a chunk along a Z-order curve, so that consecutive coordinates differ little. */
   #ordered(level: SplatLevel, first: number, count: number): Ordered {
     const own = level.positions.subarray(3 * first, 3 * (first + count));
     const origin = [0, 1, 2].map((axis) => extremeOf(own, axis, Math.min));
@@ -215,7 +216,7 @@ export class PageEncoder {
 interface Ordered {
   readonly origin: readonly number[];
   readonly step: number;
-  /** Index in the level, and the upper and the lower bytes of the coordinates, {@link interleaved}. */
+  /** For each splat, its index in the level, and the {@link interleaved} high and low bytes of its coordinates. */
   readonly splats: readonly { readonly i: number; readonly coarse: number; readonly fine: number }[];
 }
 
@@ -225,7 +226,7 @@ function extremeOf(positions: Float32Array, axis: number, pick: (a: number, b: n
   return found;
 }
 
-/** Sphere and error of a chunk. */
+/** Returns the sphere (x, y, z, radius) and the error of a chunk. */
 const rowOf = ({ spheres, errors }: ChunkErrors, chunk: number): number[] => [
   ...spheres.subarray(4 * chunk, 4 * chunk + 4),
   errors[chunk],
@@ -241,7 +242,7 @@ function largestOf({ factors }: SplatLevel, first: number, count: number): numbe
   return largest;
 }
 
-/** The smallest extents of splats at the rank {@link SIZE_RANK}. */
+/** Returns the smallest extent of the splat at the rank `SIZE_RANK` of a chunk. */
 function typicalSize({ factors }: SplatLevel, first: number, count: number): number {
   const lengths = new Float64Array(3);
   const sizes = Float64Array.from({ length: count }, (_, k) => {
@@ -251,7 +252,7 @@ function typicalSize({ factors }: SplatLevel, first: number, count: number): num
   return sizes[Math.floor(SIZE_RANK * (sizes.length - 1))];
 }
 
-/** @returns Reach of the splat. */
+/** Writes size, directions and opacity of a splat. @returns Reach of the splat in units of the scene. */
 function putShape(
   { factors, opacities }: SplatLevel,
   i: number,
@@ -267,13 +268,13 @@ function putShape(
     planes.put(PLANES.size + k, code);
     trace += 2 ** (2 * (min + coding.size * code));
   });
-  // Same sign convention as packQuantizedChunk.
+  // The sign convention is that of packQuantizedChunk.
   const [first, second] = [factors[f] < 0 ? -1 : 1, factors[f + 2] < 0 ? -1 : 1];
   const t = directionIn2(first * factors[f + 1], factors[f + 2]);
   const [u, v] = directionIn3(first * factors[f + 3], second * factors[f + 4], factors[f + 5]);
   const last = coding.directions - 1;
   const zeros = [QUANTIZED_T_ZERO, QUANTIZED_UV_ZERO, QUANTIZED_UV_ZERO];
-  // Relative to the center of the range, which is no rotation.
+  // Numbers are rounded relative to the center of the range, so that 0, which means no rotation, has an exact code.
   [t, u, v].forEach((number, k) => {
     const code = last / 2 + roundedTo((number / zeros[k] - 1) * (last / 2), octaves.direction);
     planes.put(PLANES.direction + k, Math.min(last, Math.max(0, code)));
@@ -287,5 +288,5 @@ function putShape(
 const stepOf = ({ scale }: PageCoding, own: number): number =>
   2 ** ((scale + CLASS_STEP * (own - 1)) / SCALE_STEPS - SCALE_BIAS) / 127;
 
-/** Rounds to a multiple of 2^octaves steps. */
+/** Rounds a number of steps to a multiple of 2^octaves. */
 const roundedTo = (steps: number, octaves: number): number => 2 ** octaves * Math.round(steps / 2 ** octaves);

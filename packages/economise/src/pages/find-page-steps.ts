@@ -7,20 +7,20 @@ import { viewsAround, viewsFromEverywhere } from '../views.js';
 import { manifestOf, type BuiltPage, type DetailTree } from './build-pages.js';
 import { codingFor, PageEncoder, DEFAULT_STEPS, type PageSteps } from './encode-page.js';
 import type { Deflate } from './page-planes.js';
-import type { SplatVisibility } from './seen-splats.js';
+import type { SplatVisibility } from './splat-visibility.js';
 
 export interface PageStepsOptions {
   readonly tree: DetailTree;
   /** All pages of the tree. */
   readonly pages: readonly BuiltPage[];
-  /** The cloud that the tree was built from. */
+  /** Source cloud of the tree. */
   readonly cloud: GaussianCloud;
   readonly device: GPUDevice;
-  /** PSNR over covered pixels of held-out views for the finest pages, dB. */
-  readonly minDecibels: number;
-  /** Number of views for the visibility of splats, which controls the quantization of harmonics. */
+  /** Target PSNR of the finest pages in dB, over covered pixels of held-out views. */
+  readonly minPsnr: number;
+  /** Number of views that measure the visibility of splats, on which the quantization of harmonics depends. */
   readonly scored: number;
-  /** Compresses temporary pages for measurements: a fast setting suffices. */
+  /** Compresses temporary pages that are only measured; a fast setting is sufficient. */
   readonly deflate: Deflate;
   /** Called with a sentence about each measurement. */
   readonly onStep?: (step: string) => void;
@@ -30,18 +30,19 @@ export interface FoundPageSteps {
   readonly steps: PageSteps;
   /** Visibility of the splats of the cloud; undefined for a cloud without harmonics. */
   readonly seen: SplatVisibility | undefined;
-  /** PSNR of all held-out views together, and of the worst one. */
-  readonly decibels: number;
-  readonly worstDecibels: number;
+  /** PSNR of all held-out views together in dB. */
+  readonly psnr: number;
+  /** PSNR of the held-out view with the largest error in dB. */
+  readonly worstPsnr: number;
 }
 
 /**
- * Finds the coarsest steps with a given PSNR of the finest pages in held-out views. Attributes whose rounding is less
- * visible get larger steps.
+ * Finds the coarsest steps with which the finest pages have a given PSNR in held-out views. {@link findSteps} balances
+ * the steps of the attributes.
  * @throws GaussianSplatError `out-of-memory/*`
  */
 export async function findPageSteps(options: PageStepsOptions): Promise<FoundPageSteps> {
-  const { tree, cloud, device, minDecibels, scored, onStep = () => undefined } = options;
+  const { tree, cloud, device, minPsnr, scored, onStep = () => undefined } = options;
   const around = (count: number, seed: number) => viewsAround(boundsOf(cloud), count, { seed });
   const { shDegree } = tree.levels[0];
   const everywhere = viewsFromEverywhere(boundsOf(cloud), shDegree > 0 ? scored : 1);
@@ -56,13 +57,13 @@ export async function findPageSteps(options: PageStepsOptions): Promise<FoundPag
     const found = await findSteps({
       usual: DEFAULT_STEPS as Steps<keyof PageSteps>,
       numbers: numbersOf(shDegree),
-      target: meanSquareOf(minDecibels),
+      target: meanSquareOf(minPsnr),
       measure: async (steps) => mean(await evaluator.compare(await decoded(steps), 'searched')),
       judge: async (steps) => {
         const errors = await evaluator.compare(await decoded(steps), 'heldOut');
         const error = mean(errors);
         onStep(`${decibels(error).toFixed(2)} dB in held-out views`);
-        return { error, decibels: decibels(error), worstDecibels: decibels(Math.max(...errors)) };
+        return { error, psnr: decibels(error), worstPsnr: decibels(Math.max(...errors)) };
       },
     });
     return { ...found, seen };
@@ -71,13 +72,13 @@ export async function findPageSteps(options: PageStepsOptions): Promise<FoundPag
   }
 }
 
-/** Numbers of a splat for each step. About half of the harmonics are 0 and cost little. */
+/** Returns the count of a splat's numbers for each step. About half of the harmonics are 0 and do not count. */
 const numbersOf = (degree: ShDegree): Partial<Steps<keyof PageSteps>> => ({
   ...{ place: 3, size: 3, direction: 3, opacity: 1, color: 1, chroma: 2 },
   ...(degree > 0 && { harmonics: 1.5 * ((degree + 1) ** 2 - 1) }),
 });
 
-/** Decodes the finest level of coded pages. */
+/** Encodes pages with some steps, and returns the cloud of their finest level after decoding. */
 async function cloudOfPages(
   { tree, pages, deflate }: Pick<PageStepsOptions, 'tree' | 'pages' | 'deflate'>,
   steps: PageSteps,

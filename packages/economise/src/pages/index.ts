@@ -1,4 +1,4 @@
-/** Writes the folders of LOD pages that the renderer streams: see docs/lod-format.md. */
+/** Writers of folders of LOD pages, which the renderer streams and docs/lod-format.md describes. */
 export {
   buildDetailTree,
   cutPages,
@@ -20,5 +20,5 @@ export { findPageSteps, type FoundPageSteps, type PageStepsOptions } from './fin
 export { placesOnGrid, writePages, type FolderCoding, type PageFolderOptions } from './page-folder.js';
 export type { Deflate } from './page-planes.js';
 export { HarmonicRounder } from './round-harmonics.js';
-export { visibilityWeights, type SplatVisibility } from './seen-splats.js';
+export { visibilityWeights, type SplatVisibility } from './splat-visibility.js';
 export { instancedTree } from './tile-tree.js';

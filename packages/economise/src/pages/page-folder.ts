@@ -4,21 +4,21 @@ import { cutPages, manifestOf, packPage, type BuiltPage, type DetailTree } from 
 import { PageEncoder, type PageEncoderOptions, type WrittenCoding } from './encode-page.js';
 import { instancedTree } from './tile-tree.js';
 
-/** Coding of the files of a folder. */
+/** Coding of the files of a folder, and options of their encoder. */
 export interface FolderCoding extends PageEncoderOptions {
   readonly coding: WrittenCoding;
 }
 
 export interface PageFolderOptions {
-  /** Default: files contain the uncompressed words of the GPU. */
+  /** Coding of the files. By default, files contain the uncompressed words of the GPU. */
   readonly coded?: FolderCoding | undefined;
-  /** Translations of copies of the scene, neighbors adjacent; default: a single scene. */
+  /** Translations of copies of the scene, in an order with adjacent neighbors. By default, there is a single scene. */
   readonly places?: readonly Vector3[] | undefined;
-  /** Stores a file under its path in the folder. */
+  /** Stores a file at a path relative to the folder. */
   readonly put: (path: string, bytes: Uint8Array<ArrayBuffer>) => void;
 }
 
-/** Writes the pages of a scene, or of copies of it. @returns The manifest, for `lod.json`. */
+/** Writes the pages of a scene or of copies of a scene. @returns The content of the manifest, `detail.json`. */
 export function writePages(tree: DetailTree, { coded, places, put }: PageFolderOptions): DetailManifest {
   const write = (name: string, from: DetailTree, pages: readonly BuiltPage[], how = coded): DetailManifest => {
     const encoder = how && new PageEncoder(from, how.coding, how);
@@ -31,7 +31,7 @@ export function writePages(tree: DetailTree, { coded, places, put }: PageFolderO
   if (places === undefined) return write('scene', tree, cutPages(tree));
   const above = instancedTree(tree, places);
   const abovePages = cutPages(above);
-  // Visibility is known only for the scene itself.
+  // The visibility of splats is not known for the tree above the copies.
   const top = write('top', above, abovePages, coded && { ...coded, seen: undefined });
   const part = write('part', tree, cutPages(tree, false));
   const parents = new Map<number, readonly [page: number, chunk: number]>();
@@ -42,7 +42,11 @@ export function writePages(tree: DetailTree, { coded, places, put }: PageFolderO
   return { ...top, trees: [...top.trees, ...part.trees], instances: [...top.instances, ...copies] };
 }
 
-/** Translations of columns × rows copies on the plane y = 0, along a Z-order curve so that neighbors have one parent. */
+/**
+ * Returns translations of columns × rows copies on the plane y = 0. Their order is a Z-order curve, so that neighbors have
+ * the same parent.
+ * @param spacing Distance between neighbors in units of the scene.
+ */
 export function placesOnGrid(columns: number, rows: number, spacing: number): Vector3[] {
   const code = (x: number, y: number): number => {
     let [bits, unit] = [0, 1];

@@ -1,10 +1,10 @@
 import { concatenated } from '../concatenated.js';
 import { DIFFERENCES, headBytes, PLAIN, PLANES, planesOf, type SplatLevel } from '@gaussian-splat/renderer/tools';
 
-/** Compresses bytes to a section of a raw deflate stream: it ends with a sync flush, so that others can be appended. */
+/** Compresses bytes to a section of a raw deflate stream. A sync flush ends it, so that sections can be concatenated. */
 export type Deflate = (bytes: Uint8Array) => Uint8Array;
 
-/** Content of a file's planes: values in the order of its splats, chunk by chunk. */
+/** Content of a file's planes. Each plane has a byte of each splat, in the order of the file. */
 export class Planes {
   readonly bytes: Uint8Array[];
   count = 0;
@@ -19,18 +19,18 @@ export class Planes {
     this.bytes[plane][this.count] = value & 255;
   }
 
-  /** Appends coefficients above the constant one, for a class above 0. */
+  /** Appends the coefficients above the constant one of a splat whose class is above 0. */
   putHarmonics(codes: Int8Array): void {
     codes.forEach((code, k) => (this.bytes[PLANES.harmonics + k][this.#classed] = code & 255));
     this.#classed++;
   }
 
-  /** Marks the start of the finer level. */
+  /** Marks the start of the finer level, after the splats of the coarser level. */
   beginLower(): void {
     this.#lower = [this.count, this.#classed];
   }
 
-  /** Planes, and the offset of the finer level in each. Only some splats have harmonics. */
+  /** Planes, and the offset of the finer level in each. Planes of harmonics have only splats with a class above 0. */
   get whole(): { plane: Uint8Array; lower: number }[] {
     const [all, classed] = this.#lower;
     return this.bytes.map((plane, k) =>
@@ -39,7 +39,10 @@ export class Planes {
   }
 }
 
-/** The bytes in front of the planes, before the coding of planes is known. */
+/**
+ * Returns the bytes in front of the planes: the number of splats of each chunk less 1, then the floats in byte planes.
+ * The coding of each plane at the end remains 0 until {@link joined} sets it.
+ */
 export function headOf(
   counts: readonly number[],
   floats: Float32Array,
@@ -54,10 +57,10 @@ export function headOf(
   return head;
 }
 
-/** An empty last block of a deflate stream. */
+/** Empty last block of a deflate stream. */
 const END = Uint8Array.of(3, 0);
 
-/** Builds a file from planes: concatenated sections of a deflate stream. */
+/** Returns the file with a head and planes. Sets the coding of each plane at the end of `head`. */
 export function joined(head: Uint8Array, { whole: planes }: Planes, deflate: Deflate): Uint8Array<ArrayBuffer> {
   const runs = new Runs(deflate);
   planes.forEach(({ plane, lower }, k) => {
@@ -70,7 +73,7 @@ export function joined(head: Uint8Array, { whole: planes }: Planes, deflate: Def
   return concatenated([deflate(head), ...runs.pieces, END]);
 }
 
-/** Bytes, and their compressed form. */
+/** Bytes, and their compressed section. */
 interface Piece {
   readonly bytes: Uint8Array;
   readonly deflated: Uint8Array;
@@ -80,7 +83,7 @@ const pieceOf = (bytes: Uint8Array, deflate: Deflate): Piece => ({ bytes, deflat
 
 const lengthOf = (pieces: readonly Piece[]): number => pieces.reduce((sum, { deflated }) => sum + deflated.length, 0);
 
-/** Compresses a plane as one section, or as two if separate Huffman codes are smaller. */
+/** Compresses a plane to one section, or to two sections, divided at byte `at`, if these are smaller. */
 function partsOf(bytes: Uint8Array, at: number, deflate: Deflate): Piece[] {
   const whole = [pieceOf(bytes, deflate)];
   if (at === 0 || at === bytes.length) return whole;
@@ -88,7 +91,7 @@ function partsOf(bytes: Uint8Array, at: number, deflate: Deflate): Piece[] {
   return lengthOf(parts) < lengthOf(whole) ? parts : whole;
 }
 
-/** Concatenates sections; similar ones share their Huffman codes. */
+/** List of sections. A section is joined with the last one if together they compress better. */
 class Runs {
   readonly #deflate: Deflate;
   readonly #runs: Piece[] = [];

@@ -1,25 +1,25 @@
 import { CHROMA_CODES } from '@gaussian-splat/renderer/tools';
-import type { SplatVisibility } from './seen-splats.js';
+import type { SplatVisibility } from './splat-visibility.js';
 
-/** Maximum steps of a channel: the range of a signed byte. */
+/** Maximum number of steps of a channel, which is that of a signed byte. */
 const MAX_STEPS = 127;
-/** Diagonal of the root for a splat that is visible from all directions: 1 / √(4 π). */
+/** Diagonal of the root of a splat that is visible from all directions, 1 / √(4 π). */
 const EVEN_PIVOT = 0.28209479177387814;
 /**
- * Minimum reduction of the squared error for a step that costs more bits: zeros cost almost none, and smaller numbers
- * cost less than larger ones.
+ * Minimum reduction of the squared error, in squared steps, for a code other than 0, and for a code larger by 1. Zeros
+ * need almost no bits, and smaller codes fewer bits than larger ones.
  */
 const [ZERO_PRICE, STEP_PRICE] = [0.24, 0.06];
 
-/** Luma of a color and its differences, red minus blue and green minus their mean, which are mostly small. */
+/** Returns the luma of a color, and two differences that are usually small: red - blue, and green - (red + blue) / 2. */
 export function differencesOf(sh: Float32Array, at: number): [luma: number, orange: number, green: number] {
   const middle = (sh[at] + sh[at + 2]) / 2;
   return [(middle + sh[at + 1]) / 2, sh[at] - sh[at + 2], sh[at + 1] - middle];
 }
 
 /**
- * Quantizes the coefficients of a splat's color above the constant one, from the last to the first: each compensates
- * the rounding of the previous ones in the colors of the views (successive cancellation, Babai's nearest plane).
+ * Quantizer of the coefficients above the constant one, from the last to the first. Each coefficient compensates for the
+ * rounding of the previous ones in the colors of the views (successive cancellation, Babai's nearest plane).
  */
 export class ShQuantizer {
   readonly #seen: SplatVisibility | undefined;
@@ -28,7 +28,7 @@ export class ShQuantizer {
   readonly #added: Float64Array;
   readonly #root: Float64Array;
 
-  /** @param size Number of coefficients of a channel. */
+  /** @param size Number of coefficients of a channel, with the constant one. */
   constructor(size: number, seen: SplatVisibility | undefined) {
     this.#size = size;
     this.#seen = seen;
@@ -37,10 +37,11 @@ export class ShQuantizer {
   }
 
   /**
+   * Quantizes the coefficients of a splat.
    * @param i Index of the splat in the cloud; undefined if its visibility is unknown.
-   * @param valuesOf Returns the three numbers of a coefficient, as colors or differences.
-   * @param round Is called with number `n` of coefficient k, corrected, and the weight of its error, 1 for a splat that
-   * is visible from all directions; returns the rounded value.
+   * @param valuesOf Returns the three numbers of coefficient `k`, as colors or differences.
+   * @param round Returns the rounded value of number `n` of coefficient `k`. `value` is corrected for previous rounding.
+   * `weight` is that of the squared error, 1 for a splat that is visible from all directions.
    */
   round(
     i: number | undefined,
@@ -58,13 +59,13 @@ export class ShQuantizer {
     }
   }
 
-  /** Correction of the constant coefficient: subtract it from the three numbers. */
+  /** Returns the numbers to subtract from the three numbers of the constant coefficient, after {@link round}. */
   constantShift(): [number, number, number] {
     const pivot = this.#root[0];
     return [this.#shift(0, 0, pivot), this.#shift(0, 1, pivot), this.#shift(0, 2, pivot)];
   }
 
-  /** Excess of coefficient k from the rounding of those above it. */
+  /** Returns the number to subtract from number `n` of coefficient `k`, because of the rounding of higher coefficients. */
   #shift(k: number, n: number, pivot: number): number {
     let sum = 0;
     for (let j = k + 1; j < this.#size; j++) sum += this.#root[(j * (j + 1)) / 2 + k] * this.#added[3 * j + n];
@@ -82,9 +83,9 @@ export class ShQuantizer {
   }
 }
 
-/** Quantizes lumas and color differences with steps that fit into bytes. */
+/** Quantizer of the coefficients above the constant one to bytes, as lumas and color differences. */
 export class HarmonicRounder {
-  /** Codes of the last splat: all lumas, then red minus blue, then green minus their mean. */
+  /** Codes of the last splat: all lumas, then all differences red - blue, then all green - (red + blue) / 2. */
   readonly codes: Int8Array;
   readonly #rounder: ShQuantizer;
   readonly #size: number;
@@ -97,10 +98,11 @@ export class HarmonicRounder {
   }
 
   /**
-   * @param at Offset of the splat's first coefficient in `sh`.
-   * @param i Its index in the cloud; undefined if its visibility is unknown.
+   * Quantizes the coefficients of a splat to {@link codes}.
+   * @param at Index in `sh` of the splat's first number.
+   * @param i Index of the splat in the cloud; undefined if its visibility is unknown.
    * @param step Step of lumas.
-   * @returns False if some codes were clamped.
+   * @returns Whether the codes of all channels fit into bytes.
    */
   round(sh: Float32Array, at: number, i: number | undefined, step: number): boolean {
     const { codes } = this;
@@ -110,7 +112,7 @@ export class HarmonicRounder {
       (k) => differencesOf(sh, at + 3 * k),
       (value, weight, k, n) => {
         const spacing = n === 0 ? step : CHROMA_CODES * step;
-        const code = Math.sign(value) * Math.min(MAX_STEPS, roundedBy(Math.abs(value) / spacing, weight));
+        const code = Math.sign(value) * Math.min(MAX_STEPS, quantized(Math.abs(value) / spacing, weight));
         codes[count * n + k - 1] = code;
         return code * spacing;
       },
@@ -119,13 +121,13 @@ export class HarmonicRounder {
     return true;
   }
 
-  /** Correction of the constant coefficient: subtract it from its luma and its differences. */
+  /** Returns the numbers to subtract from luma and differences of the constant coefficient, after {@link round}. */
   constantShift(): [luma: number, orange: number, green: number] {
     return this.#rounder.constantShift();
   }
 }
 
-/** Whether the channels of a luma and differences fit bytes. */
+/** Whether red, green and blue, in steps of lumas, fit into signed bytes. */
 function fits(luma: number, orange: number, green: number): boolean {
   const [rest, half] = [Math.abs(luma - (CHROMA_CODES / 2) * green), (CHROMA_CODES / 2) * Math.abs(orange)];
   return (
@@ -133,8 +135,8 @@ function fits(luma: number, orange: number, green: number): boolean {
   );
 }
 
-/** Rounds to a number of steps, with a bias towards smaller ones if an error has little weight. */
-export function roundedBy(size: number, weight: number): number {
+/** Rounds a number of steps that is not negative, downwards more often if the weight of its squared error is small. */
+export function quantized(size: number, weight: number): number {
   const code = Math.floor(size + 0.5 - STEP_PRICE / 2 / weight);
   if (code > 1) return code;
   return 2 * size - 1 > ZERO_PRICE / weight ? 1 : 0;

@@ -2,26 +2,26 @@ import { constants, isOfPlanes, sampleAxis } from '@gaussian-splat/renderer/tool
 
 const { CULL_GROUP } = constants;
 /**
- * Splats within this many median distances from the median, along each axis, form the first shell; every other shell
- * reaches twice as far as the previous one.
+ * Extent of the first shell in median distances from the median along each axis. Each further shell extends twice as far
+ * as the previous one.
  */
 const FIRST_REACH = 8;
 const MAX_SHELLS = 256;
 
-/** An order of splats in chunks, with its padding. */
+/** An order of splats with padding splats between chunks. */
 export interface ShellOrder {
-  /** Indices of splats; {@link fillers} repeat an index. */
+  /** Indices of splats. At {@link fillers}, an index is repeated. */
   readonly order: Uint32Array;
-  /** Positions of padding splats with opacity 0, so that the next splat starts a chunk. */
+  /** Indices in `order` of padding splats, which need opacity 0. They end a chunk, so that the next splat begins one. */
   readonly fillers: readonly number[];
 }
 
 /**
- * Gives distant splats separate chunks, so that chunk-relative coordinates stay fine for near ones: a chunk contains
- * only splats of two neighboring shells around the center of the scene. The order within a shell does not change. A
- * scene of planes keeps its order.
- * @param positions [3 N] world units
- * @param kept Indices of splats, neighbors adjacent; not changed.
+ * Returns an order whose chunks have only splats of two adjacent shells around the center of the scene. Coordinates
+ * relative to a chunk are then precise for near splats, too. The order within a shell does not change. A scene of planes
+ * keeps its order.
+ * @param positions [N, 3] positions in units of the scene.
+ * @param kept Indices of splats with neighbors adjacent; not modified.
  */
 export function shellOrder(positions: Float32Array, kept: Uint32Array): ShellOrder {
   if (kept.length === 0 || isOfPlanes(positions, kept)) return { order: kept, fillers: [] };
@@ -30,7 +30,7 @@ export function shellOrder(positions: Float32Array, kept: Uint32Array): ShellOrd
   return isOne ? { order: kept, fillers: [] } : filledUp(kept, shells, counts);
 }
 
-/** Shell of each splat, and their counts. */
+/** Returns the shell of each splat, and the number of splats in each shell. */
 function shellsOf(positions: Float32Array, kept: Uint32Array): { shells: Uint8Array; counts: Uint32Array } {
   const axes = [0, 1, 2].map((axis) => sampleAxis(positions, kept, axis));
   const shells = new Uint8Array(kept.length);
@@ -48,12 +48,13 @@ function shellsOf(positions: Float32Array, kept: Uint32Array): { shells: Uint8Ar
 }
 
 /**
- * Concatenates shells; if one starts within a chunk of a shell other than the previous one, that chunk is padded first.
+ * Concatenates shells. If a shell would begin in a chunk with a shell that is not adjacent to it, the chunk is padded
+ * first.
  */
 function filledUp(kept: Uint32Array, shells: Uint8Array, counts: Uint32Array): ShellOrder {
   const starts = new Uint32Array(MAX_SHELLS);
   const fillers: number[] = [];
-  // The innermost shell of the open chunk.
+  // `open` is the index of the chunk that is being filled, and `innermost` its first shell.
   let [end, open, innermost] = [0, 0, 0];
   counts.forEach((count, shell) => {
     if (count === 0) return;

@@ -1,10 +1,10 @@
 import { FACTOR_NUMBERS, rowLengths, type SplatLevel } from '@gaussian-splat/renderer/tools';
-import { visibilityWeights } from './seen-splats.js';
+import { visibilityWeights } from './splat-visibility.js';
 
-/** Rank of the weight, as a fraction of the splats, that defines the first class. */
+/** Rank of the weight that defines the first class, as a fraction of the splats. */
 const REFERENCE_RANK = 0.9;
 
-/** Contribution of a splat's color error to the squared error of images: its squared opacity times its area. */
+/** Returns the estimated weight of a splat's squared color error in images: its squared opacity times its area. */
 function weightOf({ factors, opacities }: SplatLevel, i: number): number {
   const lengths = new Float64Array(3);
   rowLengths(factors, FACTOR_NUMBERS * i, lengths);
@@ -12,10 +12,10 @@ function weightOf({ factors, opacities }: SplatLevel, i: number): number {
   return opacities[i] ** 2 * lengths[1] * lengths[2];
 }
 
-/** Weights of splats in octaves below the most visible ones. */
+/** Weights of splats relative to the most visible ones. */
 export class SplatWeights {
   readonly #leaves: SplatLevel;
-  /** Weights of the leaves. */
+  /** Weights of the splats of the finest level. */
   readonly #weights: Float32Array;
   readonly #unit: number;
   /** Weight of the first class. */
@@ -35,5 +35,5 @@ export class SplatWeights {
   }
 }
 
-/** Index of a level's splat in the arrays of its harmonics. */
+/** Returns the index of a level's splat in the arrays of spherical harmonics. */
 export const numberOf = ({ shOrder }: SplatLevel, i: number): number => (shOrder ? shOrder[i] : i);

@@ -13,8 +13,9 @@ import { treeOf, type DetailTree } from './build-pages.js';
 const { CULL_GROUP } = constants;
 
 /**
- * Builds the tree above copies of another: its finest level has the coarsest chunk of each copy, in the order of
+ * Builds the tree above copies of another tree. Its finest level has the coarsest chunk of each copy, in the order of
  * `places`.
+ * @param places Translation of each copy in units of the scene.
  */
 export function instancedTree(tree: DetailTree, places: readonly Vector3[]): DetailTree {
   const top = tree.levels.length - 1;
@@ -36,7 +37,7 @@ export function instancedTree(tree: DetailTree, places: readonly Vector3[]): Det
   };
 }
 
-/** Each copy fills a chunk; padding splats are transparent. */
+/** Returns a level with a chunk for each copy of the root chunk. Padding splats have opacity 0. */
 function copiesOf(root: SplatLevel, places: readonly Vector3[]): SplatLevel {
   const level = emptyLevel(CULL_GROUP * places.length, root);
   const stride = shNumbers(root.shDegree);

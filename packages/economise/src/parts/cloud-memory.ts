@@ -1,33 +1,33 @@
 import { GaussianSplatError, shCoefficientCount, type GaussianCloud, type ShDegree } from '@gaussian-splat/core';
 
-/** Allocates memory that tasks share with their caller. */
+/** Allocator of memory that both tasks and their caller can access. */
 export type Allocator = { allocate(byteLength: number): ArrayBufferLike };
 
-/** Splats `first` to `end`, excluding the latter. */
+/** Range of splats: indices from `first` to `end`, excluding `end`. */
 export interface Part {
   readonly first: number;
   readonly end: number;
 }
 
-/** The columns of a cloud. */
+/** Arrays of a cloud, and its degree of spherical harmonics. */
 export type Columns = Pick<GaussianCloud, 'positions' | 'scales' | 'rotations' | 'opacities' | 'sh' | 'shDegree'>;
 
-/** Only the columns. */
+/** Returns a cloud's arrays and degree without its other properties. */
 export function columnsOf({ positions, scales, rotations, opacities, sh, shDegree }: GaussianCloud): Columns {
   return { positions, scales, rotations, opacities, sh, shDegree };
 }
 
-/** The arrays of a cloud. */
+/** Returns a list of the arrays of a cloud. */
 export function arraysOf({ positions, scales, rotations, opacities, sh }: Columns): Float32Array[] {
   return [positions, scales, rotations, opacities, sh];
 }
 
-/** Numbers of each column for a splat. */
+/** Returns the count of numbers of each array for a splat. */
 const widthsOf = (degree: ShDegree) =>
   ({ positions: 3, scales: 3, rotations: 4, opacities: 1, sh: 3 * shCoefficientCount(degree) }) as const;
 
 /**
- * Allocates zeroed columns in memory that tasks share.
+ * Allocates the arrays of `count` splats in memory of a pool, filled with zeros.
  * @throws GaussianSplatError `out-of-memory/allocation`
  */
 export function allocateColumns(count: number, shDegree: ShDegree, pool: Allocator): Columns {
@@ -51,7 +51,7 @@ export function allocateColumns(count: number, shDegree: ShDegree, pool: Allocat
   }
 }
 
-/** Copies a cloud to columns of its degree or a higher one, from splat `at` on. Missing coefficients stay unchanged. */
+/** Copies a cloud to arrays of its degree or a higher one, from splat `at` on. Other coefficients are not written. */
 export function putCloud(cloud: GaussianCloud, to: Columns, at: number): void {
   to.positions.set(cloud.positions, 3 * at);
   to.scales.set(cloud.scales, 3 * at);
@@ -68,9 +68,9 @@ export function putCloud(cloud: GaussianCloud, to: Columns, at: number): void {
 }
 
 /**
- * Compacts the splats of parts that are smaller than their reserved range.
- * @param runs Start and number of the splats of each part.
- * @returns Columns of the total length, in the same memory.
+ * Moves the splats of parts together, in place, if parts have fewer splats than their reserved ranges.
+ * @param runs Index of the first splat, and number of splats, of each part in ascending order.
+ * @returns Arrays of all these splats, in the same memory.
  */
 export function closeGaps(
   columns: Columns,

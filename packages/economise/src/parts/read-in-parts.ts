@@ -5,7 +5,7 @@ import type { PartRead } from './read-part.js';
 import type { Part } from './cloud-memory.js';
 import { partsOf, poolFor, type TaskPool } from './task-pool.js';
 
-/** Reads a scene in memory as `readScene` does, in parallel if its format and the pool allow it. */
+/** Reads the bytes of a scene file as `readScene` does, by parallel tasks if its format and the pool allow it. */
 export async function readInParts(
   bytes: Uint8Array,
   options: { readonly name: string; readonly signal?: AbortSignal },
@@ -27,10 +27,10 @@ export async function readInParts(
 }
 
 /**
- * Reads the splats of a file part by part into memory that tasks share.
- * @param readAll Reads parts into columns, as `readBlocks` does.
- * @returns Undefined if the scene is too small for parts, or too much of it is unusable, so that reading it as a whole
- * reports the reasons.
+ * Reads the splats of a file by parts into memory of a pool.
+ * @param readAll Reads parts into arrays, as `readBlocks` does.
+ * @returns The cloud. Undefined if the scene is too small for parts, or too many splats are unusable; the caller then
+ * reads the whole file, which reports the reasons.
  */
 export async function gatherParts(
   { count, shDegree }: SplatRanges,

@@ -2,23 +2,26 @@ import type { GaussianCloud } from '@gaussian-splat/core';
 import { readSplats } from '@gaussian-splat/formats';
 import { putCloud, type Columns, type Part } from './cloud-memory.js';
 
-/** Splats read at once: few enough to stay in the cache until they are copied. */
+/** Number of splats that are read at once, so that they remain in the cache until they are copied. */
 const BLOCK = 1 << 14;
 
-/** Result of reading a part. */
+/** Result of reading a part of a file. */
 export interface PartRead {
-  /** Number of usable splats; they are contiguous at the beginning of the part's range. */
+  /** Number of usable splats, which are contiguous from the beginning of the part's range. */
   readonly count: number;
   readonly antialiased: boolean;
   readonly filterVariance: number | undefined;
   readonly hints: GaussianCloud['hints'];
-  /** Faults of its splats: see `GaussianCloud.faults`. */
+  /** Number of unusable splats by reason; see `GaussianCloud.faults`. */
   readonly faults: readonly number[];
-  /** Warnings of the file: see `GaussianCloud.warnings`. */
+  /** Warnings about the file; see `GaussianCloud.warnings`. */
   readonly warnings: readonly string[];
 }
 
-/** Reads a part of a file block by block into columns, at the indices of its splats in the file. */
+/**
+ * Reads a part of a file by blocks into arrays of the whole scene, from index `first` on.
+ * @param read Returns the usable splats of a block; undefined if it has none.
+ */
 export async function readBlocks(
   { first, end }: Part,
   to: Columns,
@@ -43,7 +46,7 @@ export async function readBlocks(
   return { count, antialiased, filterVariance, hints, faults, warnings: [...warnings] };
 }
 
-/** Reads a part of a file in memory. */
+/** Reads a part of a file whose bytes are in memory. */
 export function readPart(input: {
   readonly bytes: Uint8Array;
   readonly name: string;

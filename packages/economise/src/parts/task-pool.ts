@@ -3,27 +3,27 @@ import { tasks } from './tasks.js';
 
 export type { Part };
 
-/** The tasks of this package by name: functions of plain data and typed arrays, which another thread can call. */
+/** Tasks of this package by name. They are functions of plain data and typed arrays, which another thread can call. */
 export type Tasks = typeof tasks;
 export type TaskName = keyof Tasks;
 export type TaskInput<Name extends TaskName> = Parameters<Tasks[Name]>[0];
 export type TaskResult<Name extends TaskName> = Awaited<ReturnType<Tasks[Name]>>;
 
-/** Runs parallel tasks. {@link inline} runs them on the calling thread; hosts with threads provide another pool. */
+/** Pool that runs parallel tasks. {@link inline} runs them on the calling thread. Hosts with threads provide other pools. */
 export interface TaskPool {
   /** Number of tasks that run in parallel. */
   readonly size: number;
-  /** Fewer splats than this are processed faster by the calling thread. */
+  /** Minimum number of splats for using the pool. The calling thread processes fewer splats faster. */
   readonly minSplats: number;
-  /** Memory that tasks share with their caller. */
+  /** Allocates memory that both tasks and their caller can access. */
   allocate(byteLength: number): ArrayBufferLike;
   /** Whether tasks can access this memory directly. */
   shares(memory: ArrayBufferLike): boolean;
-  /** Runs a task with each of several inputs. Rejects with the first error, once all have ended. */
+  /** Calls a task with each input, and returns the results in order. Rejects with the first error after all have ended. */
   run<Name extends TaskName>(name: Name, inputs: readonly TaskInput<Name>[]): Promise<TaskResult<Name>[]>;
 }
 
-/** Runs one task after another, on this thread. */
+/** Pool that runs tasks in sequence on the calling thread. */
 export const inline: TaskPool = {
   size: 1,
   minSplats: 0,
@@ -40,7 +40,7 @@ export const inline: TaskPool = {
 /** Minimum size of a part, as a fraction of {@link TaskPool.minSplats}. */
 const MIN_SHARE = 1 / 8;
 
-/** Divides splats into parts of equal size, except the last. Empty without splats. */
+/** Divides `count` splats into parts of equal size, except the last. Empty without splats. */
 export function partsOf(count: number, { size, minSplats }: TaskPool): Part[] {
   const wanted = Math.min(size, Math.floor(count / Math.max(1, MIN_SHARE * minSplats)));
   const step = Math.ceil(count / Math.max(1, wanted));
@@ -49,7 +49,7 @@ export function partsOf(count: number, { size, minSplats }: TaskPool): Part[] {
   return parts;
 }
 
-/** Returns the pool, or {@link inline} for work that is too small, or if tasks would receive copies of the arrays. */
+/** Returns the pool; {@link inline} for fewer than `minSplats` splats, or if tasks would receive copies of arrays. */
 export function poolFor(pool: TaskPool, count: number, arrays: readonly ArrayBufferView[] = []): TaskPool {
   return count >= pool.minSplats && arrays.every(({ buffer }) => pool.shares(buffer)) ? pool : inline;
 }

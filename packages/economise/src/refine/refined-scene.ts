@@ -19,34 +19,33 @@ import type { ReducedCloud } from '../reduce.js';
 
 const { CULL_GROUP, SHAPE_LOG_SCALE, COLOR_COEFFICIENT_MAJOR } = constants;
 const FLOAT_BYTES = 4;
-/**
- * Clamps for parameters without a finite logarithm: beyond these logits opacities are 0 or 1 in float32, and below this
- * scale a splat has no size.
- */
+/** Largest magnitude of a logit, and smallest scale in world units: opacities 0 and 1 and scale 0 have no finite logarithm. */
 const MAX_LOGIT = 15;
 const MIN_SCALE = 1e-20;
 
 /** A block of splats whose parameters are optimized. */
 export interface RefinedPart {
   readonly page: GaussianBlock;
-  /** Index of its first splat among all, which is a multiple of 256. */
+  /** Index of the part's first splat in `RefinedScene.screen`, a multiple of 256. */
   readonly first: number;
-  /** Splats in whole chunks: the stride between rows of `gradients` and `means`. */
+  /** Number of splats, rounded up to a multiple of 256: the stride between rows of `gradients` and `means`. */
   readonly row: number;
   /** array<f32>: parameters of each splat, in the layout of shaders/shared/refined.wgsl. */
   readonly numbers: GPUBuffer;
   /** array<u32>: the degree that each splat keeps. */
   readonly degrees: GPUBuffer;
-  /** array<f32> and array<vec2f>: a row for each optimized parameter. */
+  /** array<f32>: a row of derivatives for each optimized parameter. */
   readonly gradients: GPUBuffer;
+  /** array<vec2f>: a row of Adam's running means, of derivatives and of their squares, for each optimized parameter. */
   readonly means: GPUBuffer;
   /** array<vec4f>: the largest curvatures of each splat in any view. */
   readonly bends: GPUBuffer;
+  /** Bindings of the kernel that packs the part's parameters for the renderer. */
   readonly packing: GPUBindGroup;
 }
 
 /**
- * A cloud on the GPU whose parameters are optimized from image to image: float32 parameters, and the packed splats for
+ * A scene on the GPU whose parameters are optimized. It holds float32 parameters for the optimizer and packed splats for
  * the renderer.
  */
 export class RefinedScene implements GaussianScene {
@@ -56,9 +55,9 @@ export class RefinedScene implements GaussianScene {
   readonly antialiased: boolean;
   readonly filterVariance: number | undefined;
   readonly origin: GaussianScene['origin'];
-  readonly pages: readonly GaussianBlock[];
+  readonly blocks: readonly GaussianBlock[];
   readonly parts: readonly RefinedPart[];
-  /** array<vec2i>: SCREEN_NUMBERS of each splat in fixed point, with every block rounded up to whole chunks. */
+  /** array<vec2i>: SCREEN_NUMBERS fixed-point numbers of each splat. Each part takes {@link RefinedPart.row} splats. */
   readonly screen: GPUBuffer;
   readonly #device: GPUDevice;
   readonly #memory: GpuMemory;
@@ -92,16 +91,16 @@ export class RefinedScene implements GaussianScene {
       parts.push(part);
     }
     this.parts = parts;
-    this.pages = parts.map(({ page }) => page);
+    this.blocks = parts.map(({ page }) => page);
     const bytes = SCREEN_BYTES * SCREEN_NUMBERS * Math.max(CULL_GROUP, first);
     this.screen = memory.buffer('gs.refine.screen', bytes, storage | copyDestination);
     this.#packAll();
   }
 
   /**
-   * Uploads a reduced cloud. It takes 16 bytes of GPU memory for each parameter of a splat, about 1.2 kB at degree 3
-   * including the drawn splats.
-   * @param maxSplats Maximum of a block; default: the limits of the device.
+   * Uploads a reduced cloud. Each parameter of a splat takes 16 bytes of GPU memory. A splat of degree 3 takes about
+   * 1.2 kB, including its packed form.
+   * @param maxSplats Maximum number of splats of a block; default: the limits of the device.
    * @throws GaussianSplatError `out-of-memory/*`
    */
   static async of(device: GPUDevice, reduced: Omit<ReducedCloud, 'kept'>, maxSplats = Infinity): Promise<RefinedScene> {
@@ -123,13 +122,13 @@ export class RefinedScene implements GaussianScene {
     return this.#version;
   }
 
-  /** Packs the parameters for drawing. Record it after every change of them. */
+  /** Records the packing of the parameters for the renderer. Call this after every change of the parameters. */
   pack(pass: GPUComputePassEncoder): void {
     for (const { packing, page } of this.parts) this.#ingest.record(pass, packing, page.count);
     this.#version++;
   }
 
-  /** Reads back the cloud with its current parameters. */
+  /** Reads the current parameters back from the GPU. Returns them as a cloud. */
   async read(): Promise<GaussianCloud> {
     const width = this.#width;
     const read = await readBack(
@@ -193,7 +192,7 @@ export class RefinedScene implements GaussianScene {
     };
   }
 
-  /** `Ingest` parameters for rows of parameters. */
+  /** Returns the uniforms `Ingest` of a part with `count` splats, whose parameters are rows in one buffer. */
   #ingestOf(count: number): ArrayBuffer {
     const bytes = new ArrayBuffer(Ingest.size);
     const width = this.#width;
@@ -216,7 +215,7 @@ export class RefinedScene implements GaussianScene {
   }
 }
 
-/** [count, width] parameters of some splats. */
+/** Returns [count, width] parameters of `count` splats, from index `begin` on: logarithms of scales, logits of opacities. */
 function numbersOf(cloud: GaussianCloud, begin: number, count: number, width: number): Float32Array<ArrayBuffer> {
   const rows = new Float32Array(width * count);
   for (let k = 0, at = 0; k < count; k++, at += width) {

@@ -1,13 +1,12 @@
 import { GaussianSplatError, type Camera, type GaussianCloud } from '@gaussian-splat/core';
 import type { Viewpoint } from '@gaussian-splat/renderer';
-import type { SplatVisibility } from '../pages/seen-splats.js';
-import type { CutFigures, Evaluator, EvaluationViews } from '../evaluator.js';
+import type { Evaluator } from '../evaluator.js';
+import { EvaluatorLayer } from '../evaluator-layer.js';
 import { CloudBuffers } from '../gpu/cloud-buffers.js';
 import { ImageErrors } from '../gpu/image-errors.js';
 import { exactViewpoint } from '../gpu/show.js';
 import { mean } from '../measure.js';
-import type { Cut, ReducedCloud } from '../reduce.js';
-import type { Ranking } from '../score.js';
+import type { ReducedCloud } from '../reduce.js';
 import { RefinedScene } from './refined-scene.js';
 import { SceneFitter, USUAL_DESCENT, type OptimizerOptions } from './scene-fitter.js';
 import { LEFT_BY_REFINING } from './search-refined.js';
@@ -15,82 +14,53 @@ import { LEFT_BY_REFINING } from './search-refined.js';
 export interface RefiningOptions {
   /** Draws the reference images, and runs the backward passes. */
   readonly device: GPUDevice;
-  /** Views of these images: the scoring views. None of them may be a search or held-out view. */
+  /** Views that the splats are fitted to: the scoring views. None of them may be a search or held-out view. */
   readonly views: readonly Camera[];
-  /** Optimizer options; missing ones have defaults. */
+  /** Options of the optimizer; defaults: {@link USUAL_DESCENT}. */
   readonly descent?: Partial<OptimizerOptions>;
 }
 
 /**
- * An evaluator that refines the cuts of another one: the remaining splats are fitted to images of the whole scene, by
- * gradient descent through the rasterizer. The images stay on the GPU: 16 bytes for each pixel of the views. A splat
- * takes 1.2 kB there at degree 3 during the fit.
+ * An evaluator that refines the cuts of another evaluator. Gradient descent through the rasterizer fits the remaining
+ * splats to images of the whole scene. On the GPU the images take 16 bytes for each pixel of the views. During the fit a
+ * splat takes 1.2 kB at degree 3.
  */
-export class RefiningEvaluator implements Evaluator {
+export class RefiningEvaluator extends EvaluatorLayer {
   /**
-   * Assumed fraction of the error of drops and merges after refinement: merges must be found up to a correspondingly
-   * higher error (`MergingOptions.maxError`).
+   * Assumed fraction of the error of drops and merges that remains after refinement. `MergingOptions.maxError` must be
+   * larger by the inverse of this fraction.
    */
   static readonly leftByRefining = LEFT_BY_REFINING;
-  readonly #inner: Evaluator;
   readonly #cloud: GaussianCloud;
   readonly #options: RefiningOptions;
   readonly #viewpoint: Viewpoint;
   #images: Promise<ImageErrors> | undefined;
 
   /**
-   * @param inner Is destroyed with this one.
+   * @param inner Evaluator of the cuts; {@link destroy} destroys it, too.
    * @param cloud The cloud that `inner` evaluates.
    * @throws GaussianSplatError `unsupported/no-webgpu` without a device; `argument/value` without a view
    */
   constructor(inner: Evaluator, cloud: GaussianCloud, options: RefiningOptions) {
     requireMeans(options);
-    this.#inner = inner;
+    super(inner);
     this.#cloud = cloud;
     this.#options = options;
     this.#viewpoint = exactViewpoint(options.device);
-  }
-
-  get mergePrices(): readonly number[] | undefined {
-    return this.#inner.mergePrices;
-  }
-
-  rank(signal?: AbortSignal): Promise<Ranking> {
-    return this.#inner.rank(signal);
-  }
-
-  cut(cut: Cut, views: EvaluationViews, signal?: AbortSignal): Promise<CutFigures> {
-    return this.#inner.cut(cut, views, signal);
-  }
-
-  reduce(cut: Cut, signal?: AbortSignal): Promise<ReducedCloud> {
-    return this.#inner.reduce(cut, signal);
-  }
-
-  async seen(): Promise<SplatVisibility | undefined> {
-    return this.#inner.seen?.();
-  }
-
-  compare(cloud: GaussianCloud, views: EvaluationViews, signal?: AbortSignal): Promise<readonly number[]> {
-    return this.#inner.compare(cloud, views, signal);
-  }
-
-  sketch(cloud: GaussianCloud, views: EvaluationViews, signal?: AbortSignal): Promise<readonly number[]> {
-    return this.#inner.sketch(cloud, views, signal);
   }
 
   async refine(reduced: ReducedCloud, signal?: AbortSignal): Promise<ReducedCloud> {
     const { device, descent } = this.#options;
     const images = await (this.#images ??= this.#draw());
     signal?.throwIfAborted();
-    // There is no reference to fit.
+    // No view shows a splat, so there is no image to fit.
     if (images.covered.every((pixels) => pixels === 0)) return reduced;
     const scene = await RefinedScene.of(device, reduced);
     try {
       const fitter = new SceneFitter(device, this.#viewpoint, scene, images);
       try {
         const before = await fitter.fit({ ...USUAL_DESCENT, ...descent }, signal);
-        // Too few or too large steps may increase the error.
+        // Too few or too large steps may increase the error: then the cut remains as it was.
         if (mean(await images.measure(scene)) >= mean(before)) return reduced;
       } finally {
         fitter.destroy();
@@ -101,8 +71,8 @@ export class RefiningEvaluator implements Evaluator {
     }
   }
 
-  destroy(): void {
-    this.#inner.destroy();
+  override destroy(): void {
+    super.destroy();
     this.#viewpoint.destroy();
     void this.#images?.then(
       (images) => images.destroy(),

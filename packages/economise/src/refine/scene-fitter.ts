@@ -24,49 +24,57 @@ import { show } from '../gpu/show.js';
 import { mean } from '../measure.js';
 import type { RefinedScene } from './refined-scene.js';
 
-/** No targets: only the rasterization inputs of a frame are needed. */
+/** Auxiliary outputs without targets: the fitter needs only the rasterization inputs of a frame. */
 const AUXILIARY = new AuxiliaryOutputs();
-/** Bindings are aligned to 256 bytes. */
+/** Bytes between the uniforms of two views: WebGPU aligns the offsets of bindings to 256 bytes. */
 const VIEW_STRIDE = 256 * Math.ceil(rendererLayouts.View.size / 256);
 const SMALL_STRIDE = 256;
-/** The rates are tuned for this mean squared error, 51 dB. Smaller errors scale the steps by their square root. */
+/**
+ * Mean squared error, 51 dB, for which the learning rates are tuned. If the initial error is smaller, the rates are
+ * multiplied by the square root of the ratio.
+ */
 const USUAL_ERROR = 10 ** -5.1;
 /** Number of views after which the CPU waits for the GPU. */
 const AHEAD = 16;
 
 /** Initial learning rates of Adam for each kind of parameter. */
 export interface Rates {
-  /** In sizes of the splat along its own axes. Large or near splats are not moved. */
+  /** Learning rate of positions, in sizes of the splat along its own axes. Large or near splats do not move. */
   readonly position: number;
   /** Learning rate of log scales. */
   readonly growth: number;
-  /** Radians about the splat's own axes. */
+  /** Learning rate of rotations, in radians about the splat's own axes. */
   readonly turn: number;
+  /** Learning rate of the logits of opacities. */
   readonly logit: number;
-  /** Learning rates of the coefficients of degree 0, and of the others. */
+  /** Learning rate of the coefficients of degree 0. */
   readonly constant: number;
+  /** Learning rate of the coefficients of degrees 1 to 3. */
   readonly harmonic: number;
 }
 
 /** Options of the optimizer. */
 export interface OptimizerOptions {
+  /** Number of steps of Adam. */
   readonly steps: number;
-  /** Views in each step. */
+  /** Number of views whose derivatives are summed in each step. */
   readonly viewsAtOnce: number;
   readonly rates: Rates;
   /** Final fraction of the rates, which decay exponentially. */
   readonly lastRate: number;
-  /** Decay factors of Adam's running means of derivatives and of their squares. */
+  /** Decay factor of Adam's running mean of derivatives, 0..1. */
   readonly keepMean: number;
+  /** Decay factor of Adam's running mean of squared derivatives, 0..1. */
   readonly keepSquare: number;
   /**
-   * Epsilon of Adam: derivatives of the squared error, summed over the pixels of an image, far below it change little.
+   * Epsilon of Adam. Derivatives far below this value barely change a parameter. A derivative is that of the squared
+   * error, summed over the pixels of an image.
    */
   readonly epsilon: number;
   /**
-   * Limit of a step as a fraction of Newton's step along one parameter, with the largest curvature in any view. Adam
-   * takes steps of the same length for small derivatives: they would move a splat that fills one view and is barely
-   * visible in the others arbitrarily.
+   * Maximum step, as a fraction of Newton's step along one parameter with the largest curvature in any view. Adam alone
+   * takes steps of the same length for small derivatives. Such steps would move a splat arbitrarily if it fills one view
+   * and is barely visible in the others.
    */
   readonly newton: number;
 }
@@ -87,7 +95,7 @@ export class SceneFitter {
   readonly #refineViews: GPUBuffer;
   readonly #steps: readonly GPUBuffer[];
 
-  /** @param errors The reference images. */
+  /** @param errors Holds the reference images and their views. */
   constructor(device: GPUDevice, viewpoint: Viewpoint, scene: RefinedScene, errors: ImageErrors) {
     this.#device = device;
     this.#viewpoint = viewpoint;
@@ -101,7 +109,11 @@ export class SceneFitter {
     );
   }
 
-  /** Runs the optimizer steps. @returns [views] initial errors */
+  /**
+   * Runs the optimizer steps.
+   * @returns Mean squared errors before the first step: one for each view that shows splats.
+   * @throws The signal's reason.
+   */
   async fit(descent: OptimizerOptions, signal?: AbortSignal): Promise<readonly number[]> {
     const { steps, viewsAtOnce, lastRate } = descent;
     // Draws all views until the scene fits the viewpoint's capacity, because missing splats give wrong derivatives.
@@ -122,7 +134,7 @@ export class SceneFitter {
     return before;
   }
 
-  /** Adds the derivatives of one view to those of the scene. */
+  /** Draws a view, and adds the derivatives of its error to the gradients of the scene. @param view Index of the view. */
   look(view: number): void {
     const { camera, reference } = this.#errors.exhibits[view];
     const image = this.#errors.targetOf(camera);
@@ -154,7 +166,7 @@ export class SceneFitter {
     this.#device.queue.submit([encoder.finish()]);
   }
 
-  /** Runs all views once for the curvatures only, before the first step. */
+  /** Measures the curvatures in all views before the first step, and discards the gradients. */
   async #survey(signal: AbortSignal | undefined): Promise<void> {
     for (let view = 0; view < this.#errors.exhibits.length; view++) {
       signal?.throwIfAborted();
@@ -170,7 +182,11 @@ export class SceneFitter {
     this.#memory.destroy();
   }
 
-  /** @param number Of the step, from 1 on. @param share Remaining fraction of the rates. */
+  /**
+   * Runs one step of Adam, and packs the changed splats.
+   * @param number Number of the step, from 1 on.
+   * @param share Factor of all learning rates, 0..1.
+   */
   #step(number: number, share: number, { rates, keepMean, keepSquare, epsilon, newton }: OptimizerOptions): void {
     const kernel = rareKernelOf(this.#device, refineStep);
     const encoder = this.#device.createCommandEncoder({ label: 'gs.refine.step' });
@@ -199,7 +215,7 @@ export class SceneFitter {
     this.#device.queue.submit([encoder.finish()]);
   }
 
-  /** `View` and `RefineView` of each view and part. */
+  /** Returns two buffers: the uniforms `View`, and the uniforms `RefineView`, of each view and part. */
   #writeViews(): [GPUBuffer, GPUBuffer] {
     const { parts, origin, antialiased, filterVariance, shDegree } = this.#scene;
     const { exhibits, covered } = this.#errors;
@@ -224,7 +240,7 @@ export class SceneFitter {
   }
 }
 
-/** All views, ordered so that consecutive ones are far apart in the list. */
+/** Returns the indices of all views, ordered so that consecutive views are far apart in the original list. */
 function viewOrder(count: number): number[] {
   const gcd = (a: number, b: number): number => (b === 0 ? a : gcd(b, a % b));
   let step = Math.max(1, Math.round(0.618 * count));

@@ -6,39 +6,39 @@ import type { Cut, ReducedCloud } from '../reduce.js';
 import type { Ranking } from '../score.js';
 
 /**
- * Assumed fraction of the error of drops and merges after refinement: the search allows a correspondingly larger error,
- * and the real one is measured.
+ * Assumed fraction of the error of drops and merges that remains after refinement. The search for a cut allows an error
+ * that is larger by the inverse; the error after refinement is then measured.
  */
 export const LEFT_BY_REFINING = 0.4;
-/** Number of cuts to refine, and the fraction of the allowed error that ends the search. */
+/** Maximum number of cuts to refine; and the fraction of the allowed error above which a cut ends the search. */
 const TRIES = 4;
 const NEAR_ENOUGH = 0.97;
-/** Ratio between a cut that fits and one that does not, below which the search ends. */
+/** Ratio of the smallest budget that exceeds the limit to the largest within it, below which the search ends. */
 const NARROW = 1.03;
-/** Range of the exponent of the error as a function of the budget: estimates from two tries outside it are noise. */
+/** Range of the exponent of the error as a function of the budget. Estimates from two tries are clamped to it. */
 const [MIN_SLOPE, MAX_SLOPE] = [0.5, 2];
 
 /** Size of the cut, and whether to refine it. */
 export interface Plan {
   readonly trades: Trades;
-  /** Budget of the search, relative to the requested error. */
+  /** Budget of the cut as a factor of the allowed error. */
   readonly filling: number;
   readonly isRefined: boolean;
 }
 
-/** A cut, and the resulting cloud. */
+/** A cut, and the cloud after this cut and its refinement, if any. */
 export interface CutCloud {
   readonly cut: Cut;
   readonly reduced: ReducedCloud;
 }
 
-/** Result of a try. */
+/** Result of a try: the factor of the budget, and the larger error of the search and held-out views. */
 interface Tried {
   readonly filling: number;
   readonly error: number;
 }
 
-/** Applies a cut, and refines the result if planned. */
+/** Applies the cut of a plan, and refines the result if the plan says so and the evaluator can refine. */
 export async function cutCloud(
   { trades, filling, isRefined }: Plan,
   evaluator: Evaluator,
@@ -51,9 +51,10 @@ export async function cutCloud(
 }
 
 /**
- * Finds the largest of a few cuts whose error after refinement is within the limit: in the search views and in the
- * held-out views, which can only reduce it. None of them was used for fitting.
- * @returns Undefined if all exceed it.
+ * Refines a few cuts, and returns the largest one whose error is within the limit in both the search views and the
+ * held-out views. Refinement does not fit the splats to these views.
+ * @param budget Maximum mean squared error, peak 1.
+ * @returns Undefined if all refined cuts exceed the limit.
  */
 export async function searchRefined(
   cloud: GaussianCloud,
@@ -87,14 +88,14 @@ export async function searchRefined(
   return best;
 }
 
-/** The largest budget within the error limit (0 if there is none), and the smallest that exceeds it. */
+/** Returns the largest `filling` within the error limit, or 0; and the smallest that exceeds the limit, or Infinity. */
 function bracketOf(tried: readonly Tried[], budget: number): [number, number] {
   const fits = Math.max(0, ...tried.filter(({ error }) => error <= budget).map(({ filling }) => filling));
   const fails = Math.min(Infinity, ...tried.filter(({ error }) => error > budget).map(({ filling }) => filling));
   return [fits, fails];
 }
 
-/** Extrapolates the budget for the requested error from the last two tries, limited to the bracket. */
+/** Returns the `filling` of the next try: extrapolated from the last two tries, within the result of `bracketOf`. */
 function nextFilling(tried: readonly Tried[], budget: number): number {
   const [last, before] = [tried[tried.length - 1], tried[tried.length - 2]];
   const measured = before && Math.log(last.error / before.error) / Math.log(last.filling / before.filling);

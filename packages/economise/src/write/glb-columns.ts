@@ -10,30 +10,31 @@ export const EXTENSION = 'KHR_gaussian_splatting';
  */
 const HALF_TURN = [1, -1, 1, -1, 1, -1, 1, -1, 1, -1, 1, -1, 1, -1, 1, -1];
 
-/** The same rotation of positions. */
+/** Signs of the coordinates x, y, z under the same half turn about z. */
 const PLACE_SIGNS = [-1, -1, 1];
 
-/**
- * Splats are processed in blocks of this size, so that their rows stay in the cache while column after column of them
- * is written.
- */
+/** Splats of a block. All attributes of a block are written before the next one, so that its rows remain in the cache. */
 const BLOCK = 256;
 
 type Numbers = Float32Array | Int16Array;
 
-/** A glTF attribute of a primitive of splats. Each splat takes whole words of it. */
+/** A glTF attribute of a primitive of splats. Each splat takes a multiple of 4 bytes. */
 export interface GlbColumn {
   readonly name: string;
   readonly width: number;
   readonly isShort?: boolean;
-  /** Writes the attribute of some splats from the beginning of `out` on. */
+  /**
+   * Writes the attribute of some splats.
+   * @param out [splats.length, width]
+   * @param splats Indices of the splats in the cloud.
+   */
   readonly put: (out: Numbers, splats: Uint32Array) => void;
 }
 
-/** The attributes of splats that keep the same degree. */
+/** Returns the attributes of a primitive whose splats have this degree, 0..3. */
 export function glbColumns(columns: Columns, degree: number): GlbColumn[] {
   const { positions, rotations, opacities, scales, sh, shDegree } = columns;
-  /** Part of the splats' rows, multiplied by a sign. */
+  /** Returns a float32 attribute: `width` values of each row of `stride`, from index `at` on, multiplied by a sign. */
   const plain = (name: string, values: Float32Array, stride: number, at: number, width: number, sign = 1) => ({
     name: `${EXTENSION}:${name}`,
     width,
@@ -63,10 +64,10 @@ export function glbColumns(columns: Columns, degree: number): GlbColumn[] {
   ];
 }
 
-/** Converts a point to glTF's axes. */
+/** Converts a point from a cloud's axes to glTF's axes. */
 export const placeOf = (point: Vector3): number[] => point.map((x, axis) => PLACE_SIGNS[axis] * x);
 
-/** Positions relative to the cloud's origin, in glTF's axes. */
+/** Writes positions relative to the cloud's origin, in glTF's axes: [splats.length, 3]. */
 function putPlaces(positions: Float32Array, out: Numbers, splats: Uint32Array): void {
   for (let n = 0; n < splats.length; n++) {
     for (let axis = 0; axis < 3; axis++) {
@@ -75,7 +76,7 @@ function putPlaces(positions: Float32Array, out: Numbers, splats: Uint32Array): 
   }
 }
 
-/** The bounds of positions that glTF requires, for the output of {@link glbColumns}. */
+/** Returns `min` and `max` of the accessor of positions, which glTF requires, in glTF's axes. */
 export function placeBounds({ positions }: Columns, splats: Uint32Array): object {
   const [min, max] = [new Array<number>(3), new Array<number>(3)];
   for (let axis = 0; axis < 3; axis++) {
@@ -90,7 +91,10 @@ export function placeBounds({ positions }: Columns, splats: Uint32Array): object
   return { min, max };
 }
 
-/** The product of (0, 0, 0, 1) and (w, x, y, z), in glTF's order (x, y, z, w). */
+/**
+ * Writes rotations as normalized int16 in glTF's order (x, y, z, w). Each is the product of the half turn (0, 0, 0, 1) and
+ * the cloud's rotation (w, x, y, z).
+ */
 function putRotations(rotations: Float32Array, out: Numbers, splats: Uint32Array): void {
   for (let n = 0; n < splats.length; n++) {
     const from = 4 * splats[n];
@@ -105,11 +109,13 @@ function putRotations(rotations: Float32Array, out: Numbers, splats: Uint32Array
 export interface ColumnsToPut {
   readonly columns: Columns;
   readonly degree: number;
+  /** Indices of the splats in the cloud. */
   readonly splats: Uint32Array;
-  /** Index of the first of them in the primitive. */
+  /** Index in the primitive of the first of {@link splats}. */
   readonly at: number;
+  /** The file. */
   readonly bytes: Uint8Array;
-  /** Offset in the file of each attribute of the primitive. */
+  /** Byte offset in the file of each attribute of the primitive. */
   readonly starts: readonly number[];
 }
 

@@ -7,7 +7,7 @@ import { EXTENSION, glbColumns, placeBounds, placeOf, type GlbColumn } from './g
 
 const [FLOAT, SHORT] = [5126, 5122];
 
-/** Properties of the extension in every primitive. */
+/** Properties of `KHR_gaussian_splatting` in every primitive. */
 const SPLATS = {
   kernel: 'ellipse',
   colorSpace: 'srgb_rec709_display',
@@ -15,7 +15,7 @@ const SPLATS = {
   projection: 'perspective',
 };
 
-/** The splats that keep one degree. */
+/** A glTF primitive: the splats that keep one degree. */
 interface Primitive {
   readonly degree: number;
   readonly splats: Uint32Array;
@@ -49,7 +49,7 @@ export async function writeGlb({ cloud: given, degrees }: WrittenCloud, pool: Ta
   return bytes;
 }
 
-/** Indices of the splats that keep a degree. */
+/** Returns the indices of the splats that keep a degree, ascending. */
 function splatsOf(degrees: Uint8Array, degree: number): Uint32Array {
   const members = new Uint32Array(degrees.length);
   let count = 0;
@@ -63,13 +63,14 @@ function primitiveOf(columns: Columns, splats: Uint32Array, degree: number): Pri
 }
 
 /**
- * Returns the JSON of the file, the size of its binary data, and the offsets of the attributes of each primitive in it.
+ * Returns the JSON of the file, the byte length of the binary data, and `starts`: for each primitive, the byte offsets of
+ * its attributes in the binary data.
  */
 function describe(
   primitives: readonly Primitive[],
   { origin, hints }: Pick<GaussianCloud, 'origin' | 'hints'>,
 ): { json: object; byteLength: number; starts: number[][] } {
-  // The extension has a value only for the usual order.
+  // The extension declares only the default order; `extras` holds any other.
   const splats = hints?.order ? { ...SPLATS, extras: { sortingMethod: hints.order } } : SPLATS;
   const bufferViews: object[] = [];
   const accessors: object[] = [];
@@ -101,7 +102,7 @@ function describe(
     extensionsUsed: [EXTENSION],
     scene: 0,
     scenes: [{ nodes: [0] }],
-    // Far from (0, 0, 0) float32 would lose detail.
+    // The origin is a translation, because float32 positions far from (0, 0, 0) would lose detail.
     nodes: [{ mesh: 0, ...(origin.some((x) => x !== 0) && { translation: placeOf(origin) }) }],
     meshes: [{ primitives: meshPrimitives }],
     accessors,
@@ -111,7 +112,7 @@ function describe(
   return { json, byteLength, starts };
 }
 
-/** A GLB with an empty binary chunk, and the offset of that chunk's data. */
+/** Returns a GLB whose binary chunk contains only zeros, and the byte offset of the data of this chunk. */
 function containerOf(json: object, byteLength: number, pool: TaskPool): { bytes: Uint8Array; start: number } {
   const text = new TextEncoder().encode(JSON.stringify(json));
   const textLength = text.length + (-text.length & 3);
@@ -123,7 +124,7 @@ function containerOf(json: object, byteLength: number, pool: TaskPool): { bytes:
   words(0, 0x46546c67, 2, bytes.length, textLength, 0x4e4f534a);
   bytes.fill(0x20, 20, 20 + textLength);
   bytes.set(text, 20);
-  // "BIN" and a zero.
+  // Length and type "BIN\0" of the second chunk.
   words(20 + textLength, byteLength, 0x004e4942);
   return { bytes, start: 28 + textLength };
 }

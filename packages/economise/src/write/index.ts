@@ -1,6 +1,6 @@
 import { GaussianSplatError, type GaussianCloud } from '@gaussian-splat/core';
 import { isOfPlanes } from '@gaussian-splat/renderer/stages';
-import type { SplatVisibility } from '../pages/seen-splats.js';
+import type { SplatVisibility } from '../pages/splat-visibility.js';
 import type { ReducedCloud } from '../reduce.js';
 import type { TaskPool } from '../parts/task-pool.js';
 import { writeGlb } from './glb.js';
@@ -12,32 +12,36 @@ import { isLodIndex } from './streamed-sog.js';
 
 /** Input of writers from a reduced cloud. */
 export interface WrittenCloud extends Pick<ReducedCloud, 'cloud' | 'degrees'> {
-  /** [N] indices of its splats in the source; default 0 to N - 1. */
+  /** [N] index in the source scene of each splat of `cloud`; default 0 to N - 1. */
   readonly kept?: Uint32Array;
 }
 
 /** An encoding of a scene with a certain precision. */
 export interface Encoding {
-  /** For readers. */
+  /** Description for people, with the precision. */
   readonly title: string;
-  /** @param pool Runs parallel parts; the file is then in its memory. */
+  /**
+   * Returns the bytes of the file.
+   * @param pool Runs parallel parts, and allocates the memory of GLB files.
+   */
   readonly write: (reduced: WrittenCloud, pool?: TaskPool) => Uint8Array | Promise<Uint8Array>;
   /**
-   * Whether every splat takes as many coefficients as the one with the most, so that lower degrees of some save
-   * nothing.
+   * Whether all splats are stored with the same number of coefficients, so that lower degrees of some splats save no
+   * bytes. Default: false.
    */
   readonly hasOneDegree?: boolean;
-  /** The same encoding with all steps multiplied by a factor, if {@link tune} selected them. */
+  /** Returns this encoding with all steps multiplied by a factor. Undefined unless {@link tune} selected the steps. */
   readonly coarser?: (factor: number) => Encoding;
   /**
-   * Selects the precision so that the rounding error of a scene is within a limit.
-   * @param measure Returns the mean squared error.
+   * Returns this encoding with the coarsest precision that it finds within an error limit.
+   * @param measure Returns the mean squared error of a file against the scene.
+   * @param target Maximum mean squared error, peak 1.
    * @param seen Visibility of the splats of the scene, if known.
    */
   readonly tune?: (whole: WrittenCloud, measure: Measure, target: number, seen?: SplatVisibility) => Promise<Encoding>;
 }
 
-/** Returns the mean squared error of a written file against the scene, peak 1. */
+/** Returns the mean squared error of images of a written file against images of the scene, peak 1. */
 export type Measure = (bytes: Uint8Array) => Promise<number>;
 
 /** External encoders for formats. */
@@ -51,7 +55,7 @@ const spz = (shBits: number): Encoding => ({
   write: ({ cloud }) => writeSpz(cloud, { shBits }),
 });
 
-/** Scenes of planes keep their order, which separate primitives for each degree would break. */
+/** GLB for scenes of planes, whose order of splats must be kept: a primitive for each degree would change it. */
 const GLB_OF_PLANES: Encoding = {
   title: 'GLB, one primitive in the order of the scene',
   write: ({ cloud, degrees }, pool) =>
@@ -59,7 +63,7 @@ const GLB_OF_PLANES: Encoding = {
   hasOneDegree: true,
 };
 
-/** Encodings of each kind of file, smallest first. */
+/** Encodings by file extension, smallest file first. */
 const ENCODINGS: ReadonlyMap<string, readonly Encoding[]> = new Map([
   ['.spz', [spz(4), spz(5), spz(6), spz(8)]],
   ['.glb', [{ title: 'GLB, a primitive for each degree', write: writeGlb }]],
@@ -107,7 +111,7 @@ const USUAL_VARIANCE = 0.3;
 /** Variance in px² of SOG's `model: antialiased`. */
 const MIP_VARIANCE = 0.1;
 
-/** Filters that a format can declare. */
+/** Functions by file extension that return whether the format can declare a filter; `variance` in px². */
 const HOLDS_FILTER: Readonly<Record<string, (isCompensated: boolean, variance: number) => boolean>> = {
   '.ply': () => true,
   '.spz': (_, variance) => variance === USUAL_VARIANCE,

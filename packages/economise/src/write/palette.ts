@@ -4,7 +4,9 @@ import { RankedHeap } from '@gaussian-splat/renderer/tools';
 export interface Palette {
   /** [size, width] means of the clusters. */
   readonly entries: Float32Array;
+  /** [N] index of the cluster of each vector. */
   readonly labels: Uint32Array;
+  /** Number of clusters. */
   readonly size: number;
 }
 
@@ -19,10 +21,10 @@ interface Group {
 const TURNS = 3;
 
 /**
- * Divides vectors into at most `size` clusters: the one with the largest error is split at its mean, perpendicular to
- * its principal axis, until there are enough.
+ * Divides vectors into at most `size` clusters. Each iteration splits the cluster with the largest error at its mean,
+ * perpendicular to its principal axis.
  * @param vectors [N, width]
- * @param weights [N] weight of an error of each.
+ * @param weights [N] weight of the squared error of each vector.
  */
 export function findPalette(vectors: Float32Array, width: number, weights: Float32Array, size: number): Palette {
   const count = weights.length;
@@ -66,7 +68,10 @@ export function findPalette(vectors: Float32Array, width: number, weights: Float
   return { entries, labels, size: groups.length };
 }
 
-/** The two halves of a cluster; undefined if one would be empty. */
+/**
+ * Splits a cluster at its mean, perpendicular to its principal axis. Returns the indices of the vectors of both halves;
+ * undefined if one would be empty.
+ */
 function cut(
   { members, mean }: Group,
   vectors: Float32Array,

@@ -1,7 +1,9 @@
 import { shCoefficientCount, type GaussianCloud } from '@gaussian-splat/core';
+import { safeOrbitOf } from './safe-orbit.js';
 
 /**
- * Writes the PLY of 3D Gaussian Splatting, binary, float32, without normals, with comments for filter, up and order;
+ * Writes the PLY of 3D Gaussian Splatting, binary, float32, without normals, with comments for filter, up and order, and
+ * the elements of Niantic's library for the limits of a camera;
  * positions are float64 if the cloud lies too far from (0, 0, 0) for float32.
  */
 export function writePly(cloud: GaussianCloud): Uint8Array<ArrayBuffer> {
@@ -19,6 +21,7 @@ export function writePly(cloud: GaussianCloud): Uint8Array<ArrayBuffer> {
     hints,
   } = cloud;
   const coefficients = shCoefficientCount(shDegree);
+  const orbit = safeOrbitOf(cloud);
   const isFar = origin.some((x) => x !== 0);
   const names = [
     ...['x', 'y', 'z', 'f_dc_0', 'f_dc_1', 'f_dc_2'],
@@ -34,10 +37,11 @@ export function writePly(cloud: GaussianCloud): Uint8Array<ArrayBuffer> {
     ...(hints?.order ? [`comment sorting_method ${hints.order}`] : []),
     `element vertex ${count}`,
     ...names.map((name, k) => `property ${isFar && k < 3 ? 'double' : 'float'} ${name}`),
+    ...(orbit ? ORBIT_ELEMENTS : []),
     'end_header',
   ];
   const header = new TextEncoder().encode(`${lines.join('\n')}\n`);
-  const bytes = new Uint8Array(header.length + 4 * (names.length + (isFar ? 3 : 0)) * count);
+  const bytes = new Uint8Array(header.length + 4 * ((names.length + (isFar ? 3 : 0)) * count + (orbit?.length ?? 0)));
   bytes.set(header);
   const view = new DataView(bytes.buffer, header.length);
   let at = 0;
@@ -60,8 +64,16 @@ export function writePly(cloud: GaussianCloud): Uint8Array<ArrayBuffer> {
     for (let k = 0; k < 3; k++) put(Math.max(LOG_NOTHING, Math.log(scales[3 * i + k])));
     for (let k = 0; k < 4; k++) put(rotations[4 * i + k]);
   }
+  orbit?.forEach(put);
   return bytes;
 }
+
+const ORBIT_ELEMENTS = [
+  'element safe_orbit_camera_elevation_min_max_radians 2',
+  'property float safe_orbit_camera_elevation_min_max_radians',
+  'element safe_orbit_camera_radius_min 1',
+  'property float safe_orbit_camera_radius_min',
+];
 
 /** Replaces the infinite logarithm of a zero scale, which other readers reject; in float32 it is read as 0. */
 const LOG_NOTHING = -104;

@@ -1,30 +1,34 @@
 import type { GaussianCloud } from '@gaussian-splat/core';
-import { roundedBy, ShQuantizer } from '../pages/round-harmonics.js';
-import { visibilityWeights, type SplatVisibility } from '../pages/seen-splats.js';
+import { quantized, ShQuantizer } from '../pages/round-harmonics.js';
+import { visibilityWeights, type SplatVisibility } from '../pages/splat-visibility.js';
 import type { Palette } from './palette.js';
 
 /**
- * The code of 0 in the palette; codes within {@link EVEN_CODES} of it are evenly spaced, and the largest is at most
- * {@link MAX_BENT_CODE} steps.
+ * `MIDDLE_CODE` is the code of 0 in the palette. Values within `EVEN_CODES` codes of 0 are evenly spaced. The largest
+ * value is at most `MAX_BENT_CODE` steps.
  */
 const [MIDDLE_CODE, EVEN_CODES, MAX_BENT_CODE] = [127, 48, 2000];
 /**
- * Rank of the weight, as a fraction of the entries, that gets the usual step, and the maximum octaves of larger steps.
+ * Quantile of the entries' weights, 0..1: entries with this weight or more are quantized with one step. Lighter entries
+ * have steps of up to 2 ** `MAX_OCTAVES`.
  */
 const [REFERENCE_RANK, MAX_OCTAVES] = [0.9, 5];
-/** Digits of the values of a codebook: more take more bytes, and are finer than any step. */
+/** Significant digits of the values of a codebook. More digits take more bytes, and are finer than any step. */
 export const DIGITS = 6;
 
 export interface RoundedPalette {
-  /** [size, width], {@link MIDDLE_CODE} for 0 */
+  /** [size, width] indices in `values`; {@link MIDDLE_CODE} stands for 0. */
   readonly codes: Uint8Array;
-  /** The entries are reordered: by step, and within equal steps by first use. */
+  /** [N] index of each splat's entry. Entries are sorted by step, and entries of equal steps by first use. */
   readonly labels: Uint32Array;
-  /** The codebook. */
+  /** Codebook: the value of each code, ascending. */
   readonly values: readonly number[];
 }
 
-/** Quantizes palette entries, each according to its visibility, optimized for the most visible splat that uses it. */
+/**
+ * Quantizes the entries of a palette: less visible entries have larger steps. Rounding minimizes the visible error of
+ * the heaviest splat that uses the entry.
+ */
 export function roundPalette(
   { entries, labels, size }: Palette,
   targets: { order: Uint32Array; weights: Float32Array; seen: SplatVisibility | undefined; step: number },
@@ -75,8 +79,8 @@ export function roundPalette(
 }
 
 /**
- * Values of codes -127 to 127: multiples of a step near 0, and if their range is too small, with increasing distances
- * farther away.
+ * Values of the codes -127 to 127. Codes near 0 are multiples of a step. If 127 steps do not reach the largest value, the
+ * distances between larger codes increase.
  */
 class CodeScale {
   readonly #step: number;
@@ -92,16 +96,23 @@ class CodeScale {
     return Math.sign(code) * this.#step * (size + this.#bend * Math.max(0, size - EVEN_CODES) ** 2);
   }
 
-  /** @param unit Codes are multiples of it. */
+  /**
+   * Returns the code that quantizes a value, 0 or more.
+   * @param value 0 or more.
+   * @param unit The code is a multiple of this number.
+   */
   codeOf(value: number, unit: number, weight: number): number {
     const steps = value / this.#step - EVEN_CODES;
     const bent = this.#bend > 0 && steps > 0 ? (Math.sqrt(1 + 4 * this.#bend * steps) - 1) / (2 * this.#bend) : steps;
-    const code = unit * roundedBy((EVEN_CODES + bent) / unit, weight);
+    const code = unit * quantized((EVEN_CODES + bent) / unit, weight);
     return Math.min(code, unit * Math.floor(MIDDLE_CODE / unit));
   }
 }
 
-/** Weight of an error of each splat. */
+/**
+ * Returns the weight of a squared error of each splat of `order`: from the visibility if it is known, otherwise squared
+ * opacity times area.
+ */
 export function weightsOf(
   { opacities, scales }: GaussianCloud,
   order: Uint32Array,
@@ -109,7 +120,6 @@ export function weightsOf(
 ): Float32Array {
   const usual = Float32Array.from(order, (i) => {
     const [a, b, c] = scales.subarray(3 * i, 3 * i + 3);
-    // Squared opacity times the area.
     return opacities[i] ** 2 * (Math.max(a * b, b * c, a * c) + 1e-20);
   });
   return seen
@@ -121,8 +131,9 @@ export function weightsOf(
 }
 
 /**
- * Mean constant coefficients of the visible colors of some harmonics: with M the mean of Y Yᵀ, the sum of M_j0 / M_00
- * times coefficient j; a root of M has the same quotients in its first column.
+ * Returns the constant coefficients that best replace some harmonics in the visible directions: [N, 3], 0 if visibility
+ * is unknown. With M the mean of Y Yᵀ, each is the sum of M_j0 / M_00 times coefficient j. The first column of a root of
+ * M has the same quotients.
  * @param of Returns coefficient and channel `n` of the splat at position k of the order.
  */
 export function addedBy(

@@ -1,7 +1,7 @@
 import { GaussianSplatError, shCoefficientCount, type GaussianCloud } from '@gaussian-splat/core';
 import { upright } from '@gaussian-splat/formats';
 import { packedOrder } from '@gaussian-splat/renderer/tools';
-import type { SplatVisibility } from '../pages/seen-splats.js';
+import type { SplatVisibility } from '../pages/splat-visibility.js';
 import type { Steps } from '../steps.js';
 import { findPalette, type Palette } from './palette.js';
 import { addedBy, DIGITS, roundPalette, weightsOf } from './sog-palette.js';
@@ -20,37 +20,40 @@ export type EncodeWebp = (
 ) => Promise<Uint8Array>;
 
 /**
- * Quantization steps: SOG stores bytes, and images with fewer values are smaller. `place` in 1/65,535 of the scene's
- * logarithmic box, `size` in octaves, `turn` and `opacity` in 1/255, `color` and `harmonics` in units of coefficients,
- * the latter for the most visible splats: for others it is larger.
+ * Quantization steps: SOG stores bytes, and images with fewer values are smaller. Units: `place` 1/65,535 of the scene's
+ * logarithmic box, `size` octaves, `turn` and `opacity` 1/255 of their range, `color` and `harmonics` coefficients. The
+ * step `harmonics` applies to the most visible splats; less visible ones have larger steps.
  */
 export type SogSteps = Steps<'place' | 'size' | 'turn' | 'opacity' | 'color' | 'harmonics'>;
 
 export interface SogOptions {
   readonly steps: SogSteps;
-  /** Entries of the palette of harmonics, at most 65,536. */
+  /** Maximum number of entries of the palette of harmonics, at most 65,536. */
   readonly palette: number;
   readonly encodeWebp: EncodeWebp;
-  /** Cached palettes for the same cloud and order, by size: they do not depend on the steps. */
+  /** Cache of palettes for the same cloud and order, by size. Palettes do not depend on the steps. */
   readonly palettes?: Map<number, Palette>;
   /**
-   * Visibility of the cloud's splats: harmonics of less visible ones get a less accurate palette entry. Default:
-   * estimated from opacities and sizes.
+   * Visibility of the cloud's splats: the palette represents harmonics of less visible splats less accurately. Default:
+   * an estimate from opacities and sizes.
    */
   readonly seen?: SplatVisibility | undefined;
-  /** See {@link EncodeWebp}; default 0.7: 1 takes twenty times as long, for 1 % less. */
+  /** Effort of {@link EncodeWebp}, 0..1; default 0.7. An effort of 1 takes twenty times as long for 1 % fewer bytes. */
   readonly effort?: number;
 }
 
 const USUAL_EFFORT = 0.7;
-/** Resolution of SOG. */
+/** Largest code of a position along an axis: SOG stores 16 bits. */
 const MAX_PLACES = 65_535;
 const PALETTE_ROW = 64;
-/** Codes of a codebook; smaller steps are enlarged to fit. */
+/** Largest code of a codebook, one byte. Steps that would need larger codes are enlarged. */
 const MAX_CODES = 255;
 const LN2 = Math.LN2;
 
-/** Writes SOG version 2 as a bundle. A scene with an up direction other than (0, -1, 0) is rotated. */
+/**
+ * Writes SOG version 2 as a bundle, a ZIP archive. A scene with an up direction other than (0, -1, 0) is rotated.
+ * @throws GaussianSplatError `argument/cloud` for a scene without usable splats.
+ */
 export async function writeSog(given: GaussianCloud, options: SogOptions): Promise<Uint8Array<ArrayBuffer>> {
   const cloud = upright(given);
   const order = packedOrder(cloud);
@@ -59,8 +62,8 @@ export async function writeSog(given: GaussianCloud, options: SogOptions): Promi
 }
 
 /**
- * The files of a SOG by name.
- * @param order Indices of its splats, at least one, in the order of the file.
+ * Returns the files of a SOG by name, `meta.json` first.
+ * @param order Indices of the splats to write, at least one, in the order of the file.
  */
 export async function sogFiles(
   cloud: GaussianCloud,
@@ -71,7 +74,7 @@ export async function sogFiles(
   const images = new Map<string, Image>();
   const means = putMeans(cloud, order, steps.place, images);
   const { length } = order;
-  const scales = codebook(length, 3, (n, k) => Math.log(cloud.scales[3 * order[n] + k]), LN2 * steps.size);
+  const scales = codebook(length, 3, (n, k) => logScale(cloud.scales, order[n], k), LN2 * steps.size);
   const stride = 3 * shCoefficientCount(cloud.shDegree);
   const harmonics = cloud.shDegree > 0 ? harmonicsOf(cloud, order, options) : undefined;
   const colors = codebook(
@@ -120,7 +123,10 @@ function imageOf(width: number, height: number): Image {
   return { rgba: new Uint8ClampedArray(4 * width * height), width, height };
 }
 
-/** An image with a pixel for each splat. */
+/**
+ * Returns an image with a pixel for each splat, in rows whose width is a multiple of 4.
+ * @param channel Returns channel `c` (RGBA) of the splat at position `k`, 0..255.
+ */
 function ofSplats(count: number, channel: (k: number, c: number) => number): Image {
   const width = 4 * Math.ceil(Math.sqrt(count) / 4);
   const image = imageOf(width, Math.ceil(count / width));
@@ -130,6 +136,15 @@ function ofSplats(count: number, channel: (k: number, c: number) => number): Ima
 
 const roundedByte = (value: number, step: number): number =>
   Math.min(255, Math.max(0, Math.round(Math.round(value / step) * step)));
+
+/** Minimum ratio of a splat's scales that is stored. Thinner splats look the same, but would widen the codebook. */
+const THINNEST = 1e-4;
+
+/** Returns the logarithm of scale `k` of splat `i`, which is finite also for the axes without extent of flat splats. */
+function logScale(scales: Float32Array, i: number, k: number): number {
+  const longest = Math.max(scales[3 * i], scales[3 * i + 1], scales[3 * i + 2]);
+  return Math.log(Math.max(scales[3 * i + k], THINNEST * longest));
+}
 
 const logPlace = (x: number): number => Math.sign(x) * Math.log1p(Math.abs(x));
 
@@ -141,7 +156,7 @@ function putMeans(
 ): { mins: number[]; maxs: number[] } {
   const codes = new Uint16Array(3 * order.length);
   const [mins, maxs]: [number[], number[]] = [[], []];
-  // Whole steps of codes, so that the lower bytes of positions have few values.
+  // The step is an integer number of codes, so that the low bytes of positions have few values.
   const whole = Math.max(1, Math.round(step));
   for (let axis = 0; axis < 3; axis++) {
     const values = Float64Array.from(order, (i) => logPlace(positions[3 * i + axis] + origin[axis]));
@@ -160,7 +175,7 @@ function putMeans(
   return { mins, maxs };
 }
 
-/** The three components besides the largest, which alpha selects. */
+/** Returns the image of rotations: RGB hold the three smaller components, alpha is 252 + the index of the largest. */
 function quatsOf({ rotations }: GaussianCloud, order: Uint32Array, step: number): Image {
   const codes = new Uint8Array(4 * order.length);
   order.forEach((i, k) => {
@@ -169,7 +184,7 @@ function quatsOf({ rotations }: GaussianCloud, order: Uint32Array, step: number)
     for (let n = 1; n < 4; n++) if (Math.abs(q[n]) > Math.abs(q[largest])) largest = n;
     const sign = q[largest] < 0 ? -1 : 1;
     let at = 4 * k;
-    // Rounded about the center, so that an unrotated axis stays unrotated.
+    // Rounds relative to the center of the range, so that a component of 0 has the code 128 with any step.
     for (let n = 0; n < 4; n++) {
       if (n !== largest) codes[at++] = 128 + signedByte(sign * q[n] * Math.SQRT2 * 127.5 - 0.5, step);
     }
@@ -181,7 +196,12 @@ function quatsOf({ rotations }: GaussianCloud, order: Uint32Array, step: number)
 const signedByte = (value: number, step: number): number =>
   Math.min(127, Math.max(-128, Math.round(Math.round(value / step) * step)));
 
-/** Evenly spaced values, and the nearest one for each number. */
+/**
+ * Quantizes [length, width] numbers to at most 256 evenly spaced values.
+ * @param of Returns number `k` of row `n`.
+ * @param step Minimum distance of the values.
+ * @returns The values, ascending, and for each number the index of the nearest value.
+ */
 function codebook(
   length: number,
   width: number,
@@ -192,7 +212,6 @@ function codebook(
   for (let n = 0; n < length; n++) {
     for (let k = 0; k < width; k++) {
       const value = of(n, k);
-      if (!Number.isFinite(value)) continue;
       low = Math.min(low, value);
       high = Math.max(high, value);
     }
@@ -209,14 +228,11 @@ function codebook(
   return { values, codes };
 }
 
-/**
- * The palette of harmonics, as images and in `meta.json`, and its effect on the visible colors of each splat, which the
- * constant coefficient compensates.
- */
+/** Encoded palette of harmonics: its properties in `meta.json`, its images, and its effect on colors. */
 interface Harmonics {
   readonly meta: { readonly count: number; readonly bands: number; readonly codebook: readonly number[] };
   readonly images: ReadonlyMap<string, Image>;
-  /** [N, 3] */
+  /** [N, 3] error of the visible colors in units of the constant coefficients, which compensate it. */
   readonly added: Float32Array;
 }
 

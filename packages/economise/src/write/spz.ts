@@ -1,5 +1,6 @@
 import { GaussianSplatError, shCoefficientCount, type GaussianCloud } from '@gaussian-splat/core';
 import { upright } from '@gaussian-splat/formats';
+import { safeOrbitOf } from './safe-orbit.js';
 
 /** Precision of an SPZ. */
 export interface SpzOptions {
@@ -13,11 +14,16 @@ const MAX_FRACTIONAL_BITS = 20;
 const MAX_STEPS = 2 ** 23 - 1;
 
 /**
- * The coordinate system of a cloud, which current converters keep and expect: right, down, forward is system 6 of the
- * extension 0xADBE0003.
+ * Record that declares the axes of a cloud: extension 0xADBE0003, 4 bytes, system 6 (right, down, forward). Current
+ * converters keep and expect this record.
  */
 const FRAME = [0xadbe0003, 4, 6];
-/** Our own record, docs/decisions/0022-the-frame-of-spz.md: 1 for per-pixel order. */
+/** Type and length of the limits of an orbiting camera. */
+const SAFE_ORBIT = [0xadbe0002, 12];
+/**
+ * Record of this project for per-pixel order (docs/decisions/0022-the-frame-of-spz.md): its type, its length in bytes,
+ * and its value.
+ */
 const PIXEL_ORDER = [0x47530001, 4, 1];
 const FLAG_ANTIALIASED = 1;
 const FLAG_EXTENSIONS = 2;
@@ -30,7 +36,12 @@ const FLAG_EXTENSIONS = 2;
 export async function writeSpz(given: GaussianCloud, options: SpzOptions): Promise<Uint8Array<ArrayBuffer>> {
   const cloud = upright(given);
   const { count, shDegree, antialiased } = cloud;
-  const records = [...FRAME, ...(cloud.hints?.order === 'pixel' ? PIXEL_ORDER : [])];
+  const orbit = safeOrbitOf(cloud);
+  const records = [
+    ...FRAME,
+    ...(cloud.hints?.order === 'pixel' ? PIXEL_ORDER : []),
+    ...(orbit ? [...SAFE_ORBIT, ...new Uint32Array(Float32Array.from(orbit).buffer)] : []),
+  ];
   const coefficients = shCoefficientCount(shDegree) - 1;
   const fractionalBits = fractionalBitsOf(cloud);
   const body = new Uint8Array(16 + count * (20 + 3 * coefficients) + 4 * records.length);
@@ -51,8 +62,8 @@ export async function writeSpz(given: GaussianCloud, options: SpzOptions): Promi
 const byte = (value: number): number => Math.min(255, Math.max(0, Math.round(value)));
 
 /**
- * Number of fractional bits for the farthest coordinate.
- * @throws GaussianSplatError `argument/value` if it does not fit even without any.
+ * Returns the maximum number of fractional bits, 0..20, with which the largest coordinate fits in 24 bits.
+ * @throws GaussianSplatError `argument/value` for coordinates beyond 8,388,607, which do not fit with 0 bits.
  */
 export function fractionalBitsOf({ positions, origin }: Pick<GaussianCloud, 'positions' | 'origin'>): number {
   let largest = 1e-9;
@@ -83,7 +94,10 @@ function packColors({ count, opacities, sh, shDegree }: GaussianCloud, out: Uint
   return at;
 }
 
-/** Two bits for the largest of (x, y, z, w), then a sign and nine bits of magnitude for each of the others. */
+/**
+ * Returns a rotation (w, x, y, z) as a u32. The two highest bits are the index of the largest component of (x, y, z, w).
+ * A sign bit and nine bits of magnitude follow for each other component.
+ */
 function packRotation(rotations: Float32Array, at: number): number {
   const q = [1, 2, 3, 0].map((k) => rotations[at + k]);
   const largest = q.reduce((best, value, k) => (Math.abs(value) > Math.abs(q[best]) ? k : best), 0);

@@ -8,21 +8,21 @@ import { nothingToWrite, sogFiles, type SogOptions } from './sog.js';
 const LOD_INDEX = 'lod-meta.json';
 /** Whether a file of this name is the index of a streamed scene. */
 export const isLodIndex = (name: string): boolean => /(^|[\\/])lod-meta\.json$/i.test(name);
-/** Splats of the coarsest level of a box: one chunk of the renderer, and the ratio between two levels. */
+/** Splats of the coarsest level of a box, one chunk of the renderer; and the ratio between the splats of two levels. */
 const CHUNK = 256;
 const KEPT = 4;
 /**
- * Minimum number of levels of a scene with enough splats, and the maximum number of splats over all coarsest levels:
- * more would delay the first frame.
+ * Minimum number of levels of a scene with enough splats, and the maximum number of splats in all coarsest levels
+ * together. More splats would delay the first frame.
  */
 const MIN_LEVELS = 4;
 const MAX_COARSEST_CHUNKS = 40_000;
-/** Maximum number of splats in a file, which has to be complete before any of it is shown. */
+/** Maximum number of splats in a file. The renderer shows no splat of a file before the file is complete. */
 const FILE_SPLATS = 131_072;
 
 /** A region of the scene: neighboring splats, and their coarser levels. */
 interface Box {
-  /** Indices in the cloud. */
+  /** Indices of the region's splats in the cloud. */
   readonly kept: Uint32Array;
   /** Finest level first. */
   readonly levels: readonly SplatLevel[];
@@ -81,7 +81,7 @@ export async function writeStreamedSog(
   return files.set(LOD_INDEX, new TextEncoder().encode(JSON.stringify(index)));
 }
 
-/** Boxes with equally many splats, within one, so that all have the same levels. */
+/** Divides the splats into boxes whose counts differ by at most 1, so that all boxes have equally many levels. */
 function boxesOf(cloud: GaussianCloud, order: Uint32Array): Box[] {
   let max = CHUNK * KEPT ** (MIN_LEVELS - 1);
   while ((order.length * CHUNK) / max > MAX_COARSEST_CHUNKS) max *= KEPT;
@@ -93,7 +93,7 @@ function boxesOf(cloud: GaussianCloud, order: Uint32Array): Box[] {
   });
 }
 
-/** Groups of boxes whose splats of a level are in one file. */
+/** Returns groups of indices of boxes: the splats of a group at this level are in one file. */
 function groupsOf(boxes: readonly Box[], level: number): number[][] {
   const groups: number[][] = [];
   let splats = Infinity;
@@ -120,7 +120,7 @@ function joined(parts: readonly Uint32Array[]): Uint32Array {
   return all;
 }
 
-/** Concatenates levels to a cloud; opacities of merged splats above 1 become 1. */
+/** Concatenates levels to one cloud. Merged splats may have opacities above 1, which become 1. */
 function cloudOf(levels: readonly SplatLevel[], like: GaussianCloud): GaussianCloud {
   const count = levels.reduce((sum, level) => sum + level.count, 0);
   const [positions, scales] = [new Float32Array(3 * count), new Float32Array(3 * count)];
@@ -141,17 +141,21 @@ function cloudOf(levels: readonly SplatLevel[], like: GaussianCloud): GaussianCl
   return { ...like, count, positions, scales, rotations, opacities, sh };
 }
 
-/** A float32 can hold its square root. */
+/** Minimum variance in world units², whose square root float32 can hold. */
 const MIN_VARIANCE = 1e-36;
 
-/** @param factors Lower triangular roots: xx, yx, yy, zx, zy, zz. */
+/**
+ * Returns the row-major 3x3 covariance of a splat.
+ * @param factors Lower triangular roots of covariances: xx, yx, yy, zx, zy, zz.
+ * @param at Index of the splat's first factor.
+ */
 function covarianceOf(factors: Float32Array, at: number): number[] {
   const [xx, yx, yy, zx, zy, zz] = factors.subarray(at, at + 6);
   const [xy, xz, yz] = [xx * yx, xx * zx, yx * zx + yy * zy];
   return [xx * xx, xy, xz, xy, yx * yx + yy * yy, yz, xz, yz, zx * zx + zy * zy + zz * zz];
 }
 
-/** The box of the centers, world units. */
+/** Returns the axis-aligned bounds of the splats' centers, in world units. */
 function boundOf({ positions, origin }: GaussianCloud, kept: Uint32Array): { min: number[]; max: number[] } {
   const [min, max] = [
     [Infinity, Infinity, Infinity],

@@ -1,5 +1,5 @@
 import { GaussianSplatError, shCoefficientCount } from '@gaussian-splat/core';
-import type { SplatVisibility } from '../pages/seen-splats.js';
+import type { SplatVisibility } from '../pages/splat-visibility.js';
 import { findSteps, scaledSteps } from '../steps.js';
 import type { Encoding, Measure, WrittenCloud } from './index.js';
 import type { Palette } from './palette.js';
@@ -8,23 +8,24 @@ import { writeStreamedSog } from './streamed-sog.js';
 import { writeZip } from './zip.js';
 
 const USUAL: SogSteps = { place: 4, size: 1 / 12, turn: 4, opacity: 4, color: 1 / 32, harmonics: 1 / 64 };
-/** Numbers of a splat for each step; about half of a palette entry is 0. */
+/** Number of values of a splat that each step quantizes. Harmonics depend on the palette; about half of them are 0. */
 const NUMBERS: Omit<SogSteps, 'harmonics'> = { place: 3, size: 3, turn: 3, opacity: 1, color: 3 };
-/** Finest steps that files support. */
+/** Finest steps that files support, in the units of {@link SogSteps}. */
 const FINEST: SogSteps = { place: 1, size: 1e-3, turn: 1, opacity: 1, color: 1e-3, harmonics: 1e-3 };
 const PALETTES = [1024, 4096, 8192, 16_384, 32_768, 65_536];
-/** Maximum fraction of the error for the palette, if a larger one would have less. */
+/** Maximum fraction of the allowed error that the palette may cause, unless it is the largest palette. */
 const PALETTE_SHARE = 0.4;
-/** A search ends at this fraction of the allowed error. */
+/** The search for steps ends when the error reaches this fraction of the allowed error. */
 const NEAR_ENOUGH = 0.9;
-/** For temporary files of measurements. */
+/** Effort of {@link EncodeWebp} for temporary files that are only measured. */
 const QUICK = 0;
 
 /**
- * Returns a SOG encoding whose steps and palette are as coarse as measurements allow.
- * @param encodeWebp Undefined if only names are needed.
- * @param isStreamed Whether to write an archive of an index and files by level of detail; the steps are still measured
- * on one file.
+ * Returns a SOG encoding whose `tune` selects the coarsest steps and palette within an error limit.
+ * @param encodeWebp If undefined, `tune` throws GaussianSplatError `argument/value`. The encoding returned here always
+ * throws it in `write`, before `tune`.
+ * @param isStreamed Whether to write an archive of an index and files by level of detail. The steps are measured on one
+ * SOG file in either case.
  */
 export function tuneSog(encodeWebp: EncodeWebp | undefined, isStreamed = false): Encoding {
   return {
@@ -87,7 +88,7 @@ async function tuned(
   return { steps, palette, encodeWebp, seen };
 }
 
-/** Visibility of some of the splats. */
+/** Returns the visibility of the splats with the indices `kept`. */
 function splatsSeen({ energies, roots }: SplatVisibility, kept: Uint32Array): SplatVisibility {
   const numbers = roots.length / energies.length;
   const own = new Float32Array(numbers * kept.length);

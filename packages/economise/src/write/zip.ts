@@ -1,8 +1,8 @@
-/** Writes ZIP archives without compression, because the files are already compressed. */
+/** Signatures of a file's local header, of its entry in the central directory, and of the end of the directory. */
 const LOCAL = 0x04034b50;
 const CENTRAL = 0x02014b50;
 const END = 0x06054b50;
-/** Version 2.0, and 1980-01-01, so that archives of the same files are identical. */
+/** Version 2.0 of ZIP; and the date 1980-01-01, so that archives of the same files are identical. */
 const VERSION = 20;
 const DATE = 0x21;
 
@@ -18,7 +18,10 @@ function crc32(bytes: Uint8Array): number {
   return ~code >>> 0;
 }
 
-/** @param files Files by name. */
+/**
+ * Writes a ZIP archive without compression, because the files are already compressed.
+ * @param files Bytes of the files by name.
+ */
 export function writeZip(files: ReadonlyMap<string, Uint8Array>): Uint8Array<ArrayBuffer> {
   const entries = [...files].map(([name, bytes]) => ({ name: new TextEncoder().encode(name), bytes }));
   const total = entries.reduce((sum, { name, bytes }) => sum + 30 + 46 + 2 * name.length + bytes.length, 22);
@@ -70,7 +73,10 @@ export function writeZip(files: ReadonlyMap<string, Uint8Array>): Uint8Array<Arr
   return zip;
 }
 
-/** Flags (names are UTF-8), method, time, date, checksum, sizes, lengths of the name and of the extra field. */
+/**
+ * Returns the fields that both headers of a file have: flags (the name is UTF-8), method, time, date, checksum, two
+ * sizes, and the lengths of the name and of the extra field.
+ */
 function factsOf(name: Uint8Array, bytes: Uint8Array): (readonly [2 | 4, number])[] {
   return [
     [2, 0x800],
@@ -85,7 +91,7 @@ function factsOf(name: Uint8Array, bytes: Uint8Array): (readonly [2 | 4, number]
   ];
 }
 
-/** Reads the files of an archive that {@link writeZip} wrote, by name. */
+/** Returns the files of an archive that {@link writeZip} wrote, by name. They share the memory of the archive. */
 export function filesOfZip(zip: Uint8Array): Map<string, Uint8Array> {
   const view = new DataView(zip.buffer, zip.byteOffset, zip.byteLength);
   const files = new Map<string, Uint8Array>();

@@ -1,13 +1,13 @@
-/** Converts points of the page to a box that CSS has transformed. */
+/** Converts points of the page to coordinates of a box, including one that CSS has transformed. */
 import type { Point } from './gestures.js';
 
 /**
- * Converts page coordinates, in CSS pixels as in a MouseEvent, to fractions of a box's width and height from its upper
+ * Converts a point of the page, CSS pixels as in a MouseEvent, to fractions of a box's width and height from its upper
  * left corner. NaN if the box is seen edge-on.
  */
 export type BoxPoints = (clientX: number, clientY: number) => Point;
 
-/** Corners of a box in circular order: left and top in percent. */
+/** Corners of a box in circular order: left and top in percent of the box. */
 const CORNERS = [
   [0, 0],
   [100, 0],
@@ -17,8 +17,9 @@ const CORNERS = [
 
 /**
  * Measures a box under any `transform`, `perspective` and `zoom`. Browsers provide only the bounding rectangle of a
- * transformed box, but the exact position of one without extent, so one is placed in each corner. The formula is that
- * of Heckbert, "Fundamentals of Texture Mapping and Image Warping" (1989), section 2.2.3.
+ * transformed box. That of a box without extent is an exact position, so this function places such a box in each
+ * corner. The projective map is that of Heckbert, "Fundamentals of Texture Mapping and Image Warping" (1989), section
+ * 2.2.3.
  * @param box A positioned element.
  */
 export function boxPoints(box: HTMLElement): BoxPoints {
@@ -39,7 +40,10 @@ export function boxPoints(box: HTMLElement): BoxPoints {
   };
 }
 
-/** Converts moves on the page, near a point, to CSS pixels of the box itself. */
+/**
+ * Returns a function that converts movements on the page near a point, CSS pixels, to CSS pixels of the box itself.
+ * Movements stay unchanged if the box cannot be measured.
+ */
 export function boxMoves(box: HTMLElement, { x, y }: Point): (point: Point) => Point {
   const at = boxPoints(box);
   const [origin, right, below] = [at(x, y), at(x + 1, y), at(x, y + 1)];

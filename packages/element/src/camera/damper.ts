@@ -1,6 +1,6 @@
-/** Below this fraction of the scale a difference is invisible, and the value snaps to its goal. */
+/** Fraction of the scale below which a difference is invisible. The value then snaps to its goal. */
 const SETTLED = 2e-5;
-/** Below this fraction of the goal steps are lost in float64: 2⁻⁵³, times about 10⁵ steps of a slow motion. */
+/** Fraction of the goal below which float64 loses steps: 2⁻⁵³, times about 10⁵ steps of a slow motion. */
 const ROUNDING = 1e-10;
 
 /**
@@ -31,7 +31,7 @@ export class Damper {
     const decay = Math.exp(-frequency * stepMs);
     const nextDistance = (distance + slope * stepMs) * decay;
     this.#velocity = (this.#velocity - frequency * slope * stepMs) * decay;
-    // Near a large goal the last, tiny steps would be lost in rounding, and the motion would never end.
+    // Near a large goal, rounding would lose the last small steps, and the motion would never end.
     const close = Math.max(SETTLED * scale, ROUNDING * Math.abs(goal));
     const settled = Math.abs(nextDistance) < close && Math.abs(this.#velocity) < close * frequency;
     return settled ? this.#rest(goal) : goal + nextDistance;

@@ -1,6 +1,6 @@
 import type { Point } from './gestures.js';
 
-/** Maximum duration of a tap, and maximum interval between two taps, ms: as in touch browsers. */
+/** Maximum duration of a tap, and maximum interval between two taps, milliseconds, as in touch browsers. */
 const TAP_MS = 300;
 /** Maximum movement of a tap, CSS pixels. */
 const TAP_SLOP = 10;
@@ -12,14 +12,17 @@ interface Tap extends Point {
 }
 
 /**
- * Detects double taps. Browsers differ in when two taps fire `dblclick`, depending on zooming and scrolling, so taps
- * are detected here. Pure: times are passed in.
+ * Detects double taps. Browsers differ in when two taps fire `dblclick`, depending on zooming and scrolling. Callers
+ * pass the times in milliseconds.
  */
 export class DoubleTap {
   #down: Tap | undefined;
   #first: Tap | undefined;
 
-  /** Handles a finger that goes down. @param isAlone False while others are down, because two fingers do not tap. */
+  /**
+   * Handles a finger that touches the surface.
+   * @param isAlone False while other fingers touch it, because two fingers do not tap.
+   */
   down(point: Point, ms: number, isAlone: boolean): void {
     if (!isAlone) return this.cancel();
     this.#down = { ...point, ms };
@@ -27,7 +30,7 @@ export class DoubleTap {
     if (isLate) this.#first = undefined;
   }
 
-  /** Handles a finger that goes up; returns true at the end of a second tap near the first one. */
+  /** Handles a finger that leaves the surface. @returns Whether that ends the second tap near the first one. */
   up(point: Point, ms: number): boolean {
     const [down, first] = [this.#down, this.#first];
     this.cancel();
@@ -37,7 +40,7 @@ export class DoubleTap {
     return false;
   }
 
-  /** Discards the taps: the page scrolls, or there are two fingers. */
+  /** Discards the taps, because the page scrolls or two fingers touch the surface. */
   cancel(): void {
     this.#down = undefined;
     this.#first = undefined;

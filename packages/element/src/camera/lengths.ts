@@ -1,10 +1,10 @@
-/** Lengths in attributes that only late-loaded code reads. */
-import { METRES_PER_UNIT, parseQuantity, type AttributeGrammar } from './grammar.js';
+/** Grammars of lengths, for attributes that only code loaded on demand reads. */
+import { METERS_PER_UNIT, parseQuantity, type AttributeGrammar } from './grammar.js';
 
-/** A positive length with a unit, such as `1.6m` or `37cm`: meters, or null. */
+/** Parses a positive length with a unit, such as `1.6m` or `37cm`. Returns meters; null if the text is malformed. */
 const parseExtent = (text: string): number | null => {
   const quantity = parseQuantity(text.trim().toLowerCase());
-  const meters = quantity === null || quantity.unit === '' ? undefined : METRES_PER_UNIT[quantity.unit];
+  const meters = quantity === null || quantity.unit === '' ? undefined : METERS_PER_UNIT[quantity.unit];
   return meters !== undefined && quantity!.value > 0 ? quantity!.value * meters : null;
 };
 
@@ -14,7 +14,7 @@ export const lengthGrammar = (fallback: string): AttributeGrammar<number> => ({
   parse: parseExtent,
 });
 
-/** The same, or undefined if absent. */
+/** Grammar of an optional positive length: meters, or undefined if the attribute is absent. */
 export const optionalLengthGrammar: AttributeGrammar<number | undefined> = {
   expected: 'a length above 0 with m, cm or mm, such as 1m or 37cm',
   fallback: '',

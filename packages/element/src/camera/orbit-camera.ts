@@ -2,7 +2,7 @@ import type { Vector3 } from '@gaussian-splat/core';
 import { Damper } from './damper.js';
 import { eyeOfPose, orbitAxes, type CameraPose } from './orbit.js';
 
-/** Fixed point of a motion: the target that the camera orbits, or the eye of a flying camera. */
+/** Point that stays fixed in a motion: the target that the camera orbits, or the eye of a flying camera. */
 export type Pivot = 'target' | 'eye';
 
 /** Lower and upper limit of each component of a pose. */
@@ -11,18 +11,12 @@ export interface CameraLimits {
   readonly max: CameraPose;
 }
 
-const KEYS = ['theta', 'phi', 'radius', 'x', 'y', 'z', 'fieldOfView'] as const;
-/** Components of a pose for its position; the others define the view from there. */
+/** Components of a pose that define its position. The others define the view from there. */
 const PLACE = ['x', 'y', 'z'] as const;
-const everywhere = (value: number): CameraPose => ({
-  theta: value,
-  phi: value,
-  radius: value,
-  x: value,
-  y: value,
-  z: value,
-  fieldOfView: value,
-});
+const VIEW = ['theta', 'phi', 'radius', 'fieldOfView'] as const;
+const KEYS = [...VIEW, ...PLACE];
+const everywhere = (value: number): CameraPose =>
+  Object.fromEntries(KEYS.map((key) => [key, value])) as unknown as CameraPose;
 
 /**
  * A camera that orbits a target: its current pose, its goal, and the damped motion between them. Independent of page,
@@ -34,6 +28,11 @@ export class OrbitCamera {
   #limits: CameraLimits = { min: everywhere(-Infinity), max: everywhere(Infinity) };
   readonly #dampers = KEYS.map(() => new Damper());
   #pivot: Pivot = 'target';
+  /**
+   * Whether the camera walks. Limits of the target then do not apply, because they would move the eye. A change of the
+   * pivot ends it.
+   */
+  walks = false;
 
   constructor(pose: CameraPose) {
     this.#now = pose;
@@ -45,12 +44,12 @@ export class OrbitCamera {
     return this.#now;
   }
 
-  /** The goal; equal to {@link now} at rest. */
+  /** The pose that the camera moves to; equal to {@link now} at rest. */
   get goal(): CameraPose {
     return this.#goal;
   }
 
-  /** Whether {@link step} still has something to do. */
+  /** Whether the current pose differs from the goal. */
   get moving(): boolean {
     return KEYS.some((key) => this.#now[key] !== this.#goal[key]);
   }
@@ -59,15 +58,16 @@ export class OrbitCamera {
     return this.#pivot;
   }
 
-  /** The pivot `eye` keeps the position of a camera that looks around, also on the way to its goal. */
+  /** Sets the fixed point. `eye` keeps the position of a camera that looks around, also on the way to its goal. */
   set pivot(pivot: Pivot) {
     if (pivot === this.#pivot) return;
     this.#pivot = pivot;
-    // Their velocities belong to another point.
+    this.walks = false;
+    // The velocities of the dampers belong to the previous pivot.
     for (const damper of this.#dampers) damper.stop();
   }
 
-  /** Limits of all further goals; the current goal is clamped to them. */
+  /** Sets the limits of all further goals, and clamps the current goal to them. */
   set limits(limits: CameraLimits) {
     this.#limits = limits;
     this.setGoal({});
@@ -76,13 +76,12 @@ export class OrbitCamera {
   /** Changes components of the goal, within the limits. */
   setGoal(changes: Partial<CameraPose>): void {
     const { min, max } = this.#limits;
-    const wanted = { ...this.#goal, ...changes };
-    const goal = { ...wanted };
-    for (const key of KEYS) goal[key] = Math.min(max[key], Math.max(min[key], wanted[key]));
+    const goal = { ...this.#goal, ...changes };
+    for (const key of this.walks ? VIEW : KEYS) goal[key] = Math.min(max[key], Math.max(min[key], goal[key]));
     this.#goal = goal;
   }
 
-  /** Removes full turns from the current azimuth, so that the path to the goal is the short one. */
+  /** Adds full turns to the current azimuth, so that it differs from the goal by at most half a turn. */
   unwind(): void {
     const turns = Math.round((this.#goal.theta - this.#now.theta) / (2 * Math.PI));
     this.#now = { ...this.#now, theta: this.#now.theta + turns * 2 * Math.PI };
@@ -95,9 +94,9 @@ export class OrbitCamera {
   }
 
   /**
-   * One step of the damped motion.
+   * Advances the damped motion by one step.
    * @param stepMs Time since the last step, milliseconds.
-   * @param decayMs Time constant of the motion, milliseconds; 0 jumps.
+   * @param decayMs Time constant of the motion, milliseconds; 0 jumps to the goal.
    * @returns Whether the camera has moved.
    */
   step(stepMs: number, decayMs: number): boolean {
@@ -109,12 +108,15 @@ export class OrbitCamera {
       const scale = key === 'theta' || key === 'phi' || key === 'fieldOfView' ? 1 : to.radius;
       now[key] = this.#dampers[i].step(from[key], to[key], stepMs, decayMs, scale);
     });
-    // At its end the motion is exactly at the goal, without the rounding error of converting through the eye.
+    // The last step sets the exact goal, without the rounding error of the conversion through the eye.
     this.#now = KEYS.every((key) => now[key] === to[key]) ? this.#goal : this.#offCourse(now);
     return true;
   }
 
-  /** The pose with the position that keeps the pivot fixed. */
+  /**
+   * Returns a pose whose position is that of the pivot: of the target, or of the eye. Its damped motion keeps an
+   * unchanged pivot fixed.
+   */
   #onCourse(pose: CameraPose): CameraPose {
     if (this.#pivot === 'target') return pose;
     const [x, y, z] = eyeOfPose(pose);
@@ -126,8 +128,8 @@ export class OrbitCamera {
   }
 
   /**
-   * Rotates camera and goal equally around the {@link pivot}, without damping: radians. @returns The angle within the
-   * limits.
+   * Rotates current pose and goal by the same azimuth around the {@link pivot}, without damping. `theta` in radians.
+   * @returns The angle that the limits allow, radians.
    */
   turnBy(theta: number): number {
     const before = this.#goal.theta;
@@ -140,19 +142,20 @@ export class OrbitCamera {
     return turned;
   }
 
-  /** Rotates the goal's view around its own eye by angles in radians. */
+  /** Rotates the view of the goal around its own eye. Angles in radians. */
   lookBy(theta: number, phi: number): void {
     const [x, y, z] = eyeOfPose(this.#goal);
     this.setGoal({ theta: this.#goal.theta + theta, phi: this.#goal.phi + phi });
     this.setGoal(withTargetAhead({ ...this.#goal, x, y, z }));
   }
 
-  /** Moves the goal's eye to a point; the direction does not change. */
+  /** Walks: moves the eye of the goal to a point in viewer space, without a change of direction. */
   setEye([x, y, z]: Vector3): void {
+    this.walks = true;
     this.setGoal(withTargetAhead({ ...this.#goal, x, y, z }));
   }
 
-  /** Moves the goal along its own axes, eye and target equally: world units. */
+  /** Moves eye and target of the goal equally along the camera's own axes, world units. */
   moveBy(right: number, up: number, forward: number): void {
     const goal = this.#goal;
     const axes = orbitAxes(goal.theta, goal.phi);
@@ -161,20 +164,20 @@ export class OrbitCamera {
     this.setGoal({ x: goal.x + along(0), y: goal.y + along(1), z: goal.z + along(2) });
   }
 
-  /** Rotates the goal around its target by angles in radians. */
+  /** Rotates the goal around its target. Angles in radians. */
   orbitBy(theta: number, phi: number): void {
     this.setGoal({ theta: this.#goal.theta + theta, phi: this.#goal.phi + phi });
   }
 
-  /** Multiplies the distance to the target. */
+  /** Multiplies the distance of the goal to its target by a factor, within the limits. */
   zoomBy(factor: number): void {
     this.setGoal({ radius: this.#goal.radius * factor });
   }
 
   /**
-   * Moves the target in the image plane.
+   * Moves eye and target of the goal in the image plane.
    * @param right Motion of the camera to its right, as a fraction of the frame's height.
-   * @param up The same, upwards.
+   * @param up Motion of the camera upwards, as a fraction of the frame's height.
    */
   panBy(right: number, up: number): void {
     const goal = this.#goal;
@@ -183,7 +186,7 @@ export class OrbitCamera {
   }
 }
 
-/** Converts a pose with the position of its eye to one with that of its target. */
+/** Converts a pose whose position is that of its eye to one with the position of its target. */
 function withTargetAhead(pose: CameraPose): CameraPose {
   const { backward } = orbitAxes(pose.theta, pose.phi);
   const [x, y, z] = PLACE.map((key, axis) => pose[key] - pose.radius * backward[axis]);

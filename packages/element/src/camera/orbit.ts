@@ -1,9 +1,13 @@
 /**
- * Orbit geometry. Viewer space: the scene's coordinates rotated so that y is up; right-handed, in world units (meters).
+ * Geometry of the orbit. Viewer space is the scene's coordinate system rotated so that y is up: right-handed, in world
+ * units (meters).
  */
 import { DEFAULT_FAR, dot, type Bounds, type Camera, type Vector3 } from '@gaussian-splat/core';
 
-/** The animated state: the orbit, its target in viewer space, and the vertical field of view. Radians and world units. */
+/**
+ * Pose of the camera: azimuth `theta` and polar angle `phi` of the orbit, its `radius`, its target x, y, z in viewer
+ * space, and the vertical field of view. Radians and world units.
+ */
 export interface CameraPose {
   readonly theta: number;
   readonly phi: number;
@@ -18,9 +22,9 @@ export interface CameraPose {
 export type ViewerFrame = readonly [Vector3, Vector3, Vector3];
 
 /**
- * The rotation of a unit vector to +y that changes the horizontal axes as little as possible. For -y, the convention of
- * the trainers, it is diag(1, -1, -1), and for nearby directions a similar one: the shortest rotation to +y or to -y,
- * whichever is nearer.
+ * Returns the rotation of a unit vector to +y that changes the horizontal axes as little as possible. It is the
+ * shortest rotation to +y or to -y, whichever is nearer; the latter is followed by diag(1, -1, -1). For -y, the
+ * convention of the trainers, the result is diag(1, -1, -1).
  */
 export function viewerFrame([x, y, z]: Vector3): ViewerFrame {
   const side = y < 0 ? -1 : 1;
@@ -40,17 +44,17 @@ export const toViewer = (frame: ViewerFrame, v: Vector3): Vector3 => [
   dot(frame[2], v),
 ];
 
-/**
- * Converts a direction or point from viewer space to scene coordinates: by the transpose, because the matrix is a
- * rotation.
- */
+/** Converts a direction or point from viewer space to scene coordinates. The inverse of a rotation is its transpose. */
 export const toScene = (frame: ViewerFrame, v: Vector3): Vector3 => [
   frame[0][0] * v[0] + frame[1][0] * v[1] + frame[2][0] * v[2],
   frame[0][1] * v[0] + frame[1][1] * v[1] + frame[2][1] * v[2],
   frame[0][2] * v[0] + frame[1][2] * v[1] + frame[2][2] * v[2],
 ];
 
-/** Axes of the camera in viewer space, in explicit form so that looking straight down or up is not singular. */
+/**
+ * Returns the unit axes of the camera in viewer space for angles in radians. The explicit form is not singular for a
+ * view straight down or up.
+ */
 export function orbitAxes(theta: number, phi: number): { right: Vector3; up: Vector3; backward: Vector3 } {
   const [sinTheta, cosTheta, sinPhi, cosPhi] = [Math.sin(theta), Math.cos(theta), Math.sin(phi), Math.cos(phi)];
   return {
@@ -60,14 +64,14 @@ export function orbitAxes(theta: number, phi: number): { right: Vector3; up: Vec
   };
 }
 
-/** Position of a pose's eye in viewer space. */
+/** Returns the position of a pose's eye in viewer space. */
 export function eyeOfPose(pose: CameraPose): Vector3 {
   const { backward } = orbitAxes(pose.theta, pose.phi);
   return [pose.x + pose.radius * backward[0], pose.y + pose.radius * backward[1], pose.z + pose.radius * backward[2]];
 }
 
 /**
- * Framing distance of a sphere of the given radius: radius / sin(half the smaller field of view).
+ * Returns the distance that frames a sphere: radius / sin(half the smaller field of view).
  * @param radius World units, above 0.
  * @param fieldOfView Vertical, radians.
  * @param aspect Width / height, above 0.
@@ -78,10 +82,13 @@ export function framingDistance(radius: number, fieldOfView: number, aspect: num
   return radius / Math.sin(Math.min(vertical, horizontal));
 }
 
-/** Near plane in world units: the trainers' 0.2, or less for a scene small enough to be clipped by it. */
+/**
+ * Distance of the near plane, world units: 0.2 as in the trainers, or less for a small scene that this plane would
+ * clip.
+ */
 export const nearPlane = (bounds: Bounds): number => Math.min(0.2, bounds.radius / 100);
 
-/** The pinhole camera of a pose, in scene coordinates, for a frame of width x height pixels. */
+/** Returns the pinhole camera of a pose, in scene coordinates, for a frame of width x height pixels. */
 export function cameraOfPose(
   pose: CameraPose,
   frame: ViewerFrame,
@@ -111,15 +118,16 @@ export function cameraOfPose(
 }
 
 /**
- * The same view by parallel rays: as large at the target. The eye goes back until it has all of the scene before it.
- * @param radius distance of the eye to the target
- * @param reach distance from the target within which the scene lies
+ * Returns the orthographic camera with the same scale at the target. Its eye is moved back by `reach`, so that the
+ * whole scene is in front of it.
+ * @param radius Distance of the eye to the target, world units.
+ * @param reach Maximum distance of the scene from the target, world units.
  */
 export function parallelCamera(camera: Camera, radius: number, reach: number): Camera {
   const { fx, fy, worldToCamera } = camera;
   const back = Float64Array.from(worldToCamera);
   back[11] += reach;
-  // Rounded up, for what depends on it to stay as it is while the camera moves.
+  // The far plane is rounded up to a power of 2, so that it seldom changes while the camera moves.
   const far = 2 ** Math.ceil(Math.log2(radius + 2 * reach));
   return { ...camera, fx: fx / radius, fy: fy / radius, worldToCamera: back, far, orthographic: true };
 }

@@ -3,14 +3,17 @@ import type { Camera, Vector3 } from '@gaussian-splat/core';
 
 /** Position of a scene point in a frame. */
 export interface Projected {
-  /** Pixels from the left and the top edge. */
+  /** Pixels from the left edge of the frame. */
   readonly x: number;
   readonly y: number;
-  /** World units along the optical axis; 0 or less is behind the camera, and then x and y are undefined. */
+  /**
+   * World units along the optical axis. Points with a depth of 0 or less are behind the camera; their x and y are
+   * meaningless.
+   */
   readonly depth: number;
 }
 
-/** Projects a point in scene coordinates. */
+/** Returns pixels and depth of a point in scene coordinates. */
 export function project({ worldToCamera: m, fx, fy, cx, cy, orthographic }: Camera, [x, y, z]: Vector3): Projected {
   const row = (r: number): number => m[4 * r] * x + m[4 * r + 1] * y + m[4 * r + 2] * z + m[4 * r + 3];
   const depth = row(2);

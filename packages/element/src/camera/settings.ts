@@ -1,5 +1,5 @@
 /** Converts camera attributes for a given scene and frame: settings with `auto` and `%` become a pose. */
-import type { Bounds, Vector3 } from '@gaussian-splat/core';
+import type { Bounds, CloudHints, Vector3 } from '@gaussian-splat/core';
 import type { AngleSetting, OrbitSetting, RadiusSetting, TargetSetting } from './grammar.js';
 import { framingDistance, toViewer, viewerFrame, type CameraPose, type ViewerFrame } from './orbit.js';
 import type { CameraLimits } from './orbit-camera.js';
@@ -15,38 +15,43 @@ export interface CameraSettings {
   readonly fieldOfView: AngleSetting;
   readonly minFieldOfView: AngleSetting;
   readonly maxFieldOfView: AngleSetting;
-  /** Unit vector that points up in scene coordinates; undefined for that of the scene, else -y. */
+  /**
+   * Unit vector that points up in scene coordinates; undefined for the direction of the scene's file, or -y if it has
+   * none.
+   */
   readonly up: Vector3 | undefined;
-  /** Rays are parallel. */
+  /** Whether the camera is orthographic. */
   readonly orthographic?: boolean;
 }
 
-/** Bounds of a scene, in its own coordinates. */
+/** Bounds of a scene in scene coordinates. */
 export interface SceneBounds extends Bounds {
-  /** Unit vector that points up, if the scene declares one. */
+  /** Unit vector that points up; undefined if the scene's file does not declare one. */
   readonly up?: Vector3 | undefined;
+  /** Limits for a camera that the scene's file recommends: they replace the automatic ones. */
+  readonly orbit?: CloudHints['orbit'];
 }
 
-/** Rotation from scene coordinates to viewer space. */
+/** Returns the rotation from scene coordinates to viewer space. */
 export const frameOf = ({ up }: Pick<CameraSettings, 'up'>, bounds: Pick<SceneBounds, 'up'>): ViewerFrame =>
   viewerFrame(up ?? bounds.up ?? [0, -1, 0]);
 
 const DEGREE = Math.PI / 180;
-/** Values of `auto`. */
+/** Values that replace `auto`; angles in radians. */
 const AUTO = {
-  theta: 0,
   phi: 75 * DEGREE,
   fieldOfView: 45 * DEGREE,
   minFieldOfView: 1 * DEGREE,
   maxFieldOfView: 160 * DEGREE,
   minPhi: 22.5 * DEGREE,
   maxPhi: 157.5 * DEGREE,
-  /** Nearest and farthest distance, as multiples of the framing distance. */
-  minFramings: 0.02,
-  maxFramings: 5,
+  minRadius: 0,
 };
+/** Minimum and maximum distance, as multiples of the framing distance. */
+const [MIN_FRAMINGS, MAX_FRAMINGS] = [0.02, 5];
 
-const angle = (setting: AngleSetting, auto: number): number => (setting === 'auto' ? auto : setting);
+/** Returns a number or angle, or the automatic one. */
+const given = (setting: AngleSetting, auto: number): number => (setting === 'auto' ? auto : setting);
 
 function distance(setting: RadiusSetting, auto: number, framing: number): number {
   if (setting === 'auto') return auto;
@@ -55,14 +60,15 @@ function distance(setting: RadiusSetting, auto: number, framing: number): number
 
 /** Returns the pose for the attributes. `aspect` is width / height of the frame. */
 export function poseOf(settings: CameraSettings, bounds: SceneBounds, aspect: number): CameraPose {
-  const fieldOfView = angle(settings.fieldOfView, AUTO.fieldOfView);
+  const { minPhi, maxPhi, minRadius } = { ...AUTO, ...bounds.orbit };
+  const fieldOfView = given(settings.fieldOfView, AUTO.fieldOfView);
   const framing = framingDistance(bounds.radius, fieldOfView, aspect);
   const center = toViewer(frameOf(settings, bounds), bounds.center);
-  const [x, y, z] = settings.target.map((setting, axis) => (setting === 'auto' ? center[axis] : setting));
+  const [x, y, z] = settings.target.map((setting, axis) => given(setting, center[axis]));
   return {
-    theta: angle(settings.orbit.theta, AUTO.theta),
-    phi: angle(settings.orbit.phi, AUTO.phi),
-    radius: distance(settings.orbit.radius, framing, framing),
+    theta: given(settings.orbit.theta, 0),
+    phi: given(settings.orbit.phi, Math.min(maxPhi, Math.max(minPhi, AUTO.phi))),
+    radius: distance(settings.orbit.radius, Math.max(framing, Math.min(minRadius, MAX_FRAMINGS * framing)), framing),
     x,
     y,
     z,
@@ -71,8 +77,8 @@ export function poseOf(settings: CameraSettings, bounds: SceneBounds, aspect: nu
 }
 
 /**
- * Returns the limits for the attributes. An automatic limit is extended for a pose that the attributes or a flight
- * specify explicitly.
+ * Returns the limits for the attributes. `auto` limits are extended to include the pose of the attributes, and `asked`,
+ * a pose that a flight specifies.
  */
 export function limitsOf(
   settings: CameraSettings,
@@ -81,29 +87,32 @@ export function limitsOf(
   asked?: CameraPose,
 ): CameraLimits {
   const { minOrbit, maxOrbit } = settings;
+  const { minPhi, maxPhi, minRadius } = { ...AUTO, ...bounds.orbit };
   const pose = poseOf(settings, bounds, aspect);
-  const poses = [pose, asked ?? pose];
-  const min = (auto: number, key: keyof CameraPose): number => Math.min(auto, ...poses.map((each) => each[key]));
-  const max = (auto: number, key: keyof CameraPose): number => Math.max(auto, ...poses.map((each) => each[key]));
+  const [min, max] = [Math.min, Math.max].map(
+    (choose) =>
+      (auto: number, key: keyof CameraPose): number =>
+        choose(auto, pose[key], (asked ?? pose)[key]),
+  );
   const framing = framingDistance(bounds.radius, pose.fieldOfView, aspect);
   const place = (setting: TargetSetting, auto: number): Pick<CameraPose, 'x' | 'y' | 'z'> => {
-    const [x, y, z] = setting.map((value) => (value === 'auto' ? auto : value));
+    const [x, y, z] = setting.map((value) => given(value, auto));
     return { x, y, z };
   };
   return {
     min: {
-      theta: angle(minOrbit.theta, -Infinity),
-      phi: Math.max(0, angle(minOrbit.phi, min(AUTO.minPhi, 'phi'))),
-      radius: distance(minOrbit.radius, min(AUTO.minFramings * framing, 'radius'), framing),
+      theta: given(minOrbit.theta, -Infinity),
+      phi: Math.max(0, given(minOrbit.phi, min(minPhi, 'phi'))),
+      radius: distance(minOrbit.radius, min(minRadius || MIN_FRAMINGS * framing, 'radius'), framing),
       ...place(settings.minTarget, -Infinity),
-      fieldOfView: angle(settings.minFieldOfView, min(AUTO.minFieldOfView, 'fieldOfView')),
+      fieldOfView: given(settings.minFieldOfView, min(AUTO.minFieldOfView, 'fieldOfView')),
     },
     max: {
-      theta: angle(maxOrbit.theta, Infinity),
-      phi: Math.min(Math.PI, angle(maxOrbit.phi, max(AUTO.maxPhi, 'phi'))),
-      radius: distance(maxOrbit.radius, max(AUTO.maxFramings * framing, 'radius'), framing),
+      theta: given(maxOrbit.theta, Infinity),
+      phi: Math.min(Math.PI, given(maxOrbit.phi, max(maxPhi, 'phi'))),
+      radius: distance(maxOrbit.radius, max(MAX_FRAMINGS * framing, 'radius'), framing),
       ...place(settings.maxTarget, Infinity),
-      fieldOfView: angle(settings.maxFieldOfView, max(AUTO.maxFieldOfView, 'fieldOfView')),
+      fieldOfView: given(settings.maxFieldOfView, max(AUTO.maxFieldOfView, 'fieldOfView')),
     },
   };
 }

@@ -1,6 +1,6 @@
-/** Spoken names of the camera position: words for the quarter and the height. */
+/** Names of the camera position for screen readers: one of four sides, and the height. */
 
-/** The distinguished positions, with the names of `<model-viewer>`; these are also the keys of the attribute `a11y`. */
+/** Names of all positions, as in `<model-viewer>`. They are also keys of the attribute `a11y`. */
 export const VIEW_NAMES = [
   'front',
   'right',
@@ -21,7 +21,7 @@ export type ViewName = (typeof VIEW_NAMES)[number];
 
 const QUARTERS = ['front', 'right', 'back', 'left'] as const;
 
-/** Name of a camera position. @param theta Azimuth, radians. @param phi Polar angle, radians. */
+/** Returns the name of a camera position. @param theta Azimuth, radians. @param phi Polar angle, radians. */
 export function viewName(theta: number, phi: number): ViewName {
   const quarter = Math.round(theta / (Math.PI / 2));
   const side = QUARTERS[((quarter % 4) + 4) % 4];
@@ -29,7 +29,3 @@ export function viewName(theta: number, phi: number): ViewName {
   if (phi < Math.PI / 3) return `upper-${side}`;
   return phi > (2 * Math.PI) / 3 ? `lower-${side}` : side;
 }
-
-/** Sentence for a position. */
-export const viewSentence = (name: ViewName, strings: Readonly<Partial<Record<ViewName, string>>>): string =>
-  strings[name] ?? `View from ${name.replace('-', ' ')}`;

@@ -1,4 +1,7 @@
-/** Current camera values for scripts, which can be stored and written back: each `toString()` is a valid attribute. */
+/**
+ * Values of the camera for scripts. Each `toString()` returns a valid attribute, so that pages can store and restore
+ * the values.
+ */
 
 /** Position of the camera around its target. */
 export class CameraOrbit {
@@ -14,10 +17,10 @@ export class CameraOrbit {
   readonly phi: number;
   /** Distance to the target in meters (world units). */
   readonly radius: number;
-  /** The distance that frames the scene at this aspect ratio: `100%` of `camera-orbit`. */
+  /** Distance in meters that frames the scene at this aspect ratio: `100%` of `camera-orbit`. */
   readonly framingRadius: number;
 
-  /** A value for `camera-orbit`. Uses radians and meters, because only they survive a round trip without rounding. */
+  /** Returns a value for `camera-orbit`, in radians and meters, because only they restore the pose without rounding. */
   toString(): string {
     return `${this.theta}rad ${this.phi}rad ${this.radius}m`;
   }
@@ -34,7 +37,7 @@ export class CameraTarget {
   readonly y: number;
   readonly z: number;
 
-  /** A value for `camera-target`. */
+  /** Returns a value for `camera-target`. */
   toString(): string {
     return `${this.x}m ${this.y}m ${this.z}m`;
   }
@@ -57,13 +60,13 @@ export class ScenePoint {
    */
   readonly uncertainty: number;
 
-  /** A value for `data-position` of a hotspot, and for `camera-target`. */
+  /** Returns a value for `data-position` of a hotspot, and for `camera-target`. */
   toString(): string {
     return `${this.x}m ${this.y}m ${this.z}m`;
   }
 }
 
-/** A point of the visible surface under a point of the page, and the element that it belongs to. */
+/** A point of the visible surface under a point of the page, and the element that contains the surface. */
 export interface PickedPoint extends ScenePoint {
   /** The `<splat-scene>` or `<splat-mesh>` at the point, or the `<gaussian-splat>` itself for its own scene. */
   readonly element: Element;
@@ -76,7 +79,7 @@ export interface PickedPoint extends ScenePoint {
   readonly splat: number | null;
   /** Name of the triangle mesh in its file, empty if it has none; null for splats. */
   readonly mesh: string | null;
-  /** Name of its material, in the same way. */
+  /** Name of the mesh's material in its file, empty if it has none; null for splats. */
   readonly material: string | null;
 }
 
@@ -91,7 +94,7 @@ export class FieldOfView {
     return (this.radians * 180) / Math.PI;
   }
 
-  /** A value for `field-of-view`. */
+  /** Returns a value for `field-of-view`. */
   toString(): string {
     return `${this.radians}rad`;
   }

@@ -1,5 +1,5 @@
 /**
- * The attributes of `<splat-scene>` and `<splat-mesh>`, each defined once, as those of `<gaussian-splat>` in
+ * The attributes of `<splat-scene>` and `<splat-mesh>`. Each is defined once, as those of `<gaussian-splat>` in
  * ../attributes.ts. Properties of the same names accept numbers as well.
  */
 import { bareKeyword, flag, read, text, type Attribute } from '../attributes.js';
@@ -7,7 +7,7 @@ import { upGrammar } from '../camera/grammar.js';
 import type { Numbers } from '../dynamic/values.js';
 import { anglesGrammar, boxGrammar, opacityGrammar, pointGrammar, scaleGrammar } from './grammar.js';
 
-/** Attributes of both. */
+/** Attributes that `<splat-scene>` and `<splat-mesh>` share. */
 const PLACED = {
   /**
    * Same as on `<img>`: `use-credentials` sends cookies to other origins.
@@ -16,8 +16,8 @@ const PLACED = {
    */
   crossorigin: bareKeyword(['anonymous', 'use-credentials']),
   /**
-   * Position of its origin: x y z in meters of viewer space (y up, right-handed), or with `m`, `cm`, `mm`. The property
-   * takes `[x, y, z]` as well.
+   * Position of the child's origin: x y z in meters of viewer space (y up, right-handed), or with `m`, `cm`, `mm`. The
+   * property takes `[x, y, z]` as well.
    * @default `0 0 0`
    * @example position="1m 0 -2m"
    */
@@ -30,24 +30,26 @@ const PLACED = {
    */
   rotation: read<readonly [number, number, number], string | readonly number[] | null>(anglesGrammar),
   /**
-   * One factor, or one for each axis.
+   * Scale: one factor, or one for each axis.
    * @default `1`
    * @example scale="0.5"
    */
   scale: read<readonly [number, number, number], string | number | readonly number[] | null>(scaleGrammar),
   /**
-   * Visitors may click it: `click`, `pointerover` and `pointerout` of the pointer come to it, with a property `hit`, and bubble; `Tab` reaches it, `Enter` clicks it.
-   * Name it with `aria-label`. `style="cursor: …"` is the cursor over it.
+   * Visitors may click the child. It receives the pointer events `click`, `pointerover` and `pointerout`, which bubble
+   * and have a property `hit`. `Tab` focuses it, and `Enter` clicks it. Name it with `aria-label`. `style="cursor: …"`
+   * sets the cursor over it.
    * @example interactive
    */
   interactive: flag(),
   /**
-   * Plays automatically, on its own clock, as soon as it is shown. It does not start for visitors who ask for less motion. A button stops it.
+   * Plays the child's animation automatically, on its own clock, as soon as it is shown. Playback does not start for
+   * visitors who prefer reduced motion. A button stops it.
    * @example autoplay
    */
   autoplay: flag(),
   /**
-   * Starts again at the end, on its own clock.
+   * Restarts the child's animation at its end, on its own clock.
    * @example loop
    */
   loop: flag(),
@@ -55,13 +57,13 @@ const PLACED = {
 
 export const SCENE_ATTRIBUTES = {
   /**
-   * URL of the scene: a file, a sequence, a streamed folder, or a generator. The property takes a `File` or `Blob` as well.
+   * URL of the scene: a file, a sequence, a clip, a streamed folder, or a generator. The property takes a `File` or `Blob` as well.
    * @example src="plant.spz"
    */
   src: text<string | Blob | null>(),
   ...PLACED,
   /**
-   * The axis of the file that points up, same as on `<gaussian-splat>`. The scene is rotated by it before it is placed.
+   * The axis of the file that points up, as on `<gaussian-splat>`. The scene is rotated by it before it is placed.
    * @default that of the scene, else `-y`
    * @example up="y"
    */
@@ -87,12 +89,12 @@ export const SCENE_ATTRIBUTES = {
    */
   contract: text<string | object | null>(),
   /**
-   * URLs of generators, with spaces between them. Each takes the Gaussians of the one before.
+   * URLs of generators, separated by spaces. Each generator receives the Gaussians of the previous one.
    * @example chain="relight.onnx"
    */
   chain: text(),
   /**
-   * Pose of a generator, flattened or nested.
+   * Pose of a generator: numbers, flattened or as nested lists.
    * @default the rest pose
    * @example pose="0 0.3 0"
    */
@@ -108,7 +110,7 @@ export const MESH_ATTRIBUTES = {
   ...PLACED,
 };
 
-/** The properties of a table. */
+/** The element's properties that a table of attributes defines. */
 export type PropertiesOf<Table> = {
   -readonly [K in keyof Table]: Table[K] extends Attribute<infer P, unknown> ? P : never;
 };

@@ -18,13 +18,16 @@ import type { Interaction, InteractionHost, ScenePointerEvent } from './interact
 
 type Written = string | number | ArrayLike<number | string> | null | undefined;
 
-/** Numbers of a property in the format of an attribute. */
+/**
+ * Returns the value of a property in the format of an attribute: a list becomes text, with a unit after each number.
+ * Other values are returned unchanged.
+ */
 const written = (value: Written, unit = ''): string | number | null | undefined =>
   typeof value === 'object' && value !== null ? Array.from(value, (each) => `${each}${unit}`).join(' ') : value;
 
-/** Transform of a child, and its drawing options. */
+/** Transform and drawing options of a child, from its attributes. */
 export interface ChildPlace {
-  /** From its own coordinates, rotated so that y is up, to viewer space. */
+  /** Transform to viewer space, from the child's own coordinates after these were rotated so that y is up. */
   readonly placed: Matrix4;
   readonly up: Vector3 | undefined;
   readonly opacity: number;
@@ -32,11 +35,11 @@ export interface ChildPlace {
   readonly hidden: boolean;
 }
 
-/** Convention of glTF. */
+/** Up direction of glTF. */
 const UP: Vector3 = [0, 1, 0];
 const NO_VALUES: Omit<DynamicState, 'timeSeconds'> = { pose: undefined, controls: {}, images: {} };
 
-/** Events of a child of `<gaussian-splat>`, with the same meanings as there. Only those of pointers bubble. */
+/** Events of a child of `<gaussian-splat>`, with the same meanings as on that element. Only pointer events bubble. */
 export type ChildEventMap = Record<
   'click' | 'pointerover' | 'pointerout' | 'pointerenter' | 'pointerleave',
   ScenePointerEvent
@@ -47,21 +50,27 @@ export type ChildEventMap = Record<
     | 'poster-dismissed'
     | 'shader-error'
     | 'model-visibility'
+    | 'view-change'
+    | 'walk-ready'
+    | 'vr-status'
+    | 'ar-status'
+    | 'measure'
+    | 'volumechange'
     | 'contextlost'
     | 'contextrestored'
     | 'loadeddata'
     | 'canplay'
   >;
 
-/** The properties that a page may set, for the typings of frameworks. */
+/** Properties of a child that a page may set, for the types of frameworks. */
 export type SettableOf<Table> = Partial<
   PropertiesOf<Table> & Pick<SplatChild, 'matrix' | 'currentTime' | 'playbackRate'> & { hidden: boolean }
 >;
 
-/** Common base of all children: a source, a transform, and its state. */
+/** Base class of the children `<splat-scene>` and `<splat-mesh>`: a source with a transform and a loading state. */
 // eslint-disable-next-line @typescript-eslint/no-unsafe-declaration-merging
 export abstract class SplatChild extends ReactiveElement implements SourceOwner {
-  /** Its entry in the sources of its `<gaussian-splat>`. @internal */
+  /** The entry of this child in the list of sources of its `<gaussian-splat>`. @internal */
   readonly entry = new SourceEntry(this);
   /** @internal */
   protected abstract readonly table: Readonly<Record<string, Attribute<unknown, unknown>>>;
@@ -76,42 +85,39 @@ export abstract class SplatChild extends ReactiveElement implements SourceOwner 
   }
 
   /**
-   * Its whole transform, which overrides `position`, `rotation` and `scale`: 16 numbers of an affine matrix, row-major,
-   * or a `DOMMatrix`; from its own coordinates, y up, to viewer space. null for none.
+   * Complete transform of the child, from its own coordinates (y up) to viewer space. It overrides `position`,
+   * `rotation` and `scale`. The value is a row-major affine matrix of 16 numbers, a `DOMMatrix`, or null for none.
    */
   declare matrix: ArrayLike<number> | DOMMatrixReadOnly | null;
 
-  /** Whether it is shown. */
+  /** Whether the child is loaded and shown. */
   get loaded(): boolean {
     return this.entry.state === 'ready';
   }
 
-  /**
-   * Resolves, and never rejects, when nothing is pending: it is shown ({@link loaded}), it failed ({@link error}), or
-   * it has no source.
-   */
+  /** Resolves when the child is shown ({@link loaded}), has failed ({@link error}), or has no source. Never rejects. */
   get ready(): Promise<void> {
     return this.updateComplete.then(() => this.entry.scene.settled);
   }
 
-  /** Reason that it is not shown, or null. */
+  /** The error for which the child is not shown; null without an error. */
   get error(): ElementError | null {
     return this.entry.error;
   }
 
-  /** Loading progress, 0..1. */
+  /** Loading progress of the child, 0..1. */
   get progress(): number {
     return this.loaded ? 1 : (this.entry.progress ?? 0);
   }
 
-  /** Loads it again, as if `src` had just been set. */
+  /** Loads the child again, as if `src` had just been set. */
   load(): void {
     this.entry.reload();
   }
 
   /**
-   * Playback position in seconds; setting it seeks, and gives the child its own clock. Other children follow that of
-   * their `<gaussian-splat>`.
+   * Playback position in seconds. Setting it seeks, and gives the child its own clock. Children without their own clock
+   * follow that of their `<gaussian-splat>`.
    */
   get currentTime(): number {
     return this.entry.playback.currentTime;
@@ -123,7 +129,7 @@ export abstract class SplatChild extends ReactiveElement implements SourceOwner 
     this.entry.playback.currentTime = seconds;
   }
 
-  /** Duration in seconds; NaN if nothing is animated, Infinity without an end. */
+  /** Duration in seconds; NaN if nothing is animated, Infinity if the animation has no end. */
   get duration(): number {
     return this.entry.duration;
   }
@@ -133,7 +139,7 @@ export abstract class SplatChild extends ReactiveElement implements SourceOwner 
     return this.entry.playback.paused;
   }
 
-  /** Speed of its own clock; 1 is real time. */
+  /** Speed of the child's own clock; 1 is real time. Setting it gives the child its own clock. */
   get playbackRate(): number {
     return this.entry.playback.playbackRate;
   }
@@ -145,9 +151,9 @@ export abstract class SplatChild extends ReactiveElement implements SourceOwner 
   }
 
   /**
-   * Starts playback on its own clock, once it is loaded.
-   * @returns Rejects with a `NotSupportedError` if nothing is animated, and with an `AbortError` if `pause()` or
-   * another `src` intervenes.
+   * Starts playback on the child's own clock when the child is loaded.
+   * @returns Rejects with a `NotSupportedError` if nothing is animated, and with an `AbortError` if `pause()` is called
+   * or another `src` is set first.
    */
   async play(): Promise<void> {
     this.#drive();
@@ -160,19 +166,28 @@ export abstract class SplatChild extends ReactiveElement implements SourceOwner 
     playback.play();
   }
 
-  /** Pauses playback. */
+  /** Pauses playback at the frame that is shown, and gives the child its own clock. */
   pause(): void {
     this.#drive();
     this.entry.playback.pause();
   }
 
-  /** It has its own clock from here on. */
+  /** Gives the child its own clock, which continues at the time, the speed and the state of the clock before. */
   #drive(): void {
+    const { playback: before, ownClock } = this.entry;
     this.#isDriven = true;
     this.entry.hasBegun = true;
+    if (before === ownClock || !ownClock.canPlay) return;
+    ownClock.playbackRate = before.playbackRate;
+    if (before.currentTime !== ownClock.currentTime) ownClock.currentTime = before.currentTime;
+    // The animation of this child may have ended earlier than that of others.
+    if (!before.paused && ownClock.currentTime < ownClock.duration) ownClock.play();
   }
 
-  /** Whether it has its own clock: it has `autoplay` or `loop`, or a script has controlled its playback. @internal */
+  /**
+   * Whether the child has its own clock: it has `autoplay` or `loop`, or a script has controlled its playback.
+   * @internal
+   */
   get hasOwnClock(): boolean {
     return this.autoplay || this.loop || this.#isDriven;
   }
@@ -209,12 +224,12 @@ export abstract class SplatChild extends ReactiveElement implements SourceOwner 
   /** @internal */
   seenFrom(camera: Camera, member: WorldEntry | undefined, { frame }: EntryCore): Camera {
     const { placed, up } = this.#placed;
-    // Its future transform, before it is loaded.
+    // Before the child is loaded, its transform is computed without its bounds.
     const matrix = member?.placement.sceneToWorld ?? sceneToWorld(frame, placed, frameOf({ up }, {}));
     return isSolid(matrix) ? cameraInScene(camera, matrix) : camera;
   }
 
-  /** From the coordinates of its own children, y up, to the world. @internal */
+  /** Returns the matrix from the coordinates of nested children (y up) to the world. @internal */
   frameToWorld({ scene, placement }: WorldEntry): Matrix4 {
     const own = transposed(matrixOfFrame(frameOf({ up: this.#placed.up }, scene.bounds)));
     return placement.sceneToWorld ? multiply(placement.sceneToWorld, own) : own;
@@ -233,7 +248,9 @@ export abstract class SplatChild extends ReactiveElement implements SourceOwner 
     this.#place = undefined;
   }
 
-  /** Its transform in viewer space. */
+  /**
+   * Returns the transform of the child in viewer space: `matrix`, or the product of `position`, `rotation` and `scale`.
+   */
   #readPlaced(): Matrix4 {
     if (this.matrix !== null && this.matrix !== undefined) {
       const matrix = readMatrix(this.matrix);
@@ -249,7 +266,7 @@ export abstract class SplatChild extends ReactiveElement implements SourceOwner 
     });
   }
 
-  /** Parses an attribute; a malformed one counts as absent, with a warning. @internal */
+  /** Returns the parsed value of an attribute. An invalid attribute counts as absent, and logs a warning. @internal */
   protected read<T>(name: string, value: Written): T {
     const grammar = this.table[name].grammar!;
     return readAttribute(name, written(value), grammar, (sentence) =>
@@ -271,11 +288,11 @@ export abstract class SplatChild extends ReactiveElement implements SourceOwner 
 
   override disconnectedCallback(): void {
     super.disconnectedCallback();
-    // If it moves with its parent element, its state stays, and ends with that of the parent.
+    // If the child is removed together with its parent element, its state is kept as long as that of the parent.
     if (this.parentElement !== this.entry.parent) this.entry.attach(null);
   }
 
-  /** It renders nothing itself. */
+  /** Returns the element itself, because a child has no shadow tree. */
   protected override createRenderRoot(): HTMLElement {
     return this;
   }
@@ -301,27 +318,29 @@ export interface SplatChild extends Omit<PropertiesOf<typeof MESH_ATTRIBUTES>, '
   ): void;
 }
 
-/** Property declarations of a child for Lit. */
+/** Returns the property declarations of a child for Lit. */
 export const childDeclarations = (
   table: Readonly<Record<string, Attribute<unknown, unknown>>>,
 ): PropertyDeclarations => ({
   ...declarations(table),
   matrix: { attribute: false },
   hidden: { type: Boolean, reflect: true },
-  // Accessors are listed here so that values that a page sets before the definition of the element reach them.
+  // Accessors are listed, too, so that they receive values that a page sets before the element is defined.
   currentTime: { attribute: false, noAccessor: true },
   playbackRate: { attribute: false, noAccessor: true },
 });
 
-/** Interface of the parent element for children. */
+/** Interface of the parent element for its children. */
 export type ChildCore = EntryCore & InteractionHost;
 
-/** Cores of elements with children. */
+/** Cores of the elements that can have children. */
 export const cores = new WeakMap<Element, ChildCore>();
 
 const interactions = new WeakMap<Element, Lazy<Interaction>>();
 
-/** Enables clicks on the children of an element, once one of them is interactive. */
+/**
+ * Loads the code for clicks on children when the first child of an element is interactive, and updates it afterwards.
+ */
 function interactionChanged(child: SplatChild): void {
   const parent = child.parentElement;
   const core = parent && cores.get(parent);
@@ -342,7 +361,7 @@ function interactionChanged(child: SplatChild): void {
 /** Attaches a child to its parent element. A parent that is not set up yet attaches its children later. */
 export function adopt(child: SplatChild): void {
   const { parentElement } = child;
-  // Its first update may precede the setup of its parent.
+  // The first update of a child may precede the setup of its parent.
   interactionChanged(child);
   child.entry.attach((parentElement && cores.get(parentElement)) ?? null);
 }

@@ -1,16 +1,16 @@
-/** Loaded when an element gets its first child with a scene or a mesh. */
+/** Defines the children of an element. The module is loaded for the first `<splat-scene>` or `<splat-mesh>`. */
 import { adopt, SplatChild, cores, type ChildCore } from './child.js';
 import { SplatMeshElement } from './splat-mesh.js';
 import { SplatSceneElement } from './splat-scene.js';
 
-/** Registers the children's tags. */
+/** Registers the tags `splat-scene` and `splat-mesh`, unless they are registered already. */
 export function define(): void {
   if (!globalThis.customElements || customElements.get('splat-scene')) return;
   customElements.define('splat-scene', SplatSceneElement);
   customElements.define('splat-mesh', SplatMeshElement);
 }
 
-/** Enables children of an element. */
+/** Enables an element to have children, and attaches those that it already has. */
 export function compose(core: ChildCore): void {
   cores.set(core.element, core);
   define();

@@ -1,10 +1,10 @@
-/** Grammar of the attributes that place a child: see ../camera/grammar.ts. */
+/** Grammars of the attributes that place a child: see ../camera/grammar.ts. */
 import type { Vector3 } from '@gaussian-splat/core';
 import { angleGrammar, numberGrammar, parsePoint, type AttributeGrammar } from '../camera/grammar.js';
 
 const terms = (text: string): string[] => text.trim().split(/\s+/);
 
-/** `position`. */
+/** Grammar of `position`; values are in meters. */
 export const pointGrammar: AttributeGrammar<Vector3> = {
   expected: '"x y z" in meters (or with m, cm or mm)',
   fallback: '0 0 0',
@@ -13,7 +13,7 @@ export const pointGrammar: AttributeGrammar<Vector3> = {
 
 const { parse: parseAngle } = angleGrammar('0');
 
-/** `rotation`: radians. */
+/** Grammar of `rotation`; values are in radians. */
 export const anglesGrammar: AttributeGrammar<Vector3> = {
   expected: '"x y z", angles with deg or rad',
   fallback: '0 0 0',
@@ -24,7 +24,7 @@ export const anglesGrammar: AttributeGrammar<Vector3> = {
   },
 };
 
-/** `scale`. */
+/** Grammar of `scale`: one factor, or a factor for each axis. */
 export const scaleGrammar: AttributeGrammar<Vector3> = {
   expected: 'a number, or "x y z"',
   fallback: '1',
@@ -35,10 +35,10 @@ export const scaleGrammar: AttributeGrammar<Vector3> = {
   },
 };
 
-/** `opacity`. */
+/** Grammar of `opacity`, 0..1. */
 export const opacityGrammar = numberGrammar(1, 0, 'a number from 0 to 1', 1);
 
-/** `crop`: two corners; undefined for no crop. */
+/** Grammar of `crop`: the 6 coordinates of the minimum and the maximum corner; undefined for no crop. */
 export const boxGrammar: AttributeGrammar<readonly number[] | undefined> = {
   expected: '"x y z x y z" in meters, two corners of a box, the least first',
   fallback: 'none',

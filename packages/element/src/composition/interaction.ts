@@ -1,18 +1,20 @@
-/** Loaded when a child of an element is `interactive`: clicks on children and hovering. */
+/**
+ * Dispatches clicks and pointer moves to children. The module is loaded when a child of an element is `interactive`.
+ */
 import type { Camera } from '@gaussian-splat/core';
 import { boundsOfWorld } from '@gaussian-splat/renderer/tools';
 import { css, type ReactiveControllerHost } from 'lit';
 import { project } from '../camera/projection.js';
 import type { PickedPoint } from '../camera/values.js';
 import { adoptStyles } from '../styles.js';
-import { word, type A11yStrings } from '../words.js';
+import { word, type A11yStrings } from '../strings.js';
 import { SplatChild } from './child.js';
 
-/** Interface of the element for clicks on children. */
+/** Interface of the element for pointer events on its children. */
 export interface InteractionHost {
   readonly element: ReactiveControllerHost & HTMLElement;
   readonly surface: HTMLElement | null;
-  /** The camera of the last frame. */
+  /** The camera of the last frame; undefined before the first. */
   readonly drawnFrom: Camera | undefined;
   readonly isOnShow: boolean;
   readonly strings: A11yStrings;
@@ -21,7 +23,7 @@ export interface InteractionHost {
 
 /** A click or pointer event on a child, analogous to the browser's events on HTML elements. */
 export class ScenePointerEvent extends PointerEvent {
-  /** The picked point; null for a click by key, and outside all children. */
+  /** The picked point of the scene; null for a click by key, and if the pointer is over no splat or mesh. */
   readonly hit: PickedPoint | null;
 
   constructor(type: string, init: PointerEventInit, hit: PickedPoint | null) {
@@ -30,9 +32,12 @@ export class ScenePointerEvent extends PointerEvent {
   }
 }
 
-/** Minimum interval between two picks under a moving pointer, ms, and as a multiple of the duration of a pick. */
+/**
+ * Minimum pause after a pick under a moving pointer, ms, and the minimum pause as a multiple of the duration of the
+ * pick.
+ */
 const [HOVER_MS, HOVER_SHARE] = [60, 3];
-/** Margin around a focused child in CSS pixels, because bounds contain only the centers of splats. */
+/** Margin of the focus outline around a child, CSS pixels, because bounds contain only the centers of splats. */
 const MARGIN = 12;
 
 const STYLES = css`
@@ -57,9 +62,9 @@ const STYLES = css`
 `;
 
 /**
- * Dispatches clicks and pointer moves to children. A click on the frame is delayed until the GPU has picked the point,
- * and is then dispatched once, to the child or to the element itself. For keyboards there is a button for each child,
- * which ignores pointers.
+ * Dispatches clicks and pointer moves to children. A click on the frame is delayed until the GPU has picked the point.
+ * It is then dispatched once, to the child or to the element itself. For keyboards, each child has a button, which
+ * ignores pointers.
  */
 export class Interaction {
   readonly #of: InteractionHost;
@@ -67,7 +72,7 @@ export class Interaction {
   readonly #buttons = new Map<SplatChild, HTMLButtonElement>();
   #surface: HTMLElement | undefined;
   #over: SplatChild | null = null;
-  /** The latest pointer move without a pick. */
+  /** The latest pointer move for which no pick has started; undefined if there is none. */
   #moved: PointerEvent | undefined;
   #isLooking = false;
 
@@ -82,7 +87,7 @@ export class Interaction {
       attributeFilter: ['aria-label', 'title', 'lang'],
     });
     element.addEventListener('camera-change', () => this.#placeFocused());
-    // Events of children do not bubble.
+    // The event `load` of children does not bubble.
     element.addEventListener('load', () => this.update(), { capture: true });
     element.addController({ hostUpdated: () => this.update() });
     this.update();
@@ -94,7 +99,7 @@ export class Interaction {
     );
   }
 
-  /** Call when children or their attributes have changed. */
+  /** Updates the buttons of the children. Call when children or their attributes have changed. */
   update(): void {
     const { surface } = this.#of;
     if (surface === null) return;
@@ -118,7 +123,8 @@ export class Interaction {
   #listen(surface: HTMLElement): void {
     this.#surface = surface;
     surface.after(this.#layer);
-    // Code for dragging, measuring or walking stops its clicks in the capturing phase.
+    // Clicks that belong to dragging or measuring do not arrive here: that code stops them in the capturing phase.
+    // Walking follows those that are dispatched to the element.
     surface.addEventListener('click', (event) => void this.#onClick(event));
     surface.addEventListener('pointermove', (event) => this.#onMove(event));
     surface.addEventListener('pointerleave', (event) => {
@@ -160,13 +166,13 @@ export class Interaction {
   }
 
   #onMove(event: PointerEvent): void {
-    // Fingers do not hover, and a drag has another purpose.
+    // Fingers do not hover, and moves with a pressed button are drags.
     if (event.pointerType === 'touch' || event.buttons !== 0 || this.#children.length === 0) return;
     this.#moved = event;
     if (!this.#isLooking) void this.#follow();
   }
 
-  /** Picks under the pointer while it moves, at a rate that leaves the GPU time. */
+  /** Picks under the pointer while it moves, with pauses that leave the GPU time for frames. */
   async #follow(): Promise<void> {
     this.#isLooking = true;
     while (this.#moved) {
@@ -174,7 +180,7 @@ export class Interaction {
       this.#moved = undefined;
       const begin = performance.now();
       const hit = await this.#look(event);
-      // If the pointer has left meanwhile, it hovers over nothing.
+      // If the pointer has left during the pick, it hovers over nothing.
       if (this.#surface?.matches(':hover') !== false) this.#setOver(this.#childOf(hit), event, hit);
       const took = performance.now() - begin;
       await new Promise((resolve) => setTimeout(resolve, Math.max(HOVER_MS, HOVER_SHARE * took)));
@@ -182,7 +188,7 @@ export class Interaction {
     this.#isLooking = false;
   }
 
-  /** A lost device gives no result. */
+  /** Returns the picked point under a pointer; null if there is none, or the device is lost. */
   #look({ clientX, clientY }: MouseEvent): Promise<PickedPoint | null> {
     return this.#of.positionFromPoint(clientX, clientY).catch(() => null);
   }
@@ -210,7 +216,10 @@ export class Interaction {
     for (const [child, button] of this.#buttons) if (button.matches(':focus')) this.#place(child, button);
   }
 
-  /** Positions the button of a child around it, so that its outline shows the keyboard focus. */
+  /**
+   * Positions the button of a child around the child's bounds in the last frame, so that the outline of the button
+   * shows the keyboard focus.
+   */
   #place(child: SplatChild, button: HTMLButtonElement): void {
     const { drawnFrom: camera, surface } = this.#of;
     const placement = child.entry.member?.placement;
@@ -220,7 +229,7 @@ export class Interaction {
       const side = (axis: number): number => (k & (1 << axis) ? bounds.max : bounds.min)[axis];
       return project(camera, [side(0), side(1), side(2)]);
     });
-    // The eye is inside the child, which then fills the frame.
+    // If a corner is behind the camera, the outline is that of the frame.
     const isAround = corners.some(({ depth }) => depth <= 0);
     const range = (of: 'x' | 'y', size: number): [number, number] => {
       const share = (value: number): number => Math.min(1, Math.max(0, value / size));
@@ -238,7 +247,7 @@ export class Interaction {
 
 const BUBBLES = { bubbles: true, composed: true, cancelable: true } as const;
 
-/** Pointer and key fields for an event. */
+/** Returns the initial values of an event with the pointer and the modifier keys of another event. */
 function initOf(event: MouseEvent): PointerEventInit {
   const { clientX, clientY, screenX, screenY, button, buttons, detail, view } = event;
   const { ctrlKey, shiftKey, altKey, metaKey } = event;

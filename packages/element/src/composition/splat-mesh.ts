@@ -7,7 +7,7 @@ import { childDeclarations, SplatChild } from './child.js';
 
 /**
  * A triangle mesh among scenes, as a child of `<gaussian-splat>`: glTF or GLB with its materials and animations. Meshes
- * and splats occlude each other. Lit by a neutral environment, unless its file has lights.
+ * and splats occlude each other. A neutral environment lights the mesh, unless its file has lights.
  *
  * ```html
  * <gaussian-splat src="room.sog">
@@ -16,16 +16,17 @@ import { childDeclarations, SplatChild } from './child.js';
  * ```
  *
  * @tagname splat-mesh
- * @fires {CustomEvent<LoadDetail>} load - Fired when it is shown.
+ * @fires {CustomEvent<LoadDetail>} load - Fired when the mesh is shown.
  * @fires {ProgressEvent} progress - Fired when bytes have arrived.
- * @fires {CustomEvent<ElementError>} error - Fired when it cannot be shown; `detail` is the same object as the property
- * `error`. The others stay.
- * @fires {ScenePointerEvent} click - With `interactive`: fired when a visitor clicks it, by pointer or key. Bubbles.
- * @fires {ScenePointerEvent} pointerover - With `interactive`: fired when the pointer enters it. Bubbles.
- * @fires {ScenePointerEvent} pointerout - With `interactive`: fired when the pointer leaves it. Bubbles.
- * @fires {Event} play - Same as on HTMLMediaElement: fired when its own clock starts.
- * @fires {Event} pause - Fired when its own clock stops.
- * @fires {Event} ended - Fired when its own clock reaches its end.
+ * @fires {CustomEvent<ElementError>} error - Fired when the mesh cannot be shown; `detail` is the same object as the
+ * property `error`. Other scenes and meshes stay.
+ * @fires {ScenePointerEvent} click - With `interactive`: fired when a visitor clicks the mesh, by pointer or key.
+ * Bubbles.
+ * @fires {ScenePointerEvent} pointerover - With `interactive`: fired when the pointer enters the mesh. Bubbles.
+ * @fires {ScenePointerEvent} pointerout - With `interactive`: fired when the pointer leaves the mesh. Bubbles.
+ * @fires {Event} play - Same as on HTMLMediaElement: fired when the mesh's own clock starts.
+ * @fires {Event} pause - Fired when the mesh's own clock stops.
+ * @fires {Event} ended - Fired when the mesh's own clock reaches the end.
  */
 export class SplatMeshElement extends SplatChild {
   static override properties: PropertyDeclarations = childDeclarations(MESH_ATTRIBUTES);
@@ -38,7 +39,7 @@ export class SplatMeshElement extends SplatChild {
     return { src: this.src, contract: null, chain: null, postprocess: null };
   }
 
-  /** A source without splats. @internal */
+  /** Opens the mesh, a source without splats. @internal */
   readonly open: typeof openGaussians = async (request, options) => {
     const { openMesh } = await loadModule('the code that shows meshes', () => import('../meshes/open-mesh.js'));
     return openMesh(request, options);

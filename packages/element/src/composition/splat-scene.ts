@@ -9,7 +9,8 @@ import { childDeclarations, SplatChild, type ChildPlace } from './child.js';
 type Properties = PropertiesOf<typeof SCENE_ATTRIBUTES>;
 
 /**
- * A scene among others, as a child of `<gaussian-splat>`: all of them are sorted together and occlude one another.
+ * A scene among others, as a child of `<gaussian-splat>`. The splats of all scenes are sorted together and occlude one
+ * another.
  *
  * ```html
  * <gaussian-splat src="room.sog">
@@ -18,20 +19,22 @@ type Properties = PropertiesOf<typeof SCENE_ATTRIBUTES>;
  * ```
  *
  * @tagname splat-scene
- * @fires {CustomEvent<LoadDetail>} load - Fired when it is shown.
+ * @fires {CustomEvent<LoadDetail>} load - Fired when the scene is shown.
  * @fires {ProgressEvent} progress - Fired when bytes have arrived.
- * @fires {CustomEvent<ElementError>} error - Fired when it cannot be shown; `detail` is the same object as the property
- * `error`. The others stay.
+ * @fires {CustomEvent<ElementError>} error - Fired when the scene cannot be shown; `detail` is the same object as the
+ * property `error`. Other scenes and meshes stay.
  * @fires {Event} inputs-change - Fired when the inputs that the page may set change; `inputs` contains them.
- * @fires {CustomEvent<GeneratorMemoryDetail>} generator-memory - Fired once before the first run of its generator; `detail` contains the memory that is known by then.
- * @fires {CustomEvent<ElementError>} generator-error - Fired when a run of its generator fails; the last good frame
- * stays.
- * @fires {ScenePointerEvent} click - With `interactive`: fired when a visitor clicks it, by pointer or key. Bubbles.
- * @fires {ScenePointerEvent} pointerover - With `interactive`: fired when the pointer enters it. Bubbles.
- * @fires {ScenePointerEvent} pointerout - With `interactive`: fired when the pointer leaves it. Bubbles.
- * @fires {Event} play - Same as on HTMLMediaElement: fired when its own clock starts.
- * @fires {Event} pause - Fired when its own clock stops.
- * @fires {Event} ended - Fired when its own clock reaches its end.
+ * @fires {CustomEvent<GeneratorMemoryDetail>} generator-memory - Fired once before the first run of the scene's
+ * generator; `detail` contains the memory that is known by then.
+ * @fires {CustomEvent<ElementError>} generator-error - Fired when a run of the scene's generator fails; the last good
+ * frame stays.
+ * @fires {ScenePointerEvent} click - With `interactive`: fired when a visitor clicks the scene, by pointer or key.
+ * Bubbles.
+ * @fires {ScenePointerEvent} pointerover - With `interactive`: fired when the pointer enters the scene. Bubbles.
+ * @fires {ScenePointerEvent} pointerout - With `interactive`: fired when the pointer leaves the scene. Bubbles.
+ * @fires {Event} play - Same as on HTMLMediaElement: fired when the scene's own clock starts.
+ * @fires {Event} pause - Fired when the scene's own clock stops.
+ * @fires {Event} ended - Fired when the scene's own clock reaches the end.
  */
 export class SplatSceneElement extends SplatChild {
   static override properties: PropertyDeclarations = {
@@ -48,15 +51,18 @@ export class SplatSceneElement extends SplatChild {
   declare pose: Properties['pose'];
 
   /**
-   * Controls of a generator by the names of its inputs; they override the attributes `control-NAME`. Set a new object
-   * to change values.
+   * Values of a generator's controls by the names of its inputs. They override the attributes `control-NAME`. Set a new
+   * object to change values.
    */
   declare inputValues: ControlValues | null;
   protected readonly table = SCENE_ATTRIBUTES;
   #dynamicValues: Omit<DynamicState, 'timeSeconds'> | undefined;
   #observer: MutationObserver | undefined;
 
-  /** Inputs of its generators that the page may set, same as on `<gaussian-splat>`; `inputs-change` reports changes. */
+  /**
+   * Inputs of the scene's generators that the page may set, as on `<gaussian-splat>`. The event `inputs-change` reports
+   * changes.
+   */
   get inputs(): readonly GeneratorInput[] {
     return this.entry.inputs;
   }
@@ -73,7 +79,8 @@ export class SplatSceneElement extends SplatChild {
 
   override connectedCallback(): void {
     super.connectedCallback();
-    // The model defines the names of controls, so they cannot be listed in observedAttributes.
+    // Attributes `control-NAME` are observed here: the model defines their names, so `observedAttributes` cannot list
+    // them.
     this.#observer ??= new MutationObserver((records) => {
       if (!records.some(({ attributeName }) => attributeName?.startsWith(CONTROL_PREFIX))) return;
       this.requestUpdate();

@@ -1,6 +1,6 @@
 import type { ReactiveController, ReactiveControllerHost } from 'lit';
-import { viewSentence, type ViewName } from '../camera/spoken.js';
-import type { A11yStrings } from '../words.js';
+import type { ViewName } from '../camera/spoken.js';
+import type { A11yStrings } from '../strings.js';
 
 export interface AnnouncerHost {
   readonly viewName: ViewName;
@@ -13,13 +13,13 @@ export interface AnnouncerHost {
 const INTERVAL_MS = 700;
 
 /**
- * Announces the camera position to visitors who move it by keyboard and cannot see it: while the frame has the focus,
- * and at a limited rate.
+ * Announces the side from which the camera views the scene, for visitors who move the camera by keyboard and cannot see
+ * the frame. Speaks only while the frame has keyboard focus, and at a limited rate.
  */
 export class AnnouncerController implements ReactiveController {
   readonly #host: ReactiveControllerHost & HTMLElement;
   readonly #of: AnnouncerHost;
-  /** A flight announces its own destination. */
+  /** Whether camera moves are not announced: during a flight, which announces its own destination. */
   isQuiet = false;
   #text = '';
   #spoken: ViewName | undefined;
@@ -31,7 +31,7 @@ export class AnnouncerController implements ReactiveController {
     host.addController(this);
   }
 
-  /** Text of the live region. */
+  /** Text of the live region that screen readers announce; empty without an announcement. */
   get text(): string {
     return this.#text;
   }
@@ -48,7 +48,10 @@ export class AnnouncerController implements ReactiveController {
     this.#timer = undefined;
   }
 
-  /** Call when the camera has moved. */
+  /**
+   * Call when the camera has moved. Announces the new side of the view after {@link INTERVAL_MS}, if it differs from
+   * the last announced one.
+   */
   cameraMoved(): void {
     if (this.isQuiet || this.#timer !== undefined || !this.#of.isFocused) return;
     this.#timer = setTimeout(this.#speak, INTERVAL_MS);
@@ -59,10 +62,10 @@ export class AnnouncerController implements ReactiveController {
     const name = this.#of.viewName;
     if (!this.#of.isFocused || name === this.#spoken) return;
     this.#spoken = name;
-    this.say(viewSentence(name, this.#of.strings));
+    this.say(this.#of.strings[name] ?? `View from ${name.replace('-', ' ')}`);
   };
 
-  /** Name and keys of the frame are read on focus, so only moves are announced. */
+  /** Screen readers read the name and the keys of the frame on focus, so only later moves are announced. */
   readonly #onFocus = (): void => {
     this.#spoken = this.#of.viewName;
   };
@@ -73,7 +76,7 @@ export class AnnouncerController implements ReactiveController {
     this.say('');
   };
 
-  /** Writes a sentence to the live region. */
+  /** Writes a sentence to the live region, which screen readers then announce; an empty one clears it. */
   say(text: string): void {
     if (text === this.#text) return;
     this.#text = text;

@@ -6,7 +6,10 @@ import { MAX_MOVER_STEP_MS, type Mover } from './motion.js';
 export interface AutoRotateHost {
   readonly attributes: Pick<Attributes, 'autoRotateDelay' | 'rotationPerSecond'>;
   readonly camera: Pick<CameraController, 'turnBy'>;
-  /** False while the camera must not move, regardless of the attributes. */
+  /**
+   * Whether the camera may rotate: the attribute `auto-rotate` is set, the scene is visible, motion is not reduced or
+   * stopped, and the frame has no keyboard focus.
+   */
   readonly mayTurn: boolean;
   requestFrame(): void;
 }
@@ -18,8 +21,8 @@ export class AutoRotateController implements ReactiveController, Mover {
   #isTurning = false;
   #lastStep: number | undefined;
   /**
-   * The scene rotates to the right, counterclockwise from above, so the camera moves the other way; it reverses at a
-   * limit.
+   * Sign of the camera's rotation. With -1 the scene seems to rotate to the right, counterclockwise from above. The
+   * sign changes at a limit of the orbit.
    */
   #direction = -1;
 
@@ -37,14 +40,14 @@ export class AutoRotateController implements ReactiveController, Mover {
     this.#stop();
   }
 
-  /** Pauses after a visitor has moved the camera. */
+  /** Stops the rotation, and starts it again after `autoRotateDelay` milliseconds without another call. */
   rest(): void {
     this.#stop();
     if (!this.#of.mayTurn) return;
     this.#timer = setTimeout(() => this.start(), this.#of.attributes.autoRotateDelay);
   }
 
-  /** Starts without a delay. */
+  /** Starts the rotation without a delay. */
   start(): void {
     this.#stop();
     if (!this.#of.mayTurn) return;
@@ -60,11 +63,14 @@ export class AutoRotateController implements ReactiveController, Mover {
     }
     const stepMs = this.#lastStep === undefined ? 0 : Math.min(MAX_MOVER_STEP_MS, now - this.#lastStep);
     this.#lastStep = now;
-    const step = (this.#of.attributes.rotationPerSecond * stepMs) / 1000;
+    const speed = this.#of.attributes.rotationPerSecond;
+    const step = (speed * stepMs) / 1000;
+    // A change of the attribute requests the next frame.
+    if (speed === 0) return false;
     if (step === 0 || this.#of.camera.turnBy(this.#direction * step) !== 0) return true;
     this.#direction = -this.#direction;
     if (this.#of.camera.turnBy(this.#direction * step) !== 0) return true;
-    // The limits leave no range.
+    // The limits of the orbit allow no rotation in either direction.
     this.#isTurning = false;
     return false;
   }

@@ -14,19 +14,22 @@ import { CameraOrbit, CameraTarget, FieldOfView } from '../camera/values.js';
 import type { CameraChangeSource } from '../events.js';
 import type { ViewContext } from '../views/camera-view.js';
 
-/** Frames the whole of an isolated subject, and the center of other scenes. */
+/**
+ * Returns the bounds with the center and the radius that the camera frames: those of an isolated subject, otherwise
+ * those of the scene.
+ */
 const framed = (bounds: SceneBounds): SceneBounds => ({ ...bounds, ...bounds.subject });
 
-/** Bounds before any scene is loaded. */
+/** Bounds that are assumed before any scene is loaded. */
 const UNKNOWN_BOUNDS: SceneBounds = { min: [-1, -1, -1], max: [1, 1, 1], center: [0, 0, 0], radius: 1 };
-/** Longest step of the damped motion, ms: after a pause the camera continues from its last pose. */
+/** Longest step of the damped motion, ms. After a pause the camera therefore continues near its last pose. */
 const MAX_STEP_MS = 100;
-/** Length of the first step after a rest, ms. */
+/** Duration of the first step of a motion after a rest, ms. */
 const FIRST_STEP_MS = 1000 / 60;
 
 /**
- * The element's camera: combines the attributes, the scene's bounds and the frame's aspect ratio into a pose at a given
- * time.
+ * The element's camera. It combines the attributes, the bounds of the scene and the aspect ratio of the frame into a
+ * pose for each time.
  */
 export class CameraController {
   readonly #camera: OrbitCamera;
@@ -36,16 +39,16 @@ export class CameraController {
   #aspect = 1;
   #source: CameraChangeSource = 'none';
   /**
-   * Whether a visitor has zoomed since the attributes last set the distance; then a new aspect ratio does not change
-   * it.
+   * Whether a visitor has zoomed, flown or walked since the attributes last set the distance. A new aspect ratio then
+   * does not change the distance.
    */
   #userDistance = false;
-  /** Whether a visitor has moved the camera since a scene was framed. */
+  /** Whether a visitor or a flight has moved the camera since a scene was framed or the camera was reset. */
   #isTouched = false;
-  /** Whether the element itself has rotated it. */
+  /** Whether automatic rotation has moved the camera since a scene was framed. */
   #isTurned = false;
   #jumped = false;
-  /** Pose of a flight, which extends automatic limits. */
+  /** Pose of the last flight; automatic limits are extended to include it. */
   #asked: CameraPose | undefined;
   #lastStep: number | undefined;
 
@@ -76,33 +79,36 @@ export class CameraController {
     return frameOf(this.#settings, this.#bounds);
   }
 
-  /** The framed bounds, in scene coordinates: for an isolated subject, `center` and `radius` are those of all of it. */
+  /**
+   * The framed bounds, in scene coordinates. For an isolated subject, `center` and `radius` are those of the complete
+   * subject.
+   */
   get bounds(): SceneBounds {
     return this.#bounds;
   }
 
-  /** Fixed point of a visitor's motion: see {@link OrbitCamera.pivot}. */
+  /** Sets the fixed point of a visitor's rotation: see {@link OrbitCamera.pivot}. */
   set pivot(pivot: Pivot) {
     this.#camera.pivot = pivot;
   }
 
-  /** Whether a visitor has moved the camera since the page last set it. */
+  /** Whether a visitor or a flight has moved the camera since a scene was framed or the camera was reset. */
   get isTouched(): boolean {
     return this.#isTouched;
   }
 
-  /** The goal of the motion. */
+  /** The pose to which the damped motion leads. */
   get goal(): CameraPose {
     return this.#camera.goal;
   }
 
-  /** Context for parsing views. */
+  /** Values from which views are parsed: relative views refer to the goal of the motion. */
   get context(): ViewContext {
     const [settings, bounds, aspect, from] = [this.#settings, this.#bounds, this.#aspect, this.#camera.goal];
     return { settings, bounds, frame: this.viewerFrame, aspect, from };
   }
 
-  /** Moves the camera at once, within the limits of the page: a step of a flight. */
+  /** Moves the camera at once to a pose, within the limits of the page. A flight calls it in each frame. */
   moveTo(pose: CameraPose): void {
     this.#source = 'none';
     this.#userDistance = this.#isTouched = true;
@@ -116,18 +122,21 @@ export class CameraController {
     return this.#camera.moving;
   }
 
-  /** The current pinhole camera for a frame of width x height pixels. */
+  /**
+   * Returns the current camera for a frame of width x height pixels: a pinhole camera, or a parallel one if the page
+   * has set `orthographic` and the camera does not walk.
+   */
   view(width: number, height: number): Camera {
     const { now } = this.#camera;
     const { min, max, center } = this.#bounds;
     const camera = cameraOfPose(now, this.viewerFrame, width, height, nearPlane(this.#bounds));
-    if (!this.#settings.orthographic) return camera;
+    if (!this.#settings.orthographic || this.#camera.walks) return camera;
     const away = subtract(toViewer(this.viewerFrame, center), [now.x, now.y, now.z]);
     return parallelCamera(camera, now.radius, Math.hypot(...away) + Math.hypot(...subtract(max, min)));
   }
 
   /**
-   * Applies new attributes. Unset components keep the pose that a visitor may have chosen.
+   * Applies new attributes. Attributes that have not changed keep the pose that a visitor may have chosen.
    * @param set Attributes that the page has set, even to the same value.
    */
   applySettings(settings: CameraSettings, set: ReadonlySet<keyof CameraSettings> = new Set()): void {
@@ -151,14 +160,14 @@ export class CameraController {
     this.#onChange();
   }
 
-  /** Frames a new scene: the camera moves at once to the pose of the attributes. */
+  /** Frames a new scene: sets its bounds, and moves the camera at once to the pose of the attributes. */
   frame(bounds: SceneBounds): void {
     this.#bounds = framed(bounds);
     this.#isTouched = this.#isTurned = false;
     this.#reframe('automatic');
   }
 
-  /** Updates the bounds: the camera moves to the resulting pose, unless a visitor has moved it. */
+  /** Updates the bounds of the scene. The camera moves to the resulting pose, unless a visitor has moved it. */
   refine(bounds: SceneBounds): void {
     this.#bounds = framed(bounds);
     this.#limit();
@@ -170,7 +179,7 @@ export class CameraController {
     this.#onChange();
   }
 
-  /** Applies a new aspect ratio: an automatic distance follows at once. */
+  /** Applies a new aspect ratio, width / height. The camera jumps to its new distance, unless a visitor has zoomed. */
   setAspect(aspect: number): void {
     if (aspect === this.#aspect) return;
     this.#aspect = aspect;
@@ -182,7 +191,7 @@ export class CameraController {
     this.jumpToGoal();
   }
 
-  /** Returns to the pose of the attributes. */
+  /** Returns the camera to the pose of the attributes. `source` is the source of the change in the next event. */
   reset(source: CameraChangeSource): void {
     this.#source = source;
     this.#userDistance = this.#isTouched = false;
@@ -199,19 +208,22 @@ export class CameraController {
     this.#onChange();
   }
 
-  /** Orbits by a visitor's input, angles in radians. */
+  /** Orbits about the target by a visitor's input: changes azimuth `theta` and polar angle `phi`, radians. */
   orbitBy(theta: number, phi: number): void {
     this.#camera.orbitBy(theta, phi);
     this.#moveByUser();
   }
 
-  /** Looks around from the current position by a visitor's input, angles in radians. */
+  /**
+   * Looks around from the current position of the camera by a visitor's input: changes azimuth and polar angle,
+   * radians.
+   */
   lookBy(theta: number, phi: number): void {
     this.#camera.lookBy(theta, phi);
     this.#moveByUser();
   }
 
-  /** Flies by a visitor's input: world units along the camera's own axes. */
+  /** Flies by a visitor's input: moves camera and target along the camera's own axes, in world units. */
   moveBy(right: number, up: number, forward: number): void {
     this.#camera.moveBy(right, up, forward);
     this.#moveByUser();
@@ -223,14 +235,10 @@ export class CameraController {
     this.#moveByUser();
   }
 
-  /** Levels the view at once: the initial pose of a walker. */
-  level(): void {
-    const { phi } = this.#camera.goal;
-    this.#camera.lookBy(0, Math.PI / 2 - phi);
-    this.jumpToGoal();
-  }
-
-  /** Changes the distance by a factor from a visitor's input. @returns False at the limit. */
+  /**
+   * Multiplies the distance to the target by a factor from a visitor's input. @returns False if a limit leaves the
+   * distance unchanged.
+   */
   zoomBy(factor: number): boolean {
     const { radius } = this.#camera.goal;
     this.#camera.zoomBy(factor);
@@ -240,7 +248,7 @@ export class CameraController {
     return true;
   }
 
-  /** Pans by a visitor's input, in fractions of the frame's height. */
+  /** Pans by a visitor's input: moves camera and target, in fractions of the height of the frame at the target. */
   panBy(right: number, up: number): void {
     const { x, y, z } = this.#camera.goal;
     this.#camera.panBy(right, up);
@@ -248,15 +256,16 @@ export class CameraController {
     this.#moveByUser();
   }
 
-  /** Sets the orbit target that a visitor picks, in viewer space. */
+  /** Sets the orbit target to a point that a visitor has picked, in viewer space. */
   aimAt([x, y, z]: Vector3): void {
     this.#camera.setGoal({ x, y, z });
     this.#moveByUser();
   }
 
   /**
-   * Rotates the camera automatically, radians, without damping.
-   * @returns The angle within the limits.
+   * Rotates the camera automatically, without damping.
+   * @param theta Angle about the up axis, radians.
+   * @returns The angle by which the camera has rotated within its limits, radians.
    */
   turnBy(theta: number): number {
     const turned = this.#camera.turnBy(theta);
@@ -268,10 +277,10 @@ export class CameraController {
   }
 
   /**
-   * Advances to the time `now`.
+   * Advances the damped motion to the time of a frame.
    * @param now requestAnimationFrame's clock, ms.
-   * @param decayMs Time constant of the motion; 0 jumps.
-   * @returns The source of the camera change since the last step, or null without a change.
+   * @param decayMs Time constant of the motion; 0 jumps to the goal.
+   * @returns The source of the camera change since the last step; null without a change.
    */
   step(now: number, decayMs: number): CameraChangeSource | null {
     const stepMs = this.#lastStep === undefined ? FIRST_STEP_MS : Math.min(MAX_STEP_MS, now - this.#lastStep);
@@ -283,8 +292,8 @@ export class CameraController {
   }
 
   /**
-   * Keeps the target in the framing sphere, so that no pan loses the scene. A target that was farther out keeps its
-   * distance. Limits of the page replace this one.
+   * Keeps the target in the framing sphere, so that a pan does not lose the scene. A target that was outside the sphere
+   * keeps its distance from the center. Limits of the target that the page sets replace this one.
    */
   #keepNear(before: Vector3): void {
     const { minTarget, maxTarget } = this.#settings;
@@ -299,6 +308,8 @@ export class CameraController {
   }
 
   #moveByUser(): void {
+    // Another distance to the target would move the eye of a camera that flies or walks.
+    this.#userDistance ||= this.#camera.pivot === 'eye';
     this.#isTouched = true;
     this.#source = 'user-interaction';
     this.#onChange();

@@ -7,24 +7,27 @@ import { LatestTask } from '../latest-task.js';
 import type { Services } from '../element-host.js';
 
 /**
- * Minimum number of splats for building levels automatically: in smaller scenes the number of splats is not the
- * bottleneck.
+ * Minimum number of splats of a scene for which levels are built automatically. In smaller scenes the number of splats
+ * is not the bottleneck.
  */
 const MIN_SPLATS = 50_000;
 /**
- * Maximum number of splats for building them automatically: all of them are read back and merged in CPU memory, about
- * 150 bytes each.
+ * Maximum number of splats of a scene for which levels are built automatically. Building reads all splats back and
+ * merges them in CPU memory, about 150 bytes per splat.
  */
 const MAX_SPLATS = 8_000_000;
 /**
- * Duration of motion at reduced quality before levels are built, ms: the first frames of a scene, and those after a
- * rest, are often slow.
+ * Duration of motion at reduced quality after which levels are built, ms. The first frames of a scene, and those after
+ * a rest, are often slow, so shorter durations prove nothing.
  */
 const MAX_SLOW_MS = 1_500;
-/** Maximum interval between two frames of one motion, ms: longer ones are rests, and do not count. */
+/**
+ * Maximum interval between two frames of the same motion, ms. Longer intervals are rests, which do not count as slow
+ * motion.
+ */
 const LONGEST_GAP_MS = 1_000;
 
-/** Interface of the element for the controller. */
+/** Interface of the element for the controller of levels of detail. */
 export interface DetailHost {
   readonly attributes: Pick<Attributes, 'detail'>;
   readonly services: Pick<Services, 'sceneLoader'>;
@@ -35,29 +38,32 @@ export interface DetailHost {
 }
 
 /**
- * Manages levels of detail: builds them when the page requests it, or when frames in motion cannot be drawn at full
- * quality; and sets the allowed error.
+ * Manages the levels of detail of a scene, and sets their allowed error. Builds levels when the page requests them, or
+ * when frames in motion cannot be drawn at full quality.
  */
 export class DetailController {
   readonly #host: DetailHost;
   #scene: LoadedGaussians | null = null;
-  /** Levels of a streamed scene. */
+  /** Detail settings that the scene was loaded with; empty for a scene without its own levels. */
   #own: LodSettings = {};
-  /** Splats whose levels are built, in progress, or impossible. */
+  /** Splats whose levels are built, are being built, or cannot be built. */
   #of: OwnedGaussians | undefined;
   readonly #building = new LatestTask();
   #choice: DetailChoice = 'auto';
   #isPressed = false;
-  /** Accumulated motion at reduced quality, ms. */
+  /** Duration of consecutive motion at reduced quality, ms. */
   #slowMs = 0;
-  /** Time of the last reported frame in motion. */
+  /** Time of the last reported frame in motion, in milliseconds of `performance.now()`. */
   #sampledAt = 0;
 
   constructor(host: DetailHost) {
     this.#host = host;
   }
 
-  /** Applies the completely loaded scene, or null for none, and the attribute. May be called at any rate. */
+  /**
+   * Applies a completely loaded scene, null if there is none, and the attribute `detail`. May be called at any rate:
+   * only changes have an effect.
+   */
   update(scene: LoadedGaussians | null): void {
     if (scene !== this.#scene) this.#begin(scene);
     if (scene === null || scene.isDestroyed || scene.live !== undefined) return;
@@ -68,7 +74,7 @@ export class DetailController {
     this.#build(scene);
   }
 
-  /** Reports each frame in motion, and whether it was drawn at full quality. */
+  /** Call for each timed frame in motion. `isWhole`: whether frames in motion are drawn at full quality. */
   reportMotionFrame(isWhole: boolean): void {
     const gap = performance.now() - this.#sampledAt;
     this.#sampledAt += gap;
@@ -93,7 +99,7 @@ export class DetailController {
     this.#of = undefined;
   }
 
-  /** Sets the allowed error of subsequent frames. */
+  /** Sets the allowed error of subsequent frames, in pixels, if the choice has changed. */
   #setThreshold(scene: LoadedGaussians, choice: DetailChoice): void {
     if (choice === this.#choice) return;
     this.#choice = choice;
@@ -118,14 +124,14 @@ export class DetailController {
     this.#building.run(
       async (signal) => {
         const levels = await buildLevels(scene, this.#host.services.sceneLoader, this.#host.memoryBudget, signal);
-        // A sequence may have replaced the splats meanwhile.
+        // A sequence may have replaced the splats during the build.
         if (scene.isDestroyed || scene.gaussians !== gaussians) return levels?.destroy();
         scene.setLevels(levels);
         this.#host.splatsChanged();
       },
       (error) => {
         if (scene.isLost || scene.isDestroyed || scene.gaussians !== gaussians) return;
-        // If loading the code failed, the next update tries again.
+        // If the code could not be loaded, the next update tries again.
         if (error instanceof GaussianSplatError && error.code === 'network/unreachable') this.#of = undefined;
         const reason = error instanceof Error ? error.message : String(error);
         this.#host.warn(`<gaussian-splat>: the scene has no levels of detail, since building them failed: ${reason}`);

@@ -8,103 +8,111 @@ import { lossesOf } from '../dynamic-quality/image-loss.js';
 import { quantile } from '../dynamic-quality/display-interval.js';
 import { INITIAL_QUALITY, waitForRest, type QualityState, type QualityReason } from '../dynamic-quality/start.js';
 
-/** All settings of frames in motion. */
+/** Settings of all quality levels of frames in motion, for which pipelines are prepared. */
 export const MOVING_SETTINGS: readonly Partial<PerFrameSettings>[] = QUALITY_LEVELS.flatMap(
   ({ settings }) => settings ?? [],
 );
 
-/** Two changes within this time, ms, belong to the same motion. */
+/** Maximum interval between two changes of the same motion, ms; for slow frames it is longer. */
 const MOTION_MS = 150;
-/** For slow frames, two changes within this many frames do, too; upper limit in ms. */
+/**
+ * Number of frames within which two changes belong to the same motion if frames are slow. The second constant limits
+ * this interval, ms.
+ */
 const FRAMES_OF_MOTION = 2;
 const LONGEST_PAUSE_MS = 2_000;
 
-/** Images that differ in pixels by this factor invalidate the measured times. */
+/** Factor by which the number of pixels must change to invalidate the measured times. */
 const OTHER_SIZE = 1.25;
 
-/** Settings of the next frame. */
+/** Level and settings that are planned for the next frame. */
 export interface FramePlan {
-  /** Index of the level; 0 is full quality. */
+  /** Index of the quality level; 0 is full quality. */
   readonly level: number;
   readonly settings: Partial<PerFrameSettings> | undefined;
-  /** Counter of the frame size. */
+  /** Number of changes of the frame size until this frame. A time of an older size is discarded. */
   readonly size: number;
 }
 
-/** State of a frame before it is drawn. */
+/** Properties of a frame that determine its quality. */
 export interface FrameOccasion {
   /** requestAnimationFrame's clock, ms. */
   readonly now: number;
-  /** Pixels at full resolution. */
+  /** Number of pixels at full resolution. */
   readonly pixels: number;
-  /** Whether it differs from the previous frame: the camera has moved, or the scene has. */
+  /** Whether the frame differs from the previous one, because the camera or the scene has moved. */
   readonly hasChanged: boolean;
-  /** Whether the camera will continue to move. */
+  /** Whether the camera will continue to move after this frame. */
   readonly goesOn: boolean;
 }
 
-/** Draws the frame. @param onTime Is called with its duration. */
+/**
+ * Draws a frame with settings; undefined for full quality. `onTime` is called with the duration of the frame when its
+ * work is done.
+ */
 export type DrawFrame = (settings: FramePlan['settings'], onTime?: (time: WorkTime) => void) => void;
 
 /** State of the controller for statistics. */
 export interface DynamicQualityReport {
-  /** Name of the level of the last frame; `whole` is full quality. */
+  /** Name of the quality level of the last frame; `whole` is full quality. */
   readonly drawn: string;
-  /** Name of the level of frames in motion. */
+  /** Name of the quality level that frames in motion have. */
   readonly moving: string;
-  /** Reason: see {@link QualityReason}. */
+  /** Reason for the level of frames in motion. */
   readonly reason: QualityReason;
   /**
-   * Median of the last frames on that level, ms: from the earliest start of a frame until its work was done; null
-   * without any.
+   * Median duration of the last frames on the level `moving`, ms; null before the first. A duration lasts from the
+   * earliest possible start of the GPU work of a frame until its end.
    */
   readonly frameMs: number | null;
-  /** The last timed frame, at rest or in motion, ms; null without one, and with a fixed quality. */
+  /** Duration of the last timed frame, at rest or in motion, ms. Null before the first, and with a fixed quality. */
   readonly lastMs: number | null;
   /** Target duration of a frame, ms. */
   readonly targetMs: number;
 }
 
 export interface DynamicQualityOptions {
-  /** False if the page has set a fixed quality. */
+  /** Whether the quality is adapted; false if the page has set a fixed quality. */
   readonly isOn: () => boolean;
   readonly scheduler: () => FrameScheduler;
-  /** Upper limit of a frame from the page, ms; infinite if only the display limits it. */
+  /** Maximum duration of a frame that the page allows, ms; Infinity if only the display limits it. */
   readonly frameBudget: () => number;
   readonly requestFrame: () => void;
-  /** False if drawing again is expensive: for frames of a post-processor. */
+  /**
+   * Whether the full-quality image may fade in. False if drawing a frame again is expensive, as with a post-processor.
+   */
   readonly mayFade: () => boolean;
-  /** Called for each timed frame of a motion: whether frames are drawn at full quality. */
+  /** Called for each timed frame of a motion. `isWhole`: whether frames in motion are drawn at full quality. */
   readonly onFrameTimed: (isWhole: boolean) => void;
-  /** Default: the element's. */
+  /** Levels from which the controller chooses; default: {@link QUALITY_LEVELS}. */
   readonly levels?: readonly QualityLevel[];
 }
 
 /**
- * Keeps frames in motion in time with the display: measures frame times, and adapts the quality of frames in motion. At
- * rest it draws the full-quality image, 300 ms after the last motion if that takes 214 ms or less at 60 Hz.
+ * Adapts the quality of frames in motion so that they keep up with the display, from measured frame times. At rest the
+ * full-quality image is drawn: 300 ms after the last motion, if its drawing takes at most 214 ms at 60 Hz.
  */
 export class DynamicQualityController {
   readonly #options: DynamicQualityOptions;
   #state: QualityState = INITIAL_QUALITY;
   readonly #all: readonly QualityLevel[];
-  /** Levels for the image's size. */
+  /** Levels that suit the number of pixels and the measured errors. */
   #levels: readonly QualityLevel[];
-  /** Pixels of the measured frames. */
+  /** Number of pixels, at full resolution, of the measured frames. */
   #pixels = 0;
-  /** Counter of frame sizes, because times of another size arrive late. */
+  /** Number of changes of the frame size, because times of frames of the previous size may arrive late. */
   #size = 0;
   #changedAt = -Infinity;
   #drawn: QualityLevel;
-  /** Duration of the last timed frame. */
+  /** Duration of the last timed frame, ms; null before the first. */
   #lastMs: number | null = null;
-  /** Duration of the last timed full-quality image. */
+  /** Duration of the last timed full-quality image, ms; 0 before the first. */
   #wholeMs = 0;
   #restTimer: ReturnType<typeof setTimeout> | undefined;
   readonly #fade = new Fade();
-  /** Error of lower resolutions in the current view; undefined until it is measured. */
+  /** Measured errors of lower resolutions in the current view; undefined before they are measured. */
   #losses: Losses | undefined;
-  /** The running measurement of it. */
+  /** The running measurement of these errors; undefined if none runs. */
   #measuring: Promise<Losses> | undefined;
 
   constructor(options: DynamicQualityOptions) {
@@ -132,9 +140,9 @@ export class DynamicQualityController {
   }
 
   /**
-   * Draws the next frame on a canvas. Before the first full-quality image after a motion at lower resolution, the last
-   * frame of the motion is drawn once more, because only a frame of the current task can be copied; the full-quality
-   * image then fades in under the copy.
+   * Draws the next frame on a canvas. A full-quality image after a motion at lower resolution fades in under a copy of
+   * the last frame of the motion. Because only a frame of the current task can be copied, that frame is drawn once more
+   * before.
    */
   draw(occasion: FrameOccasion, canvas: HTMLCanvasElement, render: DrawFrame): void {
     if (!this.#options.isOn()) {
@@ -145,7 +153,7 @@ export class DynamicQualityController {
     const plan = this.plan(occasion);
     if (occasion.hasChanged || !this.#options.mayFade()) this.#fade.end();
     else if (plan.level === 0 && before.scale < 1 && this.#settle(before, canvas, render)) return;
-    // Uses full resolution until the error of lower ones is known.
+    // Uses full resolution until the errors of lower resolutions are known.
     const isUnknown = this.#drawn.scale < 1 && !this.#losses;
     if (isUnknown) this.#drawn = this.#levels.findLast(({ scale }) => scale === 1)!;
     const drawn = new Promise<void>((resolve) =>
@@ -159,7 +167,10 @@ export class DynamicQualityController {
     if (isUnknown || (plan.level === 0 && this.#state.level > 0)) this.#measure(canvas, occasion.pixels, drawn);
   }
 
-  /** @returns Whether the frame was another one of the motion. */
+  /**
+   * Draws the last frame of the motion once more, and copies it as a cover for the fade. @returns False if the
+   * full-quality image can be drawn now, because a cover exists or fades are unsupported.
+   */
   #settle(before: QualityLevel, canvas: HTMLCanvasElement, render: DrawFrame): boolean {
     if (this.#fade.isCovering || !canFade(canvas)) return false;
     this.#drawn = before;
@@ -168,7 +179,7 @@ export class DynamicQualityController {
     return true;
   }
 
-  /** Measures the error of lower resolutions for the last frame. If that fails, all levels are used. */
+  /** Measures the errors of lower resolutions for the last frame. If the measurement fails, all levels are used. */
   #measure(canvas: HTMLCanvasElement, pixels: number, drawn: Promise<unknown>): void {
     const scales = this.#all.flatMap(({ scale }) => (scale < 1 ? scale : []));
     const measuring = lossesOf(canvas, scales, drawn).catch((): Losses => new Map());
@@ -182,18 +193,19 @@ export class DynamicQualityController {
   }
 
   /**
-   * Plans the next frame. A single change after a rest is drawn at full quality at once; continued changes are motion.
+   * Chooses the level of the next frame. A single change after a rest is drawn at full quality at once; changes in
+   * succession are a motion.
    */
   plan({ now, pixels, hasChanged, goesOn }: FrameOccasion): FramePlan {
-    // Measurements from before a fixed quality are discarded.
+    // While the quality is fixed, measurements are discarded, because they become outdated.
     if (!this.#options.isOn()) this.reset();
     this.#fit(pixels);
     const pause = Math.max(
       MOTION_MS,
       Math.min(LONGEST_PAUSE_MS, FRAMES_OF_MOTION * Math.max(this.#lastMs ?? 0, this.#wholeMs)),
     );
-    // Frames for other reasons between two changes of one motion (a sequence with a lower frame rate than the
-    // display's) belong to it, until rest is due.
+    // Frames without a change may occur between two changes of a motion, as in a sequence with a lower frame rate than
+    // the display's. They belong to the motion until the image at rest is due.
     const isMotion = hasChanged ? goesOn || now - this.#changedAt < pause : this.#restTimer !== undefined;
     if (hasChanged) this.#changedAt = now;
     const level = isMotion ? this.#state.level : 0;
@@ -222,11 +234,12 @@ export class DynamicQualityController {
     this.#options.requestFrame();
   };
 
-  /** Records the duration of a planned frame. */
+  /** Records the duration of a frame that {@link plan} has planned, and chooses the next level of frames in motion. */
   sample({ level, size }: Pick<FramePlan, 'level' | 'size'>, { doneAt, lowerBound, upperBound }: WorkTime): void {
     if (!this.#options.isOn() || size !== this.#size) return;
     const { targetMs } = this;
-    // If only the bounds are known, they suffice: at most in time, or at least too slow.
+    // The exact duration may be unknown. Its bounds suffice if the upper one is within the target, or the lower one
+    // exceeds it.
     if (upperBound > targetMs && lowerBound <= targetMs && lowerBound < upperBound) return;
     const milliseconds = upperBound > targetMs ? lowerBound : upperBound;
     this.#lastMs = milliseconds;
@@ -236,7 +249,7 @@ export class DynamicQualityController {
     if (isWhole || level > 0) this.#options.onFrameTimed(isWhole);
   }
 
-  /** Discards all measurements: the scene or the backend has changed. */
+  /** Discards all measurements. Call when the scene or the backend has changed. */
   reset(): void {
     this.stop();
     this.#state = INITIAL_QUALITY;
@@ -247,7 +260,7 @@ export class DynamicQualityController {
     this.#losses = this.#measuring = undefined;
   }
 
-  /** Call when no frame follows. */
+  /** Ends the fade, and cancels the image at rest. Call when no frame follows. */
   stop(): void {
     this.#cancelRest();
     this.#fade.end();

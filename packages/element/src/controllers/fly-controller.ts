@@ -3,18 +3,21 @@ import type { CameraController } from './camera-controller.js';
 import { MAX_MOVER_STEP_MS, type Mover } from './motion.js';
 
 export interface FlyHost {
-  /** One unit is the size of the scene. */
+  /** The radius of its bounds scales the speed. */
   readonly camera: Pick<CameraController, 'bounds'>;
   readonly surface: HTMLElement | null;
   readonly mayFly: boolean;
-  /** Moves the camera by a visitor's keys. */
+  /** Moves the camera along its own axes, in world units. */
   flyBy(right: number, up: number, forward: number): void;
   requestFrame(): void;
 }
 
 type Direction = readonly [right: number, up: number, forward: number];
 
-/** Keyed by physical position, so that they lie under the left hand on every keyboard. */
+/**
+ * Directions of flight, by the physical position of keys (`KeyboardEvent.code`), so that the keys lie under the left
+ * hand on every keyboard.
+ */
 const DIRECTIONS: Readonly<Record<string, Direction>> = {
   KeyW: [0, 0, 1],
   KeyS: [0, 0, -1],
@@ -23,13 +26,16 @@ const DIRECTIONS: Readonly<Record<string, Direction>> = {
   KeyE: [0, 1, 0],
   KeyQ: [0, -1, 0],
 };
-/** Sizes of the scene per second. */
+/** Speed of flight, in radii of the scene per second. */
 const SPEED = 0.5;
 const FAST = 4;
-/** Minimum duration of a short press, ms. */
+/** Motion of a press in its first event, as milliseconds of flight: a short press may end before the next frame. */
 const FIRST_STEP_MS = 50;
 
-/** Flies while keys are held: W and S, A and D, Q and E; with Shift faster. */
+/**
+ * Flies while keys are held: W and S along the view, A and D to the sides, E and Q up and down. Shift makes the flight
+ * `FAST` times faster.
+ */
 export class FlyController implements ReactiveController, Mover {
   readonly #of: FlyHost;
   readonly #held = new Map<string, Direction>();
@@ -78,7 +84,6 @@ export class FlyController implements ReactiveController, Mover {
     if (direction === undefined || event.ctrlKey || event.altKey || event.metaKey) return;
     event.preventDefault();
     this.#isFast = event.shiftKey;
-    // A short press may end before the next frame.
     if (!event.repeat) this.#move(direction, FIRST_STEP_MS);
     this.#held.set(event.code, direction);
     this.#of.requestFrame();
@@ -87,7 +92,7 @@ export class FlyController implements ReactiveController, Mover {
   readonly #onUp = (event: KeyboardEvent): void => {
     this.#isFast = event.shiftKey;
     this.#held.delete(event.code);
-    // macOS does not report the release of keys while this one is held.
+    // macOS does not report the release of other keys while the Meta key is held.
     if (event.key === 'Meta') this.#held.clear();
     if (this.#held.size === 0) this.#lastStep = undefined;
   };

@@ -46,24 +46,30 @@ const STYLES = css`
 
 export interface HotspotHost {
   readonly camera: Pick<CameraController, 'viewerFrame' | 'bounds'>;
-  /** Holds a box for each of {@link HotspotController.names}, in their order, once it is rendered. */
+  /** Contains one box for each of {@link HotspotController.names}, in their order; null until it is rendered. */
   readonly hotspotLayer: HTMLElement | null;
-  /** Probes the last frame. Rejects if it is gone. */
+  /**
+   * Returns the transmittance in front of each point in the last frame. Positions are in pixels of the frame, depths in
+   * world units. Rejects if the frame is gone, with its scene or its device.
+   */
   probe(points: readonly ProbePoint[]): Promise<readonly ProbeAnswer[]>;
   warn(sentence: string): void;
 }
 
 /** A hotspot at a point of the scene, as returned by `queryHotspot`. */
 export interface HotspotPlace {
-  /** Viewer space. */
+  /** Position in viewer space, the coordinates of orbit and target. */
   readonly position: ScenePoint;
-  /** Normal of its surface; null if the page specifies none. */
+  /** Normal of the surface at the hotspot, in viewer space; null if the page specifies none. */
   readonly normal: ScenePoint | null;
-  /** CSS pixels from the element's left and top edge; null while it is behind the camera or nothing is drawn. */
+  /**
+   * Position in the element, in CSS pixels from its left and top edge. Null while the hotspot is behind the camera, or
+   * if nothing is drawn.
+   */
   readonly canvasPosition: { readonly x: number; readonly y: number } | null;
-  /** False if its normal points away from the camera. */
+  /** Whether the normal points toward the camera; true without a normal. */
   readonly facingCamera: boolean;
-  /** False if it faces away, is occluded, or is behind the camera or outside the frame. */
+  /** Whether the hotspot is within the frame, in front of the camera, faces it, and is not occluded. */
   readonly visible: boolean;
 }
 
@@ -71,35 +77,41 @@ interface Hotspot extends Located {
   readonly elements: readonly HTMLElement[];
   isOccluded: boolean;
   isVisible: boolean;
-  /** Whether one of its elements contains an open panel. */
+  /** Whether one of the hotspot's elements contains an open panel. */
   hasPanel: boolean;
 }
 
 const PREFIX = 'hotspot-';
 /** Events that may open or close a panel of a label. */
 const PANEL_EVENTS = ['toggle', 'fullscreenchange'];
-/** Transmittance below which a hotspot counts as occluded. */
+/** Transmittance, 0..1, of the splats in front of a hotspot below which it counts as occluded. */
 const HIDDEN_BELOW = 0.5;
-/** Offset of a label in front of its surface, as a fraction of the scene's size, because splats are thick. */
+/**
+ * Offset of a probed point toward the camera, as a fraction of the scene's radius, because splats are thick: a point on
+ * their surface would lie behind some of them.
+ */
 const IN_FRONT = 0.03;
 /**
- * A label moves when its point has moved by this many device pixels: less is invisible, and each write causes a style
+ * Minimum distance by which a label moves, in device pixels. Shorter moves are invisible, and each write causes a style
  * recalculation.
  */
 const VISIBLE_MOVE = 0.5;
 /** Minimum interval between two occlusion tests while the camera moves, ms. */
 const PROBE_INTERVAL_MS = 100;
 
-/** Keeps children with `slot="hotspot-…"` at their points of the scene, and fades invisible ones. */
+/**
+ * Keeps children with `slot="hotspot-…"` at their points of the scene, and fades the occluded ones and those that face
+ * away.
+ */
 export class HotspotController implements ReactiveController {
   readonly #host: ReactiveControllerHost & HTMLElement;
   readonly #of: HotspotHost;
   #hotspots = new Map<string, Hotspot>();
   #observer: MutationObserver | undefined;
   #camera: Camera | undefined;
-  /** Boxes of the labels, by their elements. */
+  /** Boxes of the labels, by the box's element in the layer. */
   readonly #boxes = new WeakMap<Element, LabelBox>();
-  /** Last visibility reported to each label. */
+  /** Visibility that was last reported to each label by an event. */
   readonly #reported = new WeakMap<HTMLElement, boolean>();
   #isProbing = false;
   #isStale = false;
@@ -111,7 +123,7 @@ export class HotspotController implements ReactiveController {
     host.addController(this);
   }
 
-  /** Slot names of children, each once. */
+  /** Slot names of the children that are labels; each name occurs once. */
   get names(): readonly string[] {
     return [...this.#hotspots.keys()];
   }
@@ -120,7 +132,7 @@ export class HotspotController implements ReactiveController {
     this.#observer = new MutationObserver((records) => this.#onMutations(records));
     const attributeFilter = ['slot', 'data-position', 'data-normal', 'data-orbit', 'open'];
     this.#observer.observe(this.#host, { childList: true, subtree: true, attributeFilter });
-    // `toggle` does not bubble.
+    // The event `toggle` does not bubble, so the listeners are capturing ones.
     for (const type of PANEL_EVENTS) this.#host.addEventListener(type, this.#findPanels, true);
     this.#collect();
   }
@@ -140,8 +152,8 @@ export class HotspotController implements ReactiveController {
   }
 
   /**
-   * Labels with an open panel, updated when one opens or closes, because a query for each label in each frame takes as
-   * long as the frame.
+   * Updates which labels contain an open panel. Called when a panel may have opened or closed, because a query for each
+   * label in each frame takes as long as the frame.
    */
   readonly #findPanels = (): void => {
     for (const hotspot of this.#hotspots.values())
@@ -149,7 +161,10 @@ export class HotspotController implements ReactiveController {
     this.#place();
   };
 
-  /** Call after a frame was drawn with this camera. */
+  /**
+   * Moves the labels to their points in a frame, and tests their occlusion. Call after a frame was drawn with this
+   * camera.
+   */
   frameDrawn(camera: Camera): void {
     this.#camera = camera;
     if (this.#hotspots.size === 0) return;
@@ -163,7 +178,7 @@ export class HotspotController implements ReactiveController {
     this.#place();
   }
 
-  /** Position of a hotspot; null for an unknown name, or one without a position. */
+  /** Returns the position of a hotspot; null for an unknown name, or for a hotspot without a position. */
   query(name: string): HotspotPlace | null {
     const hotspot = this.#hotspots.get(name);
     if (!hotspot?.position) return null;
@@ -187,7 +202,7 @@ export class HotspotController implements ReactiveController {
     );
     this.#host.requestUpdate();
     if (before.size + this.#hotspots.size === 0) return;
-    // The positions are available once the boxes are rendered.
+    // The positions are computed with the boxes, which Lit renders first.
     void this.#host.updateComplete.then(() => this.#look());
   }
 
@@ -206,7 +221,9 @@ export class HotspotController implements ReactiveController {
     return { ...fresh, ...before, elements, position, normal, hasPanel };
   }
 
-  /** Moves the boxes to the points in the last frame, and hides those outside of it. */
+  /**
+   * Moves the boxes to the positions of their points in the last frame. Hides the boxes of points behind the camera.
+   */
   #place(): void {
     const boxes = this.#of.hotspotLayer?.children;
     if (boxes === undefined) return;
@@ -225,7 +242,7 @@ export class HotspotController implements ReactiveController {
       const box = this.#boxOf(element);
       if (depth > 0) box.moveTo(hotspot, minMove);
       else box.remove();
-      // Part of a label whose point has left the frame may still be readable.
+      // A label is shown even if its point has left the frame, because part of the label may still be readable.
       box.show(isOpen, hasPanel);
       this.#notify(hotspot, isOpen && x >= 0 && y >= 0 && x <= width && y <= height);
     }
@@ -249,7 +266,8 @@ export class HotspotController implements ReactiveController {
   }
 
   /**
-   * Tests the occlusion of hotspots on the GPU, asynchronously to the frames; repeats it if the camera moved meanwhile.
+   * Tests the occlusion of hotspots on the GPU, asynchronously to the frames. Tests again if the camera has moved
+   * during the test.
    */
   async #look(): Promise<void> {
     this.#isStale = true;
@@ -262,7 +280,7 @@ export class HotspotController implements ReactiveController {
         await new Promise((resolve) => setTimeout(resolve, PROBE_INTERVAL_MS));
       }
     } catch {
-      // The frame is gone, with its scene or its device; the next one repeats the test.
+      // The frame is gone, with its scene or its device. The next frame repeats the test.
     } finally {
       this.#isProbing = false;
     }

@@ -20,45 +20,48 @@ export { handsView } from '../hands-view.js';
 export { AnnouncerController } from './announcer-controller.js';
 export { PromptController } from './prompt-controller.js';
 
-/** Allowed interactions. */
+/** Interactions that the page allows. */
 export interface InputOptions {
   readonly enabled: boolean;
   readonly zoom: boolean;
   readonly pan: boolean;
   /** Whether double clicks and double taps have an effect. */
   readonly tap: boolean;
-  /** When the wheel zooms. */
+  /** Condition under which the wheel zooms: see the attribute `zoom`. */
   readonly wheel: WheelZoom;
-  /** CSS touch-action of the frame: one-finger gestures that are left to the page. */
+  /** CSS `touch-action` of the frame: the one-finger gestures that are left to the page. */
   readonly touchAction: string;
 }
 
-/** Receiver of the input. */
+/** Interface of the element that receives the input. */
 export interface InputHost {
-  /** The element for dragging and focus, once it is rendered. */
+  /** The element that receives drags and keyboard focus; null until it is rendered. */
   readonly surface: HTMLElement | null;
-  /** Holds the labels of the page, on which a drag may begin. */
+  /** The layer of the page's labels; a drag may begin on a label, too. */
   readonly hotspotLayer: HTMLElement | null;
-  /** Read after every update of the element. */
+  /** Interactions that the page allows. The controller reads them after every update of the element. */
   readonly input: InputOptions;
-  /** @returns False if it has no effect. */
+  /** Applies a camera action. @returns False if the action has no effect, for example a zoom at the limit. */
   act(action: CameraAction): boolean;
-  /** Called for a double click or a double tap, in CSS pixels of the page. */
+  /** Called for a double click or a double tap, with its position in CSS pixels of the viewport. */
   pick(clientX: number, clientY: number): void;
-  /** Called for the space bar; returns false if it has no effect. */
+  /** Called for the space bar: stops or resumes automatic motion. Returns false if there is no automatic motion. */
   toggleMotion(): boolean;
 }
 
 const LEFT_BUTTON = 0;
 const RIGHT_BUTTON = 2;
 
-/** A pressed pointer on the frame. */
+/** A pressed pointer, and its last position. */
 interface Pointer extends Point {
   readonly start: Point;
   readonly pans: boolean;
-  /** Owner of its moves: for one finger, and for a press on a label, it is undecided until the pointer moves. */
+  /**
+   * Receiver of the pointer's moves. It is undecided for a single finger, and for a press on a label, until the pointer
+   * moves by `TOUCH_SLOP` pixels.
+   */
   readonly owner: 'camera' | 'page' | 'undecided';
-  /** Converts CSS pixels of the page to those of the element, which CSS may have transformed. */
+  /** Converts CSS pixels of the viewport to those of the element, which CSS may have transformed. */
   readonly inBox: (point: Point) => Point;
 }
 
@@ -69,13 +72,13 @@ export class InputController implements ReactiveController {
   readonly #pointers = new Map<number, Pointer>();
   readonly #doubleTap = new DoubleTap();
   /**
-   * Whether the last pointer was a finger: browsers differ in whether its second tap is also a double click, which must
-   * count once.
+   * Whether the last pressed pointer was a finger. Browsers differ in whether the second of two taps also fires a
+   * double click. The two taps must count once.
    */
   #isTouch = false;
-  /** Distance in CSS pixels of a pointer from its press. */
+  /** Maximum distance of a pointer from the point where it was pressed, CSS pixels. */
   #way = 0;
-  /** Whether the space bar had an effect when it was pressed. */
+  /** Whether the last press of the space bar had an effect, so that its repeats are canceled, too. */
   #toggles = false;
   #surface: HTMLElement | null = null;
   #listening: AbortController | undefined;
@@ -113,10 +116,11 @@ export class InputController implements ReactiveController {
     const targets = [this.#surface, layer];
     for (const { style } of targets) style.touchAction = !enabled ? '' : zoom ? touchAction : withPinch(touchAction);
     if (!enabled) setSelectable(layer, true);
-    // Lit updates once more after removal. A document listener added then would leak the element.
+    // Lit updates the element once more after its removal. A document listener that is added then would leak the
+    // element.
     if (!enabled || !this.#surface.isConnected) return this.#stop();
     this.#listening ??= this.#listen(this.#surface, targets);
-    // A wheel listener that may prevent scrolling slows the page, so it exists only if the wheel zooms.
+    // A wheel listener that may prevent scrolling slows the page, so there is one only if the wheel zooms.
     if (zoom && wheel !== 'none') this.#wheel ??= this.#listenToWheel(targets);
     else this.#stopWheel();
   }
@@ -174,11 +178,11 @@ export class InputController implements ReactiveController {
     const start = positionOf(event);
     const inBox = boxMoves(this.#surface!, start);
     this.#pointers.set(event.pointerId, { ...start, start, pans, owner, inBox });
-    // A label with a captured pointer would never get its click event.
+    // If the surface captured the pointer, the pressed label would never get its click event.
     if (!isOnLabel) this.#capture(event.pointerId);
   };
 
-  /** Whether a press on a label may move the camera: all others may select text. */
+  /** Returns whether a press on a label may move the camera. If not, the press may select text of the label. */
   #takesFromLabel(event: PointerEvent): boolean {
     const own = event.button === RIGHT_BUTTON ? labelParts.withMenu : labelParts.dragged;
     const takes = !event.defaultPrevented && !isWithin(event, own);
@@ -186,19 +190,20 @@ export class InputController implements ReactiveController {
     return takes;
   }
 
-  /** Continues a drag outside the element. */
+  /** Captures a pointer, so that its drag continues outside the element. */
   #capture(pointerId: number): void {
     try {
       this.#surface?.setPointerCapture(pointerId);
     } catch {
-      // The pointer is gone already, or synthetic; then moves arrive only over the element.
+      // The pointer has been released already, or is synthetic. Its moves then arrive only over the element.
     }
   }
 
   readonly #onMove = (event: PointerEvent): void => {
     const from = this.#pointers.get(event.pointerId);
     const height = this.#surface?.clientHeight ?? 0;
-    // If a dialog or a menu of the browser was open, the release of the button was not reported.
+    // A mouse without pressed buttons was released while a dialog or a menu of the browser was open, which is not
+    // reported.
     if (event.buttons === 0 && event.pointerType === 'mouse') this.#pointers.delete(event.pointerId);
     else if (from !== undefined && height > 0) this.#follow(event, from, height);
   };
@@ -216,11 +221,14 @@ export class InputController implements ReactiveController {
       : from.owner === 'camera'
         ? [from.pans ? panOf(start, end, height) : orbitOf(start, end, height)]
         : [];
-    // Prevents a surrounding carousel from dragging. The browser has no default action for a move.
+    // A canceled move keeps a surrounding carousel from dragging. The browser itself has no default action for moves.
     for (const action of actions) if (this.#perform(action)) event.preventDefault();
   }
 
-  /** Decides the owner of a finger; its drag counts from here on, so that the camera does not jump. */
+  /**
+   * Decides the owner of an undecided pointer once it has moved by `TOUCH_SLOP` pixels. The drag starts at this
+   * position, so that the camera does not jump.
+   */
   #decide({ pointerId, pointerType }: PointerEvent, from: Pointer, to: Point): void {
     if (Math.hypot(to.x - from.x, to.y - from.y) < TOUCH_SLOP) return;
     const isCamera = pointerType !== 'touch' || isCameraDrag(this.#of.input.touchAction, from, to);
@@ -229,6 +237,8 @@ export class InputController implements ReactiveController {
   }
 
   readonly #onUp = (event: PointerEvent): void => {
+    // A finger is captured by the label that it touches, until the surface captures it for a drag.
+    if (event.type === 'lostpointercapture' && event.target !== this.#surface) return;
     const wasDown = this.#pointers.delete(event.pointerId);
     if (!wasDown || event.pointerType !== 'touch') return;
     if (event.type !== 'pointerup') this.#doubleTap.cancel();
@@ -238,7 +248,7 @@ export class InputController implements ReactiveController {
   readonly #onKey = (event: KeyboardEvent): void => {
     if (event.ctrlKey || event.altKey || event.metaKey) return;
     if (event.key === ' ') {
-      // A held key must not scroll the page, either.
+      // The repeats of a held key must not scroll the page, either.
       this.#toggles = event.repeat ? this.#toggles : this.#of.toggleMotion();
       if (this.#toggles) event.preventDefault();
       return;
@@ -255,21 +265,27 @@ export class InputController implements ReactiveController {
     if (this.#of.input.tap) this.#of.pick(clientX, clientY);
   }
 
-  /** The end of a drag is not a click, because the scene may be inside a link. */
-  readonly #onClick = (event: Event): void => {
-    if (this.#way > TOUCH_SLOP) {
+  /**
+   * Cancels the click at the end of a drag, because the scene may be inside a link. Clicks by keys and by assistive
+   * technology end no drag; their `detail` is 0. Drags with the right button or with a finger end without a click.
+   */
+  readonly #onClick = (event: MouseEvent): void => {
+    if (this.#way > TOUCH_SLOP && event.detail > 0) {
       event.preventDefault();
       event.stopImmediatePropagation();
     }
     this.#way = 0;
   };
 
-  /** The browser's own dragging of a link or an image would end the camera's. */
+  /** Cancels the browser's dragging of a link or an image, which would end the drag of the camera. */
   readonly #onDragStart = (event: Event): void => {
     if (this.#pointers.size > 0) event.preventDefault();
   };
 
-  /** At the limit the page scrolls. With Ctrl the browser would zoom instead, so that is prevented. */
+  /**
+   * Zooms by the wheel. At the limit of the zoom the page scrolls instead. With Ctrl the browser would zoom the page,
+   * so the event is always canceled.
+   */
   readonly #onWheel = (event: WheelEvent): void => {
     if (!this.#wheelZooms(event)) return;
     if (this.#of.act(wheelOf(event)) || event.ctrlKey) event.preventDefault();
@@ -280,19 +296,22 @@ export class InputController implements ReactiveController {
     if (isWithin(event, labelParts.panel)) return false;
     if (event.ctrlKey || event.metaKey || wheel === 'always') return true;
     if (wheel !== 'auto') return false;
-    // A label may have its own scrollable box.
+    // A label may contain a scrollable box, which the wheel then scrolls.
     if (event.currentTarget !== this.#surface && scrollsAround(event.target as Element, this.#host)) return false;
     return this.#host.matches(':focus-within') || !scrollsAround(this.#host);
   }
 
-  /** The right button pans, so it opens no menu except on a label with content to copy, save or follow. */
+  /**
+   * Cancels the context menu, because the right button pans. A label with content to copy, save or follow keeps its
+   * menu.
+   */
   readonly #onContextMenu = (event: Event): void => {
     if (this.#of.input.pan && !isWithin(event, labelParts.withMenu)) event.preventDefault();
   };
 
   /**
-   * Two fingers move the camera, even if one finger scrolls the page; without zoom they are left to the page, because
-   * some visitors need its zoom.
+   * Keeps two fingers for the camera, even if one finger scrolls the page. If the element does not zoom, two fingers
+   * are left to the page, because some visitors need the browser's zoom.
    */
   readonly #onTouchMove = (event: TouchEvent): void => {
     if (event.touches.length < 2 || !event.cancelable || isWithin(event, labelParts.panel)) return;
@@ -303,7 +322,7 @@ export class InputController implements ReactiveController {
     return this.#of.input.zoom ? pinchOf(from, to, height) : [];
   }
 
-  /** Passes an action on; false if the page does not allow it. */
+  /** Passes an action to the host. Returns false if the page does not allow it. */
   #perform(action: CameraAction): boolean {
     const { zoom, pan } = this.#of.input;
     if ((action.type === 'zoom' && !zoom) || (action.type === 'pan' && !pan)) return false;
@@ -312,7 +331,7 @@ export class InputController implements ReactiveController {
   }
 }
 
-/** A CSS touch-action that leaves pinches to the page, too. */
+/** Returns a CSS `touch-action` that also leaves pinches to the page. */
 const withPinch = (touchAction: string): string =>
   ['auto', 'manipulation'].includes(touchAction)
     ? touchAction

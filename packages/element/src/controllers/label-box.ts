@@ -3,28 +3,29 @@ import type { ViewerFrame } from '../camera/orbit.js';
 
 type Point = readonly [x: number, y: number, z: number];
 
-/** A point of viewer space, and its position in a frame. */
+/** A label at a point of viewer space, and its position in the last frame. */
 export interface Located {
   readonly position: Point | null;
-  /** Normal of the label's surface; null for a label that faces every camera. */
+  /** Normal of the label's surface in viewer space; null for a label that faces every camera. */
   readonly normal: Point | null;
-  /** CSS pixels from the left and the top edge of the element. */
+  /** Position in CSS pixels from the left and the top edge of the element. */
   x: number;
   y: number;
-  /** World units along the optical axis; 0 in front of the near plane, or without a position. */
+  /** Depth along the optical axis, world units; 0 for a point nearer than the near plane, and without a position. */
   depth: number;
   facesCamera: boolean;
 }
 
-/** The camera of a frame for points of viewer space: one matrix for all labels of the frame. */
+/** Projects points of viewer space with the camera of one frame. All labels of the frame share the matrix. */
 export class LabelView {
   readonly #camera: Camera;
-  /** From viewer space to the camera's axes: 3 rows of 4. */
+  /** Row-major 3x4 matrix from viewer space to camera coordinates. */
   readonly #matrix: readonly number[];
   readonly #scaleX: number;
   readonly #scaleY: number;
 
   /**
+   * @param frame Rotation from scene coordinates to viewer space.
    * @param width Width of the element, CSS pixels.
    * @param height Height of the element, CSS pixels.
    */
@@ -39,21 +40,25 @@ export class LabelView {
     this.#scaleY = height / camera.height;
   }
 
-  /** Computes the position of a label. */
+  /** Writes `x`, `y`, `depth` and `facesCamera` of a label. A label without a position gets only the depth 0. */
   locate(label: Located): void {
     const { position, normal } = label;
     label.depth = 0;
     if (position === null) return;
-    const { fx, fy, cx, cy, near } = this.#camera;
+    const { fx, fy, cx, cy, near, orthographic } = this.#camera;
     const [x, y, z] = [this.#along(0, position, 1), this.#along(4, position, 1), this.#along(8, position, 1)];
-    label.x = ((fx * x) / z + cx) * this.#scaleX;
-    label.y = ((fy * y) / z + cy) * this.#scaleY;
+    const shrink = orthographic ? 1 : z;
+    label.x = ((fx * x) / shrink + cx) * this.#scaleX;
+    label.y = ((fy * y) / shrink + cy) * this.#scaleY;
     label.depth = z > near ? z : 0;
-    label.facesCamera = normal === null || this.#toward(normal, x, y, z) < 0;
+    label.facesCamera = normal === null || this.#toward(normal, orthographic ? [0, 0, 1] : [x, y, z]) < 0;
   }
 
-  /** The eye is the origin of the camera's axes, so the vector from the eye to a point is the point itself. */
-  #toward(normal: Point, x: number, y: number, z: number): number {
+  /**
+   * Returns the dot product of a normal and the direction of the ray through a point, in camera coordinates: negative
+   * if the surface faces the camera. The eye is their origin, so a ray of perspective has the direction of its point.
+   */
+  #toward(normal: Point, [x, y, z]: Point): number {
     return this.#along(0, normal, 0) * x + this.#along(4, normal, 0) * y + this.#along(8, normal, 0) * z;
   }
 
@@ -64,8 +69,8 @@ export class LabelView {
 }
 
 /**
- * The box of a label in the element's shadow tree. It is written only for visible changes, because each write causes a
- * style recalculation.
+ * The box of a label in the element's shadow tree. The styles of the box are written only for visible changes, because
+ * each write causes a style recalculation.
  */
 export class LabelBox {
   readonly #element: HTMLElement;
@@ -78,7 +83,9 @@ export class LabelBox {
     this.#element = element;
   }
 
-  /** @param least Minimum visible distance, CSS pixels. */
+  /**
+   * Places the box at a position. Does not write styles if the box moves by less than `min` CSS pixels in x and in y.
+   */
   moveTo({ x, y }: Located, min: number): void {
     this.#isPlaced = true;
     if (Math.abs(x - this.#x) < min && Math.abs(y - this.#y) < min) return;
@@ -87,12 +94,16 @@ export class LabelBox {
     this.#element.style.transform = `translate(${x.toFixed(2)}px, ${y.toFixed(2)}px) translate(-50%, -50%)`;
   }
 
-  /** Hides the label, which is outside the frame. */
+  /** Marks the label as outside the frame; the next call of {@link show} hides its box. */
   remove(): void {
     this.#isPlaced = false;
   }
 
-  /** @param holdsPanel Whether an open panel keeps a hidden label usable. */
+  /**
+   * Writes the classes that show, fade or hide the box.
+   * @param isOpen Whether the label faces the camera and is not occluded.
+   * @param holdsPanel Whether an open panel keeps a faded label usable.
+   */
   show(isOpen: boolean, holdsPanel: boolean): void {
     const classes = `hotspot${this.#isPlaced ? ' placed' : ''}${isOpen ? '' : holdsPanel ? ' hidden with-panel' : ' hidden'}`;
     if (classes === this.#classes) return;

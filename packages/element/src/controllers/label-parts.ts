@@ -1,8 +1,8 @@
-/** Parts of a label with their own use of pointers and of the wheel. */
+/** Selectors of the parts of a label that use pointers or the wheel themselves. */
 
 /**
- * Panels that a label has opened: they lie over the page, not in the scene. An unknown selector within `:is` matches
- * nothing.
+ * Open panels of a label, which lie over the page and not in the scene. A selector within `:is` that the browser does
+ * not know matches nothing.
  */
 const panel = ':is(:popover-open, :modal, :fullscreen, dialog[open])';
 /** Elements that use a drag to select or move content. */
@@ -15,14 +15,20 @@ export const labelParts = {
   withMenu: `${dragged}, a[href], img`,
 };
 
-/** Whether an event comes from a matching node below the listener, also from a shadow tree of the page. */
+/**
+ * Returns whether an event comes from a node that matches the selector, or from inside one. Only nodes below the
+ * listener count, also those in a shadow tree of the page.
+ */
 export function isWithin(event: Event, selector: string): boolean {
   const path = event.composedPath();
   const nodes = path.slice(0, path.indexOf(event.currentTarget!));
   return nodes.some((node) => (node as Partial<Element>).matches?.(selector));
 }
 
-/** Whether anything is scrollable: a box between a node and another, or the page itself or that of a frame around it. */
+/**
+ * Returns whether the wheel can scroll something: a box between `node` and its ancestor `end`, exclusive. If `end` is
+ * null, the page itself and a page around an `<iframe>` count, too.
+ */
 export function scrollsAround(node: Element | null, end: Element | null = null): boolean {
   if (node === end) return end === null && self !== top;
   const { scrollHeight, clientHeight, ownerDocument, parentElement } = node!;

@@ -1,9 +1,9 @@
-/** Loaded when there is automatic motion. */
+/** The visitor's control of automatic motion. The module is loaded when an element has automatic motion. */
 import { css, type ReactiveController, type ReactiveControllerHost, type TemplateResult } from 'lit';
 import type { Attributes } from '../attributes.js';
 import { CORNER_STYLES, cornerButton } from '../corner-button.js';
 import { adoptStyles } from '../styles.js';
-import type { A11yStrings } from '../words.js';
+import type { A11yStrings } from '../strings.js';
 import { prefersReducedMotion } from './motion.js';
 import type { PlaybackController } from './playback-controller.js';
 
@@ -18,27 +18,27 @@ const STYLES = css`
   }
 `;
 
-/** Label and icon of the switch. */
+/** Labels of the button, and SVG paths of its icons. */
 const SIGNS = {
-  pause: ['Stop the motion', 'M6 5h4v14H6zM14 5h4v14h-4z'],
+  pause: ['Pause', 'M6 5h4v14H6zM14 5h4v14h-4z'],
   play: ['Start the motion', 'M8 5v14l11-7z'],
 } as const;
 
 export interface MotionHost {
   readonly attributes: Pick<Attributes, 'autoRotate'>;
-  /** Whether a frame is shown that could move. */
+  /** Whether the scene is shown: in the viewport, and not covered by a poster. */
   readonly isOnShow: boolean;
-  /** Player of `autoplay`; undefined for none. */
+  /** Plays and pauses all sources with `autoplay`, and an animated shader. Undefined if there are neither. */
   readonly player: Pick<PlaybackController, 'canPlay' | 'paused' | 'play' | 'pause'> | undefined;
   readonly strings: A11yStrings;
-  /** Starts the rotation at once. */
+  /** Starts the automatic rotation of the camera at once. */
   startTurning(): void;
 }
 
 /**
- * The visitor's control of automatic motion: a rotating camera, a playing scene. Moving content needs a way to stop it
- * (WCAG 2.2.2), also for visitors without a keyboard or the reduced-motion setting. Playback by scripts is left to the
- * page.
+ * The visitor's control of automatic motion, which is a rotating camera or a playing scene. WCAG 2.2.2 requires a way
+ * to stop motion, also for visitors without a keyboard or the reduced-motion setting. Playback that scripts start is
+ * left to the page.
  */
 export class MotionController implements ReactiveController {
   readonly #host: ReactiveControllerHost & HTMLElement;
@@ -58,7 +58,7 @@ export class MotionController implements ReactiveController {
   }
 
   /**
-   * Current action of the visitor's switch; `none` without automatic motion, and in a media player, which has its own
+   * Action of the visitor's button. It is `none` without automatic motion, and in a media player, which has its own
    * button.
    */
   get switch(): 'none' | 'pause' | 'play' {
@@ -67,7 +67,7 @@ export class MotionController implements ReactiveController {
     return isPlaying || (this.#canTurn && !this.#isHeld) ? 'pause' : 'play';
   }
 
-  /** The visitor's switch; undefined without automatic motion. */
+  /** Template of the visitor's button; undefined if there is nothing to switch. */
   get view(): TemplateResult | undefined {
     const action = this.switch;
     if (action === 'none') return undefined;
@@ -76,7 +76,7 @@ export class MotionController implements ReactiveController {
     return cornerButton('pause-button', strings[action] ?? word, sign, () => this.toggle(), strings);
   }
 
-  /** Stops or resumes all automatic motion for the visitor; false if there is none. */
+  /** Stops or resumes all automatic motion for the visitor. Returns false if there is no automatic motion. */
   toggle(): boolean {
     const action = this.switch;
     if (action === 'none') return false;
@@ -87,7 +87,7 @@ export class MotionController implements ReactiveController {
     return true;
   }
 
-  /** Removing and setting the attributes again overrides the visitor's choice. */
+  /** Forgets the visitor's choice when the page removes the attributes of automatic motion. */
   hostUpdated(): void {
     if (!this.#of.attributes.autoRotate && !this.#of.player) this.#isHeld = false;
   }
@@ -96,7 +96,7 @@ export class MotionController implements ReactiveController {
     return this.#of.attributes.autoRotate && !prefersReducedMotion();
   }
 
-  /** Also with reduced motion, because the visitor may want to play it. */
+  /** Whether the scene can be played; also with reduced motion, because the visitor may want to play it. */
   get #canPlay(): boolean {
     return this.#of.player?.canPlay ?? false;
   }

@@ -1,4 +1,4 @@
-/** An automatic motion of the camera, frame by frame. */
+/** An automatic motion of the camera that advances in each frame. */
 export interface Mover {
   /**
    * Advances to the time of a frame.
@@ -8,12 +8,15 @@ export interface Mover {
   advance(now: number): boolean;
 }
 
-/** Longest step of such a motion, ms: after a pause it continues from its last state. */
+/** Longest step of an automatic motion, ms. After a pause the motion therefore continues near its last state. */
 export const MAX_MOVER_STEP_MS = 100;
 
 /** Whether the visitor's system requests reduced motion. */
 export const prefersReducedMotion = (): boolean => reducedMotion().matches;
 
-/** The media query of reduced motion, for listeners; documents of unit tests (jsdom) do not support it. */
+/**
+ * Returns the media query of reduced motion, to which listeners can be added. Documents of unit tests (jsdom) do not
+ * support media queries: there the result never changes.
+ */
 export const reducedMotion = (): MediaQueryList =>
   globalThis.matchMedia?.('(prefers-reduced-motion: reduce)') ?? new EventTarget();

@@ -1,6 +1,6 @@
 import type { Attributes } from '../attributes.js';
 
-/** Events of a playback: names of HTMLMediaElement's events. */
+/** Names of the events of a playback, as those of HTMLMediaElement. */
 export type PlaybackEvent =
   | 'play'
   | 'playing'
@@ -19,21 +19,27 @@ export type PlaybackEvent =
   | 'emptied';
 
 export interface PlaybackHost {
-  /** `time`: initial position of a scene in seconds. */
+  /** `loop`: whether a scene restarts at its end. `time`: start position of a scene in seconds, as a string. */
   readonly attributes: Pick<Attributes, 'loop' | 'time'>;
-  /** Requests a frame: while it plays, or after a seek. */
+  /** Called to request a frame while the scene plays, and after a seek. */
   requestFrame(): void;
   playbackEvent(type: PlaybackEvent): void;
 }
 
-/** Interval of timeupdate events during playback, ms: as in browsers for video. */
+/** Minimum interval between `timeupdate` events during playback, ms, as in browsers for video. */
 const UPDATE_INTERVAL_MS = 250;
 
-/** The clock of an animated scene, with the interface and events of HTMLMediaElement. It is read once in each frame. */
+/**
+ * The clock of an animated scene, with the interface and events of HTMLMediaElement. The view reads the clock once in
+ * each frame.
+ */
 export class PlaybackController {
   readonly #host: PlaybackHost;
   #time = 0;
-  /** Start position of the next scene, if set: HTML's default playback start position. */
+  /**
+   * Start position of the next scene in seconds, as HTML's default playback start position; undefined if no script has
+   * set it.
+   */
   #nextStart: number | undefined;
   #duration = NaN;
   #rate = 1;
@@ -42,9 +48,9 @@ export class PlaybackController {
   #seekTarget: number | undefined;
   #lastTick: number | undefined;
   #lastUpdate = -Infinity;
-  /** Whether the frame at the current time was missing. */
+  /** Whether the clock waits, because the frame at the current time is not loaded. */
   #isWaiting = false;
-  /** Functions that reject pending calls of play. */
+  /** Functions that reject the promises of pending calls of `play`. */
   readonly #waits = new Set<(reason: DOMException) => void>();
   #pauses = 0;
 
@@ -52,28 +58,34 @@ export class PlaybackController {
     this.#host = host;
   }
 
-  /** Seconds; NaN without an animated scene, Infinity for one without an end. */
+  /** Duration in seconds; NaN without an animated scene, Infinity for a scene without an end. */
   get duration(): number {
     return this.#duration;
   }
 
-  /** Whether there is an animated scene. */
+  /** Whether there is an animated scene that can be played. */
   get canPlay(): boolean {
     return !Number.isNaN(this.#duration);
   }
 
-  /** Current position; without an animated scene, the start position of the next one. */
+  /** Current position in seconds; without an animated scene, the start position of the next one. */
   get currentTime(): number {
     return this.canPlay && this.#nextStart === undefined ? this.#time : this.nextStart;
   }
 
-  /** Start position of the next scene. */
+  /**
+   * Start position of the next scene in seconds: the last one that a script has set, otherwise the attribute `time`,
+   * otherwise 0.
+   */
   get nextStart(): number {
     const seconds = Number(this.#host.attributes.time);
     return this.#nextStart ?? (Number.isFinite(seconds) ? Math.max(0, seconds) : 0);
   }
 
-  /** Seeks: events follow once the frame at that time is shown. Without a scene this sets the start position. */
+  /**
+   * Seeks to a time in seconds; `seeked` is fired when the frame at that time is shown. Without an animated scene, this
+   * sets the start position of the next one. Throws TypeError if the time is not finite.
+   */
   set currentTime(seconds: number) {
     if (!this.canPlay) {
       this.startNextAt(seconds);
@@ -88,18 +100,21 @@ export class PlaybackController {
     this.#host.requestFrame();
   }
 
-  /** Sets the start position of the next animated scene. If the current scene is kept, {@link keepScene} seeks it. */
+  /**
+   * Sets the start position of the next animated scene, in seconds. If the current scene is kept, {@link keepScene}
+   * seeks it. Throws TypeError if the position is not finite.
+   */
   startNextAt(seconds: number): void {
     requireFinite(seconds);
     this.#nextStart = Math.max(0, seconds);
   }
 
-  /** Call if the current scene is kept after all. */
+  /** Call if the current scene is kept although a start position was set: seeks the current scene to that position. */
   keepScene(): void {
     if (this.canPlay && this.#nextStart !== undefined) this.currentTime = this.#nextStart;
   }
 
-  /** Whether it restarts at its end. */
+  /** Whether the scene restarts at its end. */
   get loops(): boolean {
     return this.#host.attributes.loop;
   }
@@ -123,7 +138,7 @@ export class PlaybackController {
   set playbackRate(rate: number) {
     requireFinite(rate, 'playbackRate');
     if (rate === this.#rate) return;
-    // There were no ticks while it was stopped.
+    // At rate 0 no frames are requested, so the time since the last tick must not count.
     if (this.#rate === 0) this.suspend();
     this.#rate = rate;
     this.#host.playbackEvent('ratechange');
@@ -134,7 +149,7 @@ export class PlaybackController {
     if (!this.#isPaused) return;
     this.#isPaused = false;
     const isReverse = this.#rate < 0;
-    // Continues from the other end, as browsers do for video.
+    // At its end, playback starts again from the other end, as browsers do for video.
     if (this.#hasEnded || (!this.loops && this.#time === (isReverse ? 0 : this.#duration)))
       this.currentTime = isReverse && Number.isFinite(this.#duration) ? this.#duration : 0;
     this.#host.playbackEvent('play');
@@ -142,12 +157,15 @@ export class PlaybackController {
     this.#host.requestFrame();
   }
 
-  /** Number of calls of {@link pause}. */
+  /** Number of calls of {@link pause} until now. */
   get pauses(): number {
     return this.#pauses;
   }
 
-  /** Waits for a scene to play. Rejects with an `AbortError` when the wait is canceled: see {@link stopWaits}. */
+  /**
+   * Returns a promise that resolves with `ready`, when a scene can be played. Rejects with an `AbortError` if {@link
+   * stopWaits} is called first.
+   */
   waitFor(ready: Promise<void>): Promise<void> {
     return new Promise((resolve, reject) => {
       this.#waits.add(reject);
@@ -155,7 +173,7 @@ export class PlaybackController {
     });
   }
 
-  /** Cancels all pending calls of play. */
+  /** Rejects the promises of all pending calls of `play`. */
   stopWaits(): void {
     for (const reject of this.#waits) reject(notPlayed());
   }
@@ -169,11 +187,15 @@ export class PlaybackController {
   #rest(): void {
     if (this.#isPaused) return;
     this.#isPaused = true;
+    this.#isWaiting = false;
     this.#host.playbackEvent('timeupdate');
     this.#host.playbackEvent('pause');
   }
 
-  /** Call when the scene is loaded, or loaded again; NaN: it is not animated. */
+  /**
+   * Sets the duration of the scene in seconds; NaN if it is not animated. Call when the scene is loaded, or loaded
+   * again.
+   */
   setDuration(seconds: number): void {
     if (Object.is(seconds, this.#duration)) return;
     if (!Number.isNaN(seconds)) {
@@ -182,28 +204,34 @@ export class PlaybackController {
     }
     this.#duration = seconds;
     this.#host.playbackEvent('durationchange');
-    this.#host.playbackEvent('loadedmetadata');
+    if (this.canPlay) this.#host.playbackEvent('loadedmetadata');
     this.#host.requestFrame();
   }
 
   /**
-   * Advances to the time of a frame.
+   * Advances the clock to the time of a frame.
    * @param now requestAnimationFrame's clock, ms.
-   * @param until Time of the next frame that is not loaded, s: the clock stops there and waits for it.
+   * @param until Time of the next frame that is not loaded, s. The clock stops there until that frame is loaded.
    */
   tick(now: number, until = Infinity): void {
     if (this.#isPaused || Number.isNaN(this.#duration)) return;
-    if (until <= this.#time) {
+    const time = this.#time;
+    if (until <= time) {
       if (!this.#isWaiting) this.#host.playbackEvent('waiting');
       this.#isWaiting = true;
       return this.suspend();
     }
     if (this.#isWaiting) this.#host.playbackEvent('canplay');
     this.#isWaiting = false;
-    if (this.#lastTick === undefined) this.#host.playbackEvent('playing');
-    const elapsed = this.#lastTick === undefined ? 0 : (now - this.#lastTick) / 1000;
+    const last = this.#lastTick;
+    if (last === undefined) this.#host.playbackEvent('playing');
+    const seconds = last === undefined ? 0 : ((now - last) / 1000) * this.#rate;
     this.#lastTick = now;
-    this.#advance(Math.min(elapsed * this.#rate, until - this.#time));
+    // During playback a seek ends as soon as the clock advances.
+    if (seconds !== 0) this.frameShown(this.#seekTarget);
+    // Listeners of these events may have paused, or sought another time.
+    if (this.#isPaused || this.#time !== time) return;
+    this.#advance(Math.min(seconds, until - time));
     if (this.#isPaused) return;
     if (now - this.#lastUpdate >= UPDATE_INTERVAL_MS) {
       this.#lastUpdate = now;
@@ -212,12 +240,12 @@ export class PlaybackController {
     if (this.#rate !== 0) this.#host.requestFrame();
   }
 
-  /** Time does not advance while nothing is drawn, until the next tick. */
+  /** Stops the clock until the next tick. Call while nothing is drawn, so that this time does not count. */
   suspend(): void {
     this.#lastTick = undefined;
   }
 
-  /** Call when the scene is removed, or another was requested, whose time starts again. */
+  /** Resets the clock. Call when the scene is removed, or another scene is requested. */
   empty(): void {
     const couldPlay = this.canPlay;
     this.#duration = NaN;
@@ -228,9 +256,9 @@ export class PlaybackController {
     if (couldPlay) this.#host.playbackEvent('durationchange');
   }
 
-  /** Call when the frame at a time is shown. */
-  frameShown(seconds: number): void {
-    if (this.#seekTarget === undefined || seconds !== this.#seekTarget) return;
+  /** Call when the frame at a time, in seconds, is shown. Ends the seek to that time; undefined has no effect. */
+  frameShown(seconds: number | undefined): void {
+    if (seconds === undefined || seconds !== this.#seekTarget) return;
     this.#seekTarget = undefined;
     this.#host.playbackEvent('timeupdate');
     this.#host.playbackEvent('seeked');
@@ -238,8 +266,6 @@ export class PlaybackController {
 
   #advance(seconds: number): void {
     const next = this.#time + seconds;
-    // During playback a seek ends as soon as the clock has advanced.
-    if (this.#seekTarget !== undefined && seconds !== 0) this.frameShown(this.#seekTarget);
     const isWithin = this.#rate < 0 ? next > 0 && next <= this.#duration : next >= 0 && next < this.#duration;
     if (isWithin) {
       this.#time = next;
@@ -263,6 +289,6 @@ function requireFinite(value: number, name = 'currentTime'): void {
   if (!Number.isFinite(value)) throw new TypeError(`${name} expects a finite number, found ${value}`);
 }
 
-/** Error of a canceled play(). */
+/** Returns the `AbortError` with which a canceled `play()` rejects. */
 export const notPlayed = (): DOMException =>
   new DOMException('play() was taken back by pause() or another src', 'AbortError');

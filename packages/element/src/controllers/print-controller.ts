@@ -1,11 +1,13 @@
 import type { ReactiveController, ReactiveControllerHost } from 'lit';
 
-/** Shows a copy of the frame over the canvas while the page is printed, because browsers omit WebGPU canvases. */
+/**
+ * Shows a copy of the frame over the canvas while the page is printed, because browsers do not print WebGPU canvases.
+ */
 export class PrintController implements ReactiveController {
   readonly #draw: () => HTMLCanvasElement | null;
   #copy: HTMLCanvasElement | undefined;
 
-  /** @param draw Draws a frame synchronously and returns its canvas, null if there is nothing to draw. */
+  /** @param draw Draws a frame synchronously and returns its canvas; null if there is nothing to draw. */
   constructor(host: ReactiveControllerHost, draw: () => HTMLCanvasElement | null) {
     this.#draw = draw;
     host.addController(this);
@@ -26,10 +28,10 @@ export class PrintController implements ReactiveController {
     this.#take();
     const drawn = this.#draw();
     if (drawn === null) return;
-    // Has the same part name, so that the page's styles of the canvas apply to its copy.
+    // The copy has the same part name, so that the page's styles of the canvas apply to it.
     const copy = drawn.cloneNode() as HTMLCanvasElement;
     copy.getContext('2d')?.drawImage(drawn, 0, 0);
-    // Paper differs in width from the window.
+    // The width of the paper differs from that of the window, so the copy is fitted.
     Object.assign(copy.style, { position: 'absolute', inset: '0', objectFit: 'contain' });
     drawn.after(copy);
     this.#copy = copy;

@@ -15,19 +15,22 @@ export interface PromptHost {
 
 /** Amplitude of the swing, radians. */
 const WIGGLE_ANGLE = Math.PI / 18;
-/** Two full swings; then the prompt is still. Less than 5 s, so that no control to stop it is required. */
+/**
+ * Duration of the two full swings, ms; then the camera is still. WCAG 2.2.2 requires a control to stop motion only from
+ * 5 s.
+ */
 const WIGGLE_MS = 4_500;
-/** Time after which it counts as seen. */
+/** Time after which the prompt counts as seen and is hidden, ms. */
 const SHOWN_MS = 5_000;
 
-/** Rotation of the camera at a time of the swing, radians: 0 at its start and its end. */
+/** Returns the rotation of the camera at a time of the swing, radians; 0 at its start, at its end and outside. */
 export function wiggleAt(elapsedMs: number): number {
   if (elapsedMs <= 0 || elapsedMs >= WIGGLE_MS) return 0;
   const share = elapsedMs / WIGGLE_MS;
   return WIGGLE_ANGLE * Math.sin(4 * Math.PI * share) * Math.sin(Math.PI * share);
 }
 
-/** Shows visitors who have not touched the scene that they can move it. */
+/** Shows a prompt to visitors who have not moved the camera yet: that they can move it. */
 export class PromptController implements ReactiveController, Mover {
   readonly #host: ReactiveControllerHost;
   readonly #of: PromptHost;
@@ -56,12 +59,14 @@ export class PromptController implements ReactiveController, Mover {
     if (this.#state !== 'done') this.#set('idle');
   }
 
-  /** Call when a visitor has moved the camera, or has seen the prompt long enough. */
+  /**
+   * Hides the prompt until {@link reset}. Call when a visitor has moved the camera, or has seen the prompt long enough.
+   */
   dismiss(): void {
     if (this.#state !== 'done') this.#set('done');
   }
 
-  /** Resets to the state before any interaction. */
+  /** Returns to the initial state: the prompt is shown again after the threshold. */
   reset(): void {
     this.#set('idle');
   }

@@ -3,16 +3,22 @@ import type { Attributes } from '../attributes.js';
 
 export interface RevealHost {
   readonly attributes: Pick<Attributes, 'reveal'>;
-  /** Whether there is a frame to reveal. */
+  /** Whether a frame has been drawn that the element can show. */
   readonly hasImage: boolean;
   posterDismissed(): void;
 }
 
-/** Whether the poster covers the scene: until the scene is shown, or until the page or a visitor dismisses it. */
+/**
+ * Decides whether the poster covers the scene. It does so until the scene is shown, or until the page or a visitor
+ * dismisses the poster.
+ */
 export class RevealController {
   readonly #host: ReactiveControllerHost;
   readonly #of: RevealHost;
-  /** Choice by a method or a click; until then the attribute decides. */
+  /**
+   * Choice of the page by a method, or of the visitor by a click. While it is undefined, the attribute `reveal`
+   * decides.
+   */
   #requested: 'dismissed' | 'shown' | undefined;
   #wasCovered = true;
 
@@ -21,7 +27,7 @@ export class RevealController {
     this.#of = of;
   }
 
-  /** Whether the scene may be shown, so that a lazy one may be loaded. */
+  /** Whether the scene may be shown. Only then may a lazy scene be loaded. */
   get mayReveal(): boolean {
     return this.#requested === undefined ? this.#of.attributes.reveal === 'auto' : this.#requested === 'dismissed';
   }
@@ -41,7 +47,10 @@ export class RevealController {
     this.#host.requestUpdate();
   }
 
-  /** Fires the event of a dismissed poster. Called after every update. */
+  /**
+   * Calls the host's `posterDismissed` if the poster has uncovered the scene since the last call. Call after every
+   * update.
+   */
   settle(): void {
     const isCovered = this.isCovered;
     const isGone = this.#wasCovered && !isCovered;

@@ -11,33 +11,39 @@ import { isSameContract } from '../loading/same-contract.js';
 import type { Services } from '../element-host.js';
 import { timerMs } from '../attributes.js';
 
-/** `waiting`: there is a scene to load, but the element has not entered the viewport yet. */
+/**
+ * State of the requested scene. `empty`: no scene is requested. `waiting`: loading may not start yet, for example
+ * because the element has not entered the viewport.
+ */
 export type SceneState = 'empty' | 'waiting' | 'loading' | 'ready' | 'failed';
 
-/** How a scene is shown: as a `new` one, replacing its preview (`whole`), or `again` after a lost device. */
+/**
+ * Reason for which a scene is shown: it is `new`, it replaces its preview (`whole`), or it is loaded `again`, for
+ * example after the device was lost.
+ */
 export type Entrance = 'new' | 'whole' | 'again';
 
-/** Interface of the element for the controller. */
+/** Interface of the element for the controller of its scene. */
 export interface SceneHost {
   readonly services: Services;
   /** Whether a preview would be visible while a scene loads. */
   readonly wantsPreviews: boolean;
-  /** Upper limit of the scene's GPU memory in bytes. */
+  /** Maximum GPU memory of the scene, in bytes; undefined if only the device limits it. */
   readonly memoryBudget: number | undefined;
-  /** Additional data of a request for a generator. */
+  /** Parameters for opening a generator that the element provides, not the request: see {@link OpenOptions.live}. */
   readonly dynamicRequest: ReturnType<OpenOptions['live']>;
-  /** Opens sources other than scenes of splats. */
+  /** Opens sources; default: {@link openGaussians}. A replacement can open sources other than scenes of splats. */
   readonly open?: typeof openGaussians;
-  /** Shows a scene; resolves once its first frame is drawn. */
+  /** Shows a scene. Resolves when its first frame is drawn. */
   show(scene: LoadedGaussians, entrance: Entrance): Promise<void>;
-  /** Called before the current scene is destroyed; `clear` also removes its frame. */
+  /** Called before the current scene is destroyed. If `clear` is true, its last frame must disappear, too. */
   hide(clear: boolean): void;
-  /** Called when a preview of the scene is shown. */
+  /** Called when the first frame of a preview is drawn. */
   previewShown(preview: LoadedGaussians): void;
   loadStarted(): void;
   progressed(...progress: Parameters<ProgressListener>): void;
   loaded(url: string): void;
-  /** Called when there is no scene any more, or another replaces it. */
+  /** Called when the scene is removed, has failed, or is to be replaced by another. */
   emptied(): void;
   failed(error: ElementError): void;
   contextChanged(event: 'contextlost' | 'contextrestored'): void;
@@ -45,7 +51,7 @@ export interface SceneHost {
 
 type DeviceBack = (typeof comeBack)['waitForDevice'];
 
-/** The state when no more devices are requested. */
+/** Why an attempt to open a scene has ended without a device. */
 interface GivenUp {
   readonly signal: AbortSignal;
   readonly error: unknown;
@@ -53,23 +59,27 @@ interface GivenUp {
   readonly mayReturn: boolean;
 }
 
-/** Number of consecutive failed recoveries after which the loss is final. */
+/** Number of failed attempts after which no more devices are requested for a scene. */
 const MAX_FAILURES = 2;
-/** Pause before the second try, ms, because a crashed GPU process needs time to restart. */
+/** Delay of the second attempt, ms, because a crashed GPU process needs time to restart. */
 const RETRY_DELAY_MS = 1_000;
 
 /**
- * A preview stays during the upload of the whole scene if that is larger by this factor, because both take memory then.
+ * Minimum ratio of the GPU memory of the complete scene to that of its preview for keeping the preview during the
+ * upload, because both take memory then.
  */
 const MIN_GROWTH = 4;
 
-/** Growth of the number of submissions of a frame after each loss, and its maximum: the image does not change. */
+/**
+ * Factor by which the number of submissions of a frame grows after each loss of the device, and the maximum number. It
+ * does not affect the image.
+ */
 const SUBMISSIONS_GROWTH = 4;
 const MAX_SUBMISSIONS = 64;
 
 /**
- * Life cycle of the element's scene: load, replace (the latest request wins), recover after the loss of the device,
- * release. Work for an older request finds its signal aborted and has no effect.
+ * Controls the life cycle of the element's scene: loads it, replaces it (the latest request wins), recovers after the
+ * loss of the device, and releases it. Work for an older request finds its signal aborted and has no effect.
  */
 export class SceneController implements ReactiveController {
   readonly #host: ReactiveControllerHost;
@@ -78,19 +88,24 @@ export class SceneController implements ReactiveController {
   #error: ElementError | null = null;
   #scene: LoadedGaussians | null = null;
   #isPreview = false;
-  /** Request of the current scene. */
+  /** Request for which the current scene was loaded. */
   #shownRequest: SceneRequest | null = null;
   #request: SceneRequest | null = null;
   readonly #running = new LatestTask();
   #releaseTimer: ReturnType<typeof setTimeout> | undefined;
   #waiters: (() => void)[] = [];
-  /** Undefined until it has been in the viewport. */
+  /** Whether the scene is outside the viewport; undefined until it has been in the viewport. */
   #isUnseen: boolean | undefined;
-  /** Whether it was released off-screen, and is to be reloaded. */
+  /** Whether the scene was released off-screen, and must be reloaded when it is visible. */
   #isAway = false;
-  /** Whether a reported loss is still unresolved; another scene may resolve it. */
+  /** Resolves when the last load by {@link present} has ended; undefined before the first. */
+  #presented: Promise<void> | undefined;
+  /** Whether `contextlost` was reported without `contextrestored`. Another scene may end this state. */
   #isContextLost = false;
-  /** Grows with every loss of the device, because a frame that ran too long for the driver may have been the cause. */
+  /**
+   * Number of submissions of a frame. It grows with each loss of the device, because a submission that ran too long for
+   * the driver may have been the cause.
+   */
   #submissions = 1;
 
   constructor(host: ReactiveControllerHost, of: SceneHost) {
@@ -107,17 +122,17 @@ export class SceneController implements ReactiveController {
     return this.#error;
   }
 
-  /** Absolute address of the last request; empty for none. */
+  /** Absolute address of the last request; empty without one. */
   get url(): string {
     return this.#request?.url ?? '';
   }
 
-  /** The request of the current scene; null without one. */
+  /** The request of the current scene; null without a scene, and for a preview. */
   get shownRequest(): SceneRequest | null {
     return this.#scene && !this.isPreview ? this.#shownRequest : null;
   }
 
-  /** The current scene. */
+  /** The current scene, which may be a preview or a scene that will be replaced; null without one. */
   get scene(): LoadedGaussians | null {
     return this.#scene;
   }
@@ -127,25 +142,28 @@ export class SceneController implements ReactiveController {
     return this.#isPreview && this.#scene !== null;
   }
 
-  /** Whether another scene will replace the current one. */
+  /** Whether a newer request will replace the current scene. */
   get isOutgoing(): boolean {
     return this.#shownRequest !== this.#request;
   }
 
-  /** Resolves, and never rejects, once nothing is pending: shown, failed or abandoned. */
+  /**
+   * Resolves when the requested scene is shown, has failed or was abandoned, at once if nothing is pending. Never
+   * rejects.
+   */
   get settled(): Promise<void> {
     if (this.#state !== 'waiting' && this.#state !== 'loading') return Promise.resolve();
     return new Promise((resolve) => this.#waiters.push(resolve));
   }
 
-  /** Whether a request, null for none, is for another scene than the last one. */
+  /** Returns whether a request, null for no scene, is for another scene than the last request. */
   isOther(request: SceneRequest | null): boolean {
     return request === null ? this.#request !== null : !isSame(request, this.#request);
   }
 
   /**
-   * Sets the scene to show, or null for none. May be called at any rate: only changes have an effect.
-   * @param mayStart False while a lazy element is off-screen.
+   * Sets the scene to show; null for none. May be called at any rate: only changes have an effect.
+   * @param mayStart Whether loading may start; false while a lazy element is off-screen.
    */
   want(request: SceneRequest | null, mayStart: boolean): void {
     if (request === null) return this.#state === 'empty' ? undefined : this.#clear();
@@ -167,8 +185,8 @@ export class SceneController implements ReactiveController {
   }
 
   /**
-   * Reports whether the scene is in the viewport. One that has left it may be released; it is reloaded in the viewport
-   * without events.
+   * Call when the scene enters or leaves the viewport. A scene that has left the viewport may be released to free
+   * memory. It is reloaded without events when it enters the viewport again.
    */
   see(isSeen: boolean): void {
     if (!isSeen && this.#isUnseen === undefined) return;
@@ -177,16 +195,16 @@ export class SceneController implements ReactiveController {
     this.#setReleasable(false);
   }
 
-  /** Loads the scene again if it was released out of view. */
+  /** Loads the scene again if it was released off-screen. Resolves when the scene is shown or has failed. */
   async present(): Promise<void> {
-    if (!this.#isAway) return;
+    if (this.#isAway) this.#presented = this.#attempt(this.#request!, this.#running.renew(), false, () => undefined);
     this.#isAway = false;
-    await this.#attempt(this.#request!, this.#running.renew(), false, () => undefined);
+    await this.#presented;
   }
 
   /**
-   * Stops with an error: the scene cannot be drawn.
-   * @param clear False keeps the last frame.
+   * Stops with an error, because the scene cannot be loaded or drawn.
+   * @param clear Whether the last frame is removed.
    */
   fail(error: unknown, clear = true): void {
     this.#running.renew();
@@ -230,8 +248,8 @@ export class SceneController implements ReactiveController {
   }
 
   /**
-   * Reloads the same scene with the requested color precision. The current one stays until it is loaded, or if that
-   * fails.
+   * Reloads the same scene with the requested precision of its color coefficients. The current scene stays until the
+   * new one is loaded, and if loading fails.
    */
   async #refine(): Promise<void> {
     const [request, scene] = [this.#request, this.#scene];
@@ -247,7 +265,7 @@ export class SceneController implements ReactiveController {
     }
   }
 
-  /** Reloads the scene after its device was lost, with only a pair of events. */
+  /** Reloads the scene after its device was lost. The only events are `contextlost` and `contextrestored`. */
   async #restore(request: SceneRequest, loss: GPUDeviceLostInfo): Promise<void> {
     const signal = this.#running.renew();
     this.#submissions = Math.min(MAX_SUBMISSIONS, SUBMISSIONS_GROWTH * this.#submissions);
@@ -262,8 +280,8 @@ export class SceneController implements ReactiveController {
   }
 
   /**
-   * No device is available, or none lasts. The scene is loaded again once there is one, if allowed and nothing else was
-   * requested.
+   * Fails because no device is available, or none lasts. If `mayReturn` is true and nothing else is requested, the
+   * scene is loaded again when a device is available.
    */
   async #giveUp(request: SceneRequest, { signal: given, error, loss, mayReturn }: GivenUp): Promise<void> {
     try {
@@ -292,7 +310,10 @@ export class SceneController implements ReactiveController {
     this.#of.contextChanged('contextrestored');
   }
 
-  /** Opens and shows a scene, again if the device is lost meanwhile. Afterwards there is a scene, or an error. */
+  /**
+   * Opens and shows a scene; tries again if the device is lost before it is shown. Afterwards there is a scene or an
+   * error, unless the signal is aborted.
+   */
   async #attempt(
     request: SceneRequest,
     signal: AbortSignal,
@@ -310,8 +331,8 @@ export class SceneController implements ReactiveController {
         this.#submissions = Math.min(MAX_SUBMISSIONS, SUBMISSIONS_GROWTH * this.#submissions);
         this.#drop(false);
         if (++failures >= MAX_FAILURES) {
-          // A scene that has been shown is loaded once more, some seconds later; as a new one it then gets no other
-          // chance.
+          // A scene that has been shown before is loaded once more, some seconds later. That load counts as new, so it
+          // is not repeated.
           return this.#giveUp(request, { signal, error, loss, mayReturn: !isNew });
         }
         await delay(RETRY_DELAY_MS);
@@ -326,7 +347,7 @@ export class SceneController implements ReactiveController {
     const beforeUpload = (byteLength: number): void => {
       if (signal.aborted) return;
       const isSmall = this.isPreview && byteLength >= MIN_GROWTH * (this.#scene?.gaussians.byteLength ?? 0);
-      // A small preview stays meanwhile.
+      // A small preview stays until the complete scene replaces it.
       if (!isSmall) this.#drop(false);
     };
     this.#setReleasable(true);
@@ -347,9 +368,9 @@ export class SceneController implements ReactiveController {
     this.#host.requestUpdate();
     void scene.lost.then((loss) => {
       if (this.#scene !== scene) return;
-      // The scene that replaces it recovers on its own.
+      // If another scene will replace this one, the load of that scene recovers on its own.
       if (this.isOutgoing) this.#drop(false);
-      // A recovered scene uses the same backend as before.
+      // The recovered scene uses the same renderer as before.
       else void this.#restore({ ...(this.#request ?? request), renderer: scene.renderer }, loss);
     });
   }
@@ -359,13 +380,13 @@ export class SceneController implements ReactiveController {
     this.#replace(preview, true);
     void this.#of.show(preview, entrance).then(
       () => this.#scene === preview && this.#of.previewShown(preview),
-      // The whole scene will report the error.
+      // The load of the complete scene will report the error.
       () => undefined,
     );
     this.#host.requestUpdate();
   }
 
-  /** Replaces the current scene, whose frame stays until the first of the new one. */
+  /** Replaces the current scene. Its last frame stays until the first frame of the new scene. */
   #replace(scene: LoadedGaussians, isPreview: boolean): void {
     this.#drop(false);
     this.#scene = scene;
@@ -386,13 +407,13 @@ export class SceneController implements ReactiveController {
   }
 
   /**
-   * Whether the current scene may be released if others need its memory: the element is gone, or another scene is to
-   * replace it.
+   * Sets whether the current scene may be released if other scenes need its memory. This is always allowed while the
+   * element is removed, and while a scene without a generator is off-screen.
    */
   #setReleasable(isReleasable: boolean): void {
     if (this.#scene === null) return;
     const { releasable } = this.#scene.place.memory;
-    // The state of a generator cannot be restored.
+    // A generator is not released, because its state cannot be restored.
     const isUnseen = this.#isUnseen && this.#state === 'ready' && !this.#scene.live;
     if (isReleasable || this.#releaseTimer || isUnseen)
       releasable.set(this.#giveBack, isUnseen ? this.#scene.gaussians.byteLength : 0);

@@ -1,21 +1,24 @@
 import type { ReactiveController, ReactiveControllerHost } from 'lit';
 
 /**
- * The window of a node: that of its document, which may be an `<iframe>`'s or a popup's. Falls back to the page's own.
+ * Returns the window of a node's document, which may be an `<iframe>` or a popup. Falls back to the page's own window.
  */
 export const windowOf = ({ ownerDocument }: Node): Window & typeof globalThis =>
   (ownerDocument?.defaultView as (Window & typeof globalThis) | null | undefined) ?? window;
 
-/** Dense displays have 4, and zooming multiplies it by at most 5. */
+/**
+ * Maximum plausible number of device pixels per CSS pixel: dense displays have 4, and the browser's zoom multiplies
+ * them by at most 5.
+ */
 const MAX_RATIO = 20;
 
-/** A size in whole device pixels. */
+/** A size in device pixels, integers. */
 export interface PixelSize {
   readonly width: number;
   readonly height: number;
 }
 
-/** Tracks the device pixels of the frame, through resizes, zoom and moves between screens. */
+/** Tracks the size of the frame in device pixels, through resizes, zoom and moves between screens. */
 export class SizeController implements ReactiveController {
   readonly #canvasOf: () => HTMLCanvasElement | null;
   readonly #onChange: () => void;
@@ -24,7 +27,10 @@ export class SizeController implements ReactiveController {
   #resolution: MediaQueryList | undefined;
   #deviceSize: PixelSize | undefined;
 
-  /** @param canvasOf Returns the canvas, once it is rendered. */
+  /**
+   * @param canvasOf Returns the canvas; null until it is rendered.
+   * @param onChange Called when the size has changed.
+   */
   constructor(host: ReactiveControllerHost, canvasOf: () => HTMLCanvasElement | null, onChange: () => void) {
     this.#canvasOf = canvasOf;
     this.#onChange = onChange;
@@ -32,8 +38,8 @@ export class SizeController implements ReactiveController {
   }
 
   /**
-   * Size to draw at; null while there is no pixel to draw, or the size is unknown.
-   * @param maxPixelRatio Upper limit of device pixels per CSS pixel.
+   * Returns the size of frames in pixels; null while there is no pixel to draw, or the size is unknown.
+   * @param maxPixelRatio Maximum number of drawn pixels per CSS pixel.
    * @param maxSide Longest side of the device's textures, in pixels.
    */
   pixelSize(maxPixelRatio: number, maxSide: number): PixelSize | null {
@@ -43,13 +49,13 @@ export class SizeController implements ReactiveController {
     return { width: Math.max(1, Math.round(width * shrink)), height: Math.max(1, Math.round(height * shrink)) };
   }
 
-  /** Width / height; 1 if unknown. */
+  /** Width of the frame divided by its height; 1 if they are unknown. */
   get aspect(): number {
     const { width, height } = this.#deviceSize ?? { width: 0, height: 0 };
     return width > 0 && height > 0 ? width / height : 1;
   }
 
-  /** Whether there is certainly no pixel to draw, as with `display: none`. */
+  /** Whether the canvas certainly has no pixel, as with `display: none`; false if it is not rendered yet. */
   get isEmpty(): boolean {
     if (this.#canvas === null) return false;
     const { width, height } = this.#deviceSize ?? {
@@ -59,7 +65,10 @@ export class SizeController implements ReactiveController {
     return width === 0 || height === 0;
   }
 
-  /** Device pixels per CSS pixel; scripts of the page may have replaced it by any value. */
+  /**
+   * Device pixels per CSS pixel, 0..`MAX_RATIO`; 1 if a script of the page has replaced `devicePixelRatio` by an
+   * invalid value.
+   */
   get #pixelRatio(): number {
     const ratio = this.#canvas ? windowOf(this.#canvas).devicePixelRatio : devicePixelRatio;
     return ratio > 0 ? Math.min(ratio, MAX_RATIO) : 1;
@@ -82,7 +91,7 @@ export class SizeController implements ReactiveController {
 
   #observe(): void {
     const canvas = this.#canvasOf();
-    // The canvas may have been replaced.
+    // A canvas that replaces another must be observed again.
     if (canvas !== this.#canvas) this.hostDisconnected();
     this.#canvas = canvas;
     if (this.#canvas === null || this.#observer !== undefined) return;
@@ -90,10 +99,11 @@ export class SizeController implements ReactiveController {
     if (!ResizeObserver) return this.#setFromCss(this.#canvas.clientWidth, this.#canvas.clientHeight);
     this.#observer = new ResizeObserver((entries) => this.#update(entries[entries.length - 1]));
     try {
-      // Exact device pixels, even if the element's edges lie between them.
+      // This box reports exact device pixels, even if the edges of the element lie between pixels.
       this.#observer.observe(this.#canvas, { box: 'device-pixel-content-box' });
     } catch {
-      // Safari does not support device-pixel boxes: it gets CSS pixels, and a listener for changes of the ratio.
+      // Safari does not support device-pixel boxes. There the size is computed from CSS pixels, and again when the
+      // pixel ratio changes.
       this.#observer.observe(this.#canvas);
       this.#watchResolution();
     }

@@ -9,30 +9,33 @@ import type { CameraController } from './camera-controller.js';
 import type * as dynamicQuality from './dynamic-quality-controller.js';
 import type { PixelSize, SizeController } from './size-controller.js';
 
-/** Interface of the element for frames. */
+/** Interface of the element for drawing its frames. */
 export interface ViewHost extends FrameSource {
   readonly attributes: Pick<
     Attributes,
     'quality' | 'maxShDegree' | 'order' | 'filter' | 'maxPixelRatio' | 'frameBudget'
   >;
-  /** The sources that are drawn. */
+  /** The loaded scenes that are drawn. */
   readonly shown: readonly LoadedGaussians[];
   readonly camera: CameraController;
   readonly size: SizeController;
   readonly scheduler: FrameScheduler;
   readonly canvas: HTMLCanvasElement | null;
-  /** False if a frame would be invisible. */
+  /** Whether a frame would be visible. */
   readonly isVisible: boolean;
-  /** Time constant of the camera's motion, ms. */
+  /** Time constant of the camera's damped motion, ms; 0 if the camera jumps to its goal. */
   readonly decayMs: number;
-  /** Called once in each frame before the camera steps: automatic motions advance. */
+  /**
+   * Called once in each frame before the camera steps, so that automatic motions advance. `now` is
+   * requestAnimationFrame's clock, ms.
+   */
   beforeFrame(now: number): void;
-  /** Called once in each frame, before it is drawn, with its camera: animated scenes advance. */
+  /** Called once in each frame before drawing, with the frame's camera, so that animated scenes advance. */
   advanceScene(camera: Camera, now: number): void;
-  /** Called once in each frame, after its submission, with its camera. */
+  /** Called once in each frame after its commands were submitted, with the frame's camera. */
   afterFrame(camera: Camera): void;
   cameraChanged(source: CameraChangeSource): void;
-  /** Called for each timed frame of a motion: whether frames are drawn at full quality. */
+  /** Called for each timed frame of a motion. `isWhole`: whether frames in motion are drawn at full quality. */
   reportMotionFrame(isWhole: boolean): void;
   /** Called when drawing has failed permanently. */
   drawingFailed(error: unknown): void;
@@ -43,13 +46,19 @@ interface MotionEnd {
   readonly reject: (reason: unknown) => void;
 }
 
-/** Adapts the quality while moving; loaded once for all elements. Until then all frames are drawn at full quality. */
+/**
+ * Module that adapts the quality of frames in motion; it is loaded once for all elements. Until it is loaded, all
+ * frames are drawn at full quality.
+ */
 const quality = new Lazy(
   'the code that sets the quality while moving',
   () => import('./dynamic-quality-controller.js'),
 );
 
-/** A scene that is replaced sooner than this, ms, such as a preview, needs no preparation. */
+/**
+ * Delay between a frame and the preparation of pipelines, ms. A scene that is replaced sooner, such as a preview, needs
+ * no preparation.
+ */
 const PREPARE_AFTER_MS = 300;
 
 /** Draws the scene to the element's canvas, frame by frame and only on request. */
@@ -57,10 +66,10 @@ export class ViewController implements FrameClient {
   readonly #host: ViewHost;
   #ownDynamicQuality: dynamicQuality.DynamicQualityController | undefined;
   #backend: Backend | null = null;
-  /** The current surface, and its device. */
+  /** The surface of the canvas; null before the first frame. */
   #surface: Surface | null = null;
   #surfaceOf: DeviceOwner['context'] | null = null;
-  /** Waits for the first frame of a new scene, which is drawn even off-screen. */
+  /** The pending promise of {@link show}. Its first frame is drawn even off-screen. */
   #first: MotionEnd | undefined;
   #drawnContent = '';
   #preparing: ReturnType<typeof setTimeout> | undefined;
@@ -69,7 +78,7 @@ export class ViewController implements FrameClient {
     this.#host = host;
   }
 
-  /** Quality control of frames in motion; undefined until it is loaded. */
+  /** Quality control of frames in motion; undefined until its module is loaded. */
   get #dynamicQuality(): dynamicQuality.DynamicQualityController | undefined {
     const host = this.#host;
     return (this.#ownDynamicQuality ??=
@@ -88,14 +97,14 @@ export class ViewController implements FrameClient {
     return this.#host.attributes.quality === 'auto';
   }
 
-  /** Quality of frames at rest and in motion. */
+  /** Quality of the last frame and of frames in motion, for statistics. */
   get dynamicQuality(): dynamicQuality.DynamicQualityReport {
     const { attributes, scheduler } = this.#host;
     const targetMs = targetMsOf(attributes.frameBudget, scheduler);
     const atStart = {
       drawn: 'whole',
       moving: 'whole',
-      reason: 'start',
+      reason: 'initial',
       frameMs: null,
       lastMs: null,
       targetMs,
@@ -103,19 +112,21 @@ export class ViewController implements FrameClient {
     return this.#dynamicQuality?.report ?? atStart;
   }
 
-  /** Requests a frame, if it would be visible. May be called at any rate. */
+  /**
+   * Requests a frame if it would be visible, or if the first frame of a scene is pending. May be called at any rate.
+   */
   requestFrame(): void {
     if (this.#isDrawable) this.#host.scheduler.request(this);
   }
 
-  /** The backend of frames; null without one. */
+  /** The backend that draws frames; null while no scene is shown. */
   get backend(): Backend | null {
     return this.#backend;
   }
 
   /**
-   * Draws a new scene, or additions to the current one. Resolves once its first frame is drawn, or at once if there is
-   * no pixel to draw; rejects with GaussianSplatError `out-of-memory/*`.
+   * Draws a new scene, or additions to the current one. Resolves when its first frame is drawn, or at once if there is
+   * no pixel to draw. Rejects with GaussianSplatError `out-of-memory/*`.
    */
   show(scene: Drawable): Promise<void> {
     if (scene.place.context !== this.#backend?.place.context) {
@@ -133,11 +144,11 @@ export class ViewController implements FrameClient {
     });
   }
 
-  /** Stops drawing. The last frame stays, so that the next scene can replace it without a gap. */
+  /** Stops drawing. The last frame stays visible, so that the next scene can replace it without a gap. */
   pause(): void {
     this.#backend?.destroy();
     this.#backend = null;
-    // Resolves pending waits.
+    // The wait for a first frame ends.
     this.#first?.resolve();
     this.#first = undefined;
     this.#dynamicQuality?.stop();
@@ -151,7 +162,10 @@ export class ViewController implements FrameClient {
     this.#surfaceOf = null;
   }
 
-  /** Replaces a canvas that cannot show frames any more: its document has lost its window, or another API draws now. */
+  /**
+   * Replaces the canvas with a copy. Call if the canvas cannot show frames any more: its document has lost its window,
+   * or the next context is of another kind.
+   */
   renewCanvas(): void {
     const canvas = this.#host.canvas;
     canvas?.replaceWith(canvas.cloneNode());
@@ -162,11 +176,11 @@ export class ViewController implements FrameClient {
 
   drawFrame(now: number): void {
     const backend = this.#backend;
-    // It may have left the viewport since the request.
+    // The element may have left the viewport since the request.
     if (backend === null || !this.#isDrawable) return;
     const { camera } = this.#host;
     const pixels = this.#pixelsOf(backend);
-    // Nothing is drawn without a size; the size observer requests a frame when there is one.
+    // A canvas without a size is not drawn. The size observer requests a frame when the canvas has a size.
     if (pixels === null) return this.#finishUnseen();
     this.#host.beforeFrame(now);
     const source = camera.step(now, this.#host.decayMs);
@@ -185,10 +199,10 @@ export class ViewController implements FrameClient {
   }
 
   /**
-   * Draws a frame within the current task, for code that reads the canvas before the task ends: afterwards a WebGPU
+   * Draws a frame within the current task, for code that reads the canvas before the task ends. Afterwards a WebGPU
    * canvas reads as blank.
-   * @param size Size of the frame; default that of the element.
-   * @param background Premultiplied, behind the splats.
+   * @param size Size of the frame in pixels; default: that of the element.
+   * @param background Premultiplied color behind the splats.
    * @returns The canvas, or null if there is nothing to draw.
    */
   drawNow(size?: PixelSize, background?: CanvasFrame['background']): HTMLCanvasElement | null {
@@ -205,8 +219,8 @@ export class ViewController implements FrameClient {
   }
 
   /**
-   * Whether there is a scene that is visible or has a pending first frame. A document without a window, such as that of
-   * a removed frame, shows none.
+   * Whether a frame can be drawn and is needed: the scene is visible, or its first frame is pending. A document without
+   * a window, such as that of a removed `<iframe>`, shows no frames.
    */
   get #isDrawable(): boolean {
     const { canvas, isVisible } = this.#host;
@@ -214,7 +228,7 @@ export class ViewController implements FrameClient {
     return this.#first !== undefined || isVisible;
   }
 
-  /** null without a size. */
+  /** Returns the size of the next frame in pixels; null if the canvas has no pixels or an unknown size. */
   #pixelsOf({ place }: Backend): PixelSize | null {
     const { size, attributes } = this.#host;
     return size.pixelSize(attributes.maxPixelRatio, place.limits.maxTextureDimension2D);
@@ -228,7 +242,10 @@ export class ViewController implements FrameClient {
     const hasChanged = first === undefined && (cameraMoved || content !== this.#drawnContent);
     this.#drawnContent = content;
     if (first !== undefined) {
-      backend.renderFirst(request, content).then(() => this.#afterFirst(backend, first), first.reject);
+      backend.renderFirst(request, content).then(() => {
+        first.resolve();
+        this.#prepareSoon();
+      }, first.reject);
       return;
     }
     const pixels = request.camera.width * request.camera.height;
@@ -237,26 +254,22 @@ export class ViewController implements FrameClient {
       backend.render({ ...request, settings }, content, onTime);
     if (this.#dynamicQuality) this.#dynamicQuality.draw(occasion, this.#host.canvas!, draw);
     else draw(undefined);
-    this.#prepareSoon(backend);
-  }
-
-  #afterFirst(backend: Backend, { resolve }: MotionEnd): void {
-    resolve();
-    this.#prepareSoon(backend);
+    this.#prepareSoon();
   }
 
   /**
-   * Frames in motion must not wait for pipelines: these are compiled soon after the first frame, and after the quality
-   * changes to `auto`.
+   * Compiles the pipelines of frames in motion soon after the first frame, and after the quality changes to `auto`.
+   * Frames in motion therefore do not wait for pipelines.
    */
-  #prepareSoon(backend: Backend): void {
+  #prepareSoon(): void {
     if (!this.#isAuto) return;
     quality.want();
-    if (backend.isPrepared) return;
+    if (this.#backend?.isPrepared) return;
     this.#preparing ??= setTimeout(() => {
       void quality.settled.then(() => {
         this.#preparing = undefined;
-        if (this.#backend === backend && quality.value) backend.prepare(quality.value.MOVING_SETTINGS);
+        // Another scene may have replaced the one of the first frame.
+        if (quality.value) this.#backend?.prepare(quality.value.MOVING_SETTINGS);
       });
     }, PREPARE_AFTER_MS);
   }
@@ -279,17 +292,20 @@ export class ViewController implements FrameClient {
     const surface = this.#surfaceFor(backend);
     if (surface === null) return null;
     const { canvas } = surface;
-    // Setting a canvas's size clears it, even to the same size; here a frame follows at once.
+    // Setting the size of a canvas clears it, even to the same size. Here the next frame follows in the same task.
     if (canvas.width !== width) canvas.width = width;
     if (canvas.height !== height) canvas.height = height;
     return { camera: this.#host.camera.view(width, height), surface };
   }
 
-  /** null if the browser does not support the context on this canvas. */
+  /**
+   * Returns the surface of the canvas for a backend. A canvas with another kind of context is replaced. Null if the
+   * browser does not support the backend's context.
+   */
   #surfaceFor(backend: Backend): Surface | null {
     const take = (): Surface | null => (this.#surface = backend.surfaceOn(this.#host.canvas!));
     if (this.#surfaceOf !== backend.place.context && take() === null) {
-      // A canvas keeps its first kind of context.
+      // A canvas supports only the kind of context that it had first, so another kind needs a new canvas.
       this.renewCanvas();
       take();
     }

@@ -2,8 +2,8 @@ import type { ReactiveController, ReactiveControllerHost } from 'lit';
 import { windowOf } from './size-controller.js';
 
 /**
- * A positive threshold: with 0 an element that only touches the viewport's edge would count, and with a margin
- * off-screen elements would take frame time from visible ones.
+ * Fraction of the element's area that counts as visible. With 0 an element that only touches the edge of the viewport
+ * would count. With a margin around the viewport, off-screen elements would take frame time from visible ones.
  */
 const THRESHOLD = 1e-5;
 
@@ -12,7 +12,7 @@ export class VisibilityController implements ReactiveController {
   readonly #element: HTMLElement;
   readonly #onChange: () => void;
   #observer: IntersectionObserver | undefined;
-  /** Undefined until the observer has reported. */
+  /** Whether the element is in the viewport; undefined until the observer has reported. */
   #isVisible: boolean | undefined;
 
   constructor(host: ReactiveControllerHost & HTMLElement, onChange: () => void) {

@@ -1,4 +1,7 @@
-/** Loaded only if levels of detail are requested, or the GPU is too slow without. */
+/**
+ * Builds levels of detail. The module is loaded only if the page requests levels, or if the GPU is too slow without
+ * them.
+ */
 import { DetailedGaussians } from '@gaussian-splat/renderer';
 import { readPacked, type PackedLevels } from '@gaussian-splat/renderer/tools';
 import type { LoadedGaussians } from '../gpu/loaded-gaussians.js';
@@ -6,10 +9,9 @@ import { buffersOf } from '../loading/protocol.js';
 import type { SceneLoader } from '../loading/scene-loader.js';
 
 /**
- * Builds levels of detail for the splats of a scene on the GPU, in the worker, and adds them. undefined for a scene
- * that is too small for any, and if the page does not allow workers.
- * @param memoryBudget Upper limit of the GPU memory of the scene and its levels in bytes; undefined for no limit but
- * the device's.
+ * Builds levels of detail for the splats of a scene, in the worker, and uploads them. Returns undefined for a scene
+ * that is too small for levels, and if the page does not allow workers.
+ * @param memoryBudget Maximum GPU memory of the scene and its levels, in bytes; undefined if only the device limits it.
  * @throws GaussianSplatError `out-of-memory/*`, or the signal's reason.
  */
 export async function buildLevels(
@@ -21,11 +23,11 @@ export async function buildLevels(
   const { device, gaussians } = scene;
   const packed = await readPacked(device, gaussians, () => {
     signal.throwIfAborted();
-    // A sequence frees them when it replaces the splats.
+    // A sequence frees the splats when it replaces them.
     if (scene.gaussians !== gaussians) throw new Error('other splats are shown');
   });
   signal.throwIfAborted();
-  // Its arrays are transferred to the worker, because the main thread would be blocked for seconds.
+  // The arrays are transferred to the worker, because building levels would block the main thread for seconds.
   const nothing = async (): Promise<undefined> => undefined;
   const transfer = buffersOf(packed);
   const levels = await loader.ask<PackedLevels | undefined>({ type: 'levels', packed }, signal, nothing, { transfer });

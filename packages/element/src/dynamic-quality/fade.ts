@@ -1,19 +1,19 @@
 /**
- * Duration of the crossfade from a frame with fewer pixels to the full-resolution image, ms: too short for a noticeable
- * delay, long enough not to look like a cut.
+ * Duration of the crossfade from a frame with fewer pixels to the full-resolution image, ms. It is too short for a
+ * noticeable delay, and long enough not to look like a cut.
  */
 export const FADE_MS = 100;
 
 /**
- * Overlays the full-resolution image with the last frame of a motion and fades it out. The blend weights sum to 1, as
- * in view transitions, so that translucent pixels keep their alpha.
+ * Fades from the last frame of a motion to the full-resolution image. A copy of the frame lies over the canvas and
+ * fades out. The weights of both add up to 1, as in view transitions, so that translucent pixels keep their alpha.
  */
 export class Fade {
   #overlay: HTMLCanvasElement | undefined;
   #animations: readonly Animation[] = [];
   #state: 'none' | 'awaited' | 'covering' | 'fading' = 'none';
 
-  /** The frame that it is to fade from is not there yet. */
+  /** Whether the copy of the last frame has been requested and has not arrived yet. */
   get isAwaited(): boolean {
     return this.#state === 'awaited';
   }
@@ -23,8 +23,8 @@ export class Fade {
   }
 
   /**
-   * Overlays a canvas with a copy of the frame drawn in the current task.
-   * @returns a promise that fulfills when the overlay is shown, or when it cannot be
+   * Overlays a canvas with a copy of the frame that was drawn in the current task.
+   * @returns A promise that resolves when the overlay is shown, or cannot be shown.
    */
   async cover(canvas: HTMLCanvasElement): Promise<void> {
     this.end();
@@ -35,7 +35,7 @@ export class Fade {
     if (frame) this.#overlay = overlayOf(canvas, frame);
   }
 
-  /** Starts the fade once the canvas shows the full-resolution image. */
+  /** Starts the fade. Call when the canvas shows the full-resolution image. */
   start(canvas: HTMLCanvasElement): void {
     const overlay = this.#overlay;
     if (this.#state !== 'covering') return;
@@ -50,7 +50,7 @@ export class Fade {
     fading.onfinish = () => this.#overlay === overlay && this.end();
   }
 
-  /** Leaves the canvas as it is. */
+  /** Ends the fade at once: removes the overlay, and restores the style of the canvas. */
   end(): void {
     this.#state = 'none';
     const overlay = this.#overlay;
@@ -63,7 +63,7 @@ export class Fade {
   }
 }
 
-/** Whether a page's own style of the canvas lets two of them be added up. */
+/** Returns whether the browser and the page's style of the canvas allow the overlay to be added to the canvas. */
 export function canFade(canvas: HTMLCanvasElement): boolean {
   const view = canvas.ownerDocument.defaultView;
   if (!view || !('animate' in canvas) || !CSS.supports('mix-blend-mode', 'plus-lighter')) return false;
@@ -71,7 +71,10 @@ export function canFade(canvas: HTMLCanvasElement): boolean {
   return opacity === '1' && mixBlendMode === 'normal' && visibility === 'visible';
 }
 
-/** A canvas with the same style that shows a frame; it takes over the bitmap's memory. */
+/**
+ * Returns a canvas over another one, with the same part name, that shows a frame. The canvas takes ownership of the
+ * bitmap. Returns undefined if the browser does not support this.
+ */
 function overlayOf(canvas: HTMLCanvasElement, frame: ImageBitmap): HTMLCanvasElement | undefined {
   const overlay = canvas.ownerDocument.createElement('canvas');
   overlay.setAttribute('part', 'canvas');

@@ -1,32 +1,36 @@
 /**
- * Measures the loss of frames with fewer pixels on the image itself, because neither splat sizes nor coverage predict
- * it.
+ * Measures the loss of frames with fewer pixels, from the image itself, because neither the sizes of splats nor their
+ * coverage predict the loss.
  */
 
-/** [height, width, 4] premultiplied, 0..1. */
+/** Pixels of an image; `values` are [height, width, 4], premultiplied, 0..1. */
 export interface Pixels {
   readonly values: Float32Array;
   readonly width: number;
   readonly height: number;
 }
 
-/** Squared errors of the enlarged image, summed over the channels of the covered pixels. */
+/**
+ * Squared errors of an enlarged image, summed over the channels of covered pixels, and the number of the summed values.
+ */
 export interface LossSum {
   sum: number;
   values: number;
 }
 
-/** Pixels beside a block that the cubic kernel reaches, at scale 1. */
+/** Distance in pixels that the cubic kernel reaches, at scale 1. */
 const REACH = 2;
-/** Only every STEP-th pixel of a block is compared, across and down. */
+/** Distance in pixels of the compared pixels of a block, across and down. */
 const STEP = 2;
 
 /**
- * Adds the loss of a block at a fraction of its pixels across and down: samples at the centers of larger pixels, as in
- * reduced frames, enlarged by the Catmull-Rom cubic (shaders/shared/compose.wgsl). Pixels at the edge, whose kernel
- * reaches outside, are skipped.
- * @param x of the block's first pixel within the image
- * @param y of the same pixel
+ * Adds the loss of a block at a scale. The block is sampled at the centers of larger pixels, as in reduced frames, and
+ * enlarged by the Catmull-Rom cubic (shaders/shared/compose.wgsl). Pixels near the edge, whose kernel reaches outside,
+ * are skipped.
+ * @param scale Fraction of the width and the height of reduced frames.
+ * @param x Column of the block's first pixel in the image.
+ * @param y Row of the block's first pixel in the image.
+ * @param to Sum to which the errors are added.
  */
 export function addLoss({ values, width, height }: Pixels, scale: number, x: number, y: number, to: LossSum): void {
   const margin = Math.ceil(REACH / scale);
@@ -42,7 +46,7 @@ export function addLoss({ values, width, height }: Pixels, scale: number, x: num
   }
 }
 
-/** PSNR with peak 1; Infinity without error or without covered pixels. */
+/** Returns the PSNR for a peak of 1, in dB; Infinity if there is no error, or no covered pixel. */
 export const decibelsOf = ({ sum, values }: LossSum): number => (sum > 0 ? -10 * Math.log10(sum / values) : Infinity);
 
 function enlargedAt(
@@ -64,7 +68,7 @@ function enlargedAt(
       addSample(values, width, height, sampleX, sampleY, across[i] * down[j], found);
     }
   }
-  // The cubic overshoots beside an edge.
+  // The cubic overshoots beside edges.
   for (let k = 0; k < 4; k++) found[k] = Math.max(0, found[k]);
   found[3] = Math.min(1, found[3]);
 }
@@ -78,7 +82,10 @@ function cubicWeights(t: number): [number, number, number, number] {
   ];
 }
 
-/** Adds the interpolated image between the centers of its pixels. */
+/**
+ * Adds to the four channels of `found` `weight` times the bilinear interpolation of the image at a position in pixels.
+ * The centers of pixels are integers. Positions outside are clamped to the edge.
+ */
 function addSample(
   values: Float32Array,
   width: number,

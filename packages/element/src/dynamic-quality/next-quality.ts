@@ -1,4 +1,4 @@
-/** How much of the whole image a frame in motion can afford: a pure function of what frames took. */
+/** Chooses the quality level of frames in motion: a pure function of the measured frame times. */
 import type { QualityLevel } from './quality-levels.js';
 import { quantile } from './display-interval.js';
 import { HOLD_MS, INITIAL_QUALITY, type QualityState, type QualityReason } from './start.js';
@@ -6,66 +6,73 @@ import { inPixels, modelOf, type TimeModel } from './time-model.js';
 
 /** The measured time of a frame. */
 export interface FrameSample {
-  /** Arrival of the measurement, ms of any monotonic clock. */
+  /** Time when the measurement arrived, in milliseconds of any monotonic clock. */
   readonly now: number;
-  /** Level that the frame was drawn with. */
+  /** Index of the level at which the frame was drawn. */
   readonly level: number;
   readonly milliseconds: number;
 }
 
-/** Parameters of the choice of a level. */
+/** Parameters from which a level is chosen. */
 export interface QualityTargets {
-  /** Time budget of a frame, ms. */
+  /** Target duration of a frame, ms. */
   readonly targetMs: number;
-  /** The first is the whole image; the others lose more and more. */
+  /** Levels by decreasing quality; the first one is full quality. */
   readonly levels: readonly QualityLevel[];
 }
 
-/** Number of recent frames; the typical ones count, so a single slow frame changes nothing. */
+/** Number of recent frames that are considered. A single slow frame does not change their typical time. */
 const MEMORY = 9;
 const ENOUGH = 5;
-/** Shorter times are indistinguishable from 0, ms. */
+/** Minimum frame time, ms; shorter times are indistinguishable from 0. */
 const NOTHING_MS = 0.01;
-/** Frames needed for a decision if all of them are too slow. */
+/** Number of frames that a step down needs; fewer than the number for a step up. */
 const MIN_FRAMES = 3;
-/** The level is chosen to take the first fraction of the target; it is kept up to the second. */
+/**
+ * Fractions of the target: a level is chosen if it is predicted to take at most the first, and kept while frames take
+ * at most the second.
+ */
 const AIM = 0.85;
 const LATE = 1.05;
-/** Levels that take so little longer than the fastest are as good, and more accurate. */
+/**
+ * Levels whose time is within this factor of the fastest level count as equally fast; the most accurate of them is
+ * chosen.
+ */
 const AS_FAST = 1.05;
 /**
- * Maximum growth per second of the accepted frame time, as a factor: faster growth usually comes from another tab or
- * the page, not from the scene.
+ * Maximum factor by which the smoothed frame time grows per second. Faster growth usually comes from another tab or
+ * from the page, not from the scene.
  */
 const GROWTH = Math.exp(2.8);
 /**
- * Minimum of the accepted frame time as a fraction of the target: after almost empty frames it would lag behind slow
- * ones for seconds.
+ * Minimum of the smoothed frame time, as a fraction of the target. Without it, the smoothed time would lag behind slow
+ * frames for seconds after almost empty ones.
  */
 const LITTLE = 0.04;
-/** Upper limit of the time between two frames in that growth, ms. */
+/** Maximum time between two frames that counts for this growth, ms. */
 const LONGEST_STEP_MS = 100;
 /**
- * After a pause of this length, ms, an idle GPU runs at a low clock for the second time: frames are not representative.
+ * Length of a pause after which the GPU runs at a low clock, ms, and the duration of that state, ms. Frames of this
+ * time are not representative.
  */
 const REST_MS = 250;
 const WAKING_MS = 400;
-/** Factor for longer holds if the last upward step had to be undone. */
+/** Factor by which the hold grows if the last upward step had to be undone, and the maximum of the hold, ms. */
 const LONGER = 3;
 const LONGEST_HOLD_MS = 60_000;
-/** Frames later than this factor of the target end a hold early. */
+/** Factor of the target above which frame times end a hold early. */
 const FAR_TOO_LATE = 1.25;
-/** After this time without a change, ms, an unmeasured level is tried if it may be fast enough. */
+/** Time without a change of level after which an unmeasured level is tried, if it may be fast enough, ms. */
 const TRIAL_MS = 6_000;
 
-/** The controller state after a frame. Frames of another level arrive too late and are ignored. */
+/** Returns the state after the measurement of a frame. Late measurements of frames at another level are ignored. */
 export function nextQuality(state: QualityState, sample: FrameSample, rules: QualityTargets): QualityState {
   if (sample.level !== state.level) return state;
   const seen = observe(state, sample, rules);
   return choose(seen, sample.now, rules) ?? seen;
 }
 
-/** Adds the time of a frame to the measurements of its level and of the load. */
+/** Returns the state with the time of a frame added to the measurements of its level. */
 function observe(
   state: QualityState,
   { now, level, milliseconds }: FrameSample,
@@ -80,7 +87,8 @@ function observe(
   const max = (state.smoothedMs || AIM * targetMs) * GROWTH ** (step / 1000);
   let { measured } = state;
   const load = state.load || usual;
-  // Until the memory is full, the load from before the change is used.
+  // While fewer than `MEMORY` frames are measured at a level, its time is related to the load before the change of
+  // level.
   if (state.recent.length < MEMORY && recent.length >= MIN_FRAMES)
     measured = { ...measured, [level]: { share: usual / load, at: now, load } };
   const smoothedMs = recent.length < MIN_FRAMES ? state.smoothedMs : Math.max(LITTLE * targetMs, Math.min(max, usual));
@@ -88,8 +96,8 @@ function observe(
 }
 
 /**
- * Typical time of a frame, ms: the mean of the middle half. The times of two queued frames may arrive together, so a
- * median would alternate.
+ * Returns the typical time of a frame, ms: the mean of the middle half. The times of two queued frames may arrive
+ * together, so a median would alternate.
  */
 function usualOf(recent: readonly number[]): number {
   const cut = recent.length >> 2;
@@ -97,7 +105,7 @@ function usualOf(recent: readonly number[]): number {
   return middle.reduce((sum, time) => sum + time, 0) / middle.length;
 }
 
-/** The next level, or null to keep the current one. */
+/** Returns the state with another level, or null to keep the current level. */
 function choose(state: QualityState, now: number, rules: QualityTargets): QualityState | null {
   const { level, recent, measured } = state;
   if (recent.length < MIN_FRAMES) return null;
@@ -109,7 +117,10 @@ function choose(state: QualityState, now: number, rules: QualityTargets): Qualit
   return level > 0 ? whereInTime(state, now, times, model, rules) : null;
 }
 
-/** The most accurate level that is predicted to be fast enough, else one of the fastest. */
+/**
+ * Returns the most accurate level that is predicted to be fast enough, otherwise the most accurate of the fastest
+ * levels.
+ */
 function bestOf(times: readonly number[], targetMs: number): number {
   const min = Math.min(...times);
   const within = min <= AIM * targetMs ? AIM * targetMs : Math.max(targetMs, AS_FAST * min);
@@ -127,7 +138,8 @@ function whereLate(
   const { targetMs } = rules;
   const usual = times[level];
   let to = bestOf(times, targetMs);
-  // An unmeasured level is not tried here: only a level known to be as fast is chosen.
+  // An unmeasured level is not tried while frames are late. Without a prediction that is clearly faster, only measured
+  // levels are considered.
   if (times[to] * AS_FAST > usual)
     to = bestOf(
       times.map((time, other) => (isKnown[other] ? time : Infinity)),
@@ -139,12 +151,12 @@ function whereLate(
   const isUrgent = to > level && usual > FAR_TOO_LATE * targetMs && times[to] <= targetMs;
   if (isTurn && isSoon && !isUrgent) return null;
   if (to < level && recent.length < ENOUGH) return null;
-  return change(state, now, to, 'slow', times[to]);
+  return change(state, now, to, 'over-budget', times[to]);
 }
 
 /**
- * Steps up to a level that is predicted to be fast enough; after a while without a change, one level up if that may be
- * fast enough.
+ * Returns the state with a more accurate level that is predicted to be fast enough. After {@link TRIAL_MS} without a
+ * change, tries the next level if it may be fast enough. Returns null to keep the current level.
  */
 function whereInTime(
   state: QualityState,
@@ -157,15 +169,15 @@ function whereInTime(
   const { levels, targetMs } = rules;
   if (recent.length < ENOUGH) return null;
   if (direction === 'down' && now - turnedAt < hold) return null;
-  // Upper limit for an unmeasured level: proportional to its pixels.
+  // Returns the maximum time of a level, ms. For an unmeasured level, it is proportional to the pixels.
   const maxOf = (other: number): number =>
     isKnown[other] ? times[other] : (times[level] * inPixels(levels[other], other)) / inPixels(levels[level], level);
   const to = times.findIndex((time, other) => time <= AIM * targetMs && maxOf(other) <= targetMs);
-  if (to !== -1 && to < level) return change(state, now, to, 'spare', times[to]);
+  if (to !== -1 && to < level) return change(state, now, to, 'headroom', times[to]);
   const above = level - 1;
   const mayBe = times[above] <= targetMs && maxOf(above) <= FAR_TOO_LATE * targetMs;
   const isTried = now - changedAt > TRIAL_MS && !isKnown[above] && mayBe;
-  return isTried ? change(state, now, above, 'trial', times[above]) : null;
+  return isTried ? change(state, now, above, 'probe', times[above]) : null;
 }
 
 function change(
@@ -196,8 +208,8 @@ function change(
 }
 
 /**
- * The controller state after the usable levels of an image of the same size change; measurements of the remaining
- * levels are kept.
+ * Returns the state after the set of usable levels has changed for an image of the same size. Measurements of the
+ * remaining levels are kept.
  */
 export function limited(state: QualityState, levels: readonly QualityLevel[]): QualityState {
   const last = levels.length - 1;
@@ -205,8 +217,8 @@ export function limited(state: QualityState, levels: readonly QualityLevel[]): Q
 }
 
 /**
- * The controller state after the number of pixels changes by a factor and other levels become usable: earlier
- * measurements do not apply. The new level draws about as many pixels as before, which takes no longer.
+ * Returns the state after the number of pixels has changed by the factor `growth`, which invalidates all measurements.
+ * The new level draws about as many pixels as the previous one, which takes no longer.
  */
 export function resized(state: QualityState, growth: number, levels: readonly QualityLevel[]): QualityState {
   const level = Math.min(state.level, levels.length - 1);

@@ -1,21 +1,26 @@
 import { QUALITIES, type PerFrameSettings } from '@gaussian-splat/renderer';
 
-/** How frames in motion may be drawn. */
+/** A quality level of frames in motion. */
 export interface QualityLevel {
-  /** For people. */
+  /** Name of the level in statistics. */
   readonly name: string;
-  /** Settings of the frame; undefined on the first level, which equals the image at rest. */
+  /**
+   * Settings in which frames differ from those at rest; undefined for the first level, which equals the image at rest.
+   */
   readonly settings: Partial<PerFrameSettings> | undefined;
-  /** Fraction of the image's width and height that is drawn. */
+  /** Width and height of drawn frames, as a fraction of those of the image. */
   readonly scale: number;
 }
 
-/** Fractions of the image's width and height: each level has about half the pixels of the one before. */
+/**
+ * Width and height of frames at the reduced levels, as fractions of those of the image. Each level has about half the
+ * pixels of the one before.
+ */
 const SCALES = [0.71, 0.5, 0.35, 0.25];
 
 /**
- * Allowed error of levels of detail, in drawn pixels: hardly any loss in close views, and a smaller one in distant
- * views than fewer pixels would cause (docs/decisions/0014).
+ * Allowed error of levels of detail, in drawn pixels, at full and at lower resolution. It causes hardly any loss in
+ * close views. In distant views it causes a smaller loss than fewer pixels would (docs/decisions/0014).
  */
 const [BALANCED_DETAIL, SMALLER_DETAIL] = [0.5, 1];
 
@@ -23,9 +28,9 @@ const { depthKeyBits, transmittanceMin } = QUALITIES.balanced;
 const balanced: Partial<PerFrameSettings> = { depthKeyBits, transmittanceMin, detail: BALANCED_DETAIL };
 
 /**
- * All levels from the full image down: the settings of the quality `balanced`, which save the most time per loss, then
- * fewer pixels. The objects are shared, because the renderer compares settings by identity. docs/frontier lists the dB
- * and the time of each.
+ * All levels by decreasing quality: full quality, then the settings of `balanced`, which save the most time for their
+ * loss, then fewer pixels. The settings are shared objects, because the renderer compares them by identity.
+ * docs/frontier lists the loss in dB and the time of each level.
  */
 export const QUALITY_LEVELS: readonly QualityLevel[] = [
   { name: 'whole', settings: undefined, scale: 1 },
@@ -37,22 +42,27 @@ export const QUALITY_LEVELS: readonly QualityLevel[] = [
   })),
 ];
 
-/** Minimum number of pixels of a level: below it, tiles have too many splats each, and frames take longer. */
+/**
+ * Minimum number of pixels of frames at a level. With fewer pixels, each tile has too many splats, and frames take
+ * longer.
+ */
 const MIN_PIXELS = 8192;
 
 /**
- * Error of a frame by the fraction of pixels across and down, dB; hair and small subjects lose nearly everything at one
- * half.
+ * PSNR of reduced frames in dB, by their scale. Images of hair or of small subjects lose nearly all detail at one half.
  */
 export type Losses = ReadonlyMap<number, number>;
 
 /**
- * Levels below this PSNR are not used: over 10 % of the covered pixels would be off by more than 16/255
+ * Minimum PSNR of a level, dB. Below it, over 10 % of the covered pixels would be off by more than 16/255
  * (docs/decisions/0014).
  */
 export const MIN_PSNR = 27;
 
-/** The levels that are usable for an image of this number of pixels and these losses. */
+/**
+ * Returns the levels that are usable for an image with a number of pixels at full resolution. Scales without a measured
+ * loss count as usable.
+ */
 export const levelsForSize = (
   pixels: number,
   levels: readonly QualityLevel[],

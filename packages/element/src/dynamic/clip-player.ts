@@ -1,4 +1,4 @@
-/** Loaded only for clips. */
+/** Plays clips of moving splats. The module is loaded only for clips. */
 import { clipGroupAt, frameAt, type ClipIndex } from '@gaussian-splat/formats';
 import { AnimatedGaussians } from '@gaussian-splat/renderer';
 import type { PackedAnimation } from '@gaussian-splat/renderer/tools';
@@ -17,14 +17,14 @@ export interface ClipOptions {
   readonly signal: AbortSignal;
   readonly listeners: DynamicListeners;
   readonly loops: () => boolean;
-  /** Start position in seconds. */
+  /** Start position of playback, seconds. */
   readonly startSeconds: number;
   readonly memoryBudget: number | undefined;
 }
 
 /**
- * Plays a clip: groups of frames are fetched ahead by byte ranges, uploaded once each, and their frames evaluated on
- * the GPU.
+ * Plays a clip. Groups of frames are fetched ahead by byte ranges and uploaded once each; the GPU computes their
+ * frames.
  */
 export class ClipPlayer implements Timeline {
   readonly gaussians: AnimatedGaussians;
@@ -46,7 +46,10 @@ export class ClipPlayer implements Timeline {
     this.#slots = new GroupSlots(gaussians, index);
   }
 
-  /** Opens a clip with a coarse image of the first frame. Rejects with GaussianSplatError, or the signal's reason. */
+  /**
+   * Opens a clip. Resolves when the coarse part of the group at the start position is loaded. Rejects with
+   * GaussianSplatError, or the signal's reason.
+   */
   static async open(options: ClipOptions): Promise<ClipPlayer> {
     const { device, loader, request, signal, memoryBudget, startSeconds, listeners } = options;
     const ask = async <T>(own: Pick<ClipRequest, 'whole' | 'part'>, aborted: AbortSignal): Promise<T> => {
@@ -89,11 +92,6 @@ export class ClipPlayer implements Timeline {
     }
   }
 
-  /** Number of groups in memory, or in transit. */
-  get heldGroups(): number {
-    return this.#cache.held;
-  }
-
   get buffered(): readonly (readonly [number, number])[] {
     const { framesPerSecond, groups } = this.#index;
     const spans: [number, number][] = [];
@@ -114,7 +112,7 @@ export class ClipPlayer implements Timeline {
     return group < groups.length ? Math.max(timeSeconds, groups[group].first / framesPerSecond) : Infinity;
   }
 
-  /** Shows the frame at a time, if it is loaded; fetches the following ones. */
+  /** Shows the frame at a time, if its group is loaded, and fetches the following groups. */
   request({ timeSeconds }: Pick<DynamicState, 'timeSeconds'>): void {
     const frame = frameAt(this.#index, timeSeconds);
     const group = clipGroupAt(this.#index, frame);
@@ -130,7 +128,7 @@ export class ClipPlayer implements Timeline {
   }
 }
 
-/** Largest sizes of the parts over all groups. */
+/** Returns the largest sizes of each part over all groups, for which GPU buffers are allocated. */
 function roomOf({ groups }: ClipIndex): { rows: number; planes: number; frames: number }[] {
   const room: { rows: number; planes: number; frames: number }[] = [];
   for (const { frames, parts } of groups) {
@@ -144,7 +142,7 @@ function roomOf({ groups }: ClipIndex): { rows: number; planes: number; frames: 
   return room;
 }
 
-/** A local file of the page. */
+/** Returns the content of a `blob:` address; undefined for other addresses. */
 async function localFile(url: string): Promise<Blob | undefined> {
   return url.startsWith('blob:') ? (await fetch(url)).blob() : undefined;
 }

@@ -1,7 +1,7 @@
-/** Loaded only for the attribute `controls-panel`, if a model has inputs. */
+/** The panel of controls. The module is loaded only for the attribute `controls-panel`, if a model has inputs. */
 import { css, type ReactiveElement } from 'lit';
 import { adoptStyles } from '../styles.js';
-import { readSpokenStrings, type A11yStrings } from '../words.js';
+import { readSpokenStrings, type A11yStrings } from '../strings.js';
 import type { GeneratorInput } from './inputs.js';
 import { poseOf, turnsOf } from './pose-of.js';
 import { readNumbers, valueOf, type ControlValues, type Numbers } from './values.js';
@@ -12,12 +12,12 @@ export const PANEL_WORDS = {
   'controls-reset': 'Reset',
   'controls-time': 'Time',
   'controls-joint': 'Joint',
-  'controls-scene': 'Scene',
+  'controls-group': 'Scene',
 } as const;
 
-/** Maximum number of sliders for one input; larger ones are left to the page. */
+/** Maximum number of sliders for one input. The page can set the remaining elements of larger inputs. */
 const MAX_SLIDERS = 24;
-/** Range of coefficients without a declared one: standard deviations of body shapes. */
+/** Range of coefficients for which the contract declares none, in standard deviations of body shapes. */
 const SHAPE_RANGE = [-3, 3] as const;
 const SLIDER_STEPS = 200;
 const SLIDES = ['control', 'shape'];
@@ -41,13 +41,13 @@ const STYLES = css`
     cursor: pointer;
     min-block-size: 24px;
   }
-  [part='controls-scene'] {
+  [part='controls-group'] {
     margin: 0.5em 0 0;
     padding: 0;
     border: 0;
     min-inline-size: 0;
   }
-  [part='controls-scene'] legend {
+  [part='controls-group'] legend {
     padding: 0;
     font-weight: 600;
   }
@@ -68,7 +68,7 @@ const STYLES = css`
   }
 `;
 
-/** Owner of the inputs: the element, or a `<splat-scene>` in it. */
+/** The element that inputs belong to: `<gaussian-splat>`, or a `<splat-scene>` in it. */
 interface Owner extends HTMLElement, Pick<ReactiveElement, 'addController'> {
   readonly inputs: readonly GeneratorInput[];
   inputValues: ControlValues | null;
@@ -87,19 +87,19 @@ interface PanelHost extends Owner {
 
 const panels = new WeakMap<PanelHost, ControlsPanel>();
 
-/** Controls for visitors, generated from the inputs of the current models. */
+/** A panel of controls for visitors, which is generated from the inputs of the current models. */
 export class ControlsPanel {
   readonly #element: PanelHost;
   readonly #strings: A11yStrings;
   readonly #box: HTMLElement;
   /**
-   * For poses with joint rotations, which visitors edit as axis-angle: the pose of the page, and the last one that was
-   * read or edited.
+   * Poses with joint rotations, which visitors edit as axis-angle. `given` is the pose that the page has set, and
+   * `last` is the last one that was read or edited.
    */
   readonly #poses = new Map<Owner, { given: Pose; last: Pose }>();
-  /** Owners whose values it follows. */
+  /** Owners that the panel observes for changes of their values. */
   readonly #followed = new WeakSet<Owner>();
-  /** Functions that update each control to its current value. */
+  /** Functions that set each control to its current value. */
   #followers: (() => void)[] = [];
   #reported = '';
 
@@ -113,14 +113,14 @@ export class ControlsPanel {
     element.addEventListener('inputs-change', () => this.#update());
     element.addEventListener('timeupdate', () => this.#follow());
     element.addEventListener('emptied', () => this.#update());
-    // Inputs of a removed child are no longer controlled; its events do not reach the element.
+    // Observes removals, because the events of a removed child do not reach the element. Its controls disappear.
     new MutationObserver(() => this.#update()).observe(element, {
       attributeFilter: ['controls-panel'],
       childList: true,
     });
   }
 
-  /** Returns the panel of an element, created at the first call. */
+  /** Shows or updates the panel of an element. The first call creates it. */
   static show(element: PanelHost): void {
     const panel = panels.get(element) ?? new ControlsPanel(element);
     panels.set(element, panel);
@@ -136,7 +136,7 @@ export class ControlsPanel {
     this.#reported = reported;
     this.#followers = [];
     for (const owner of owners) {
-      // Values that the page sets are shown, too.
+      // Controls also show values that the page sets.
       if (!this.#followed.has(owner)) owner.addController({ hostUpdated: () => this.#follow() });
       this.#followed.add(owner);
     }
@@ -163,28 +163,28 @@ export class ControlsPanel {
     for (const follow of this.#followers) follow();
   }
 
-  /** A slider for a value that other code may set, too. */
+  /** Returns a slider that follows its value, because other code may set the value, too. */
   #slider(...[title, range, step, now, onValue]: Parameters<typeof slider>): HTMLElement {
     const control = slider(title, range, step, now, onValue);
     this.#followers.push(() => showValue(control, now()));
     return control;
   }
 
-  /** The element and its children that have inputs. */
+  /** The element and its children, as far as they have inputs. */
   get #owners(): readonly Owner[] {
     const children = [...this.#element.children] as Element[] as Owner[];
     return [this.#element, ...children].filter(({ inputs = [] }) => inputs.length > 0);
   }
 
-  /** Name of a child: its title or id, or else its index. */
+  /** Returns the name of a child for visitors: its title, its id, or its number from 1. */
   #titleOf(owner: Owner): string {
     return (
-      owner.title || owner.id || `${this.#word('controls-scene')} ${[...this.#element.children].indexOf(owner) + 1}`
+      owner.title || owner.id || `${this.#word('controls-group')} ${[...this.#element.children].indexOf(owner) + 1}`
     );
   }
 
   #group(owner: Owner, controls: readonly HTMLElement[]): HTMLElement {
-    const group = make('fieldset', { part: 'controls-scene' });
+    const group = make('fieldset', { part: 'controls-group' });
     group.append(make('legend', { textContent: this.#titleOf(owner) }), ...controls);
     return group;
   }
@@ -219,7 +219,7 @@ export class ControlsPanel {
     return labeled(label, field);
   }
 
-  /** Controls to select a joint and rotate it around its three axes. */
+  /** Returns controls to select a joint and to rotate it about its three axes; none for poses in another format. */
   #pose(owner: Owner, input: GeneratorInput): HTMLElement[] {
     const { format = 'parameters', joints, size } = input;
     const perJoint = { 'axis-angle': 3, quaternion: 4, matrix: 9, parameters: 0 }[format];
@@ -233,7 +233,10 @@ export class ControlsPanel {
       return numbers?.length === size ? turnsOf(numbers, input) : [...none];
     };
     let turns = turnsNow();
-    /** Values of the page, or as edited here, because a pose does not preserve full turns. */
+    /**
+     * Returns the current rotations as axis-angle, radians. Rotations that a visitor has edited are not read from the
+     * pose, which does not preserve full turns.
+     */
     const read = (): number[] => {
       if (owner.pose === pose.last) return turns;
       pose.given = pose.last = owner.pose;
@@ -289,7 +292,7 @@ export class ControlsPanel {
   }
 }
 
-/** Value of an input that the page has set. */
+/** Returns the numbers of an input that a property or an attribute sets; undefined if neither does. */
 function valuesOf(owner: Owner, name: string): readonly number[] | undefined {
   const found = valueOf(owner.inputValues ?? {}, name);
   return readNumbers((found as Numbers | undefined) ?? owner.getAttribute(`control-${name.toLowerCase()}`));
@@ -299,7 +302,7 @@ function set(owner: Owner, name: string, value: ControlValues[string]): void {
   owner.inputValues = { ...owner.inputValues, [name]: value };
 }
 
-/** Default numbers of an input. */
+/** Returns the default value of an input as a list. */
 const numbersOf = ({ default: initial = 0 }: GeneratorInput): readonly number[] =>
   typeof initial === 'number' ? [initial] : initial;
 
@@ -312,13 +315,14 @@ function slider(
 ): HTMLElement {
   const field = make('input', { type: 'range', part: 'control-input' });
   Object.assign(field, { min: String(min), max: String(max), step: String(step) });
-  // Not an output element, because a label applies to the first one in it. A range reports its own value.
+  // Not an `<output>` element, because a label applies to the first labelable element in it. Screen readers read the
+  // value of the range itself.
   const shown = make('span', { part: 'control-value', ariaHidden: 'true' });
   const control = labeled(title, field, shown);
   field.addEventListener('input', () => {
     const value = field.valueAsNumber;
     shown.textContent = short(value);
-    // Steps that begin at a fraction miss zero by their rounding.
+    // If the minimum is not a multiple of the step, rounding can make the value near zero instead of zero.
     onValue(Math.abs(value) < step / 1e6 ? 0 : value);
   });
   showValue(control, now());

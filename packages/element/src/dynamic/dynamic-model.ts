@@ -6,51 +6,55 @@ import type { SceneLimits } from '../loading/protocol.js';
 import type { SceneLoader } from '../loading/scene-loader.js';
 import type { ReadControls } from './values.js';
 
-/** State of a model that a page sets, apart from the camera. Names are case-insensitive. */
+/** State that a page sets for a model, apart from the camera. Names of inputs are case-insensitive. */
 export interface DynamicState extends ReadControls {
   readonly timeSeconds: number;
-  /** Flattened; undefined for the model's rest pose. */
+  /** Flattened numbers of the pose, in the format of the model's input; undefined for the rest pose of the model. */
   readonly pose: readonly number[] | undefined;
 }
 
 /** Listeners of a model. */
 export interface DynamicListeners {
-  /** Called when a frame for a time is ready to be drawn. */
+  /** Called when the Gaussians of a time are ready to be drawn. */
   readonly onFrame: (timeSeconds: number) => void;
-  /** Called when the frame at a time is shown by the frame being drawn. */
+  /** Called when the image that is being drawn shows the frame at a time. */
   readonly onShown: (timeSeconds: number) => void;
-  /** Called when a run fails; the last good frame stays. */
+  /** Called when a run or a download fails. The last good frame stays visible. */
   readonly onError: (error: unknown) => void;
-  /** Called when the model runs on the CPU. */
+  /** Called with the reason when the model runs on the CPU instead of the GPU. */
   readonly onFallback: (reason: string) => void;
-  /** Called when an input of the next run has arrived: an image. */
+  /** Called when data for the next frame has arrived, such as an image, so that a frame must be requested. */
   readonly onInput: () => void;
 }
 
-/** Changes the Gaussians of a scene over time: a generator, or a sequence of files. */
+/** Changes the Gaussians of a scene over time: a generator, a sequence of files, or a clip. */
 export interface Timeline {
-  /** Current bounds of the Gaussians; absent if those of the first frame apply. */
+  /**
+   * Reads the current bounds of the Gaussians from the GPU; absent if the bounds of the first frame apply to all
+   * frames.
+   */
   readBounds?(): Promise<SceneBounds>;
-  /** Bounds of the Gaussians: those of the contract, or of the last runs. */
+  /** Bounds of the Gaussians, as the contract or the file declares them, otherwise as measured in the last runs. */
   readonly bounds?: SceneBounds;
-  /** Duration in seconds; Infinity if the contract declares none. */
+  /** Duration in seconds; Infinity if the contract declares none, NaN if time has no effect. */
   readonly duration: number;
   /** Inputs that the page may set; absent if there are none. */
   readonly inputs?: readonly GeneratorInput[];
-  /** Inputs that `control-NAME` sets; absent if there are none. */
+  /** Names of the inputs that `control-NAME` sets; absent if there are none. */
   readonly settable?: readonly string[];
-  /** Requests the Gaussians of a state; the latest request wins, and an unchanged one costs nothing. */
+  /** Requests the Gaussians of a state. The latest request wins, and a request of the same state costs nothing. */
   request(state: DynamicState, camera: Camera): void;
   /**
-   * Returns the first time from `timeSeconds` on whose frame is not loaded, or Infinity; absent if the clock never waits.
+   * Returns the first time, from `timeSeconds` on, whose frame is not loaded; Infinity if all are. Absent if the clock
+   * never waits.
    */
   loadedUntil?(timeSeconds: number): number;
-  /** [start, end] of the times that need no more bytes, seconds; absent for all. */
+  /** Time ranges in seconds whose frames are loaded; absent if all frames are. */
   readonly buffered?: readonly (readonly [start: number, end: number])[];
   close(): void;
 }
 
-/** The generator of a scene, with the first frame in its Gaussians. */
+/** The generator of a scene. Its Gaussians contain the first frame. */
 export interface DynamicModel extends Timeline {
   readonly gaussians: DynamicGaussians;
   readonly bounds: SceneBounds;
@@ -59,27 +63,37 @@ export interface DynamicModel extends Timeline {
 /** Location of a generator, and the state of its first frame. */
 export interface DynamicRequest {
   readonly url: string;
-  /** Addresses of models that each receive the Gaussians of the previous one. */
+  /** Addresses of models that process the Gaussians in sequence: each receives those of the previous model. */
   readonly chain?: readonly string[];
-  /** Address of a contract, its JSON text, or the contract itself; null for that of the model or its sidecar. */
+  /**
+   * Contract of the generator as an address, as JSON text, or as an object. Null selects the contract in the model or
+   * beside it.
+   */
   readonly contract?: unknown;
   readonly credentials: RequestCredentials;
-  /** Upper limit of the GPU memory of the Gaussians in bytes; undefined for no limit but the device's. */
+  /** Maximum GPU memory of the Gaussians, in bytes; undefined if only the device limits it. */
   readonly memoryBudget: number | undefined;
-  /** The element that shows it: only code that is loaded for generators reads its attribute `gpu-check`. */
+  /**
+   * The element that shows the generator. Its attribute `gpu-check` is read only by code that is loaded for generators.
+   */
   readonly element: HTMLElement;
-  /** Folder of the runtime's files; null for the one beside the bundle. */
+  /** Folder of the files of the ONNX runtime; null for the folder beside the bundle. */
   readonly runtimeLocation: string | null;
-  /** Provides workers: one that reads the header, and one that runs a model on the CPU on request. */
+  /** Provides the worker that reads the header, and a worker that runs the model on the CPU if required. */
   readonly loader: SceneLoader;
-  /** Limits of the model's load. */
+  /** Limits for loading the model. */
   readonly limits?: SceneLimits | undefined;
   readonly state: () => DynamicState;
   /** Whether playback restarts at its end. */
   readonly loops: () => boolean;
-  /** False if controls may belong to another model, which then reports unknown ones. */
+  /**
+   * Whether this model reports unknown controls. False if they may belong to another model, which then reports them.
+   */
   readonly ownsControls: () => boolean;
-  /** A camera for the bounds that the contract declares, or for unknown ones. */
+  /**
+   * Returns a camera for the first run, which frames the bounds that the contract declares; undefined if it declares
+   * none.
+   */
   readonly camera: (bounds: SceneBounds | undefined) => Camera;
   readonly listeners: DynamicListeners;
 }

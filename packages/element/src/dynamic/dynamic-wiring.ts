@@ -12,14 +12,14 @@ import type { PostHost } from './post-controller.js';
 /** Interface of the element for its models. */
 export interface DynamicHost extends Pick<ElementHost, 'attributes' | 'services' | 'dynamicValues'> {
   readonly playback: PlaybackController;
-  /** The sources that are drawn. */
+  /** The loaded scenes that are drawn. */
   readonly shown: readonly LoadedGaussians[];
   requestFrame(): void;
   readonly element: HTMLElement;
   dispatch(event: GaussianSplatEventMap[keyof GaussianSplatEventMap]): void;
 }
 
-/** Connects the models of an element, a generator and a post-processor, with its state and events. */
+/** Connects the models of an element, which are generators and post-processors, with its state and its events. */
 export class DynamicWiring implements PostHost {
   readonly #post = new Lazy('the code that runs post-processors', async () => {
     const { PostController } = await import('./post-controller.js');
@@ -29,32 +29,37 @@ export class DynamicWiring implements PostHost {
   #backend: Backend | null = null;
   readonly #host: DynamicHost;
   #lastFault = '';
-  /** Previous number of inputs. */
+  /** Number of inputs at the last notification. */
   #inputs = 0;
 
   constructor(host: DynamicHost) {
     this.#host = host;
   }
 
-  /** Whether there is a post-processor, or will be. */
+  /** Whether the page has requested a post-processor, which may not be loaded yet. */
   get hasPost(): boolean {
     return this.#postUrls.length > 0;
   }
 
-  /** @param urls Absolute addresses of post-processors, in execution order; none for unprocessed frames. */
+  /**
+   * Sets the post-processors. May be called at any rate: only changes have an effect.
+   * @param urls Absolute addresses of post-processors, in execution order; empty for unprocessed frames.
+   */
   wantPost(urls: readonly string[]): void {
     if (urls.join(' ') === this.#postUrls.join(' ')) return;
     this.#postUrls = urls;
     this.#open();
   }
 
-  /** Call when drawing starts or stops. A destroyed backend closes its post-processor itself. */
+  /** Call when drawing starts with a backend, or stops (null). A destroyed backend closes its post-processor itself. */
   attachPost(backend: Backend | null): void {
     this.#backend = backend;
     this.#open();
   }
 
   #open(): void {
+    // A failure of the next scene or post-processor is reported, also if the last one has failed in the same way.
+    this.#lastFault = '';
     if (this.#post.value) this.#post.value.open(this.#backend, this.#postUrls);
     else if (this.hasPost && this.#backend)
       this.#post.get().then(
@@ -82,19 +87,19 @@ export class DynamicWiring implements PostHost {
     this.#host.requestFrame();
   }
 
-  /** Reports a change of inputs, after the change is shown. */
+  /** Fires `inputs-change` after the current task, unless there are no inputs and there were none before. */
   notifyInputs(inputs: { readonly length: number } = [0]): void {
     if (inputs.length + this.#inputs > 0) queueMicrotask(() => this.#host.dispatch(new Event('inputs-change')));
     this.#inputs = inputs.length;
   }
 
-  /** Current state of the models that the page sets. */
+  /** Inputs that the page has set for the models, and the current time of playback. */
   get state(): DynamicState {
     return { ...this.#host.dynamicValues, timeSeconds: this.#host.playback.currentTime };
   }
 
   get listeners(): DynamicListeners {
-    // The clock of a scene may change.
+    // Read at each call, because the playback of the host may change.
     const onShown = (timeSeconds: number): void => this.#host.playback.frameShown(timeSeconds);
     return {
       onFrame: (timeSeconds) => {
@@ -109,25 +114,20 @@ export class DynamicWiring implements PostHost {
     };
   }
 
-  /**
-   * Advances the clock of an animated scene before a frame, and requests its generator's output. The frame does not
-   * wait.
-   */
-  advance({ live }: LoadedGaussians, camera: Camera, now: number): void {
+  /** Requests the Gaussians of an animated scene at the current time. The frame does not wait for them. */
+  advance({ live }: LoadedGaussians, camera: Camera): void {
     if (live === undefined) return;
-    const { playback } = this.#host;
-    playback.tick(now, live.loadedUntil?.(playback.currentTime));
     try {
       live.request(this.state, camera);
     } catch (error) {
-      // Values of the page that do not match the model are reported once, not in each frame.
+      // Values of the page that do not suit the model are reported once, not in each frame.
       this.#fail(error);
     }
   }
 
   #fail(cause: unknown): void {
     const error = toElementError(cause);
-    // The loss of the device has its own events.
+    // The loss of the device has events of its own.
     if (error.code === 'device-lost' || error.message === this.#lastFault) return;
     this.#lastFault = error.message;
     this.#host.dispatch(new CustomEvent('generator-error', { detail: error }));

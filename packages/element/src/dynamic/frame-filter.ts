@@ -2,33 +2,36 @@ import type { Camera } from '@gaussian-splat/core';
 import type { PerFrameSettings, RenderSettings, Rgba, SceneDepth } from '@gaussian-splat/renderer';
 import type { GeneratorInput } from './inputs.js';
 
-/** A frame to draw. */
+/** Parameters of a frame that is to be drawn. */
 export interface Frame {
   readonly camera: Camera;
   readonly target: GPUTexture;
-  /** Premultiplied. */
+  /** Premultiplied color behind the splats. */
   readonly background?: Rgba | undefined;
-  /** Settings that differ from those at rest. */
+  /** Settings in which the frame differs from frames at rest. */
   readonly settings?: Partial<PerFrameSettings> | undefined;
-  /** Takes the depth of the splats, too. */
+  /** Receives the depth of the splats, if present. */
   readonly depth?: SceneDepth | undefined;
 }
 
-/** A filter between the renderer and the canvas. Independent of the runtime, which is loaded on demand. */
+/**
+ * A filter that processes frames between the renderer and the canvas. The interface does not depend on the ONNX
+ * runtime, which is loaded on demand.
+ */
 export interface FrameFilter {
-  /** Inputs that the page may set. */
+  /** Inputs of the filter's models that the page may set. */
   readonly inputs: readonly GeneratorInput[];
-  /** Settings that the frames which it takes need. */
+  /** Renderer settings that the filter requires for its input frames. */
   readonly settings?: Partial<RenderSettings> | undefined;
-  /** Bytes of GPU memory of its own images. */
+  /** GPU memory of the filter's images, bytes. */
   readonly byteLength: number;
   /**
-   * Shows a frame.
-   * @param content Changes whenever the same camera would give another frame.
-   * @param draw Renders the frame into the given target.
+   * Draws a frame if it has changed, and presents it or a processed frame.
+   * @param content Key of the scene's content. It changes whenever the same camera would give another frame.
+   * @param draw Renders a frame into the target of its argument.
    */
   render(frame: Frame, content: string, draw: (frame: Frame) => void): void;
-  /** Call if the last frame was incomplete and is drawn again. */
+  /** Call if the last frame was incomplete, so that the next one is drawn even if nothing has changed. */
   invalidate(): void;
   close(): void;
 }

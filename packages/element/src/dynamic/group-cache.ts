@@ -1,27 +1,29 @@
 import { BackOff } from '@gaussian-splat/core/fetch';
-import type { ClipIndex } from '@gaussian-splat/formats';
+import { clipPartBytes, type ClipIndex } from '@gaussian-splat/formats';
 import type { PackedAnimation } from '@gaussian-splat/renderer/tools';
 
 export interface GroupSource {
   fetchPart(group: number, part: number, signal: AbortSignal): Promise<PackedAnimation>;
-  /** Called when a part has arrived. */
+  /** Called when a part has arrived, or has failed. */
   onArrival(): void;
-  /** Called once when a part is unavailable. */
+  /** Called at the first failure of a part; its further failures are not reported. */
   onError(error: unknown): void;
 }
 
-/** Prefetch time of groups; the next one is always fetched. */
+/** Duration for which groups are prefetched, s. The next group is always fetched. */
 const AHEAD_SECONDS = 6;
-/** Maximum total size of groups in memory; the current and the next one are always kept. */
+/** Maximum number of groups that are prefetched, because each frame searches them. */
+const MAX_AHEAD = 200;
+/** Maximum total size of groups in memory, bytes. The current and the next group are always kept. */
 const MAX_BYTES = 160 << 20;
 /**
- * Milliseconds before a failed part is requested again, four times as many after each further failure, and the maximum
- * number of attempts.
+ * Delay before a failed part is requested again, ms: four times as long after each further failure. The second constant
+ * is the maximum number of attempts.
  */
 const RETRY_MS = 5_000;
 const MAX_TRIES = 4;
 
-/** State of a part. */
+/** A part of a group: `content` after it has arrived, `abort` while it is in transit. */
 interface Entry {
   readonly group: number;
   readonly part: number;
@@ -29,7 +31,10 @@ interface Entry {
   abort?: AbortController;
 }
 
-/** Groups of a clip in memory: fetched ahead part by part, and discarded if the memory is full, past ones first. */
+/**
+ * Cache of the groups of a clip. Groups are fetched ahead, part by part. If the memory is full, parts that are not
+ * needed soon are discarded, those fetched first before others.
+ */
 export class GroupCache {
   readonly #index: ClipIndex;
   readonly #source: GroupSource;
@@ -44,7 +49,7 @@ export class GroupCache {
     this.#source = source;
   }
 
-  /** Number of groups with parts in memory or in transit. */
+  /** Number of groups of which any part is in memory or in transit. */
   get held(): number {
     return new Set(
       [...this.#entries.values()].filter(({ content, abort }) => content ?? abort).map(({ group }) => group),
@@ -55,18 +60,20 @@ export class GroupCache {
     return this.#entries.get(keyOf(group, part))?.content;
   }
 
-  /** Whether a part has failed, until it is requested again. */
+  /** Returns whether a part has failed and is not requested again yet. */
   isMissing(group: number, part: number): boolean {
     return this.#failures.isPaused(keyOf(group, part));
   }
 
-  /** Fetches the parts for the first frame. Rejects with the thrown error. */
+  /** Fetches the coarse part of the group of the first frame. Rejects with the error of the download. */
   async first(group: number, signal: AbortSignal): Promise<void> {
     const content = await this.#source.fetchPart(group, 0, signal);
     this.#entries.set(keyOf(group, 0), { group, part: 0, content });
   }
 
-  /** Sets the current group. */
+  /**
+   * Sets the current group, and fetches the groups that follow it. `loops`: whether the first group follows the last.
+   */
   want(group: number, loops: boolean): void {
     const key = `${group} ${loops}`;
     if (key !== this.#wantedFor) {
@@ -87,12 +94,16 @@ export class GroupCache {
     this.#entries.clear();
   }
 
-  /** A coarse version of the next group has priority over a fine one of the current group. */
+  /**
+   * Returns the needed parts, the most urgent first. The coarse part of the next group has priority over the fine parts
+   * of the current group.
+   */
   #wantedFrom(group: number, loops: boolean): (readonly [number, number])[] {
     const { groups, framesPerSecond } = this.#index;
     const ahead: number[] = [];
     let seconds = 0;
-    for (let k = 1; k < groups.length && (seconds < AHEAD_SECONDS || ahead.length === 0); k++) {
+    const end = Math.min(groups.length, 1 + MAX_AHEAD);
+    for (let k = 1; k < end && (seconds < AHEAD_SECONDS || ahead.length === 0); k++) {
       const next = group + k;
       if (next >= groups.length && !loops) break;
       ahead.push(next % groups.length);
@@ -116,14 +127,14 @@ export class GroupCache {
     if (this.#isClosed) return;
     for (const { abort } of this.#entries.values()) if (abort) return;
     const due = this.#wanted.find(
-      // Refinements of a group are useless without its coarse part.
+      // The fine parts of a group are useless without its coarse part.
       ([group, part]) => !this.get(group, part) && !this.isMissing(group, part) && (part === 0 || this.get(group, 0)),
     );
     if (!due || !this.#makeRoom(due)) return;
     void this.#fetch(due);
   }
 
-  /** Discards unneeded parts, oldest first, until a part fits. False if it does not fit and can wait. */
+  /** Discards unneeded parts, oldest first, until a part fits. Returns false if the part does not fit and can wait. */
   #makeRoom([group, part]: readonly [number, number]): boolean {
     const needed = this.#bytesOf(group, part);
     const kept = [...this.#entries].filter(([, { content }]) => content);
@@ -138,8 +149,7 @@ export class GroupCache {
   }
 
   #bytesOf(group: number, part: number): number {
-    const { splats, planes } = this.#index.groups[group].parts[part];
-    return splats * (56 + 2 * planes);
+    return clipPartBytes(this.#index.groups[group].parts[part]);
   }
 
   async #fetch([group, part]: readonly [number, number]): Promise<void> {

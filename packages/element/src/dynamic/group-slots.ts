@@ -2,10 +2,10 @@ import type { ClipIndex } from '@gaussian-splat/formats';
 import { ANIMATION_SLOTS, type AnimatedGaussians } from '@gaussian-splat/renderer';
 import type { GroupCache } from './group-cache.js';
 
-/** Bytes of parts that are not needed at once to upload in each frame. */
+/** Maximum bytes per frame for uploading parts that are not needed at once. */
 const BYTES_PER_FRAME = 1 << 20;
 
-/** Tracks which groups are on the GPU, and the shown frame. */
+/** Uploads groups of frames to slots of GPU memory, and shows their frames. */
 export class GroupSlots {
   readonly #gaussians: AnimatedGaussians;
   readonly #index: ClipIndex;
@@ -13,7 +13,7 @@ export class GroupSlots {
   readonly #groups = new Array<number>(ANIMATION_SLOTS).fill(-1);
   #shownFrame = -1;
   #shownSlot = 0;
-  /** Parts of the group in the shown frame. */
+  /** Number of parts that the shown frame contains. */
   #shownParts = 0;
 
   constructor(gaussians: AnimatedGaussians, index: ClipIndex) {
@@ -21,14 +21,16 @@ export class GroupSlots {
     this.#index = index;
   }
 
-  /** Index of the frame in the clip. */
+  /** Index in the clip of the shown frame; -1 before the first. */
   get shownFrame(): number {
     return this.#shownFrame;
   }
 
   /**
-   * Shows a frame of a group with the parts that are loaded, and uploads the next ones.
-   * @returns Whether there is more to upload.
+   * Shows a frame of a group with the parts that are loaded, and uploads more parts of this group and the next.
+   * @param frame Index of the frame in the clip.
+   * @param group Index of the group of the frame.
+   * @returns Whether parts were uploaded, so that another frame is needed.
    */
   show(frame: number, group: number, cache: GroupCache): boolean {
     const gaussians = this.#gaussians;
@@ -47,7 +49,7 @@ export class GroupSlots {
     return left < BYTES_PER_FRAME;
   }
 
-  /** A slot other than the one that is kept. */
+  /** Clears a slot other than `kept`, and assigns it to a group. Returns the index of the slot. */
   #take(group: number, kept: number): number {
     const slot = (kept + 1) % ANIMATION_SLOTS;
     this.#gaussians.clear(slot);

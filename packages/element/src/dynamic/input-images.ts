@@ -10,19 +10,19 @@ const MAX_IMAGE = 2 ** 28;
 export interface InputImagesOptions {
   readonly credentials: RequestCredentials;
   readonly signal: AbortSignal;
-  /** Called when all named images have arrived, or failed. */
+  /** Called when no image is in transit any more: all have arrived or failed. */
   readonly onChange: () => void;
   readonly onError: (error: unknown) => void;
-  /** Resolves when no run reads an image. */
+  /** Resolves when no run of a model reads an image. */
   readonly whenIdle: () => Promise<void>;
 }
 
-/** Size of a tensor as far as the model fixes it. */
+/** Shape of an image tensor, with the sizes that the model fixes. */
 type WantedShape = ReturnType<typeof imageShapeOf>;
 
 /**
- * Image inputs of models: fetched, cropped to the model's proportions and resampled on the GPU whenever the page names
- * others.
+ * The image inputs of models. Images that the page sets are fetched, cropped to the model's proportions, and resampled
+ * on the GPU.
  */
 export class InputImages {
   readonly #device: GPUDevice;
@@ -30,10 +30,14 @@ export class InputImages {
   readonly #shapes = new Map<string, WantedShape>();
   readonly #sources = new Map<string, ImageSources>();
   readonly #tensors: Record<string, ImageTensor> = {};
-  readonly #loading = new Set<Promise<void>>();
+  /** Loads of the current images, by the names of the inputs. */
+  readonly #loading = new Map<string, Promise<void>>();
   #isDestroyed = false;
 
-  /** @param models Models whose image inputs the page sets, except for those in `given`. */
+  /**
+   * @param models Models whose image inputs the page sets.
+   * @param given Names of inputs that the page does not set.
+   */
   constructor(
     device: GPUDevice,
     models: readonly GeneratorModel[],
@@ -50,41 +54,43 @@ export class InputImages {
     }
   }
 
-  /** Received images by the names of inputs. */
+  /** Tensors of the images that have arrived, by the names of the inputs. */
   get tensors(): Readonly<Record<string, GpuTensor>> {
     return this.#tensors;
   }
 
-  /** Whether an image is in transit. Other state of the page may belong to it. */
+  /** Whether an image is in transit. Other values that the page has set may belong to that image. */
   get isLoading(): boolean {
     return this.#loading.size > 0;
   }
 
-  /** Whether every input has its images, and none is in transit. */
+  /** Whether every image input has its images, and no image is in transit. */
   get areComplete(): boolean {
     return !this.isLoading && [...this.#shapes.keys()].every((name) => name in this.#tensors);
   }
 
-  /** Resolves, and never rejects, once nothing is in transit. */
+  /** Resolves when no image is in transit. Never rejects. */
   async settled(): Promise<void> {
-    while (this.#loading.size > 0) await Promise.all(this.#loading);
+    while (this.#loading.size > 0) await Promise.all(this.#loading.values());
   }
 
-  /** Sets the current images of the page; only new ones are loaded. */
+  /** Sets the images by the names of inputs. Only images that have changed are loaded. */
   update(images: Readonly<Record<string, ImageSources>>): void {
     for (const name of this.#shapes.keys()) {
       const source = valueOf(images, name);
       if (source === undefined || isSame(source, this.#sources.get(name))) continue;
       this.#sources.set(name, source);
       const loading: Promise<void> = this.#load(name, source).finally(() => {
-        this.#loading.delete(loading);
+        // An image that was replaced before it arrived does not delay its successor.
+        if (this.#loading.get(name) !== loading) return;
+        this.#loading.delete(name);
         if (!this.isLoading && !this.#isDestroyed) this.#options.onChange();
       });
-      this.#loading.add(loading);
+      this.#loading.set(name, loading);
     }
   }
 
-  /** Call after the model is closed. */
+  /** Frees the tensors when no run reads them. Call after the model is closed. */
   destroy(): void {
     this.#isDestroyed = true;
     void this.#options.whenIdle().then(() => Object.values(this.#tensors).forEach((tensor) => tensor.destroy()));
@@ -106,11 +112,13 @@ export class InputImages {
         const tensor = this.#tensorFor(name, all[0]);
         all.forEach((pixels, view) => tensor.upload(pixels, 'cover', view));
       } finally {
-        // Closed in any case, even if another one has replaced it.
+        // Decoded images are closed in any case, also if the page has replaced them.
         for (const pixels of made) pixels.close();
       }
     } catch (error) {
-      if (!this.#isDestroyed && !this.#options.signal.aborted) this.#options.onError(error);
+      // The failure of an image that the page has replaced meanwhile is not reported.
+      const isCurrent = this.#sources.get(name) === source;
+      if (isCurrent && !this.#isDestroyed && !this.#options.signal.aborted) this.#options.onError(error);
     }
   }
 
@@ -125,7 +133,10 @@ export class InputImages {
   }
 }
 
-/** The images of an input: a list, or addresses separated by spaces. */
+/**
+ * Returns the images of an input, from a list, or from addresses separated by spaces. Throws GaussianSplatError
+ * `argument/value` if there are not as many as the input has views.
+ */
 function listed(name: string, source: ImageSources, views: number): readonly ImageSource[] {
   const text = typeof source === 'string' && views > 1 ? source.trim().split(/\s+/) : source;
   const list = Array.isArray(text) ? (text as readonly ImageSource[]) : [text as ImageSource];
@@ -138,7 +149,10 @@ function listed(name: string, source: ImageSources, views: number): readonly Ima
   });
 }
 
-/** Lists are new objects whenever a page sets its controls. */
+/**
+ * Returns whether two values name the same images. Lists are compared by their elements, because a page creates new
+ * lists whenever it sets its controls.
+ */
 function isSame(a: ImageSources, b: ImageSources | undefined): boolean {
   if (!Array.isArray(a) || !Array.isArray(b)) return a === b;
   return a.length === b.length && a.every((each, i) => each === (b as readonly ImageSource[])[i]);
@@ -157,7 +171,7 @@ async function pixelsOf(
   }
   if (typeof source !== 'string' && !(source instanceof Blob)) return source;
   const blob = typeof source === 'string' ? await fetchImage(source, options) : source;
-  // Only the orientation of the file is applied; colors stay as encoded.
+  // The image is rotated as the file declares.
   return createImageBitmap(blob, { imageOrientation: 'from-image', premultiplyAlpha: 'premultiply' }).catch(
     (cause: unknown) => {
       throw unreadable(name, typeof source === 'string' ? source : source.type, cause);

@@ -1,37 +1,42 @@
 import type { InputBinding } from '@gaussian-splat/core/contract';
 import type { GeneratorModel } from '@gaussian-splat/generator';
 
-/** An input of a model that a page may set, from its contract: enough to create controls for visitors. */
+/**
+ * An input of a model that a page may set, as its contract declares it. The description suffices to create controls for
+ * visitors.
+ */
 export interface GeneratorInput {
-  /** Name as in `inputValues` and `control-NAME`. */
+  /** Name of the input, as in `inputValues` and `control-NAME`. */
   readonly name: string;
   /**
-   * `control`, `shape`, `seed`, `image`: set by `control-NAME` or `inputValues`; `pose`: by `pose`; `time`, `frame`: by
-   * `currentTime`. Others, such as `view`, are set by the element itself.
+   * Kind of the input. `control`, `shape`, `seed` and `image` are set by `control-NAME` or `inputValues`, `pose` by
+   * `pose`, `time` and `frame` by `currentTime`. The element itself sets others, such as `view`.
    */
   readonly role: Exclude<InputBinding['role'], 'gaussians' | 'depth' | 'state'>;
-  /** For readers. */
+  /** Name for visitors; default: {@link name}. */
   readonly label: string;
-  /** Number of its elements; 0 for an image. */
+  /** Number of elements of the tensor; 0 for an image. */
   readonly size: number;
-  /** Range of each element. */
+  /** Allowed range of each element, inclusive. */
   readonly range?: readonly [min: number, max: number];
   readonly step?: number;
-  /** Default: all elements, or one number for all. */
+  /** Default value: all elements, or one number for all of them. */
   readonly default?: number | readonly number[];
-  /** Format of the rotations of a pose. */
+  /** Format of the joint rotations of a pose. */
   readonly format?: 'axis-angle' | 'quaternion' | 'matrix' | 'parameters';
   readonly quaternionOrder?: 'wxyz' | 'xyzw';
   readonly joints?: readonly string[];
-  /** Index of the parent of each joint, -1 for roots. */
+  /** Index of the parent of each joint; -1 for roots. */
   readonly parents?: readonly number[];
-  /** Names of the coefficients of a shape. */
+  /** Names of the elements, for example of the coefficients of a shape. */
   readonly names?: readonly string[];
-  /** Number of images in one tensor, for an image. */
+  /** Number of images that the tensor of an image input contains; absent for 1. */
   readonly views?: number;
 }
 
-/** The inputs of models in a chain, each name once. */
+/**
+ * Returns the inputs of the models of a chain. If several models have an input of the same name, the first one counts.
+ */
 export function inputsOf(models: readonly GeneratorModel[]): readonly GeneratorInput[] {
   const found = new Map<string, GeneratorInput>();
   for (const { header, contract } of models) {

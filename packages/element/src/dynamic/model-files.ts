@@ -1,4 +1,4 @@
-/** Files of models: their headers, which a worker reads, and companion files. */
+/** Reads the headers of models, in a worker, and fetches the files beside them. */
 import { GaussianSplatError } from '@gaussian-splat/core';
 import { bytesOf, fetchPatiently } from '@gaussian-splat/core/fetch';
 import type { ModelPlace, OpenedModel } from '@gaussian-splat/core/onnx';
@@ -6,7 +6,7 @@ import type { ModelSource } from '@gaussian-splat/generator';
 import type { SceneLimits } from '../loading/protocol.js';
 import type { SceneLoader } from '../loading/scene-loader.js';
 
-/** Reads headers of models in a worker, within the limits of the page. */
+/** Returns a function that reads the header of a model in a worker, within the limits of the page. */
 export function readsHeaders(loader: SceneLoader, limits: SceneLimits | undefined): ModelSource['openHeader'] {
   return (place: ModelPlace, signal = new AbortController().signal) => {
     const request = { place, limits };
@@ -18,11 +18,12 @@ export function readsHeaders(loader: SceneLoader, limits: SceneLimits | undefine
 }
 
 /**
- * Fetches a contract or an image.
+ * Fetches a file of a model: a contract or an image.
+ * @param address URL, absolute or relative to the document.
  * @param maxBytes Maximum size of the file.
- * @param expected Description of the expected file, for users.
- * @param remedy Suggested correction.
- * @throws GaussianSplatError `network/*`; the reason of the signal.
+ * @param expected Description of the expected file, for the message of an error.
+ * @param remedy Suggested correction, for the message of an error.
+ * @throws GaussianSplatError `network/*`, or the reason of the signal.
  */
 export async function fetchBeside(
   address: string,

@@ -1,18 +1,21 @@
-/** Attributes of the element that only late-loaded code for models reads. */
+/** Reads attributes of the element that only concern models. Late-loaded code for models imports this module. */
 import { Lazy } from '@gaussian-splat/core';
 import type { DynamicRequest } from './dynamic-model.js';
 
 interface ModelElement extends HTMLElement {
-  readonly compare?: string | null;
+  readonly gpuCheck?: string | null;
   readonly controlsPanel?: boolean;
 }
 
-/** Value of the attribute `gpu-check`; child elements have no property for it. Any value but "off" is the default. */
-export const compareOf = ({
+/**
+ * Returns the function that starts workers for the check of the GPU's results, or false if the attribute `gpu-check` is
+ * "off". Child elements have no property for this attribute.
+ */
+export const gpuCheckOf = ({
   element,
   loader,
 }: Pick<DynamicRequest, 'element' | 'loader'>): false | DynamicRequest['loader']['spawn'] =>
-  ((element as ModelElement).compare ?? element.getAttribute('compare'))?.trim() === 'off' ? false : loader.spawn;
+  ((element as ModelElement).gpuCheck ?? element.getAttribute('gpu-check'))?.trim() === 'off' ? false : loader.spawn;
 
 const ownerOf = (element: HTMLElement): ModelElement | null =>
   'controlsPanel' in element ? (element as ModelElement) : element.parentElement;
@@ -21,11 +24,14 @@ const panel = new Lazy('the code of the panel of controls', () => import('./cont
 
 const offered = new WeakSet<HTMLElement>();
 
-/** Creates the panel of controls of an element, or of a child's parent, whenever its attribute is set. */
+/**
+ * Shows the panel of controls whenever the attribute `controls-panel` of an element is set, or that of the parent of a
+ * child element.
+ */
 export function offerPanel(element: HTMLElement): void {
   if (offered.has(element)) return;
   offered.add(element);
-  // A child may be moved to another element, and has none after its removal.
+  // The owner may change: a child may be moved to another element, and has no owner after its removal.
   let last: ModelElement | null = null;
   const show = async (): Promise<void> => {
     const owner = ownerOf(element);

@@ -1,4 +1,6 @@
-/** Loaded only for generators: only this module and post-view.ts depend on `@gaussian-splat/generator`. */
+/**
+ * Opens generators. The module is loaded only for them: only it and post-view.ts depend on `@gaussian-splat/generator`.
+ */
 import { SPLAT_FILTERS } from '@gaussian-splat/core';
 import { Generator, setRuntimeLocation, type GeneratorModel, type ModelSource } from '@gaussian-splat/generator';
 import { DynamicGaussians } from '@gaussian-splat/renderer';
@@ -13,7 +15,7 @@ import { inputsOf } from './inputs.js';
 import type { DynamicModel, DynamicRequest } from './dynamic-model.js';
 import { InputImages } from './input-images.js';
 import { fetchBeside, readsHeaders } from './model-files.js';
-import { compareOf, offerPanel } from './of-element.js';
+import { gpuCheckOf, offerPanel } from './of-element.js';
 import { StateReader } from './read-state.js';
 import { RunWatch } from './run-watch.js';
 import { waitForImages, type WaitingPlace } from './wait-for-images.js';
@@ -27,30 +29,36 @@ import type { GeneratorMemoryDetail } from '../events.js';
 /** Maximum size of a contract in bytes. */
 const MAX_CONTRACT = 2 ** 20;
 
-/** Bounds from a contract: those of the centers also apply to the subject. Undefined if it declares none. */
+/**
+ * Returns the bounds that a contract declares for the centers of the Gaussians, which also serve as those of the
+ * subject; undefined if it declares none.
+ */
 export function declaredBounds(contract: Contract): SceneBounds | undefined {
   const { bounds } = contract;
   if (bounds === undefined) return undefined;
   const { min, max } = bounds;
   const center = [0, 1, 2].map((axis) => (min[axis] + max[axis]) / 2) as [number, number, number];
   const sides = [0, 1, 2].map((axis) => max[axis] - min[axis]);
-  // Centers rarely fill the corners of a box: the sphere with 90 % of them is smaller than the one around the box, but
-  // a long subject reaches both of its ends.
+  // Centers rarely fill the corners of a box, so the sphere with 90 % of them is smaller than the one around the box.
+  // The sphere of a long subject still contains both of its ends.
   const radius = Math.max(0.7 * Math.hypot(...sides), ...sides) / 2 || 1;
   return { min, max, center, radius, up: upOf(contract) };
 }
 
-/** Unit vector of a contract that points up; undefined if it declares none. */
+/** Returns the up direction that a contract declares, as a unit vector; undefined if it declares none. */
 export const upOf = ({ coordinates }: Contract): Vector3 | undefined =>
   parseUp(coordinates?.up?.replace('+', '') ?? '') ?? undefined;
 
 /**
- * Fraction of the progress before a generator's first frame that follows its download: compiling the runtime, creating
- * a session, the first runs. The duration is unknown beforehand, but a full progress bar must not stop.
+ * Fraction of the progress that follows the download of a generator: compiling the runtime, creating a session, and the
+ * first run. The duration of these steps is unknown, so the progress stays below 1 until the first frame.
  */
 const WARM_UP = 0.25;
 
-/** Opens the scene of a generator. @param lease The caller releases it if this rejects. */
+/**
+ * Opens the scene of a generator. Rejects with GaussianSplatError, or the signal's reason.
+ * @param lease Lease of the device, which the caller releases if the promise rejects.
+ */
 export async function openDynamicScene(
   request: SceneRequest,
   options: OpenOptions,
@@ -80,7 +88,10 @@ export async function openDynamicScene(
   }
 }
 
-/** Opens a generator, with its first run in its Gaussians. Rejects with GaussianSplatError, or the signal's reason. */
+/**
+ * Opens a generator and waits for its first run. Rejects with GaussianSplatError, or the signal's reason.
+ * @param place Resolves with the place where an empty scene is shown until the image inputs arrive.
+ */
 async function openDynamicModel(
   request: DynamicRequest,
   device: GPUDevice,
@@ -100,14 +111,14 @@ async function openDynamicModel(
       watch?.frameMade();
     },
     onError: (error) => (isOpen ? listeners.onError(error) : (firstFailure = error)),
-    compare: compareOf(request),
+    gpuCheck: gpuCheckOf(request),
     onFallback: (reason) => {
       listeners.onFallback(reason);
       listeners.onInput();
     },
   });
   let watch: RunWatch | undefined;
-  // Closed early when it is aborted.
+  // The generator is closed at once if the signal is aborted before it is open.
   signal.addEventListener('abort', () => !isOpen && generator.close(), { once: true });
   let gaussians: DynamicGaussians | undefined;
   let images: InputImages | undefined;
@@ -142,7 +153,8 @@ async function openDynamicModel(
     signal.throwIfAborted();
     isOpen = true;
     watch = new RunWatch(gaussians, model.header.name, onError, (now, isFirst) => {
-      // The contract's bounds cover all times.
+      // Declared bounds contain the Gaussians of all times. A sample replaces them only if the previous one had no visible
+      // Gaussians.
       if (declared === undefined || isFirst) bounds = { ...now, up: upOf(model.contract) };
       if (isFirst) void (request.element as Framed).updateFraming?.();
     });
@@ -165,7 +177,7 @@ async function openDynamicModel(
   }
 }
 
-/** Memory that is known before the first run, over all models of a chain. */
+/** Returns the memory of all models of a chain, as far as it is known before the first run. */
 function memoryOf(models: readonly GeneratorModel[], gaussianBytes: number): GeneratorMemoryDetail {
   const all = models.map(({ header }) => modelMemory(header));
   const sizes = all.flatMap(({ largestKnownTensorBytes }) => largestKnownTensorBytes ?? []);
@@ -197,8 +209,8 @@ function liveModel(
     request: (state, camera) => {
       images.update(state.images);
       reader.checkPose(state);
-      // Two images and the pose of their cameras belong together, so no run may mix old and new ones. The last one to
-      // arrive requests again.
+      // Several images and the pose of their cameras belong together, so no run may mix old and new ones. When the last
+      // image has arrived, a frame requests the run again.
       if (!images.isLoading) generator.request(reader.read(state, camera, images.tensors, ownsControls() ? [] : null));
     },
     close: () => {
@@ -208,7 +220,7 @@ function liveModel(
   };
 }
 
-/** Sources of the generator, and of those that follow it in a chain. The contract of the page is that of the first. */
+/** Returns the sources of all models of a chain. The contract that the page sets is that of the first model. */
 async function sourcesOf(request: DynamicRequest, signal: AbortSignal): Promise<ModelSource[]> {
   const { url, chain = [], credentials } = request;
   const contract = await contractOf(request, signal);
@@ -218,7 +230,7 @@ async function sourcesOf(request: DynamicRequest, signal: AbortSignal): Promise<
 
 async function contractOf(request: DynamicRequest, signal: AbortSignal): Promise<unknown> {
   const { credentials } = request;
-  // Templates write empty attributes; an empty address would be that of the page.
+  // Templates may write an empty attribute, which counts as none: as an address it would refer to the page.
   const contract = typeof request.contract === 'string' ? request.contract.trim() : request.contract;
   if (typeof contract !== 'string' || contract === '' || contract.startsWith('{')) return contract || undefined;
   const remedy = 'check the address in the attribute contract, or leave it out';
@@ -227,11 +239,14 @@ async function contractOf(request: DynamicRequest, signal: AbortSignal): Promise
   return new TextDecoder().decode(bytes);
 }
 
-/** False if the clock has no effect, so that there is nothing to play. Without `fps` no time determines a frame. */
+/**
+ * Returns whether a model depends on the time. If none does, there is nothing to play. An input of role `frame` needs
+ * `fps`, which relates frames to time.
+ */
 const takesTime = ({ contract: { inputs, fps } }: GeneratorModel): boolean =>
   Object.values(inputs).some(({ role }) => role === 'time' || (role === 'frame' && fps !== undefined));
 
-/** The element, if it frames its scene: a child does not. */
+/** An element that may frame its scene; a child element has no such method. */
 interface Framed extends HTMLElement {
   updateFraming?(): Promise<void>;
 }

@@ -3,30 +3,38 @@ import { LatestTask } from '../latest-task.js';
 import { PostView, type PostRequest } from './post-view.js';
 
 export interface PostHost {
-  /** Additional data of a request for a post-processor. */
+  /** Parameters of the element for opening a post-processor. */
   readonly postRequest: Omit<PostRequest, 'urls' | 'signal' | 'onChange'>;
   requestFrame(): void;
-  /** Called when there is another filter, or none. */
+  /** Called when the post-processor has been set or removed, so that the inputs may have changed. */
   notifyInputs(): void;
 }
 
 /**
- * Inserts the post-processor of the attribute between the frames and the canvas. Until it is loaded, unprocessed frames
- * are shown.
+ * Inserts the post-processors of the attribute `postprocess` between the renderer and the canvas. Until they are
+ * loaded, unprocessed frames are shown.
  */
 export class PostController {
   readonly #host: PostHost;
   readonly #opening = new LatestTask();
+  /** Backend and addresses that are open, are being opened, or have failed. */
+  #backend: Backend | null = null;
+  #urls = '';
 
   constructor(host: PostHost) {
     this.#host = host;
   }
 
   /**
-   * @param painter null while nothing is drawn.
-   * @param urls In execution order; none for unprocessed frames.
+   * Opens post-processors for a backend, instead of the previous ones. May be called at any rate, as for each child that
+   * is shown: only changes have an effect.
+   * @param backend Backend that draws the frames; null while nothing is drawn.
+   * @param urls Absolute addresses in execution order; empty for unprocessed frames.
    */
   open(backend: Backend | null, urls: readonly string[]): void {
+    const key = urls.join(' ');
+    if (backend === this.#backend && key === this.#urls) return;
+    [this.#backend, this.#urls] = [backend, key];
     this.#opening.renew();
     if (backend === null) return;
     if (backend.filter) {

@@ -1,11 +1,11 @@
-/** Loaded only for post-processors: see open-dynamic-model.ts. */
+/** Runs post-processors. The module is loaded only for them: see open-dynamic-model.ts. */
 import { PostProcessor, setRuntimeLocation, type GpuTensor } from '@gaussian-splat/generator';
 import { FilteredFrame } from '@gaussian-splat/renderer';
 import type { Frame, FrameFilter } from './frame-filter.js';
 import { inputsOf, type GeneratorInput } from './inputs.js';
 import type { DynamicRequest } from './dynamic-model.js';
 import { InputImages } from './input-images.js';
-import { compareOf, offerPanel } from './of-element.js';
+import { gpuCheckOf, offerPanel } from './of-element.js';
 import { readsHeaders } from './model-files.js';
 import { StateReader } from './read-state.js';
 
@@ -13,31 +13,30 @@ export interface PostRequest extends Pick<
   DynamicRequest,
   'credentials' | 'element' | 'runtimeLocation' | 'loader' | 'limits' | 'state'
 > {
-  /** One post-processor, or a chain of several. */
+  /** Absolute addresses of post-processors, in execution order. */
   readonly urls: readonly string[];
   readonly signal: AbortSignal;
-  /** Inputs of the scene that `control-NAME` sets, too. */
+  /** Returns the names of other models' inputs that `control-NAME` sets, which are not reported as unknown. */
   readonly others: () => readonly string[];
-  /** Called when the frame would change. */
+  /** Called when the next frame would differ, so that it must be drawn. */
   readonly onChange: () => void;
   readonly onError: (error: unknown) => void;
   readonly onFallback: (reason: string) => void;
 }
 
 /**
- * A post-processor counts as fast enough below the first time, ms, and until it exceeds the second: the duration of a
- * run until the GPU has finished it.
+ * A post-processor becomes fast enough if a run takes at most the first time, ms, and remains so until a run exceeds
+ * the second. A run lasts until the GPU has finished it.
  */
 const IN_TIME_MS = 34;
 const TOO_LATE_MS = 50;
-/** Pause after a failure. */
+/** Delay of the next run after a failure, ms. */
 const RETRY_MS = 1_000;
 
 /**
- * Shows frames through a post-processor. A frame at rest is always shown processed, as soon as the result is ready.
- * While the frame changes, processed frames are shown, one run late, if the post-processor is fast enough; otherwise
- * unprocessed ones. Runs never delay drawing: a frame is passed on when the post-processor is free, and only the latest
- * is.
+ * Shows frames that a post-processor has processed. A frame at rest is always shown processed, as soon as the result is
+ * ready. While frames change, processed frames are shown one run late if the post-processor is fast enough, otherwise
+ * unprocessed frames. Runs never delay drawing: only the latest frame is passed on, when the post-processor is free.
  */
 export class PostView implements FrameFilter {
   readonly #device: GPUDevice;
@@ -48,15 +47,15 @@ export class PostView implements FrameFilter {
   #surface: FilteredFrame | undefined;
   #tensor: GpuTensor | undefined;
   #depth: GpuTensor | undefined;
-  /** The target surface of the current run. */
+  /** The surface whose frame is the input of the current run. */
   #pending: FilteredFrame | undefined;
-  /** Keys of the last drawn frame, of the post-processor's input, and of its output. */
+  /** Keys of the last drawn frame, of the last input of the post-processor, and of its last output; empty for none. */
   #drawn = '';
   #handed = '';
   #filtered = '';
   /**
-   * State at the start of the last run, and of the last failed one: that is not tried again, and nothing else before a
-   * time, ms.
+   * State at the start of the last run, and of the last failed run. The failed state is not tried again. No state is
+   * tried before the time `#retryAt`, in milliseconds of `performance.now()`.
    */
   #tried = '';
   #failed = '';
@@ -77,7 +76,7 @@ export class PostView implements FrameFilter {
     this.#images = new InputImages(device, models.slice(0, 1), given, options);
   }
 
-  /** Fetches and checks it. Rejects with GaussianSplatError, or the signal's reason. */
+  /** Fetches and checks the post-processors. Rejects with GaussianSplatError, or the signal's reason. */
   static async open(request: PostRequest, device: GPUDevice): Promise<PostView> {
     const { urls, credentials, runtimeLocation, signal, onFallback, onError, onChange } = request;
     if (runtimeLocation !== null) setRuntimeLocation(new URL(runtimeLocation, document.baseURI));
@@ -87,7 +86,7 @@ export class PostView implements FrameFilter {
       device,
       {
         signal,
-        compare: compareOf(request),
+        gpuCheck: gpuCheckOf(request),
         onFallback,
         onImage: (image) => {
           if (view) view.#accept(image);
@@ -105,7 +104,7 @@ export class PostView implements FrameFilter {
     return (view = new PostView(device, request, post));
   }
 
-  /** Only the rasterizer `tiles` writes depth. */
+  /** If the post-processor needs depth, the rasterizer must be `tiles`, the only one that writes it. */
   get settings(): FrameFilter['settings'] {
     return this.#post.depth && { rasterizer: 'tiles' };
   }
@@ -114,7 +113,7 @@ export class PostView implements FrameFilter {
     return this.#surface?.byteLength ?? 0;
   }
 
-  /** Inputs that the page sets, without the image. */
+  /** Inputs of the models, without the image of the frame, which the page does not set. */
   get inputs(): readonly GeneratorInput[] {
     return inputsOf(this.#post.models).filter(({ name }) => name !== this.#post.input.name);
   }
@@ -142,8 +141,8 @@ export class PostView implements FrameFilter {
   }
 
   /**
-   * A run in progress may still read the input. Other surfaces are freed at once, because many sizes may occur during
-   * one run.
+   * Destroys a surface when no run reads it. Surfaces that are not the input of the current run are destroyed at once,
+   * because many sizes may occur during one run.
    */
   #retire(surface: FilteredFrame | undefined): void {
     if (surface !== this.#pending || !this.#post.isBusy) surface?.destroy();
@@ -159,13 +158,16 @@ export class PostView implements FrameFilter {
     return this.#surface;
   }
 
-  /** Key of everything that a run depends on. */
+  /** Returns a key of all values that a run depends on: the frame, controls, time and images. */
   #said(key: string): string {
     const { controls, images, timeSeconds } = this.#request.state();
     return `${key} ${JSON.stringify([controls, timeSeconds])} ${String(Object.values(images))}`;
   }
 
-  /** False for a failed input, and for a while after a failure; then a frame is requested. */
+  /**
+   * Returns whether a run may start. False for a state that has failed, and for {@link RETRY_MS} after any failure; a
+   * frame is then requested at the end of that time.
+   */
   #isDue(key: string): boolean {
     const waitMs = this.#retryAt - performance.now();
     if (this.#said(key) === this.#failed) return false;
@@ -174,7 +176,7 @@ export class PostView implements FrameFilter {
     return waitMs <= 0;
   }
 
-  /** Passes the drawn frame to the post-processor if it or a control has changed. */
+  /** Passes the drawn frame and the state of the page to the post-processor, which runs if any of them has changed. */
   #offer(surface: FilteredFrame, { camera }: Frame, key: string): void {
     this.#tried = this.#said(key);
     const { input } = this.#post;
@@ -206,7 +208,7 @@ export class PostView implements FrameFilter {
   }
 
   #accept(image: GpuTensor): void {
-    // The element may have been resized meanwhile.
+    // The element may have been resized during the run.
     if (this.#pending !== this.#surface || image.dtype === 'int32') return;
     const { buffer, dims, dtype } = image;
     this.#surface?.accept({ buffer, dims, dtype });

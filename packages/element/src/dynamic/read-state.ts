@@ -4,22 +4,33 @@ import type { GeneratorModel, GeneratorState, GpuTensor } from '@gaussian-splat/
 import type { DynamicState } from './dynamic-model.js';
 import { valueOf } from './values.js';
 
-/** Range of a seed: models take it as int32 or int64. */
+/** Allowed range of a seed, which models receive as int32 or int64. */
 const INT32 = [-(2 ** 31), 2 ** 31 - 1] as const;
 
-/** Converts the state of the page to that of a generator. Invalid values are corrected and reported, each once. */
+/**
+ * Converts the state that the page sets to the state of a generator. Invalid values are corrected, and each is reported
+ * once.
+ */
 export class StateReader {
   readonly #inputs: Contract['inputs'];
   readonly #report: (error: GaussianSplatError) => void;
   readonly #reported = new Set<string>();
 
-  /** @param models Models whose inputs the page may set. */
+  /**
+   * @param models Models whose inputs the page may set.
+   * @param report Receives the error for each invalid value, with code `argument/value`.
+   */
   constructor(models: readonly GeneratorModel[], report: (error: GaussianSplatError) => void) {
     this.#inputs = merged(models.map(({ contract }) => contract.inputs));
     this.#report = report;
   }
 
-  /** @param others Names that another model has; null if that one reports unknown names. */
+  /**
+   * Returns the state of a run.
+   * @param images Tensors of image inputs, by name.
+   * @param others Names of inputs of other models, which are not reported as unknown; null if another model reports
+   * unknown names.
+   */
   read(
     state: DynamicState,
     camera: Camera,
@@ -60,7 +71,7 @@ export class StateReader {
     return nearest;
   }
 
-  /** Inputs that `control-NAME` sets. */
+  /** Names of the inputs that `control-NAME` sets. */
   get settable(): readonly string[] {
     const roles = ['control', 'shape', 'seed', 'image'];
     return Object.keys(this.#inputs).filter((name) => roles.includes(this.#inputs[name].role));
@@ -75,7 +86,7 @@ export class StateReader {
     }
   }
 
-  /** Reports a pose that no model accepts. */
+  /** Reports a pose if no model has an input for it. */
   checkPose({ pose }: DynamicState): void {
     if (pose === undefined || Object.values(this.#inputs).some(({ role }) => role === 'pose')) return;
     this.#say('pose', 'none: the model takes no pose', `${pose.length} numbers`, 'leave it out');
@@ -93,7 +104,10 @@ export class StateReader {
   }
 }
 
-/** The inputs of several models. Inputs with the same name are one control, whose values must be valid for all. */
+/**
+ * Merges the inputs of several models. Controls of the same name become one control, whose range is the intersection of
+ * their ranges.
+ */
 function merged(models: readonly Contract['inputs'][]): Contract['inputs'] {
   const inputs: Record<string, InputBinding> = {};
   for (const [name, binding] of models.flatMap(Object.entries<InputBinding>)) {

@@ -1,21 +1,24 @@
 import type { Bounds } from '@gaussian-splat/core';
 import { ContractError } from '@gaussian-splat/core/contract';
 
-/** Delay after the last run, ms: a sample reads positions back, so there is none during consecutive runs. */
+/**
+ * Delay of a sample after the last run, ms. A sample reads positions back from the GPU, so none is taken between
+ * consecutive runs.
+ */
 const REST_MS = 700;
-/** Maximum number of Gaussians for sampling. */
+/** Maximum number of Gaussians of a scene that is sampled. */
 const MAX_COUNT = 1_000_000;
 
-/** Interface of `DynamicGaussians` of the renderer. */
+/** The part of the renderer's `DynamicGaussians` that is sampled. */
 export interface Watched {
   readonly count: number;
   readSample(): Promise<{ readonly bounds: Bounds; readonly drawn: number; readonly unusable: number }>;
 }
 
 /**
- * Samples the Gaussians once runs have stopped. Reports a run whose rows are all unusable once, because nothing is
- * visible although nothing has failed; and again after a usable one. Transparent Gaussians are not reported, because
- * scenes fade in.
+ * Samples the Gaussians after a pause of the runs. Reports a run whose rows are all unusable, because nothing is
+ * visible although nothing has failed. It is reported again only after a usable run. Transparent Gaussians are not
+ * reported, because scenes fade in.
  */
 export class RunWatch {
   readonly #gaussians: Watched;
@@ -25,7 +28,13 @@ export class RunWatch {
   #timer: ReturnType<typeof setTimeout> | undefined;
   #isEmpty = false;
 
-  /** @param onBounds Is called with the bounds, and whether the previous sample had no usable rows. */
+  /**
+   * @param gaussians Gaussians of the scene.
+   * @param where Name of the model, for the error.
+   * @param onError Receives the error of an unusable run.
+   * @param onBounds Called with the bounds of a usable sample; `isFirst` is true if the previous sample had no visible
+   * Gaussians.
+   */
   constructor(
     gaussians: Watched,
     where: string,
@@ -38,7 +47,10 @@ export class RunWatch {
     this.#onBounds = onBounds;
   }
 
-  /** Call when a run is shown. Returns at once. */
+  /**
+   * Call when a run is shown. A sample of the Gaussians is read {@link REST_MS} milliseconds after the last call, unless
+   * there are more than {@link MAX_COUNT}.
+   */
   frameMade(): void {
     clearTimeout(this.#timer);
     if (this.#gaussians.count > MAX_COUNT) return;
@@ -51,7 +63,7 @@ export class RunWatch {
 
   async #look(): Promise<void> {
     const sample = await this.#gaussians.readSample().catch(() => undefined);
-    // A closed scene reports nothing.
+    // The scene has been closed, so nothing is reported.
     if (sample === undefined) return;
     const { bounds, drawn, unusable } = sample;
     const isEmpty = drawn === 0;

@@ -1,4 +1,4 @@
-/** Loaded only for sequences. */
+/** Plays sequences of scene files. The module is loaded only for sequences. */
 import { type Bounds } from '@gaussian-splat/core';
 import { BackOff, fileRequest } from '@gaussian-splat/core/fetch';
 import { frameAt, framePath, motionFrame, type SceneSequence } from '@gaussian-splat/formats';
@@ -19,7 +19,7 @@ export interface SequenceOptions {
   readonly frameUrl: (url: string) => string;
   readonly loops: () => boolean;
   readonly memoryBudget: number | undefined;
-  /** Called with the size of the first frame before its upload. */
+  /** Called with the size of the first frame, in bytes, before its upload. */
   readonly beforeUpload: (byteLength: number) => void;
 }
 
@@ -27,31 +27,31 @@ export interface SequenceOptions {
 const AT_ONCE = 3;
 
 /**
- * Milliseconds before a failed frame is requested again, four times as many after each further failure, and the maximum
- * number of attempts.
+ * Delay before a failed frame is requested again, ms: four times as long after each further failure. The second
+ * constant is the maximum number of attempts.
  */
 const RETRY_MS = 5_000;
 const MAX_TRIES = 4;
 
-/** A frame in transit, or loaded. */
+/** A frame in transit, or a loaded frame, which has `packed`. */
 interface FetchedFrame {
   readonly abort: AbortController;
   packed?: PackedGaussians;
 }
 
 /**
- * Plays a sequence of scene files. The next frames are fetched and unpacked in the worker, as many as the memory limit
- * allows; if one is late, the previous one stays visible.
+ * Plays a sequence of scene files. The worker fetches and unpacks the next frames, as many as the memory limit allows.
+ * If a frame is late, the previous one stays visible.
  */
 export class SequencePlayer implements Timeline {
   readonly duration: number;
   readonly bounds: Bounds;
-  /** Set once by the creator of the scene. */
+  /** Scene that shows the sequence. Its creator sets this property once. */
   scene: LoadedGaussians | undefined;
   readonly #sequence: SceneSequence;
   readonly #options: SequenceOptions;
   readonly #slots = new Map<number, FetchedFrame>();
-  /** Failures by the path of the file. */
+  /** Failures of downloads, by the path of the file. */
   readonly #failures = new BackOff<string>({ firstMs: RETRY_MS, factor: 4, maxTries: MAX_TRIES });
   readonly #room: FrameRoom;
   #gaussians: SequenceGaussians;
@@ -75,7 +75,10 @@ export class SequencePlayer implements Timeline {
     this.#slots.set(0, { abort: new AbortController(), packed: first.packed });
   }
 
-  /** Opens a sequence with its first frame on the GPU. Rejects with GaussianSplatError, or the signal's reason. */
+  /**
+   * Opens a sequence. Resolves when its first frame is on the GPU. Rejects with GaussianSplatError, or the signal's
+   * reason.
+   */
   static async open(sequence: LoadedSequence, options: SequenceOptions): Promise<SequencePlayer> {
     const { device, signal, onProgress, memoryBudget, beforeUpload } = options;
     const first = await load(sequence, 0, options, 'auto', signal, onProgress);
@@ -91,21 +94,24 @@ export class SequencePlayer implements Timeline {
     return this.#gaussians;
   }
 
-  /** Shows the frame at a time, if it is loaded; fetches the following ones. */
+  /** Shows the frame at a time, if it is loaded, and fetches the following frames. */
   request({ timeSeconds }: DynamicState): void {
     const frame = this.#frameAt(timeSeconds);
     this.#showLate(frame);
     this.#prefetch(frame);
     const slot = this.#slots.get(frame);
     if (frame !== this.#shown && slot?.packed) this.#show(frame);
-    // An unavailable frame is skipped, so that a seek to it ends.
+    // An unavailable frame counts as shown, so that a seek to it ends.
     if (frame === this.#shown || this.#isMissing(frame)) this.#notify(timeSeconds);
   }
 
-  /** The newest of the late frames: if every frame is late, playback follows the clock with a delay. */
+  /**
+   * If the current frame is not loaded, shows the newest loaded frame before it. If every frame is late, playback thus
+   * follows the clock with a delay.
+   */
   #showLate(frame: number): void {
     if (this.#slots.get(frame)?.packed) return;
-    // The current frame may belong to the previous loop.
+    // The shown frame may belong to the previous loop.
     const before = this.#shown < frame ? this.#shown : -1;
     const late = [...this.#slots.keys()].filter(
       (held) => held > before && held < frame && this.#slots.get(held)!.packed,
@@ -132,12 +138,14 @@ export class SequencePlayer implements Timeline {
     this.#shown = frame;
   }
 
-  /** After the submission of the current frame. */
+  /** Calls the listener after the image that is being drawn is submitted. */
   #notify(timeSeconds: number): void {
     queueMicrotask(() => this.#isClosed || this.#options.listeners.onShown(timeSeconds));
   }
 
-  /** A frame with more splats than any before gets new buffers; the last one stays visible meanwhile. */
+  /**
+   * Creates larger buffers for a frame with more splats than any frame before. The last frame stays visible meanwhile.
+   */
   async #grow(frame: number, packed: PackedGaussians): Promise<void> {
     if (this.#isGrowing) return;
     this.#isGrowing = true;
@@ -150,18 +158,19 @@ export class SequencePlayer implements Timeline {
       this.#shown = -1;
       listeners.onInput();
     } catch (error) {
-      // Skipped like an unavailable one, because it does not fit, and each frame would try again.
+      // A frame that does not fit counts as unavailable; otherwise each image would try again.
       if (this.#slots.get(frame)?.packed === packed) this.#fail(frame, error);
     } finally {
       this.#isGrowing = false;
     }
   }
 
-  /** Fetches the next frames, nearest first, and discards the others. */
+  /** Fetches the next frames, nearest first, and discards frames that are not needed. */
   #prefetch(frame: number): void {
     const wanted = this.#wantedFrom(frame);
     for (const [held, { abort, packed }] of this.#slots) {
-      // Frames that the clock has just passed may still arrive, because on a slow connection all are passed.
+      // Frames that the clock has just passed may still arrive. On a slow connection, the clock passes every frame
+      // before it arrives.
       const isLate = held < frame && frame - held <= this.#room.frames && !packed;
       if (wanted.includes(held) || isLate) continue;
       abort.abort();
@@ -177,20 +186,23 @@ export class SequencePlayer implements Timeline {
     }
   }
 
-  /** Whether a frame has failed, until it is requested again. */
+  /** Returns whether a frame has failed and is not requested again yet. */
   #isMissing(frame: number): boolean {
     return this.#failures.isPaused(this.#fileOf(frame));
   }
 
-  /** Path of the file of a frame: the frames of one file of motion arrive, or fail, together. */
+  /** Returns the path of the file of a frame. All frames in one file of differences arrive, or fail, together. */
   #fileOf(frame: number): string {
     return motionFrame(this.#sequence, frame)?.path ?? framePath(this.#sequence, frame);
   }
 
-  /** An unavailable frame is reported once, and requested at increasing intervals, then no more. */
+  /**
+   * Records the failure of a frame. Only the first failure of its file is reported. The frame is requested again at
+   * increasing intervals, up to {@link MAX_TRIES} times.
+   */
   #fail(frame: number, error: unknown): void {
     this.#slots.delete(frame);
-    // The first waiting frame of a file has reported the failure.
+    // Another frame in the same file has already reported the failure.
     if (this.#isMissing(frame)) return;
     if (this.#failures.fail(this.#fileOf(frame)) === 1 && !this.#isClosed) this.#options.listeners.onError(error);
   }
@@ -215,7 +227,7 @@ export class SequencePlayer implements Timeline {
       if (slot.abort.signal.aborted) return;
       this.#fail(frame, error);
     }
-    // Frames that wait for the same file request it again.
+    // Other frames that need this file request it in the next image.
     if (!slot.abort.signal.aborted) listeners.onInput();
   }
 }
@@ -232,7 +244,7 @@ async function load(
   const sh = request.sh === 'auto' ? precision : request.sh;
   const asked = (path: string): FileRequest => {
     const own = fileRequest(path, request, limits?.origins);
-    // An address that the page has rewritten is not changed.
+    // If the page rewrites the address, its result is used unchanged.
     const { href } = new URL(path, request.url);
     const url = frameUrl(href);
     return { ...own, ...(url !== href && { url }), limits };

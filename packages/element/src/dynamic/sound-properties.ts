@@ -1,7 +1,7 @@
-/** Additional properties of elements with a child with `slot="sound"`: same as on HTMLMediaElement. */
+/** Additional properties of elements that have a child with `slot="sound"`, as those of HTMLMediaElement. */
 export interface SoundProperties {
-  /** Whether the sound is muted. */
+  /** Whether the sound is muted; true without a sound. */
   muted?: boolean;
-  /** 0..1 */
+  /** Volume of the sound, 0..1. */
   volume?: number;
 }

@@ -1,4 +1,4 @@
-/** Loaded only if an element has a child with `slot="sound"`. */
+/** Plays sound with animated scenes. The module is loaded only if an element has a child with `slot="sound"`. */
 import { css } from 'lit';
 import { adoptStyles } from '../styles.js';
 
@@ -21,20 +21,20 @@ const STYLES = css`
   }
 `;
 
-/** Sound within this offset is left unchanged, seconds. */
+/** Maximum offset between sound and scene that is not corrected, seconds. */
 const NEAR = 0.015;
-/** Sound beyond this offset is sought; in between its speed is adjusted. */
+/** Offset above which the sound seeks, seconds. For smaller offsets its speed is adjusted. */
 const FAR = 0.12;
-/** Factor of the offset that is corrected per second. */
+/** Relative change of the speed for each second of offset. */
 const GAIN = 2;
-/** Maximum relative change of the speed: inaudible as a change of pitch, which browsers preserve. */
+/** Maximum relative change of the speed. It is inaudible, because browsers preserve the pitch. */
 const MAX_BEND = 0.1;
-/** Time without a frame after which the sound pauses, ms, because the image does not move. */
+/** Time without a move of the scene's clock after which the sound pauses, ms, because the image does not change. */
 const STILL_MS = 1_000;
-/** Range of playback rates that browsers support. */
+/** Minimum and maximum playback rate that browsers support; 1 is real time. */
 const [SLOWEST, FASTEST] = [0.0625, 16];
 
-/** The element's interface for its sound. */
+/** The part of the element that its sound follows. */
 export interface SoundHost extends HTMLElement {
   readonly currentTime: number;
   readonly playbackRate: number;
@@ -49,10 +49,11 @@ export class Sound {
   readonly #captions: HTMLElement;
   #track: HTMLMediaElement | undefined;
   #listening: AbortController | undefined;
-  #isRunning = false;
-  /** Time of the scene at the last comparison. */
+  /** Handle of the requested animation frame; 0 while the sound does not follow the clock. */
+  #frame = 0;
+  /** Time of the scene, in seconds, when the sound was last aligned. */
   #alignedTo = NaN;
-  /** Whether the browser waits for a user activation. */
+  /** Whether the browser has refused to play until the visitor interacts with the page. */
   #isRefused = false;
   #still: ReturnType<typeof setTimeout> | undefined;
 
@@ -61,15 +62,16 @@ export class Sound {
     adoptStyles(element.shadowRoot!, STYLES);
     this.#captions = Object.assign(element.ownerDocument.createElement('div'), { className: 'captions' });
     this.#captions.setAttribute('part', 'captions');
-    for (const type of ['play', 'playing', 'waiting', 'pause', 'seeking', 'seeked', 'ratechange', 'emptied'])
-      element.addEventListener(type, () => this.#follow());
+    // `timeupdate` is fired by a clock that moves again without another event, as after a long task of the page.
+    const types = ['play', 'playing', 'waiting', 'pause', 'seeking', 'seeked', 'ratechange', 'emptied', 'timeupdate'];
+    for (const type of types) element.addEventListener(type, () => this.#follow());
     Object.defineProperties(element, {
       muted: { get: () => this.#track?.muted ?? true, set: (isMuted: boolean) => this.#set('muted', isMuted) },
       volume: { get: () => this.#track?.volume ?? 1, set: (volume: number) => this.#set('volume', volume) },
     });
   }
 
-  /** Call when the child may have changed. */
+  /** Call when the child with `slot="sound"` may have been added, replaced or removed. */
   update(): void {
     const child = this.#element.querySelector<HTMLMediaElement>(':scope > :is(audio, video)[slot=sound]') ?? undefined;
     if (child === this.#track) return;
@@ -125,27 +127,32 @@ export class Sound {
 
   #follow(): void {
     if (!this.#track || !this.#moves) return this.#rest();
-    if (this.#isRunning) return;
-    this.#isRunning = true;
-    requestAnimationFrame(this.#step);
+    if (this.#frame !== 0) return;
+    this.#alignedTo = this.#element.currentTime;
+    this.#expectMoves();
+    this.#frame = requestAnimationFrame(this.#step);
   }
 
-  /** Runs once in each frame while the scene plays. */
+  /** Ends the alignment if the clock of the scene does not advance, as while nothing is drawn out of view. */
+  #expectMoves(): void {
+    clearTimeout(this.#still);
+    this.#still = setTimeout(() => this.#rest(), STILL_MS);
+  }
+
+  /** Runs once in each frame while the scene plays, and aligns the sound. */
   readonly #step = (frameTime: number): void => {
     const track = this.#track;
-    if (!this.#isRunning || !track) return;
-    if (!this.#moves) return this.#rest();
-    clearTimeout(this.#still);
-    this.#still = setTimeout(() => this.#track?.pause(), STILL_MS);
-    requestAnimationFrame(this.#step);
-    // Deferred, so that the clock of the scene has advanced to this frame in any order of callbacks.
-    setTimeout(() => this.#isRunning && track === this.#track && this.#align(track, frameTime));
+    if (!track || !this.#moves) return this.#rest();
+    this.#frame = requestAnimationFrame(this.#step);
+    // Deferred until all callbacks of the frame have run, so that the clock of the scene has advanced.
+    setTimeout(() => this.#frame !== 0 && track === this.#track && this.#align(track, frameTime));
   };
 
   #align(track: HTMLMediaElement, frameTime: number): void {
     const { currentTime, playbackRate } = this.#element;
     const hasMoved = currentTime !== this.#alignedTo;
     this.#alignedTo = currentTime;
+    if (hasMoved) this.#expectMoves();
     if (!hasMoved || track.seeking || track.readyState < HTMLMediaElement.HAVE_METADATA) return;
     const now = currentTime + (playbackRate * (performance.now() - frameTime)) / 1000;
     if (now >= track.duration) return track.pause();
@@ -159,7 +166,10 @@ export class Sound {
     if (track.paused) this.#start(track);
   }
 
-  /** Browsers allow no sound before a user activation: it starts then. */
+  /**
+   * Starts the sound. If the browser refuses to play before the visitor interacts with the page, the sound starts after
+   * that interaction.
+   */
   #start(track: HTMLMediaElement): void {
     if (this.#isRefused) return;
     track.play().catch(({ name }: DOMException) => {
@@ -173,13 +183,14 @@ export class Sound {
   }
 
   #rest(): void {
-    this.#isRunning = false;
+    cancelAnimationFrame(this.#frame);
+    this.#frame = 0;
     clearTimeout(this.#still);
     const track = this.#track;
     if (!track) return;
     track.pause();
     const { currentTime } = this.#element;
-    // Captions are those of the paused frame.
+    // Seeks to the time of the paused frame, so that its captions are shown.
     if (track.readyState > 0 && Math.abs(track.currentTime - currentTime) > NEAR)
       track.currentTime = Math.min(currentTime, track.duration || currentTime);
   }

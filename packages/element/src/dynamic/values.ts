@@ -1,11 +1,13 @@
-/** Values that attributes write as text and properties hold as numbers: poses and controls. */
+/** Poses and controls: values that are text in attributes, and numbers or images in properties. */
 
-/** Numbers in any format of authors: a number, a list, nested lists, a typed array, or any of these as text. */
+/**
+ * Numbers in any format that authors may use: a number, a list, nested lists, a typed array, or any of these as text.
+ */
 export type Numbers = string | number | ArrayLike<number> | readonly (ArrayLike<number> | number)[];
 
 /**
- * The flattened numbers. Text is JSON or numbers separated by spaces or commas.
- * @returns Undefined for no value, and for anything but finite numbers.
+ * Returns the flattened numbers of a value. Text is JSON, or numbers separated by spaces or commas.
+ * @returns Undefined without a value, and if any element is not a finite number.
  */
 export function readNumbers(value: Numbers | null | undefined): number[] | undefined {
   if (value === null || value === undefined || value === '') return undefined;
@@ -36,24 +38,24 @@ function flatten(value: unknown): number[] {
 /** Prefix of the attributes that hold controls: `control-smile="0.5"`. */
 export const CONTROL_PREFIX = 'control-';
 
-/** An image for a model: its URL, or an image source. */
+/** An image for a model, as its URL, its file, or a source that WebGPU can copy. */
 export type ImageSource = string | Blob | GPUCopyExternalImageSource;
 
-/** For an input of several images, a list, or addresses separated by spaces. */
+/** The image of an input. For an input of several images, it is a list, or addresses separated by spaces. */
 export type ImageSources = ImageSource | readonly ImageSource[];
 
-/** Controls of a page by the names of the model's inputs: numbers, or images for image inputs. */
+/** Values of controls by the names of the model's inputs: numbers, or images for image inputs. */
 export type ControlValues = Readonly<Record<string, Numbers | ImageSources>>;
 
-/** Controls, sorted by type. */
+/** Values of controls by the names of inputs, separated into numbers and images. */
 export interface ReadControls {
   readonly controls: Readonly<Record<string, readonly number[]>>;
   readonly images: Readonly<Record<string, ImageSources>>;
 }
 
 /**
- * Reads the controls of an element: its attributes, overridden by its property. Values other than numbers may be
- * images, which is known once the model is loaded. Empty ones are reported to `warn`.
+ * Reads the controls of an element from its attributes and from its property, which has priority. Values other than
+ * numbers may be images, which is known only when the model is loaded. `warn` is called for empty and invalid values.
  */
 export function readControls(
   attributes: Iterable<{ readonly name: string; readonly value: string }>,
@@ -82,6 +84,6 @@ const isPixels = (value: unknown): boolean =>
     ? value.some((each) => typeof each === 'string' || isPixels(each))
     : typeof value === 'object' && value !== null && !ArrayBuffer.isView(value);
 
-/** The value of a name; attributes have no capital letters. */
+/** Returns the value of a name, or of its lowercase form, because names of attributes have no capital letters. */
 export const valueOf = <T>(values: Readonly<Record<string, T>>, name: string): T | undefined =>
   values[name] ?? values[name.toLowerCase()];

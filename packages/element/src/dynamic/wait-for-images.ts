@@ -3,22 +3,23 @@ import { DynamicGaussians } from '@gaussian-splat/renderer';
 import type { SceneBounds } from '../camera/settings.js';
 import { LoadedGaussians } from '../gpu/loaded-gaussians.js';
 import type { OpenOptions } from '../gpu/open-scene.js';
+import { withLease } from '../gpu/shared-device.js';
 import type { DynamicRequest, Timeline } from './dynamic-model.js';
 import type { InputImages } from './input-images.js';
 
-/** Destination of a scene without splats meanwhile. */
+/** Options for showing a scene without splats while images are missing. */
 export type WaitingPlace = Pick<OpenOptions, 'device' | 'onPreview' | 'submissions'>;
 
-/** Polling interval for the inputs of an element that draws nothing, ms. */
+/** Interval at which the inputs of an element without previews are checked, ms. */
 const LOOK_MS = 250;
 
-/** Bounds of an unknown subject. */
+/** Bounds of the scene without splats. */
 const UNIT_BALL: SceneBounds = { min: [-1, -1, -1], max: [1, 1, 1], center: [0, 0, 0], radius: 1 };
 
 /**
- * Resolves once all image inputs of a generator have arrived. Meanwhile the element shows a scene without splats, so
- * that the page and the panel of controls know the inputs.
- * @throws the reason of the signal.
+ * Resolves when all image inputs of a generator have arrived. Until then the element shows a scene without splats, so
+ * that the page and the panel of controls know the inputs. Rejects with the signal's reason, or if that scene cannot be
+ * created.
  */
 export async function waitForImages(
   { inputs, settable }: Pick<Timeline, 'inputs' | 'settable'>,
@@ -37,10 +38,11 @@ export async function waitForImages(
       clearInterval(timer);
       reject(signal.reason as Error);
     });
-    // Checked in every frame; an off-screen element draws none.
+    // The empty scene checks in every frame. An element without previews is off-screen and draws no frames, so a timer
+    // checks.
     const timer = place.onPreview ? undefined : setInterval(look, LOOK_MS);
     const waiting: Timeline = { duration: NaN, inputs, settable, request: look, close: () => undefined };
-    void showEmpty(place, layout, waiting).then(look, reject);
+    void showEmpty(place, layout, waiting, signal).then(look, reject);
   });
 }
 
@@ -48,14 +50,15 @@ async function showEmpty(
   { device, onPreview, submissions }: WaitingPlace,
   layout: GaussianModelFile['layout'],
   live: Timeline,
+  signal: AbortSignal,
 ): Promise<void> {
   if (onPreview === undefined) return;
-  const lease = await device.acquire();
-  try {
+  await withLease(device, async (acquiring) => {
+    const lease = await acquiring;
     const gaussians = await DynamicGaussians.create(lease.device, { ...layout, capacity: 1, paddedRows: undefined });
+    // Another source may have been requested meanwhile, whose scene must not be replaced.
+    if (signal.aborted) gaussians.destroy();
+    signal.throwIfAborted();
     onPreview(new LoadedGaussians(lease, gaussians, UNIT_BALL, submissions, { live }));
-  } catch (error) {
-    lease.release();
-    throw error;
-  }
+  });
 }

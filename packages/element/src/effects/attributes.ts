@@ -1,13 +1,13 @@
-/** The attributes of `<splat-cut>`, each defined once, as those of `<gaussian-splat>` in ../attributes.ts. */
+/** Attributes of `<splat-cut>`. Each is defined once, like those of `<gaussian-splat>` in ../attributes.ts. */
 import type { Vector3 } from '@gaussian-splat/core';
 import { read } from '../attributes.js';
-import { angleGrammar, keywordGrammar, numberGrammar, parseQuantity, METRES_PER_UNIT } from '../camera/grammar.js';
+import { angleGrammar, keywordGrammar, numberGrammar, parseQuantity, METERS_PER_UNIT } from '../camera/grammar.js';
 import type { AttributeGrammar } from '../camera/grammar.js';
 import { anglesGrammar, pointGrammar, scaleGrammar } from '../composition/grammar.js';
 
 type Numbers = string | number | readonly number[] | null;
 
-/** Effect of a cut on the splats on its side. */
+/** Effect of a cut on the splats of its side. */
 export type CutEffect = 'hide' | 'fade' | 'tint' | 'lighten' | 'recolor' | 'displace';
 
 const colorGrammar: AttributeGrammar<Vector3> = {
@@ -16,7 +16,7 @@ const colorGrammar: AttributeGrammar<Vector3> = {
   parse: parseColor,
 };
 
-/** Parses a CSS color to three numbers 0..1, sRGB-encoded. */
+/** Parses a CSS color. Returns red, green and blue, 0..1, sRGB-encoded; null if it is no color. */
 function parseColor(text: string): Vector3 | null {
   const context = document.createElement('canvas').getContext('2d');
   if (!context || !CSS.supports('color', text)) return null;
@@ -34,7 +34,7 @@ const edgeGrammar: AttributeGrammar<number | 'hard'> = {
     if (word === 'soft') return 0;
     if (word === 'hard') return word;
     const quantity = parseQuantity(word);
-    const meters = quantity && METRES_PER_UNIT[quantity.unit];
+    const meters = quantity && METERS_PER_UNIT[quantity.unit];
     return meters && quantity.value >= 0 ? quantity.value * meters : null;
   },
 };
@@ -48,8 +48,8 @@ export const CUT_ATTRIBUTES = {
    */
   shape: read<'box' | 'sphere' | 'cylinder' | 'plane'>(keywordGrammar(['box', 'sphere', 'cylinder', 'plane'])),
   /**
-   * Position of its center: x y z in meters of viewer space, or of its parent scene, y up. The property takes `[x, y,
-   * z]` as well.
+   * Position of the center: x y z in meters of viewer space, or of the coordinates of its parent scene, y up. The
+   * property takes `[x, y, z]` as well.
    * @default `0 0 0`
    * @example position="0 0.5m 0"
    */
@@ -67,13 +67,13 @@ export const CUT_ATTRIBUTES = {
    */
   scale: read<Vector3, Numbers>(scaleGrammar),
   /**
-   * Which side changes: `inside` of the shape, or all that is `outside`.
+   * Side of the shape whose splats change: `inside` or `outside`.
    * @default `inside`
    * @example side="outside"
    */
   side: read<'inside' | 'outside'>(keywordGrammar(['inside', 'outside'])),
   /**
-   * `soft`: a splat at the edge changes by its fraction on that side. `hard`: its center decides. A length makes the soft edge wider.
+   * `soft`: a splat at the edge changes by its fraction on that side. `hard`: it changes if its center is on that side. A length is the width of a softer edge.
    * @default `soft`
    * @example edge="10cm"
    */
@@ -86,7 +86,7 @@ export const CUT_ATTRIBUTES = {
    */
   effect: read<CutEffect>(keywordGrammar(['hide', 'fade', 'tint', 'lighten', 'recolor', 'displace'])),
   /**
-   * How much of it, 0 to 1. `lighten` darkens below 0.
+   * Strength of the effect, 0 to 1. Below 0, `lighten` darkens.
    * @default `1`
    * @example amount="0.5"
    */

@@ -1,4 +1,4 @@
-/** Loaded if an element has a cut, a reveal effect or a shader. */
+/** Effects of an element with cuts, a reveal effect or a shader. Loaded on demand. */
 import { GaussianSplatError, multiply, type Matrix4, type Vector3 } from '@gaussian-splat/core';
 import {
   MAX_CUTS,
@@ -23,7 +23,7 @@ import { defineCuts } from './define.js';
 import { NO_REVEAL, parseReveal, revealedBy, REVEAL_FORM, type RevealEffect } from './reveal.js';
 import { SplatCutElement, showers, type PlacedCut } from './splat-cut.js';
 
-/** Interface of the element for effects. */
+/** The part of the element that effects use. */
 export interface EffectsHost {
   readonly element: ReactiveControllerHost &
     HTMLElement & { splatShader: SplatShader | null; revealProgress: number | null };
@@ -45,10 +45,10 @@ export interface EffectsHost {
 
 type Player = NonNullable<MotionHost['player']>;
 
-/** Cuts of children, the reveal effect, and the page's hook for splats. */
+/** Applies the cuts of children, the reveal effect, and the page's shader to the splats of all scenes. */
 export class Effects implements Mover {
   readonly #host: EffectsHost;
-  /** Compilation of the current shader by device. */
+  /** Compiled program of the current shader by device. */
   #programs = new WeakMap<GPUDevice, SplatProgram>();
   readonly #compiling = new WeakMap<GPUDevice, Promise<void>>();
   readonly #modifiers = new Map<WorldEntry, SplatModifier>();
@@ -60,7 +60,7 @@ export class Effects implements Mover {
   #last: number | undefined;
   #reveal: RevealEffect = NO_REVEAL;
   #revealText: string | null = null;
-  /** State of the reveal effect. */
+  /** URL of the scene that the reveal effect is for. */
   #url = '';
   #startedAt: number | undefined;
   #progress = 0;
@@ -71,8 +71,10 @@ export class Effects implements Mover {
     defineCuts();
     host.behaviors.add(this);
     host.element.addController({ hostUpdated: () => this.#update() });
+    // Without a scene no frame is drawn.
+    host.element.addEventListener('emptied', () => this.#freeRemoved());
     this.#update();
-    // Frames before this code was loaded did not apply it.
+    // Earlier frames were drawn without effects, because this code was not loaded.
     host.requestFrame();
   }
 
@@ -81,7 +83,10 @@ export class Effects implements Mover {
     this.#host.requestFrame();
   }
 
-  /** Player of automatic playback, including the page's shader, for the visitor's switch. */
+  /**
+   * Returns the interface with which the button for automatic motion plays and pauses `other` together with an animated
+   * shader. Returns `other` itself if the shader is not animated.
+   */
   playerWith(other: MotionHost['player']): MotionHost['player'] {
     if (!this.#shader?.animated) return other;
     const players: Player[] = [this.#player, ...(other?.canPlay ? [other] : [])];
@@ -110,17 +115,17 @@ export class Effects implements Mover {
     return this.#advanceReveal(now) || moves;
   }
 
-  /** Compiles the pipelines of a scene before its first frame. Never rejects. */
+  /** Compiles the pipelines that a scene needs for effects, before its first frame. Never rejects. */
   async prepareFor(scene: LoadedGaussians): Promise<void> {
+    this.#restartReveal(this.#host.sources.ownEntry);
     if (this.#isWanted) await this.#compile(scene);
   }
 
-  /** Writes all effects to the world, before a frame. */
+  /** Writes the effects of all scenes to the world. Called before each frame. */
   prepareFrame(): void {
     const { entries, ownEntry: own } = this.#host.sources;
     this.#restartReveal(own);
-    const members = entries.flatMap(({ member }) => member ?? []);
-    for (const [member, modifier] of this.#modifiers) if (!members.includes(member)) this.#forget(member, modifier);
+    this.#freeRemoved();
     const shared = this.#sharedChanges;
     for (const { owner, member } of entries) if (member) this.#modify(member, owner.element, shared);
   }
@@ -133,11 +138,15 @@ export class Effects implements Mover {
     return this.#reveal.kind !== 'none' && this.#revealed < 1 && !this.#isReducing;
   }
 
-  /** Progress of the reveal, 0..1. */
+  /** Progress of the reveal effect, 0..1: that of the page, or else by time. */
   get #revealed(): number {
+    return Math.min(1, Math.max(0, this.#givenProgress ?? this.#progress));
+  }
+
+  /** Progress that the page sets; undefined without one, and for NaN. */
+  get #givenProgress(): number | undefined {
     const { revealProgress } = this.#host.element;
-    const own = typeof revealProgress === 'number' && !Number.isNaN(revealProgress) ? revealProgress : this.#progress;
-    return Math.min(1, Math.max(0, own));
+    return typeof revealProgress === 'number' && !Number.isNaN(revealProgress) ? revealProgress : undefined;
   }
 
   get #isWanted(): boolean {
@@ -149,7 +158,7 @@ export class Effects implements Mover {
     return (this.#cuts ??= [...found].filter((each) => each instanceof SplatCutElement));
   }
 
-  /** Changes for all scenes. */
+  /** Changes that apply to all scenes: the reveal effect, and cuts that are children of the element. */
   get #sharedChanges(): SplatChanges {
     const { frame, sources, element } = this.#host;
     const bounds = this.#isRevealing ? sources.bounds : null;
@@ -162,7 +171,7 @@ export class Effects implements Mover {
     return { ...reveal, cuts, time: this.#time, uniforms, worldToViewer: matrixOfFrame(frame) };
   }
 
-  /** The cuts of a parent, in world coordinates. */
+  /** Returns the cuts that are children of a parent, in world coordinates. */
   #cutsOf(parent: Element, toWorld: Matrix4): SplatCut[] {
     return this.#children
       .filter(({ parentElement }) => parentElement === parent)
@@ -179,7 +188,7 @@ export class Effects implements Mover {
     let modifier = this.#modifiers.get(member);
     if (cuts.length > MAX_CUTS) this.#host.warn(tooManyCuts(cuts.length));
     if (isChanged && scene.renderer === 'webgl') return this.#host.warn(NO_WEBGL);
-    if (!isChanged || scene.drawn.pages.length === 0) {
+    if (!isChanged || scene.drawn.blocks.length === 0) {
       if (modifier) this.#forget(member, modifier);
       return;
     }
@@ -190,6 +199,16 @@ export class Effects implements Mover {
       this.#modifiers.set(member, (modifier = new SplatModifier(scene.device, program)));
     }
     if (modifier.write(changes, placement) || placement.modifier !== modifier) placement.modifier = modifier;
+  }
+
+  /** Frees the modifiers of scenes that are not shown any more. Their placements have left the world. */
+  #freeRemoved(): void {
+    const { entries } = this.#host.sources;
+    for (const [member, modifier] of this.#modifiers) {
+      if (entries.some((entry) => entry.member === member)) continue;
+      this.#modifiers.delete(member);
+      modifier.destroy();
+    }
   }
 
   #forget(member: WorldEntry, modifier: SplatModifier): void {
@@ -220,7 +239,7 @@ export class Effects implements Mover {
     if (program) this.#programs.set(device, program);
   }
 
-  /** The scene is drawn without the shader. */
+  /** Discards a shader that does not compile: reports it, and draws the scenes without it. */
   #refuse(shader: SplatShader | null, error: Error): void {
     if (shader === null) return;
     this.#shader = null;
@@ -230,7 +249,7 @@ export class Effects implements Mover {
     this.#host.requestFrame();
   }
 
-  /** The page may have set another value. */
+  /** Reads the attribute and the property that select effects, after an update of the element. */
   #update(): void {
     const { element, attributes } = this.#host;
     this.#readReveal(attributes.revealEffect);
@@ -244,13 +263,13 @@ export class Effects implements Mover {
     this.#refused = null;
     this.#shader = shader;
     if (shader?.animated && !before?.animated) this.#isPlaying = !this.#isReducing;
-    // The button that pauses is rendered before this, in the same update.
+    // The button for automatic motion was rendered earlier in this update, so it needs another one.
     if (shader?.animated !== before?.animated) this.#host.element.requestUpdate();
     this.#host.requestFrame();
-    // Changed values alone need no other program.
+    // If only values have changed, the program stays the same.
     if (shader && before && isSameCode(shader, before)) return;
     const scenes = this.#host.sources.entries.flatMap(({ member }) => member?.scene ?? []);
-    // The current program draws until the next one is compiled.
+    // The current program is used until the next one is compiled.
     if (scenes.length === 0) this.#programs = new WeakMap();
     for (const scene of scenes) void this.#compile(scene).then(() => this.#host.requestFrame());
   }
@@ -263,28 +282,30 @@ export class Effects implements Mover {
     this.#reveal = effect ?? NO_REVEAL;
   }
 
-  /** Another scene starts its reveal again. */
+  /**
+   * Restarts the reveal effect if the element's scene has another URL. A scene that is about to be replaced is shown
+   * already, so the effect waits for the next one.
+   */
   #restartReveal(own: SourceEntry): void {
-    const { url } = own.scene;
-    if (url === this.#url) return;
+    const { url, isOutgoing } = own.scene;
+    if (url === this.#url || isOutgoing) return;
     this.#url = url;
     this.#startedAt = undefined;
     this.#progress = 0;
   }
 
   #advanceReveal(now: number): boolean {
-    if (!this.#isRevealing || !this.#host.isOnShow || typeof this.#host.element.revealProgress === 'number')
-      return false;
+    if (!this.#isRevealing || !this.#host.isOnShow || this.#givenProgress !== undefined) return false;
     this.#startedAt ??= now;
     const { isPreview, progress } = this.#host.sources;
     const byTime = (now - this.#startedAt) / Math.max(1, this.#reveal.milliseconds);
-    // No finer than the received data.
+    // The effect `detail` does not exceed the fraction of data that has arrived.
     this.#progress = this.#reveal.kind === 'detail' && isPreview ? Math.min(byTime, progress ?? 0, 0.95) : byTime;
     return this.#progress < 1;
   }
 }
 
-/** The first ones count: those of the scene, then those of the element, then the reveal. */
+/** Message for too many cuts. Cuts of the scene take precedence, then those of the element, then the reveal effect. */
 const tooManyCuts = (found: number): string =>
   new GaussianSplatError('argument/splat-cut', {
     where: '<splat-cut>',
@@ -296,7 +317,7 @@ const tooManyCuts = (found: number): string =>
 const NO_WEBGL =
   '<gaussian-splat>: WebGL 2 draws the scene without <splat-cut>, reveal-effect and splatShader, which need WebGPU.';
 
-/** Whether two shaders have the same program. */
+/** Whether two shaders compile to the same program. */
 const isSameCode = (a: SplatShader, b: SplatShader): boolean => {
   const of = ({ code, moves, uniforms = {} }: SplatShader): string =>
     JSON.stringify([code, moves, Object.entries(uniforms).map(([name, value]) => [name, Object(value).length])]);

@@ -1,11 +1,11 @@
-/** Reveal effects: the attribute `reveal-effect`, as changes of splats. */
+/** Reveal effects of the attribute `reveal-effect`, as changes of splats. */
 import { cross, normalize, type Matrix4, type Vector3 } from '@gaussian-splat/core';
 import type { SplatChanges } from '@gaussian-splat/renderer/modifiers';
 import type { SceneBounds } from '../camera/settings.js';
 
 const KINDS = ['none', 'fade', 'grow', 'sweep', 'detail'] as const;
 
-/** Value of the attribute. */
+/** Parsed value of the attribute. */
 export interface RevealEffect {
   readonly kind: (typeof KINDS)[number];
   /** Axis of `sweep`, in viewer space. */
@@ -21,7 +21,7 @@ const DEFAULT_MS = 1500;
 export const NO_REVEAL: RevealEffect = { kind: 'none', axis: AXES.y, milliseconds: DEFAULT_MS };
 export const REVEAL_FORM = 'none, fade, grow, detail, or sweep with an axis such as -y, and a time such as 2s';
 
-/** Parses the attribute `reveal-effect`: null if it is malformed. */
+/** Parses the attribute `reveal-effect`. Returns null if it is malformed. */
 export function parseReveal(text: string | null): RevealEffect | null {
   let effect = NO_REVEAL;
   for (const term of (text ?? 'none').trim().toLowerCase().split(/\s+/)) {
@@ -35,18 +35,18 @@ export function parseReveal(text: string | null): RevealEffect | null {
   return effect;
 }
 
-/** A shape without volume: everything is outside of it. */
+/** Transform of a shape without volume, so that every point is outside. */
 const NOTHING: Matrix4 = [0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1];
-/** Initial fraction of the splats in `detail`, as a power of 2. */
+/** Initial fraction of the splats in `detail`, as an exponent of 2. */
 const COARSEST = -6;
 /** Standard deviation of the front of `sweep`, as a fraction of the radius. */
 const FRONT = 0.05;
 
 /**
- * Returns the changes at a progress.
- * @param progress 0..1
+ * Returns the changes of all splats at a progress.
+ * @param progress 0..1; no changes at 1
  * @param bounds Bounds of the scene in world coordinates.
- * @param axis Axis of `sweep` in world coordinates.
+ * @param axis Unit vector of `sweep` in world coordinates.
  */
 export function revealedBy(
   { kind }: RevealEffect,

@@ -9,12 +9,12 @@ import { CUT_ATTRIBUTES, type CutEffect } from './attributes.js';
 
 type Name = keyof typeof CUT_ATTRIBUTES;
 
-/** A cut in the coordinates of its parent, y up. */
+/** A cut in the coordinates of its parent element, y up. `placed` maps the unit shape to these coordinates. */
 export interface PlacedCut extends Omit<SplatCut, 'shapeToWorld'> {
   readonly placed: Matrix4;
 }
 
-/** Listeners of elements for their cuts. */
+/** For each `<gaussian-splat>`, the listener that is notified when one of its cuts changes. */
 export const showers = new WeakMap<Element, { cutsChanged(): void }>();
 
 /**
@@ -39,8 +39,8 @@ export class SplatCutElement extends ReactiveElement {
   };
 
   /**
-   * Its whole transform, which overrides `position`, `rotation` and `scale`: 16 numbers of an affine matrix, row-major,
-   * or a `DOMMatrix`. null for none.
+   * Complete transform of the shape, which overrides `position`, `rotation` and `scale`: 16 numbers of an affine
+   * matrix, row-major, or a `DOMMatrix`. null for none.
    */
   declare matrix: ArrayLike<number> | DOMMatrixReadOnly | null;
   readonly #warned = new Set<string>();
@@ -52,7 +52,7 @@ export class SplatCutElement extends ReactiveElement {
     this.hidden = false;
   }
 
-  /** The cut; undefined while it is hidden. @internal */
+  /** The parsed cut; undefined while the element is hidden. @internal */
   get cut(): PlacedCut | undefined {
     return this.hidden ? undefined : (this.#cut ??= this.#read());
   }
@@ -69,7 +69,7 @@ export class SplatCutElement extends ReactiveElement {
     this.#shower = null;
   }
 
-  /** It renders nothing itself. */
+  /** The element has no shadow tree, because it renders nothing. */
   protected override createRenderRoot(): HTMLElement {
     return this;
   }
@@ -114,7 +114,7 @@ export class SplatCutElement extends ReactiveElement {
     }
   }
 
-  /** Parses an attribute or its property. @param unit Unit of the property's numbers. */
+  /** Returns the parsed value of a property, which may be text or numbers. @param unit Unit of numbers. */
   #value<T>(name: Name, unit = ''): T {
     const value: unknown = this[name];
     const written =

@@ -12,34 +12,34 @@ import type {
 import type { ProbeAnswer, ProbePoint, WorkTime } from '@gaussian-splat/renderer/tools';
 import type { Frame, FrameFilter } from '../dynamic/frame-filter.js';
 
-/** Settings of frames. */
+/** Settings of all frames of an element. */
 export interface Rendering {
   readonly quality: Quality;
-  /** Maximum degree of spherical harmonics to evaluate. */
+  /** Maximum degree of spherical harmonics that is evaluated, 0..3. */
   readonly shDegree: ShDegree;
   readonly order: RenderSettings['order'];
-  /** Overrides those of the scenes. */
+  /** Low-pass filter of the splats, instead of the scenes' own; undefined to use theirs. */
   readonly filter?: SplatFilter | undefined;
 }
 
-/** LOD settings for scenes with levels of detail. */
+/** Allowed error in pixels, and maximum number of splats, for scenes with levels of detail. */
 export type LodSettings = Pick<FrameSettings, 'detail' | 'splatBudget'>;
 
-/** Counts that are read back from the GPU. */
+/** Counts of the splats of a frame, which are read back from the GPU. */
 export interface ReadCounts {
   readonly drawn: number;
-  /** Visible splats beyond the capacity of the device's buffers. */
+  /** Number of visible splats that are not drawn, because they exceed the capacity of the buffers. */
   readonly left: number;
-  /** null with WebGL, which does not count it. */
-  readonly contributed: number | null;
+  /** Number of splats that contribute visibly to some pixel; null with WebGL, which does not count them. */
+  readonly contributing: number | null;
 }
 
-/** Owner of a device, on which frames are drawn. */
+/** The device on which frames are drawn, and its state. */
 export interface DeviceOwner {
-  /** The GPU context: owners with the same one share a backend. */
+  /** The GPU context. Scenes with the same context share a backend. */
   readonly context: GPUDevice | WebGL2RenderingContext;
   readonly limits: { readonly maxTextureDimension2D: number };
-  /** GPU memory of the scenes. */
+  /** Ledger of the GPU memory of all scenes on the device. */
   readonly memory: MemoryLedger;
   readonly isLost: boolean;
   readonly lost: Promise<GPUDeviceLostInfo>;
@@ -50,50 +50,55 @@ export interface Drawable {
   readonly place: DeviceOwner;
   /** @throws GaussianSplatError `unsupported/webgl` without WebGPU. */
   readonly device: GPUDevice;
-  /** Number of submissions of a frame. */
+  /** Number of submissions into which the work of a frame is divided. */
   readonly submissions: number;
-  /** Creates a backend for its device. */
+  /** Creates a backend that draws on the device of this scene. */
   openBackend(contents: FrameSource, events: BackendEvents): Backend;
 }
 
-/** Current content of frames. */
+/** Provides the current content of frames. */
 export interface FrameSource {
   readonly world: World;
-  /** LOD settings, also at rest. */
+  /** Settings of the levels of detail of all frames, also at rest. */
   readonly levels: LodSettings;
   /**
-   * Called before each frame: updates the world.
-   * @returns A key that changes whenever the frame would.
+   * Updates the world. Called before each frame.
+   * @returns A key of the content, which changes whenever the frame would differ.
    */
   prepareFrame(): string;
-  /** Draws meshes, before splats are drawn over them. @returns Overrides of the target for the splats. */
+  /**
+   * Draws meshes, before the splats are drawn over them. @returns Properties of the target of the splats that differ
+   * from those of the frame.
+   */
   drawBeneath?(frame: Frame): Partial<FrameTarget>;
 }
 
-/** Events of a backend. */
+/** Listeners of a backend. */
 export interface BackendEvents {
-  /** The last frame was incomplete; the next one will not be. */
+  /**
+   * Called after a frame with missing splats, because its buffers were too small. The next frame has larger buffers.
+   */
   readonly onIncomplete: () => void;
-  /** A later frame than the first needs more memory than available: `out-of-memory/allocation`. */
+  /** Called with `out-of-memory/allocation` if a frame after the first needs more memory than is available. */
   readonly onError: (error: GaussianSplatError) => void;
 }
 
-/** Surface of a canvas: a context for backends of one kind. */
+/** The context of a canvas on which backends of one kind draw. */
 export interface Surface {
   readonly canvas: HTMLCanvasElement | OffscreenCanvas;
-  /** Clears the canvas, and frees its resources. */
+  /** Clears the canvas, and frees the resources of the context. */
   unconfigure(): void;
 }
 
-/** One frame to draw on a canvas. */
+/** Parameters of a frame that is drawn on a canvas. */
 export interface CanvasFrame {
   readonly camera: Camera;
   readonly surface: Surface;
-  /** Premultiplied. */
+  /** Premultiplied color behind the splats. */
   readonly background?: Rgba | undefined;
-  /** Settings that differ from those at rest. */
+  /** Settings in which the frame differs from frames at rest. */
   readonly settings?: Partial<PerFrameSettings> | undefined;
-  /** Whether the frame is read in the same task. */
+  /** Whether a script reads the canvas in the same task. */
   readonly isRead?: boolean;
 }
 
@@ -102,28 +107,34 @@ export interface Backend {
   readonly place: DeviceOwner;
   /** @throws GaussianSplatError `unsupported/webgl` without WebGPU. */
   readonly device: GPUDevice;
-  /** Bytes of GPU memory for drawing, without the splats. */
+  /** GPU memory for drawing in bytes, without that of the splats. */
   readonly byteLength: number;
-  /** Resolution scale of each side that the overdraw limit requires, 0..1. */
+  /** Factor of the width and of the height, 0..1, by which frames are reduced to limit overdraw. */
   readonly pixelShare: number;
   readonly isDestroyed: boolean;
   readonly isLost: boolean;
-  /** Whether the pipelines for other settings are compiled. */
+  /** Whether {@link prepare} was called for the current settings. */
   readonly isPrepared: boolean;
   /** Filter between the renderer and the canvas; undefined for unprocessed frames. */
   readonly filter: FrameFilter | undefined;
-  /** Closes the previous filter; destroying the backend closes the current one. */
+  /**
+   * Sets the filter of subsequent frames, and closes the previous one. Destroying the backend closes the current
+   * filter.
+   */
   setFilter(filter: FrameFilter | undefined): void;
-  /** Sets the settings of subsequent frames. */
+  /** Sets quality, order and filter of subsequent frames. */
   setRendering(rendering: Rendering): void;
-  /** Compiles the pipelines for other settings, so that no frame has to. */
+  /** Compiles the pipelines for other settings, so that frames with these settings need not wait. */
   prepare(settings: readonly Partial<PerFrameSettings>[]): void;
-  /** Configures the canvas's context for drawing; null for a canvas of another kind. */
+  /**
+   * Configures the context of a canvas for drawing, and returns it; null if the canvas already has another kind of
+   * context.
+   */
   surfaceOn(canvas: HTMLCanvasElement): Surface | null;
   /**
    * Encodes and submits one frame.
    * @param content The last result of `FrameSource.prepareFrame`.
-   * @param onTime Is called with the GPU time of the frame, some frames later.
+   * @param onTime Called with the GPU time of the frame, some frames later.
    */
   render(frame: CanvasFrame, content: string, onTime?: (time: WorkTime) => void): void;
   /**
@@ -131,9 +142,12 @@ export interface Backend {
    * @throws GaussianSplatError `out-of-memory/allocation`
    */
   renderFirst(frame: CanvasFrame, content: string): Promise<void>;
-  /** Probes the last frame: see `Viewpoint.probe`. */
+  /** Returns the transmittance in front of points of the last frame: see `Viewpoint.probe`. */
   probe(points: readonly ProbePoint[]): Promise<readonly ProbeAnswer[]>;
-  /** Reads the counts of the last frame, and of a view. Reads back from the GPU: for panels, not for frames. */
+  /**
+   * Returns the counts of the last frame, and of the view of a camera. Reads back from the GPU, so call it for
+   * statistics only, not in each frame.
+   */
   readCounts(camera: Camera): Promise<ReadCounts>;
   /** Resolves when the GPU has finished all submitted work, or is lost. */
   finished(): Promise<unknown>;

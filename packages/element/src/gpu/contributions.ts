@@ -1,32 +1,35 @@
-/** Loaded only if a page requests the contribution of its splats. */
+/** Counts the splats that contribute to a frame. The module is loaded only if a page requests this count. */
 import type { Camera, SplatFilter } from '@gaussian-splat/core';
 import { Viewpoint, type FrameSettings, type World } from '@gaussian-splat/renderer';
 import { AuxiliaryOutputs, readBackWith, untilItHasRoom } from '@gaussian-splat/renderer/tools';
 import type { ReadCounts } from './backend.js';
 
-/** Source of the counts: a backend. */
+/** The part of a backend whose splats are counted. */
 export interface Counted {
   readonly device: GPUDevice;
   readonly isDestroyed: boolean;
-  readonly viewpoint: Pick<Viewpoint, 'statistics'>;
+  readonly viewpoint: Pick<Viewpoint, 'stats'>;
   readonly view: { readonly world: World; readonly settings: FrameSettings; readonly filter: SplatFilter | undefined };
 }
 
-/** Minimum weight, alpha times transmittance, that is visible on an 8-bit display: half a step. */
+/** Minimum weight, alpha times transmittance, that is visible on an 8-bit display: half of one step. */
 const MIN_WEIGHT = 0.5 / 255;
-/** Splats of a chunk, because whole chunks are recorded. */
+/** Number of splats in a chunk. Weights are recorded for whole chunks. */
 const CHUNK = 256;
 
-/** Reads the counts of the last frame, and of a view. Reads back from the GPU: for panels, not for frames. */
+/**
+ * Returns how many splats the last frame drew and left out, and how many contribute to the view of `camera`. Reads
+ * back from the GPU, so call it for statistics only. Throws if the backend is destroyed.
+ */
 export async function readCounts(viewport: Counted, camera: Camera): Promise<ReadCounts> {
-  const { visible, overflow } = await viewport.viewpoint.statistics();
+  const { visible, overflow } = await viewport.viewpoint.stats();
   if (viewport.isDestroyed) throw new Error('the frame is gone');
-  return { drawn: visible, left: overflow, contributed: await countContributing(viewport, camera) };
+  return { drawn: visible, left: overflow, contributing: await countContributing(viewport, camera) };
 }
 
 /**
- * Counts the splats that are visible in some pixel of a view. Draws the view with the compute rasterizer, independent
- * of the page's, and reads all weights back: for panels, not for frames.
+ * Returns the number of splats that are visible in some pixel of a view. Draws the view with the compute rasterizer,
+ * whichever the page uses, and reads all weights back. Call it for statistics only.
  */
 async function countContributing({ device, view }: Counted, camera: Camera): Promise<number> {
   const { world, settings, filter } = view;
@@ -37,7 +40,7 @@ async function countContributing({ device, view }: Counted, camera: Camera): Pro
     Math.max(
       1,
       world.placements
-        .flatMap(({ scene, visible }) => (visible ? scene.pages : []))
+        .flatMap(({ scene, visible }) => (visible ? scene.blocks : []))
         .reduce((sum, { count }) => sum + Math.ceil(count / CHUNK), 0),
     );
   const viewpoint = new Viewpoint(device, world, {

@@ -1,8 +1,8 @@
-/** Handling of lost devices in a scene's life cycle. */
+/** Detects failures that lost devices cause, and waits for the page to be visible. */
 import { GaussianSplatError } from '@gaussian-splat/core';
 import type { Backend } from './backend.js';
 
-/** The device was lost before the first frame. */
+/** Error of a scene whose device was lost before its first frame. */
 export class DeviceLostError extends Error {
   /** Loss information of the browser. */
   readonly info: GPUDeviceLostInfo;
@@ -13,34 +13,35 @@ export class DeviceLostError extends Error {
   }
 }
 
-/** A missing device is final at first, but after a loss it may only be delayed. */
+/**
+ * Returns whether an error results from a lost device, so that another attempt may succeed. For a new scene (`isNew`) a
+ * missing device is final; after a loss it may only be delayed.
+ */
 export function isDeviceFailure(error: unknown, isNew: boolean): boolean {
   if (error instanceof DeviceLostError) return true;
   if (!(error instanceof GaussianSplatError)) return false;
-  // A generator may be the first to detect the loss.
+  // A generator may detect the loss before the device reports it.
   return error.family === 'device-lost' || (!isNew && error.family === 'unsupported');
 }
 
-/** Maximum delay of the report of a loss, ms: buffers of the device fail before. */
+/** Maximum delay between the first failures of a lost device's buffers and the report of the loss, ms. */
 const LOSS_MS = 200;
 
-/** Whether a failure resulted from the end of drawing, or from a lost device. */
+/**
+ * Returns whether a failure has resulted from the end of drawing, or from a lost device. Waits up to {@link LOSS_MS}
+ * for the report of a loss.
+ */
 export async function isGone(backend: Pick<Backend, 'isDestroyed' | 'isLost'>): Promise<boolean> {
   if (!backend.isDestroyed && !backend.isLost) await delay(LOSS_MS);
   return backend.isDestroyed || backend.isLost;
 }
 
-/** Whether the device was lost before all submitted work was done. */
-export async function wasLost(backend: Pick<Backend, 'finished' | 'isLost'>): Promise<boolean> {
-  await backend.finished();
-  // The loss is reported a little later.
-  await new Promise((resolve) => setTimeout(resolve));
-  return backend.isLost;
-}
-
 export const delay = (ms: number): Promise<void> => new Promise((resolve) => setTimeout(resolve, ms));
 
-/** Resolves when the page is visible, or the wait is aborted: a hidden page would only lose its device again. */
+/**
+ * Resolves when the page is visible, or the wait is aborted. A device that is requested by a hidden page would only be
+ * lost again.
+ */
 export function pageVisible(signal: AbortSignal): Promise<void> {
   return new Promise((resolve) => {
     const check = (): void => {

@@ -1,16 +1,20 @@
-/** Loaded only if a lost device cannot be replaced at once. */
+/** Handles lost devices that cannot be replaced at once. The module is loaded only then. */
 import { GaussianSplatError } from '@gaussian-splat/core';
 import { timerMs } from '../attributes.js';
 import { delay, isDeviceFailure } from './device-failures.js';
 import type { DeviceLease, SharedDevice } from './shared-device.js';
 
-/** @param loss Loss information of the browser, if there is any. */
+/**
+ * Returns the error of a scene whose device was lost for good, `device-lost/unrecoverable`.
+ * @param cause Error of the last attempt.
+ * @param loss Loss information of the browser, if there is any.
+ */
 export function unrecoverable(cause: unknown, loss?: GPUDeviceLostInfo): GaussianSplatError {
   const said = loss && ` (reason "${loss.reason}": ${loss.message.replace(/\.$/, '') || 'nothing more is known'})`;
   const lost = `a device that was lost${said ?? ''}`;
   const why = cause instanceof GaussianSplatError ? `${cause.where}: ${cause.found}` : String(cause);
   const isLoss = isDeviceFailure(cause, true);
-  // Chromium denies a page that has lost two devices within a short time any other, until it is reloaded.
+  // If a page loses two devices within a short time, Chromium grants it no other device until it is reloaded.
   const reload = isLoss ? 'reload the page' : 'reload the page, to which the browser may refuse the GPU until then';
   return new GaussianSplatError('device-lost/unrecoverable', {
     where: 'GPU device',
@@ -24,16 +28,16 @@ export function unrecoverable(cause: unknown, loss?: GPUDeviceLostInfo): Gaussia
   });
 }
 
-/** Pause before the first request, ms; it doubles each time. */
+/** Delay of the first request, ms. It doubles for each further request, up to the second constant. */
 const FIRST_MS = 5_000;
 const LONGEST_MS = 300_000;
-/** A page that becomes visible requests at once, but not sooner than this after the last request, ms. */
+/** Minimum delay between two requests, ms, also when the page becomes visible. */
 const MIN_MS = 2_000;
 
 /**
- * Requests a device at increasing intervals, and whenever the page becomes visible: browsers that deny a page the GPU
+ * Requests a device at increasing intervals, and whenever the page becomes visible. Browsers that deny a page the GPU
  * after crashes do so for some minutes.
- * @returns A lease of it; undefined once the wait is aborted.
+ * @returns A lease of the device; undefined if the wait is aborted.
  */
 export async function waitForDevice(device: SharedDevice, signal: AbortSignal): Promise<DeviceLease | undefined> {
   for (let pause = FIRST_MS; ; pause = Math.min(LONGEST_MS, 2 * pause)) {
@@ -46,7 +50,7 @@ export async function waitForDevice(device: SharedDevice, signal: AbortSignal): 
   }
 }
 
-/** Resolves after a while, when the page becomes visible, or when the wait is aborted. */
+/** Resolves after a time in milliseconds, or earlier if the page becomes visible or the wait is aborted. */
 function untilShown(milliseconds: number, signal: AbortSignal): Promise<void> {
   return new Promise((resolve) => {
     const end = (): void => {

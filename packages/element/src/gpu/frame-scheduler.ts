@@ -1,49 +1,50 @@
 import { DisplayInterval } from '../dynamic-quality/display-interval.js';
 
-/** A client that draws. */
+/** A client of the scheduler that draws frames. */
 export interface FrameClient {
-  /** Draws one frame. Requests the next one from the scheduler if needed. `now` is requestAnimationFrame's clock, ms. */
+  /**
+   * Draws one frame, and requests another one from the scheduler if needed. `now` is requestAnimationFrame's clock, ms.
+   */
   drawFrame(now: number): void;
 }
 
 /**
- * Frames until another client counts fully: clients that draw occasionally take little of the time. Clients that have
- * stopped do not count.
+ * Number of frames over which the number of clients is smoothed when it grows, because clients that draw occasionally
+ * take little time. Clients that have stopped are not counted.
  */
 const MEMORY = 8;
 
-/** Time of the last frame in any window, by the page's clock. */
+/** Time of the last frame in any window, in milliseconds of the page's `performance.now()`. */
 let lastDrawn = -Infinity;
 
-/** Fraction of the display interval for frames: the page and its compositor need the rest. */
+/** Fraction of the display interval that frames may take, because the page and its compositor need the rest. */
 const SHARE_OF_INTERVAL = 0.8;
 
 /**
- * Target GPU duration of a frame, ms: the page's limit, else a fraction of the display interval, divided among elements
- * that draw at the same time.
+ * Returns the target GPU duration of a frame, ms. It is the limit that the page sets, if finite. Otherwise it is a
+ * fraction of the display interval, divided by the number of clients that draw at the same time.
  */
 export const targetMsOf = (
   budgetMs: number,
   { displayInterval, clients }: Pick<FrameScheduler, 'displayInterval' | 'clients'>,
 ): number => (budgetMs < Infinity ? budgetMs : (SHARE_OF_INTERVAL * displayInterval) / clients);
 
-/** Milliseconds since the last frame in any window. */
+/** Returns the milliseconds since the last frame in any window; Infinity before the first. */
 export const sinceLastImage = (): number => performance.now() - lastDrawn;
 
-/** Scheduler of each window with elements. */
+/** The schedulers of windows with elements. */
 const KNOWN = new WeakMap<Window, FrameScheduler>();
 
-/** One requestAnimationFrame loop for all elements of a window; it runs only while an element has requested a frame. */
+/** A requestAnimationFrame loop for all elements of a window. It runs only while an element has requested a frame. */
 export class FrameScheduler {
   readonly #window: Window;
   #due = new Set<FrameClient>();
   #drawing = new Set<FrameClient>();
   #handle = 0;
-  #waitsForPage = false;
   readonly #interval = new DisplayInterval();
   #clients = 1;
 
-  /** @param view The window whose frames are drawn; default the page's own. */
+  /** @param view The window whose requestAnimationFrame is used; default: the page's own. */
   constructor(view: Window = globalThis as unknown as Window) {
     this.#window = view;
   }
@@ -55,23 +56,23 @@ export class FrameScheduler {
     return known;
   }
 
-  /** Milliseconds between two frames of the display. */
+  /** Interval between two refreshes of the display, ms. */
   get displayInterval(): number {
     return this.#interval.milliseconds;
   }
 
-  /** Number of clients that draw at the same time, frame after frame: at least 1. */
+  /** Smoothed number of clients that draw in the same frames, 1 or more. */
   get clients(): number {
     return this.#clients;
   }
 
-  /** Requests one frame; repeated requests count once. */
+  /** Requests one frame for a client. Repeated requests before that frame count once. */
   request(client: FrameClient): void {
     this.#due.add(client);
     this.#schedule();
   }
 
-  /** Cancels a request. */
+  /** Cancels the request of a client. */
   cancel(client: FrameClient): void {
     this.#due.delete(client);
     this.#drawing.delete(client);
@@ -82,19 +83,14 @@ export class FrameScheduler {
 
   #schedule(): void {
     if (this.#handle !== 0 || this.#due.size === 0) return;
-    if (this.#window.document.visibilityState === 'hidden') this.#waitForPage();
+    const { document } = this.#window;
+    // A listener that is added again counts once.
+    if (document.visibilityState === 'hidden')
+      document.addEventListener('visibilitychange', this.#onVisible, { once: true });
     else this.#handle = this.#window.requestAnimationFrame(this.#tick);
   }
 
-  #waitForPage(): void {
-    if (this.#waitsForPage) return;
-    this.#waitsForPage = true;
-    const resume = (): void => {
-      this.#waitsForPage = false;
-      this.#schedule();
-    };
-    this.#window.document.addEventListener('visibilitychange', resume, { once: true });
-  }
+  readonly #onVisible = (): void => this.#schedule();
 
   readonly #tick = (time: number): void => {
     this.#handle = 0;

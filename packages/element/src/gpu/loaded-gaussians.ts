@@ -1,4 +1,4 @@
-import type { GaussianScene } from '@gaussian-splat/renderer';
+import type { GaussianScene, StreamProgress } from '@gaussian-splat/renderer';
 import { QueueClock } from '@gaussian-splat/renderer/tools';
 import type { SceneBounds } from '../camera/settings.js';
 import type { Timeline } from '../dynamic/dynamic-model.js';
@@ -6,55 +6,57 @@ import type { FrameSource, LodSettings, Backend, BackendEvents, Drawable, Device
 import type { DeviceLease } from './shared-device.js';
 import { WebGpuBackend } from './webgpu-backend.js';
 
-/** A scene's Gaussians with additional levels of detail, which own only the levels. */
+/** A scene's Gaussians with additional levels of detail. The object owns only the levels, not the Gaussians. */
 export interface OwnedLevels extends GaussianScene {
-  /** Bytes of GPU memory of the levels. */
+  /** GPU memory of the levels, bytes. */
   readonly byteLength: number;
   destroy(): void;
 }
 
-/** Gaussians with one owner. */
+/** Gaussians on the GPU, which their owner must destroy. */
 export interface OwnedGaussians extends GaussianScene {
-  /** Splats of the current frame, if the capacity is larger. */
+  /** Number of splats in the current frame; absent if it always equals the capacity. */
   readonly frameCount?: number;
-  /** Splats of the finest level, if the file has levels of detail. */
+  /** Number of splats in the finest level; absent if the file has no levels of detail. */
   readonly leafCount?: number;
-  /** Dropped splats of the file; unknown for a generator. */
+  /** Number of splats of the file that were dropped as unusable; absent for a generator. */
   readonly droppedCount?: number;
+  /** Pages on the GPU of a streamed scene. */
+  readonly progress?: StreamProgress;
   readonly byteLength: number;
   destroy(): void;
 }
 
-/** Triangles of a source, with or without splats. */
+/** Triangle meshes of a source, which may also have splats. */
 export interface MeshModel {
   readonly triangles: number;
   readonly byteLength: number;
-  /** Incremented when its animation has moved it. */
+  /** Counter that is incremented when an animation has moved the meshes. */
   readonly version: number;
   dispose(): void;
 }
 
 /**
- * The GPU content of one source: its splats, their levels of detail, their generator, and the lease that keeps the
+ * The GPU content of one source: its splats, their levels of detail, and their generator. It holds the lease of the
  * device.
  */
 export class LoadedGaussians implements Drawable {
-  /** Its backend. */
+  /** Kind of backend that draws the scene. */
   readonly renderer: 'webgpu' | 'webgl' = 'webgpu';
   readonly #bounds: SceneBounds;
-  /** The generator or sequence that writes the Gaussians; undefined for those of a file. */
+  /** The generator, sequence or clip that writes the Gaussians; undefined for those of a file. */
   readonly live: Timeline | undefined;
-  /** Number of submissions of a frame. */
+  /** Number of submissions into which the work of a frame is divided. */
   readonly submissions: number;
-  /** Its triangles, once they are read. */
+  /** The meshes of the source; undefined until they are read, and if there are none. */
   model: MeshModel | undefined;
-  /** Sort order of its splats, if its file declares one. */
+  /** Sort order of the splats that the file declares; undefined if it declares none. */
   readonly order: 'pixel' | undefined;
-  /** Whether its file has triangles, too. */
+  /** Whether the file also contains triangle meshes. */
   readonly hasMeshes: boolean;
-  /** Messages about content of its file that is not drawn. */
+  /** Messages about content of the file that is not drawn. */
   warnings: readonly string[];
-  /** Called when the next frame would show more than the last one. */
+  /** Called when another frame is required: a part has arrived, or a view has no feedback pass yet. */
   onChange: () => void = () => undefined;
   readonly #lease: DeviceLease;
   #gaussians: OwnedGaussians;
@@ -93,7 +95,10 @@ export class LoadedGaussians implements Drawable {
     if (live) QueueClock.of(lease.device).isShared = true;
   }
 
-  /** For a generator, the bounds of its last runs. */
+  /**
+   * Bounds of the splats in scene coordinates: those that the generator or sequence reports, otherwise those of the
+   * file.
+   */
   get bounds(): SceneBounds {
     return this.live?.bounds ?? this.#bounds;
   }
@@ -102,24 +107,24 @@ export class LoadedGaussians implements Drawable {
     return this.#gaussians;
   }
 
-  /** Levels of detail that were built from its splats. */
+  /** Levels of detail that were built from the splats; undefined if there are none. */
   get levels(): OwnedLevels | undefined {
     return this.#levels;
   }
 
-  /** The drawn scene: the levels, if there are any, include the splats. */
+  /** The scene that is drawn. If levels were built, it is the levels, which include the splats. */
   get drawn(): GaussianScene {
     return this.#levels ?? this.#gaussians;
   }
 
-  /** Draws with these levels in subsequent frames, or only the splats; frees previous levels. */
+  /** Sets the levels of subsequent frames; undefined to draw only the splats. Frees the previous levels. */
   setLevels(levels: OwnedLevels | undefined): void {
     if (levels === this.#levels) return;
     this.#levels?.destroy();
     this.#levels = levels;
   }
 
-  /** LOD settings, also at rest. */
+  /** Settings of the levels of detail, also at rest. */
   get detail(): LodSettings {
     return this.#detail;
   }
@@ -128,19 +133,19 @@ export class LoadedGaussians implements Drawable {
     this.#detail = detail;
   }
 
-  /** Whether its file has levels of detail, complete or streamed. */
+  /** Whether the file contains levels of detail, complete or streamed. */
   get hasOwnLevels(): boolean {
-    return this.gaussians.pages.some(({ details }) => details !== undefined);
+    return this.gaussians.blocks.some(({ details }) => details !== undefined);
   }
 
-  /** Replaces the splats in subsequent frames; frees the previous ones and their levels. */
+  /** Replaces the splats in subsequent frames. Frees the previous splats and their levels. */
   replaceGaussians(gaussians: OwnedGaussians): void {
     this.setLevels(undefined);
     this.#gaussians.destroy();
     this.#gaussians = gaussians;
   }
 
-  /** Creates its backend. */
+  /** Creates a backend on the device of the scene. */
   openBackend(contents: FrameSource, events: BackendEvents): Backend {
     return new WebGpuBackend(this, contents, events);
   }
@@ -163,7 +168,7 @@ export class LoadedGaussians implements Drawable {
     return this.#lease.lost;
   }
 
-  /** Aborted when it is destroyed. */
+  /** Signal that is aborted when the scene is destroyed. */
   get signal(): AbortSignal {
     return this.#life.signal;
   }

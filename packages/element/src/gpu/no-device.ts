@@ -1,4 +1,4 @@
-/** Messages for missing GPU devices, insufficient memory, and other rare errors. Loaded on demand. */
+/** Errors of missing GPU devices and of insufficient memory, and other rare errors. The module is loaded on demand. */
 import { GaussianSplatError } from '@gaussian-splat/core';
 import { visitorMessages } from '../errors.js';
 
@@ -38,7 +38,7 @@ export const noAdapter = (): GaussianSplatError =>
     remedy: 'switch on hardware acceleration in the browser settings, or update the graphics driver',
   });
 
-/** Prototype.js 1.7 replaces `Array.from`. */
+/** Returns the error of a page that has changed `Array.from`, as Prototype.js 1.7 does. */
 export const changedPage = (): GaussianSplatError =>
   new GaussianSplatError('unsupported/page', {
     where: 'this page',
@@ -64,7 +64,7 @@ export const noContext = (): GaussianSplatError =>
     remedy: 'use a browser that shows WebGPU on a canvas',
   });
 
-/** For a page's own device, or a browser that does not respond. */
+/** Returns the error of a page whose function for devices has failed, or of a browser that does not respond. */
 export const noDevice = (cause: unknown): GaussianSplatError =>
   new GaussianSplatError('unsupported/no-adapter', {
     where: 'the graphics adapter',
@@ -74,7 +74,10 @@ export const noDevice = (cause: unknown): GaussianSplatError =>
     cause,
   });
 
-/** @param where Content that could not be drawn. */
+/**
+ * Returns the error of a failed GPU allocation, `out-of-memory/allocation`.
+ * @param where Description of the content that could not be drawn.
+ */
 export const outOfMemory = (where: string, cause: GPUError): GaussianSplatError =>
   new GaussianSplatError('out-of-memory/allocation', {
     where,

@@ -18,36 +18,42 @@ import { limitScenes, loadBytes } from './memory-budget.js';
 import type { PartUploads } from './part-uploads.js';
 import type { PreviewUploads } from './preview-uploads.js';
 import { assertWebGpu, why } from './request-device.js';
-import type { DeviceLease, SharedDevice } from './shared-device.js';
+import { withLease, type DeviceLease, type SharedDevice } from './shared-device.js';
 import { shown, upload } from './upload.js';
 
 export interface OpenOptions {
   readonly device: SharedDevice;
   readonly loader: SceneLoader;
   readonly signal: AbortSignal;
-  /** Address for fetching a frame of a sequence. */
+  /** Returns the address from which a frame of a sequence is fetched, as the page rewrites it. */
   readonly frameUrl: (url: string) => string;
   readonly onProgress: ProgressListener;
-  /** Called with a preview of a scene that is still loading; the callee owns it. Absent: no previews. */
+  /**
+   * Called with a preview of a scene that is still loading. The callee owns the preview. Absent if no previews are
+   * wanted.
+   */
   readonly onPreview?: (preview: LoadedGaussians) => void;
   /**
-   * Called with the size of the new scene just before its upload: the moment to free an old one, so that both never
-   * coexist.
+   * Called with the GPU memory of the new scene, in bytes, just before its upload. The callee can free the old scene,
+   * so that both never coexist.
    */
   readonly beforeUpload: (byteLength: number) => void;
-  /** Upper limit of the scene's GPU memory in bytes; undefined for no limit but the device's. */
+  /** Maximum GPU memory of the scene, in bytes; undefined if only the device limits it. */
   readonly memoryBudget: number | undefined;
-  /** Number of submissions of a frame. */
+  /** Number of submissions into which the work of a frame is divided. */
   readonly submissions: number;
-  /** Opens sources other than scenes of splats. */
+  /**
+   * Opens sources with WebGPU; undefined for {@link openGaussians}. A replacement can open sources other than scenes of
+   * splats.
+   */
   readonly open: typeof openGaussians | undefined;
-  /** Additional data of a request for a generator. */
+  /** Returns additional parameters for opening a generator. */
   readonly live: () => Omit<DynamicRequest, 'url' | 'chain' | 'contract' | 'credentials' | 'memoryBudget'>;
 }
 
 /**
- * Opens the requested source, with WebGL if WebGPU is unavailable and the request allows it. Rejects with
- * GaussianSplatError or the signal's reason.
+ * Opens the requested source. Uses WebGL if the request demands it, or if it allows it and WebGPU is unavailable.
+ * Rejects with GaussianSplatError, or the signal's reason.
  */
 export async function openScene(request: SceneRequest, options: OpenOptions): Promise<LoadedGaussians> {
   const { open = openGaussians } = options;
@@ -61,36 +67,39 @@ export async function openScene(request: SceneRequest, options: OpenOptions): Pr
       if (request.renderer !== 'auto' || (error as Partial<GaussianSplatError>).family !== 'unsupported') throw error;
     }
   const { openGlScene } = await loadModule('the code that draws with WebGL', () => import('../webgl/open-gl-scene.js'));
-  return openGlScene(limited(request, options), options, reason);
+  return openGlScene(request, options, reason);
 }
 
-/** The request with default byte limits of a load. */
+/** Returns a request with a limit of bytes: the request's own, or the default. */
 export const limited = <T extends FileRequest>(request: T, { memoryBudget }: Pick<OpenOptions, 'memoryBudget'>): T => ({
   ...request,
   limits: { maxBytes: loadBytes(memoryBudget), ...request.limits },
 });
 
 /**
- * Opens the requested source with WebGPU; autotuning of the device follows later. Rejects with GaussianSplatError or
- * the signal's reason.
+ * Opens the requested source with WebGPU. The device is autotuned later, when the page is idle. Rejects with
+ * GaussianSplatError, or the signal's reason.
  */
 export async function openGaussians(request: SceneRequest, options: OpenOptions): Promise<LoadedGaussians> {
-  // Checked first, so that no bytes are fetched in vain.
+  // WebGPU is checked first, so that no bytes are fetched in vain.
   await assertWebGpu();
   const open = isGenerator(request) ? openDynamicScene : isStreamed(request) ? openStreamedScene : openLoadedScene;
-  const scene = await open(limited(request, options), options);
+  const scene = await withLease(options.device, (lease) => open(request, options, lease));
   chooseAtRest(scene.device);
   return scene;
 }
 
-/** Requests device and file concurrently, then uploads. */
-async function openLoadedScene(request: SceneRequest, options: OpenOptions): Promise<LoadedGaussians> {
-  // If either fails the other is canceled, because bytes are useless without a GPU.
+/** Requests the device and the file concurrently, then uploads the scene. */
+async function openLoadedScene(
+  request: SceneRequest,
+  options: OpenOptions,
+  acquiring: Promise<DeviceLease>,
+): Promise<LoadedGaussians> {
+  // If the device or the file fails, the other is canceled: bytes are useless without a GPU.
   const abort = new AbortController();
   const giveUp = (): void => abort.abort(options.signal.reason);
   options.signal.addEventListener('abort', giveUp, { once: true });
-  const acquiring = options.device.acquire();
-  // While the bytes are in transit, variants for the first frame are selected.
+  // Variants for the first frame are selected while the bytes are in transit.
   const choosing = acquiring.then(({ device }) => pickInitialVariants(device, images()));
   choosing.catch(ignore);
   const { onPreview } = options;
@@ -132,7 +141,6 @@ async function openLoadedScene(request: SceneRequest, options: OpenOptions): Pro
     endPreviews();
     parts?.then((uploads) => uploads.destroy(), ignore);
     abort.abort(error);
-    acquiring.then((lease) => lease.release(), ignore);
     loading.catch(ignore);
     throw error;
   } finally {
@@ -140,13 +148,16 @@ async function openLoadedScene(request: SceneRequest, options: OpenOptions): Pro
   }
 }
 
-/** Generators are recognized by the file name, or by a contract from the page. */
+/** Returns whether a request is for a generator: the page has set a contract, or the file name ends with `.onnx`. */
 export function isGenerator({ url, contract }: SceneRequest): boolean {
   if (contract !== undefined && contract !== null && contract !== '') return true;
   return /\.onnx$/i.test(nameIn(url));
 }
 
-/** The name that identifies a kind: the path of an address, or the name that a page appends to an object URL. */
+/**
+ * Returns the text that identifies the kind of a file: the path of an address, or the name that a page has appended to
+ * an object URL.
+ */
 function nameIn(url: string): string {
   if (!URL.canParse(url)) return url;
   const { pathname, protocol, hash } = new URL(url);
@@ -171,42 +182,26 @@ async function openSequence(
   return scene;
 }
 
-/** Requests device and code concurrently. */
-const openDynamicScene = (request: SceneRequest, options: OpenOptions): Promise<LoadedGaussians> =>
-  openLate(options, async (lease) => {
-    const late = await loadModule('the code that runs generators', () => import('../dynamic/open-dynamic-model.js'));
-    return late.openDynamicScene(request, options, await lease);
-  });
+/** Opens a generator. Requests the device and the code concurrently. */
+const openDynamicScene: typeof openLoadedScene = async (request, options, lease) => {
+  const late = await loadModule('the code that runs generators', () => import('../dynamic/open-dynamic-model.js'));
+  return late.openDynamicScene(request, options, await lease);
+};
 
 /**
- * LOD folders are recognized by the name of their manifest, clips by their extension, and streamed SOG by its name,
- * unless it is to be loaded completely.
+ * Returns whether a scene is loaded in parts: a `detail.json`, a clip (`.gsv`, `.4dgs`), or a `lod-meta.json`, unless
+ * `isWhole` requests it completely.
  */
 export function isStreamed({ url, isWhole }: SceneRequest): boolean {
   const name = /(^|\/)(detail|lod-meta)\.json$|\.(gsv|4dgs)$/i.exec(nameIn(url));
   return name !== null && !(isWhole && name[2] === 'lod-meta');
 }
 
-const openStreamedScene = (request: SceneRequest, options: OpenOptions): Promise<LoadedGaussians> =>
-  openLate(options, async (lease) => {
-    const late = await loadModule('the code that streams scenes', () => import('./open-streamed.js'));
-    return late.openStreamedScene(request, options, await lease);
-  });
-
-/** Opens a scene with a lease, which is released if that fails. */
-async function openLate(
-  { device }: OpenOptions,
-  open: (lease: Promise<DeviceLease>) => Promise<LoadedGaussians>,
-): Promise<LoadedGaussians> {
-  const acquiring = device.acquire();
-  try {
-    return await open(acquiring);
-  } catch (error) {
-    acquiring.then((lease) => lease.release(), ignore);
-    throw error;
-  }
-}
+const openStreamedScene: typeof openLoadedScene = async (request, options, lease) => {
+  const late = await loadModule('the code that streams scenes', () => import('./open-streamed.js'));
+  return late.openStreamedScene(request, options, await lease);
+};
 
 function ignore(): void {
-  // The relevant failure has already been thrown.
+  // Another promise reports the failure.
 }

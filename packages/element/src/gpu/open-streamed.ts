@@ -1,4 +1,4 @@
-/** Opens streamed scenes: page by page (docs/lod-format.md), or streamed SOG box by box. */
+/** Opens streamed scenes: manifests of pages (docs/lod-format.md), streamed SOG by boxes, and clips. */
 import { fileRequest } from '@gaussian-splat/core/fetch';
 import { loadModule } from '@gaussian-splat/core';
 import { MemoryLedger, pickInitialVariants, StreamedGaussians, type PoolOptions } from '@gaussian-splat/renderer';
@@ -19,15 +19,15 @@ export interface StreamedOptions {
   readonly loader: SceneLoader;
   readonly signal: AbortSignal;
   readonly onProgress: ProgressListener;
-  /** Bytes of GPU memory for pages; undefined for the default of the device. */
+  /** Maximum GPU memory of the scene, in bytes; undefined for the default of the device. */
   readonly memoryBudget: number | undefined;
-  /** Called when another frame is needed. */
+  /** Called when a part has arrived, so that another frame is needed. */
   readonly onChange: () => void;
-  /** Additional data for a clip. */
+  /** Returns additional parameters for opening a clip. */
   readonly live: () => Pick<DynamicRequest, 'listeners' | 'loops' | 'state'>;
 }
 
-/** A scene that is loaded in parts. */
+/** A scene that is loaded in parts, after its coarsest part has arrived. */
 export interface OpenedStream {
   readonly gaussians: OwnedGaussians;
   readonly bounds: SceneBounds;
@@ -37,15 +37,16 @@ export interface OpenedStream {
   readonly warnings?: readonly string[];
 }
 
-/** Fraction of the memory that the scenes of the page leave unused, because others may follow. */
+/** Fraction of the remaining memory budget that a streamed scene may use, because other scenes may follow. */
 const SHARE_OF_REST = 0.5;
-/** Maximum number of listed failures of parts. */
+/** Maximum number of failures of parts that are reported. */
 const MAX_WARNINGS = 16;
-/** Allowed error in pixels, if the limits allow it. */
+/** Allowed error in pixels. If the limit of splats does not allow it, the error is larger. */
 const DETAIL = 1;
 
 /**
- * Opens a folder by its manifest: fetches that and the coarsest level. Failures of parts are added to `warnings` later.
+ * Opens a streamed scene: fetches its manifest or index, and its coarsest level. Failures of parts are added to
+ * `warnings` later.
  * @throws GaussianSplatError `network/*`, `decode/*`, `out-of-memory/*`, or the signal's reason.
  */
 async function openStreamed(request: SceneRequest, device: GPUDevice, options: StreamedOptions): Promise<OpenedStream> {
@@ -54,14 +55,14 @@ async function openStreamed(request: SceneRequest, device: GPUDevice, options: S
   const caps = streamCaps();
   const warnings: string[] = [];
   const pool: PoolOptions = {
-    // Computed when the pool is allocated, so that the scene gets coarser beside many others, but always has a slot.
+    // Computed when the pool is allocated. Beside many other scenes this scene is coarser, but it always has a slot.
     get memoryBudget() {
       const { budgetBytes, bytes } = MemoryLedger.of(device);
       return Math.min(memoryBudget, caps.bytes, SHARE_OF_REST * Math.max(0, budgetBytes - bytes));
     },
     signal,
     onChange,
-    // The parent of a missing page stays visible. The page is requested again repeatedly, but reported once.
+    // The parent of a missing page stays visible. The page is requested repeatedly, but its failure is reported once.
     onError: (error) => {
       const sentence = error instanceof Error ? error.message : String(error);
       if (warnings.includes(sentence) || warnings.length === MAX_WARNINGS) return;
@@ -87,7 +88,10 @@ async function openClip(request: SceneRequest, device: GPUDevice, options: Strea
   return { gaussians, bounds, live: player };
 }
 
-/** Limits of the downloads of one scene: they apply to all of its parts together, each counted once. */
+/**
+ * Limits of the downloads of one scene. They apply to the sum of all of its parts; a part that is fetched again counts
+ * once.
+ */
 class Allowance {
   readonly #limits: SceneLimits;
   readonly #bytes = new Map<string, number>();
@@ -97,7 +101,7 @@ class Allowance {
     this.#limits = limits;
   }
 
-  /** The remaining limits for a part. */
+  /** Returns the limits for a part: the bytes that the other parts leave. */
   of(part: string): SceneLimits {
     const { maxBytes = Infinity } = this.#limits;
     const others = this.#sum - (this.#bytes.get(part) ?? 0);
@@ -158,7 +162,7 @@ const openBoxes: Open = async (request, device, { loader, signal, onProgress }, 
   return StreamedGaussians.openSource(device, source, pool);
 };
 
-/** Opens a streamed scene, which then owns the lease. The caller releases it if this rejects. */
+/** Opens a streamed scene, which then owns the lease. If the promise rejects, the caller releases the lease. */
 export async function openStreamedScene(
   request: SceneRequest,
   options: Omit<StreamedOptions, 'onChange'> & { beforeUpload(byteLength: number): void; readonly submissions: number },
@@ -170,7 +174,7 @@ export async function openStreamedScene(
   limitScenes(lease.device, memoryBudget);
   signal.throwIfAborted();
   const onChange = (): void => opened.scene?.onChange();
-  // The fitting part is determined when the manifest is loaded.
+  // The size of the scene is unknown until the manifest is loaded, so its limit is reported.
   beforeUpload(memoryBudget ?? 0);
   const { gaussians, bounds, ...rest } = await openStreamed(request, lease.device, {
     ...{ loader, signal, onProgress, memoryBudget, onChange, live },

@@ -1,35 +1,31 @@
-/** Loaded for scenes that are uploaded while their splats are put in order. */
+/** Uploads scenes while their splats are sorted. The module is loaded for the first such scene. */
 import { GaussianBuffers } from '@gaussian-splat/renderer';
-import { sceneBytes, turn, type PackedHead, type PackedPortion } from '@gaussian-splat/renderer/tools';
+import { sceneBytes, type PackedHead, type PackedPortion } from '@gaussian-splat/renderer/tools';
 import type { ScenePart } from '../loading/protocol.js';
-
-/** Bytes that are handed to the GPU before other tasks get the thread. */
-const BYTES_AT_ONCE = 1 << 22;
 
 export interface PartUploadOptions {
   readonly signal: AbortSignal;
-  /** Bytes of GPU memory that the scene may take; undefined for no limit but the device's. */
+  /** Maximum GPU memory of the scene, in bytes; undefined if only the device limits it. */
   readonly memoryBudget: number | undefined;
-  /** Called before the scene is allocated, with its bytes. */
+  /** Called with the GPU memory of the scene, in bytes, before it is allocated. */
   readonly beforeUpload: (byteLength: number) => void;
 }
 
-/** Puts one scene on the GPU, part by part. */
+/** Uploads one scene to the GPU, part by part. */
 export class PartUploads {
   readonly #device: Promise<GPUDevice>;
   readonly #options: PartUploadOptions;
   #gaussians: Promise<GaussianBuffers> | undefined;
-  /** Fulfills once all portions received until now are written. */
+  /** Resolves when all portions that have been received are written. */
   #written: Promise<void> = Promise.resolve();
-  #left = BYTES_AT_ONCE;
 
-  /** @param device fulfills once scenes may be allocated on it */
+  /** @param device Resolves with the device when scenes may be allocated on it. */
   constructor(device: Promise<GPUDevice>, options: PartUploadOptions) {
     this.#device = device;
     this.#options = options;
   }
 
-  /** Receives parts of the loader. A head starts the upload and discards the previous one. */
+  /** Adds a part that the loader has sent. A head starts a new upload, and discards the previous one. */
   add(part: ScenePart): void {
     if ('head' in part) {
       this.destroy();
@@ -39,11 +35,14 @@ export class PartUploads {
       const gaussians = this.#gaussians;
       this.#written = this.#written.then(() => this.#write(gaussians, part.portion));
     }
-    // The load fails with the allocation, and says why.
+    // `finish` reports a failed allocation.
     this.#written.catch(ignore);
   }
 
-  /** The scene, once its last part has been added. Rejects as {@link GaussianBuffers.upload} does, or with the signal's reason. */
+  /**
+   * Returns the scene when all parts are written. Call after the last part was added. Rejects as {@link
+   * GaussianBuffers.upload} does, or with the signal's reason.
+   */
   async finish(): Promise<GaussianBuffers> {
     await this.#written;
     const gaussians = await this.#gaussians!;
@@ -56,16 +55,10 @@ export class PartUploads {
     this.#gaussians = undefined;
   }
 
-  /** Portions that came while the scene was allocated would otherwise be written in one task. */
   async #write(gaussians: Promise<GaussianBuffers> | undefined, portion: PackedPortion): Promise<void> {
     const made = await gaussians;
-    // After a restart, portions of the load before it remain.
-    if (!made || gaussians !== this.#gaussians) return;
-    made.write(portion);
-    for (const values of Object.values(portion)) if (ArrayBuffer.isView(values)) this.#left -= values.byteLength;
-    if (this.#left > 0) return;
-    await turn();
-    this.#left = BYTES_AT_ONCE;
+    // Portions that were sent before a restart of the load are ignored.
+    if (gaussians === this.#gaussians) await made?.write(portion);
   }
 
   async #allocate(head: PackedHead): Promise<GaussianBuffers> {
@@ -78,5 +71,5 @@ export class PartUploads {
 }
 
 function ignore(): void {
-  // Its result is awaited elsewhere.
+  // Other code awaits the promise and handles its failure.
 }

@@ -1,16 +1,19 @@
 import type { LoadedScene } from '../loading/protocol.js';
 import type { LoadedGaussians } from './loaded-gaussians.js';
-import type { SharedDevice } from './shared-device.js';
+import { withLease, type SharedDevice } from './shared-device.js';
 import { upload, type SceneUploadOptions } from './upload.js';
 
 export interface PreviewUploadOptions extends SceneUploadOptions {
   readonly device: SharedDevice;
-  /** Resolves when the device is ready to draw. */
+  /** Resolves when variants for the first frame are selected, so that previews can be drawn. */
   readonly ready: Promise<unknown>;
   readonly onPreview: (preview: LoadedGaussians) => void;
 }
 
-/** Uploads the previews of one load, one at a time; of those that arrive meanwhile the latest is next. */
+/**
+ * Uploads the previews of one load, one at a time. Of the previews that arrive during an upload, only the latest is
+ * uploaded next.
+ */
 export class PreviewUploads {
   readonly #options: PreviewUploadOptions;
   readonly #over = new AbortController();
@@ -21,13 +24,13 @@ export class PreviewUploads {
     this.#options = options;
   }
 
-  /** Callback for the loader. */
+  /** Uploads a preview as soon as possible, and passes it to `onPreview`. It replaces a preview that still waits. */
   readonly show = (preview: LoadedScene): void => {
     this.#next = preview;
     if (!this.#isBusy) void this.#run();
   };
 
-  /** Call when the whole scene has arrived, or the load has failed: discards pending previews. */
+  /** Discards pending previews. Call when the complete scene has arrived, or the load has failed. */
   end(): void {
     this.#next = undefined;
     this.#over.abort();
@@ -42,7 +45,7 @@ export class PreviewUploads {
         await this.#upload(preview);
       }
     } catch {
-      // A failure here also affects the whole scene, whose load reports it.
+      // The same failure affects the complete scene, whose load reports it.
     } finally {
       this.#isBusy = false;
     }
@@ -51,14 +54,11 @@ export class PreviewUploads {
   async #upload(preview: LoadedScene): Promise<void> {
     const { device, ready, onPreview, signal, ...options } = this.#options;
     await ready;
-    const lease = await device.acquire();
     const either = AbortSignal.any([signal, this.#over.signal]);
-    try {
+    await withLease(device, async (acquiring) => {
+      const lease = await acquiring;
       either.throwIfAborted();
       onPreview(await upload(lease, preview, { ...options, signal: either }));
-    } catch (error) {
-      lease.release();
-      throw error;
-    }
+    });
   }
 }

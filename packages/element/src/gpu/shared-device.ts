@@ -9,16 +9,22 @@ const ANSWER_MS = 20_000;
 /** A lease of the page's GPU device. */
 export interface DeviceLease extends DeviceOwner {
   readonly device: GPUDevice;
-  /** Releases the lease; the last one destroys the device. Further calls have no effect. */
+  /**
+   * Releases the lease. The release of the last lease destroys the device, unless the page keeps it. Further calls have
+   * no effect.
+   */
   release(): void;
 }
 
-/** One device, and the leases that keep it. */
+/** One device, and its leases. */
 class DeviceSession {
   isLost = false;
   isClosed = false;
   readonly device: GPUDevice;
-  /** Loss listeners. One shared promise would keep every past waiter alive. */
+  /**
+   * Listeners for the loss of the device, one for each lease. A promise that all leases share would keep the memory of
+   * released ones alive.
+   */
   readonly #listeners = new Set<(info: GPUDeviceLostInfo) => void>();
   readonly #isKept: boolean;
   #info: GPUDeviceLostInfo | undefined;
@@ -36,7 +42,7 @@ class DeviceSession {
     });
   }
 
-  /** Creates a lease of the device; releasing the last one calls `onUnused`. */
+  /** Returns a new lease of the device. The release of the last lease calls `onUnused`. */
   lease(onUnused: () => void): DeviceLease {
     let notify: (info: GPUDeviceLostInfo) => void = () => undefined;
     const lost = new Promise<GPUDeviceLostInfo>((resolve) => (notify = resolve));
@@ -70,8 +76,8 @@ class DeviceSession {
 }
 
 /**
- * One GPU device for all elements of a page: requested when the first of them needs it, destroyed when the last has
- * released it, requested again after a loss.
+ * One GPU device for all elements of a page. It is requested when the first element needs it, destroyed when the last
+ * element has released it, and requested again after a loss.
  */
 export class SharedDevice {
   readonly #request: () => GPUDevice | Promise<GPUDevice>;
@@ -79,9 +85,9 @@ export class SharedDevice {
   #session: Promise<DeviceSession> | null = null;
 
   /**
-   * @param request Source of devices; called again after a loss.
-   * @param options.keepDevice Does not destroy the device when the last user has released it: for a page that has its
-   * own.
+   * @param request Returns a device; called again after a loss. Default: requests a device of the browser.
+   * @param options.keepDevice Whether the device is kept when its last user has released it, because it belongs to the
+   * page.
    */
   constructor(
     request: () => GPUDevice | Promise<GPUDevice> = requestGpuDevice,
@@ -101,7 +107,7 @@ export class SharedDevice {
       if (error instanceof GaussianSplatError) throw error;
       throw await why(({ noDevice }) => noDevice(error));
     }
-    // Its last user may have closed it meanwhile.
+    // The last user may have closed the session during the wait.
     if (session.isClosed) return this.acquire();
     return session.lease(() => {
       this.#forget(opening);
@@ -120,7 +126,10 @@ export class SharedDevice {
     return new DeviceSession(await this.#answer(), this.#keepDevice);
   }
 
-  /** A browser with a hanging GPU process never responds. */
+  /**
+   * Requests a device with a time limit, because a browser whose GPU process hangs never responds. A device that
+   * arrives later is destroyed.
+   */
   async #answer(): Promise<GPUDevice> {
     let isLate = false;
     let timer: ReturnType<typeof setTimeout> | undefined;
@@ -140,5 +149,27 @@ export class SharedDevice {
 
   #forget(opening: Promise<DeviceSession>): void {
     if (this.#session === opening) this.#session = null;
+  }
+}
+
+/**
+ * Opens something that then owns a lease of the device. The lease is released if that fails.
+ * @param open Receives the lease while it may still be awaited.
+ */
+export async function withLease<T>(
+  device: SharedDevice,
+  open: (lease: Promise<DeviceLease>) => Promise<T>,
+): Promise<T> {
+  const acquiring = device.acquire();
+  // `open` may fail, or load code, before it awaits the lease.
+  acquiring.catch(() => undefined);
+  try {
+    return await open(acquiring);
+  } catch (error) {
+    acquiring.then(
+      (lease) => lease.release(),
+      () => undefined,
+    );
+    throw error;
   }
 }

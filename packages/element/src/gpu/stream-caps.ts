@@ -1,6 +1,9 @@
 import { isHandheld } from './memory-budget.js';
 
-/** Limits of a streamed scene by device, because phones terminate pages that use more. */
+/**
+ * Limits of a streamed scene: number of splats, and bytes of GPU memory. They depend on the device, because phones
+ * terminate pages that use more.
+ */
 export interface StreamCaps {
   readonly splats: number;
   readonly bytes: number;

@@ -5,15 +5,15 @@ import type { DeviceLease } from './shared-device.js';
 
 export interface SceneUploadOptions {
   readonly signal: AbortSignal;
-  /** Upper limit of the scene's GPU memory in bytes; undefined for no limit but the device's. */
+  /** Maximum GPU memory of the scene, in bytes; undefined if only the device limits it. */
   readonly memoryBudget: number | undefined;
-  /** Number of submissions of a frame. */
+  /** Number of submissions into which the work of a frame is divided. */
   readonly submissions: number;
 }
 
 /**
- * Uploads a scene to the GPU, which then owns the lease. Rejects with GaussianSplatError `out-of-memory/*` or the
- * signal's reason.
+ * Uploads a scene to the GPU. The returned scene owns the lease. Rejects with GaussianSplatError `out-of-memory/*`, or
+ * the signal's reason; the caller then releases the lease.
  */
 export async function upload(
   lease: DeviceLease,
@@ -26,7 +26,7 @@ export async function upload(
   throw options.signal.reason;
 }
 
-/** A scene that is on the GPU. It owns the lease. */
+/** Returns a scene from uploaded Gaussians and the properties of its file. The scene owns the lease. */
 export const shown = (
   lease: DeviceLease,
   gaussians: GaussianBuffers,

@@ -17,8 +17,8 @@ import type { Counted } from './contributions.js';
 import { why } from './request-device.js';
 
 /**
- * Draws frames on one WebGPU device: a viewpoint, whose buffers match the frame size, and the optional filter before
- * the canvas.
+ * Draws frames on one WebGPU device, with a viewpoint, whose buffers match the frame size, and an optional filter
+ * before the canvas.
  */
 export class WebGpuBackend implements Backend {
   readonly viewpoint: Viewpoint;
@@ -32,7 +32,7 @@ export class WebGpuBackend implements Backend {
   #filter: FrameFilter | undefined;
   #isDestroyed = false;
   #isPrepared = false;
-  /** Size of the last frame; empty if the next one may need other buffers for any size. */
+  /** Size of the last frame, as text. It is empty if the next frame may need other buffers even at the same size. */
   #drawnSize = '';
   #layout = 0;
 
@@ -72,7 +72,7 @@ export class WebGpuBackend implements Backend {
 
   setRendering(rendering: Rendering): void {
     const { quality, shDegree, order } = this.#rendering;
-    // A low-pass filter takes effect with the next frame of any kind.
+    // A change of the low-pass filter alone needs no other buffers or pipelines.
     this.#rendering = rendering;
     if (rendering.quality === quality && rendering.shDegree === shDegree && rendering.order === order) return;
     this.#isPrepared = false;
@@ -91,11 +91,11 @@ export class WebGpuBackend implements Backend {
     this.#drawnSize = '';
   }
 
-  /** Settings of a frame; including those of motion, if there are any. */
+  /** Returns the settings of a frame. `settings` are those of frames in motion; undefined at rest. */
   #settings(settings?: Partial<PerFrameSettings>): FrameSettings {
     const { detail = 0, splatBudget = 0 } = this.#contents.levels;
     const { quality, shDegree, order } = this.#rendering;
-    // The larger error: of the page's setting and of dynamic quality.
+    // The allowed error is the larger one of the page's setting and of dynamic quality.
     const max = Math.max(detail, settings?.detail ?? 0);
     return {
       quality,
@@ -122,7 +122,10 @@ export class WebGpuBackend implements Backend {
     );
   }
 
-  /** Premultiplied alpha lets the page show through. */
+  /**
+   * Returns the context of a canvas, configured with premultiplied alpha, so that the page is visible behind the splats.
+   * Null if the canvas has a context of another kind, or the browser has no WebGPU.
+   */
   surfaceOn(canvas: HTMLCanvasElement): Surface | null {
     const context = canvas.getContext('webgpu');
     const [format, { device }] = [canvasFormat(), this];
@@ -143,7 +146,7 @@ export class WebGpuBackend implements Backend {
   }
 
   #renderOnce(frame: Frame, content: string, onTime: ((time: WorkTime) => void) | undefined): void {
-    // A lost device is detected by other code.
+    // Other code detects a lost device.
     if (onTime) this.#clock.time(() => this.#draw(frame, content)).then(onTime, () => undefined);
     else this.#draw(frame, content);
   }
@@ -154,7 +157,11 @@ export class WebGpuBackend implements Backend {
     const { filter } = this.#rendering;
     const draw = (drawn: Frame): void => {
       const { camera, target, background: over, depth } = drawn;
-      this.viewpoint.draw(camera, { target, over, filter, depth, ...this.#contents.drawBeneath?.(drawn) }, settings);
+      this.viewpoint.draw(
+        camera,
+        { target, background: over, filter, depth, ...this.#contents.drawBeneath?.(drawn) },
+        settings,
+      );
     };
     if (this.#filter) this.#filter.render(frame, `${content} ${filter} ${JSON.stringify(settings)}`, draw);
     else draw(frame);
@@ -162,7 +169,7 @@ export class WebGpuBackend implements Backend {
 
   /**
    * Renders the first frame, which makes the renderer allocate its buffers, and waits until the GPU has finished it.
-   * @throws GaussianSplatError `out-of-memory/allocation`: WebGPU reports a failed allocation only through an error
+   * @throws GaussianSplatError `out-of-memory/allocation`. WebGPU reports a failed allocation only through an error
    * scope.
    */
   async renderFirst(request: CanvasFrame, content: string): Promise<void> {
@@ -171,14 +178,17 @@ export class WebGpuBackend implements Backend {
     const error = await this.#withRefusal(() => this.#draw(frame, content));
     if (error) throw await why(({ outOfMemory }) => outOfMemory('first frame', error));
     await this.finished();
-    // The GPU is idle now. The result is not awaited.
+    // The clock is calibrated while the GPU is idle. The result is not awaited.
     this.#clock.calibrate().catch(() => undefined);
   }
 
-  /** Resolves with the device's error if some work ran out of memory. */
+  /**
+   * Runs work that allocates GPU memory. Resolves with the device's error if the memory was insufficient, otherwise
+   * with null.
+   */
   #withRefusal(work: () => void): Promise<GPUError | null> {
     const { device } = this;
-    // A lost device resolves no scopes; its loss is reported by other code.
+    // A lost device does not resolve error scopes; other code reports its loss.
     const refusal = (): Promise<GPUError | null> => device.popErrorScope().catch(() => null);
     device.pushErrorScope('out-of-memory');
     try {
@@ -199,7 +209,7 @@ export class WebGpuBackend implements Backend {
     return readCounts(this, camera);
   }
 
-  /** The view at rest. */
+  /** World, settings and filter of frames at rest. */
   get view(): Counted['view'] {
     return { world: this.#contents.world, settings: this.#settings(), filter: this.#rendering.filter };
   }
@@ -220,7 +230,7 @@ export class WebGpuBackend implements Backend {
 const sizeOf = ({ camera: { width, height } }: Frame): string => `${width} x ${height}`;
 
 let format: GPUTextureFormat | undefined;
-/** Format of the canvas. A browser has one; it is read once. */
+/** Returns the preferred format of canvases, which is the same for all of a browser and is read once. */
 export const canvasFormat = (): GPUTextureFormat => (format ??= navigator.gpu.getPreferredCanvasFormat());
 
 const frameOf = ({ surface, ...frame }: CanvasFrame): Frame => ({
@@ -228,9 +238,12 @@ const frameOf = ({ surface, ...frame }: CanvasFrame): Frame => ({
   target: (surface as GPUCanvasContext).getCurrentTexture(),
 });
 
-/** Compute shaders may then write to the canvas directly, if the device supports it. */
+/**
+ * Returns the usage of the canvas's textures. Frames can be copied, and compute shaders may write to the canvas
+ * directly if the device supports it.
+ */
 function canvasUsage(device: GPUDevice, format: GPUTextureFormat): GPUTextureUsageFlags {
-  const { RENDER_ATTACHMENT, STORAGE_BINDING } = GPUTextureUsage;
+  const { COPY_SRC, RENDER_ATTACHMENT, STORAGE_BINDING } = GPUTextureUsage;
   const isStorable = format === 'rgba8unorm' || device.features.has('bgra8unorm-storage');
-  return isStorable ? RENDER_ATTACHMENT | STORAGE_BINDING : RENDER_ATTACHMENT;
+  return COPY_SRC | RENDER_ATTACHMENT | (isStorable ? STORAGE_BINDING : 0);
 }

@@ -1,5 +1,5 @@
-/** German. */
-import type { Words } from '../words.js';
+/** Texts of the element in German. */
+import type { Words } from '../strings.js';
 
 export const words: Words = {
   front: 'Ansicht von vorn',
@@ -23,7 +23,7 @@ export const words: Words = {
   'controls-reset': 'Zurücksetzen',
   'controls-time': 'Zeit',
   'controls-joint': 'Gelenk',
-  'controls-scene': 'Szene',
+  'controls-group': 'Szene',
   'error-unsupported': 'Diese 3D-Szene braucht WebGPU, das hier nicht verfügbar ist.',
   'error-network': 'Die 3D-Szene konnte nicht heruntergeladen werden.',
   'error-decode': 'Die 3D-Szene konnte nicht gelesen werden.',

@@ -1,5 +1,5 @@
-/** Spanish. */
-import type { Words } from '../words.js';
+/** Texts of the element in Spanish. */
+import type { Words } from '../strings.js';
 
 export const words: Words = {
   front: 'Vista frontal',
@@ -23,7 +23,7 @@ export const words: Words = {
   'controls-reset': 'Restablecer',
   'controls-time': 'Tiempo',
   'controls-joint': 'Articulación',
-  'controls-scene': 'Escena',
+  'controls-group': 'Escena',
   'error-unsupported': 'Esta escena 3D necesita WebGPU, que no está disponible aquí.',
   'error-network': 'No se pudo descargar la escena 3D.',
   'error-decode': 'No se pudo leer la escena 3D.',

@@ -1,5 +1,5 @@
-/** French. */
-import type { Words } from '../words.js';
+/** Texts of the element in French. */
+import type { Words } from '../strings.js';
 
 export const words: Words = {
   front: 'Vue de face',
@@ -23,7 +23,7 @@ export const words: Words = {
   'controls-reset': 'Réinitialiser',
   'controls-time': 'Temps',
   'controls-joint': 'Articulation',
-  'controls-scene': 'Scène',
+  'controls-group': 'Scène',
   'error-unsupported': 'Cette scène 3D nécessite WebGPU, qui n’est pas disponible ici.',
   'error-network': 'La scène 3D n’a pas pu être téléchargée.',
   'error-decode': 'La scène 3D n’a pas pu être lue.',

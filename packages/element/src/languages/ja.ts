@@ -1,5 +1,5 @@
-/** Japanese. */
-import type { Words } from '../words.js';
+/** Texts of the element in Japanese. */
+import type { Words } from '../strings.js';
 
 export const words: Words = {
   front: '正面からの表示',
@@ -23,7 +23,7 @@ export const words: Words = {
   'controls-reset': 'リセット',
   'controls-time': '時間',
   'controls-joint': '関節',
-  'controls-scene': 'シーン',
+  'controls-group': 'シーン',
   'error-unsupported': 'この3DシーンにはWebGPUが必要ですが、ここでは利用できません。',
   'error-network': '3Dシーンをダウンロードできませんでした。',
   'error-decode': '3Dシーンを読み取れませんでした。',

@@ -1,5 +1,5 @@
-/** Korean. */
-import type { Words } from '../words.js';
+/** Texts of the element in Korean. */
+import type { Words } from '../strings.js';
 
 export const words: Words = {
   front: '앞에서 본 모습',
@@ -23,7 +23,7 @@ export const words: Words = {
   'controls-reset': '초기화',
   'controls-time': '시간',
   'controls-joint': '관절',
-  'controls-scene': '장면',
+  'controls-group': '장면',
   'error-unsupported': '이 3D 장면에는 WebGPU가 필요하지만 여기서는 사용할 수 없습니다.',
   'error-network': '3D 장면을 내려받지 못했습니다.',
   'error-decode': '3D 장면을 읽지 못했습니다.',

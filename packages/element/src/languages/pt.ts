@@ -1,5 +1,5 @@
-/** Portuguese. */
-import type { Words } from '../words.js';
+/** Texts of the element in Portuguese. */
+import type { Words } from '../strings.js';
 
 export const words: Words = {
   front: 'Vista de frente',
@@ -23,7 +23,7 @@ export const words: Words = {
   'controls-reset': 'Redefinir',
   'controls-time': 'Tempo',
   'controls-joint': 'Articulação',
-  'controls-scene': 'Cena',
+  'controls-group': 'Cena',
   'error-unsupported': 'Esta cena 3D precisa de WebGPU, que não está disponível aqui.',
   'error-network': 'Não foi possível baixar a cena 3D.',
   'error-decode': 'Não foi possível ler a cena 3D.',

@@ -1,5 +1,5 @@
-/** Russian. */
-import type { Words } from '../words.js';
+/** Texts of the element in Russian. */
+import type { Words } from '../strings.js';
 
 export const words: Words = {
   front: 'Вид спереди',
@@ -23,7 +23,7 @@ export const words: Words = {
   'controls-reset': 'Сбросить',
   'controls-time': 'Время',
   'controls-joint': 'Сустав',
-  'controls-scene': 'Сцена',
+  'controls-group': 'Сцена',
   'error-unsupported': 'Для этой 3D-сцены нужен WebGPU, который здесь недоступен.',
   'error-network': 'Не удалось загрузить 3D-сцену.',
   'error-decode': 'Не удалось прочитать 3D-сцену.',

@@ -1,5 +1,5 @@
-/** Chinese. */
-import type { Words } from '../words.js';
+/** Texts of the element in Chinese. */
+import type { Words } from '../strings.js';
 
 export const words: Words = {
   front: '前视图',
@@ -23,7 +23,7 @@ export const words: Words = {
   'controls-reset': '重置',
   'controls-time': '时间',
   'controls-joint': '关节',
-  'controls-scene': '场景',
+  'controls-group': '场景',
   'error-unsupported': '此 3D 场景需要 WebGPU，而这里无法使用。',
   'error-network': '无法下载 3D 场景。',
   'error-decode': '无法读取 3D 场景。',

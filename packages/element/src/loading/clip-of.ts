@@ -1,5 +1,5 @@
-/** Loaded by the worker for the first clip. */
-import type { ClipIndex, ClipPart } from '@gaussian-splat/formats';
+/** Reads clips by byte ranges. The worker loads this module for the first clip. */
+import type { ClipIndex, ClipPart, LoadLimits } from '@gaussian-splat/formats';
 import {
   CLIP_HEAD_BYTES,
   clipIndexBytes,
@@ -15,34 +15,34 @@ import { packAnimation, type PackedAnimation } from '@gaussian-splat/renderer/to
 import { fileLimits, fileName, limitsFrom, named } from './load-scene.js';
 import type { ClipRequest } from './protocol.js';
 
-/** Size of the first request: the index of most clips, and some content. */
+/** Size of the first request, bytes. It contains the index of most clips. */
 const HEAD_BYTES = 8_192;
 
-/** The parsed beginning of a clip. */
+/** A clip whose index has been parsed. */
 export interface OpenedClip {
   readonly index: ClipIndex;
-  /** False for servers that send whole files only. */
+  /** Whether the server sends byte ranges; false if it sends only whole files. */
   readonly isPartial: boolean;
-  /** The whole file, of formats that are not read by byte ranges. */
+  /** The whole file; absent for formats that are read by byte ranges. */
   readonly file?: Blob;
 }
 
-/** Reads the requested data: the index, or a part. */
+/** Returns the index of a clip, or the packed content of a part if the request names one. */
 export const readClip = (request: ClipRequest, signal: AbortSignal): Promise<OpenedClip | PackedAnimation> =>
   (request.part ? readPart : openClip)(request, signal);
 
 /**
- * Reads head and index. Throws GaussianSplatError (`network/*`, `decode/*`, `out-of-memory/*`), or the signal's reason
- * once that is aborted.
+ * Reads the head and the index of a clip. Throws GaussianSplatError (`network/*`, `decode/*`, `out-of-memory/*`), or
+ * the signal's reason if that is aborted.
  */
 async function openClip(request: ClipRequest, signal: AbortSignal): Promise<OpenedClip> {
   const name = fileName(request.url);
   const limits = limitsFrom(request);
   try {
     if (isFourDgs(request)) return await openFourDgs(request, signal);
-    const { bytes, isPartial } = await bytesAt(request, 0, HEAD_BYTES, signal);
+    const { bytes, isPartial } = await bytesAt(request, 0, HEAD_BYTES, signal, limits());
     const length = CLIP_HEAD_BYTES + clipIndexBytes(bytes, name);
-    const whole = length <= bytes.length ? bytes : (await bytesAt(request, 0, length, signal)).bytes;
+    const whole = length <= bytes.length ? bytes : (await bytesAt(request, 0, length, signal, limits())).bytes;
     return { index: parseClip(whole, name, limits()), isPartial };
   } catch (error) {
     signal.throwIfAborted();
@@ -50,7 +50,7 @@ async function openClip(request: ClipRequest, signal: AbortSignal): Promise<Open
   }
 }
 
-/** Reads a part of a group in the layout of the GPU. Throws as {@link openClip} does. */
+/** Reads a part of a group of frames, and packs it into the layout of the GPU. Throws as {@link openClip} does. */
 async function readPart(request: ClipRequest, signal: AbortSignal): Promise<PackedAnimation> {
   const { origin } = request.part!;
   const name = fileName(request.url);
@@ -66,14 +66,17 @@ async function readPart(request: ClipRequest, signal: AbortSignal): Promise<Pack
 
 async function readGsvPart(request: ClipRequest, signal: AbortSignal): Promise<ClipPartContent> {
   const { part, frames } = request.part!;
-  const { bytes } = await bytesAt(request, part.start, endOf(part), signal);
-  return readClipPart({ bytes, part, frames, name: fileName(request.url), limits: limitsFrom(request)() });
+  const limits = limitsFrom(request);
+  const { bytes } = await bytesAt(request, part.start, endOf(part), signal, limits());
+  return readClipPart({ bytes, part, frames, name: fileName(request.url), limits: limits() });
 }
 
-/** Recognized by the extension of its name, same as clips. */
+/** Returns whether the extension of a file's name is `.4dgs`. */
 const isFourDgs = ({ url }: ClipRequest): boolean => /\.4dgs$/i.test(fileName(url));
 
-/** The file that was opened last: its groups are made one by one. */
+/**
+ * The `.4dgs` file that was opened last. Its parsed content is kept, because each request computes one group of frames.
+ */
 let opened: { readonly url: string; readonly clip: FourDgsClip } | undefined;
 
 async function openFourDgs(request: ClipRequest, signal: AbortSignal): Promise<OpenedClip> {
@@ -103,11 +106,12 @@ async function groupOfFourDgs(request: ClipRequest): Promise<ClipPartContent> {
 const endOf = ({ start, sceneBytes, motionBytes }: ClipPart): number => start + sceneBytes + motionBytes;
 
 async function bytesAt(
-  { url, credentials, whole, limits }: ClipRequest,
+  { url, credentials, whole }: ClipRequest,
   start: number,
   end: number,
   signal: AbortSignal,
+  { maxBytes, maxSeconds }: LoadLimits,
 ): Promise<{ bytes: Uint8Array; isPartial: boolean }> {
   if (whole) return { bytes: new Uint8Array(await whole.slice(start, end).arrayBuffer()), isPartial: true };
-  return fetchRange(url, start, end, { credentials, signal, maxBytes: limits?.maxBytes });
+  return fetchRange(url, start, end, { credentials, signal, maxBytes, maxSeconds });
 }

@@ -1,4 +1,7 @@
-/** Loaded by the worker for large PLYs: several workers pack their rows while the rest is in transit. */
+/**
+ * Reads a large PLY with several workers, which pack its rows while the rest is in transit. The worker loads this
+ * module for the first large PLY.
+ */
 import { MAX_DROPPED_RATIO, splatRanges, type LoadLimits } from '@gaussian-splat/formats';
 import { boundsOf } from '@gaussian-splat/core';
 import { packGaussians } from '@gaussian-splat/renderer';
@@ -11,19 +14,23 @@ import {
   type SortedBlock,
 } from '@gaussian-splat/renderer/tools';
 import type { LoadListeners } from './load-scene.js';
-import { packRows, release, type HelperAnswer, type HelperRequest } from './pack-shares.js';
+import { packRows, release, type HelperAnswer, type HelperRequest } from './pack-shards.js';
 import { PartPreviews } from './part-previews.js';
 import { PlyHelpers, type HelperWork } from './ply-helpers.js';
-import { PlyShares, type Rows } from './ply-shares.js';
+import { PlyShares, type Rows } from './ply-shards.js';
 import type { LoadedScene, SceneRequest, SentScene } from './protocol.js';
 
-/** Time without a helper after which shards are packed here while bytes arrive, ms. */
+/** Time without a helper after which this thread itself packs shards while bytes arrive, ms. */
 const ALONE_AFTER_MS = 500;
-/** Interval for handling messages while bytes arrive, ms. */
+/** Interval after which this thread yields to pending messages while bytes arrive, ms. */
 const TURN_MS = 8;
 
-/** A PLY that is being downloaded. */
+/**
+ * Packs a PLY while it is downloaded. The work consists of tickets: shards of rows to pack, and later blocks to sort.
+ */
 export class LargePly implements HelperWork {
+  /** Bytes of the file before the first row. */
+  readonly #header: Uint8Array;
   readonly #count: number;
   readonly #sh: SceneRequest['sh'];
   readonly #limits: () => LoadLimits;
@@ -33,17 +40,18 @@ export class LargePly implements HelperWork {
   readonly #helpers = new PlyHelpers(this);
   readonly #previews: PartPreviews;
   readonly #began = performance.now();
-  /** Time of the last handled messages. */
+  /** Time when this thread last yielded to messages, in milliseconds of `performance.now()`. */
   #turned = 0;
-  /** Shards below this index have been assigned, or packed here. */
+  /** Index of the first shard that has been neither assigned to a helper nor packed by this thread. */
   #next = 0;
-  /** Tickets to assign first: of lost helpers, and of blocks. */
+  /** Tickets that are assigned before new shards, the last one first: those of lost helpers, and those of blocks. */
   readonly #again: number[] = [];
-  /** Cells to be sorted, by their tickets. */
+  /** Cells whose splats must be sorted as blocks, by their tickets. */
   readonly #blocks = new Map<number, ShareCell>();
   #joined: JoinedBlocks | undefined;
 
   /**
+   * Starts reading a file whose rows can be packed independently.
    * @param beginning First bytes of the file.
    * @param total Size of the file in bytes.
    * @returns Undefined for a file that must be read as a whole.
@@ -58,15 +66,18 @@ export class LargePly implements HelperWork {
     listeners: LoadListeners,
   ): Promise<LargePly | undefined> {
     const { maxSplats = Infinity } = limits();
-    // Reading the file as a whole reports invalid headers and exceeded limits. The download keeps the limit of bytes.
+    // A file with an invalid header, or above the limit of splats, is read as a whole, which reports the fault. The
+    // download itself checks the limit of bytes.
     const { rows, count = 0 } = (await splatRanges(beginning, name).catch(() => undefined)) ?? {};
     const isWhole =
       rows !== undefined && count > 0 && count <= maxSplats && rows.start + count * rows.byteLength <= total;
-    return isWhole ? new LargePly(name, rows, count, sh, limits, signal, listeners) : undefined;
+    if (!isWhole) return undefined;
+    return new LargePly(name, beginning.slice(0, rows.start), rows, count, sh, limits, signal, listeners);
   }
 
   private constructor(
     name: string,
+    header: Uint8Array,
     rows: Rows,
     count: number,
     sh: SceneRequest['sh'],
@@ -74,6 +85,7 @@ export class LargePly implements HelperWork {
     signal: AbortSignal,
     listeners: LoadListeners,
   ) {
+    this.#header = header;
     this.#count = count;
     this.#sh = sh;
     this.#limits = limits;
@@ -89,9 +101,9 @@ export class LargePly implements HelperWork {
     listeners.askForHelp?.(this.#shares.length, (port) => this.#helpers.add(port));
   }
 
-  /** Call with all received bytes when more have arrived. */
+  /** Packs shards that have arrived. Call after each arrival of bytes, with all received bytes. */
   async onArrival(bytes: Uint8Array): Promise<void> {
-    // The download has restarted, perhaps with another file.
+    // The download has restarted, perhaps with another file, whose header `finish` compares.
     if (bytes.length < this.#shares.bytes.length) this.#forget(undefined);
     this.#shares.bytes = bytes;
     await this.#shares.findLayout(this.#sh);
@@ -100,23 +112,26 @@ export class LargePly implements HelperWork {
     const request = isAlone ? this.next() : undefined;
     if (request) await this.#workHere(request);
     if (this.#listeners.onPreview) this.#previews.showIfDue();
-    // A download that never waits keeps the answers of helpers from this thread.
+    // A download that never waits would block the answers of helpers, which arrive as messages.
     if (this.#helpers.areThere && performance.now() - this.#turned > TURN_MS) {
       await turn();
       this.#turned = performance.now();
     }
   }
 
-  /** Returns the scene, once all bytes are received; undefined for a fault that reading the whole file reports. */
+  /**
+   * Returns the scene after the download. Undefined if bytes are missing or invalid, or if a restarted download has
+   * brought a file with another header: the caller then reads the file as a whole, which reports a fault.
+   */
   async finish(bytes: Uint8Array): Promise<LoadedScene | SentScene | undefined> {
     const shares = this.#shares;
     shares.bytes = bytes;
-    if (shares.arrived < shares.length) return undefined;
+    if (shares.arrived < shares.length || !this.#header.every((byte, k) => byte === bytes[k])) return undefined;
     for (;;) {
       await shares.findLayout(this.#sh);
       if (!shares.layout) return undefined;
       await this.#workAll();
-      // Reading the file as a whole reports an exceeded time limit, and the reasons of dropped splats.
+      // Reading the file as a whole reports an exceeded time limit, and why splats were dropped.
       if (this.#isLate || !shares.areAllDealt) return undefined;
       const count = shares.splats;
       const droppedCount = this.#count - count;
@@ -127,7 +142,7 @@ export class LargePly implements HelperWork {
         this.#forget(layout);
         continue;
       }
-      // Nothing can fail from here on. Freeing the file reduces the memory of a scene to a third.
+      // Nothing can fail after this point. Freeing the file reduces the memory of the load to a third.
       release(bytes);
       const { antialiased = false, filterVariance, origin = [0, 0, 0], up, order, warnings } = shares.facts;
       const { onPart } = this.#listeners;
@@ -165,16 +180,16 @@ export class LargePly implements HelperWork {
     this.#again.push(...tickets);
   }
 
-  /** Sorts all blocks. */
+  /** Sorts the blocks of all cells, with the helpers, into the joined scene. */
   async #join(joined: JoinedBlocks): Promise<void> {
     this.#joined = joined;
-    // Largest first, so that none delays the end.
+    // The largest blocks are sorted first, so that a large one does not delay the end.
     const cells = this.#shares.takeCells().sort((a, b) => b.count - a.count);
     cells.forEach((cell, k) => {
       this.#blocks.set(this.#shares.length + k, cell);
       this.#again.push(this.#shares.length + k);
     });
-    // The last is taken first.
+    // `next` takes the last ticket first.
     this.#again.reverse();
     this.#helpers.rooms.length = 0;
     await this.#workAll();
@@ -199,14 +214,17 @@ export class LargePly implements HelperWork {
     else this.take({ ticket, epoch, share: await packRows(request.rows, request.layout) });
   }
 
-  /** Runs all remaining work, on the available helpers and on this thread. */
+  /**
+   * Runs all remaining work on the available helpers and on this thread. Returns early if the time limit is exceeded
+   * before blocks are sorted.
+   */
   async #workAll(): Promise<void> {
     for (;;) {
       this.#signal.throwIfAborted();
       if (this.#isLate && !this.#joined) return;
       this.#helpers.feed();
       const isHelped = this.#helpers.areBusy;
-      // Helpers sort blocks; this thread is busy with their answers.
+      // Helpers sort the blocks alone if there are any, because their answers occupy this thread.
       const request = isHelped && this.#joined ? undefined : this.next();
       if (request) {
         await this.#workHere(request);
@@ -220,12 +238,14 @@ export class LargePly implements HelperWork {
   }
 }
 
-/** The bounds of its chunks are sent when those of all are known. */
+/**
+ * Returns the splats of a block as a portion, without the bounds of chunks, which are sent at the end for all blocks.
+ */
 const ofSplats = ({ start, geometry, sh }: SortedBlock): PackedPortion => ({ start, geometry, sh });
 
 let own: MessageChannel | undefined;
 
-/** Yields for pending messages. A timer would wait for 4 ms. */
+/** Yields to pending messages. A timer would take at least 4 ms. */
 function turn(): Promise<void> {
   const { port1, port2 } = (own ??= new MessageChannel());
   return new Promise((resolve) => {

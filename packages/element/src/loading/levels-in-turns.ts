@@ -1,14 +1,17 @@
-/** Loaded by the worker on demand. */
+/** Builds levels of detail in steps. The worker loads this module on demand. */
 import { GaussianSplatError } from '@gaussian-splat/core';
 import type { PackedGaussians } from '@gaussian-splat/renderer';
 import { buildPackedLevels, type PackedLevels } from '@gaussian-splat/renderer/tools';
 
-/** Milliseconds after which it yields to other messages: of concurrent loads, and cancellations. */
+/**
+ * Maximum duration of one step, ms. After it the worker handles other messages, such as concurrent loads and
+ * cancellations.
+ */
 const TURN_MS = 30;
 
 /**
- * Builds the levels of detail of a scene; rejects with GaussianSplatError `out-of-memory/allocation`, or the signal's
- * reason.
+ * Builds the levels of detail of a scene; undefined if the scene is too small for levels. Rejects with
+ * GaussianSplatError `out-of-memory/allocation`, or with the signal's reason.
  */
 export async function levelsInTurns(packed: PackedGaussians, signal: AbortSignal): Promise<PackedLevels | undefined> {
   try {
@@ -31,7 +34,9 @@ async function build(packed: PackedGaussians, signal: AbortSignal): Promise<Pack
   }
 }
 
-/** Only memory can be insufficient for levels of a loaded scene. */
+/**
+ * Returns the error of a failed build. Lack of memory is the only possible cause, because the loaded scene is valid.
+ */
 function outOfMemory(cause: unknown): GaussianSplatError {
   return new GaussianSplatError('out-of-memory/allocation', {
     where: 'levels of detail',

@@ -1,14 +1,14 @@
-/** Common parts of all loads: names, progress and errors. */
+/** Functions that all loads use: for file names, progress and errors. */
 import { GaussianSplatError } from '@gaussian-splat/core';
 import { outOfMemory } from '@gaussian-splat/formats';
 import type { ProgressListener } from './protocol.js';
 
-/** Minimum interval of progress reports in ms, because chunks may arrive by the thousand. */
+/** Minimum interval between progress reports, ms, because thousands of chunks may arrive. */
 const PROGRESS_INTERVAL_MS = 50;
 
 /**
- * Last segment of the URL's path: the file name for users, whose extension identifies formats without a signature. A
- * `blob:` URL has no name of its own; its fragment is used, so that a page can append `#plant.splat`.
+ * Returns the last segment of the URL's path. It is the file name in messages, and its extension identifies formats
+ * without a signature. A `blob:` URL has no name, so its fragment is used: a page can append `#plant.splat`.
  */
 export function fileName(url: string): string {
   if (!URL.canParse(url) || url.startsWith('data:')) return url.slice(0, 80);
@@ -25,7 +25,10 @@ function decodeURIComponentSafely(text: string): string {
   }
 }
 
-/** Passes the first and the last report and limits those between. */
+/**
+ * Returns a listener that passes on at most one report per {@link PROGRESS_INTERVAL_MS}. A report of a complete file whose
+ * size is known is always passed on.
+ */
 export function throttled(onProgress: ProgressListener): ProgressListener {
   let last = -Infinity;
   return (loaded, total) => {
@@ -36,7 +39,9 @@ export function throttled(onProgress: ProgressListener): ProgressListener {
   };
 }
 
-/** Converts errors without a code: failed allocations, or an internal bug that the file triggers. */
+/**
+ * Returns an error with a code. Errors without one are failed allocations, or internal faults that the file triggers.
+ */
 export function named(error: unknown, where: string): GaussianSplatError {
   if (error instanceof GaussianSplatError) return error;
   const memory = outOfMemory(error, where);

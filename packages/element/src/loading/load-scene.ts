@@ -1,4 +1,4 @@
-/** Fetches, reads and packs one scene, in the worker, or on the main thread if workers are not available. */
+/** Fetches, reads and packs one scene. Runs in the worker, or on the main thread if workers are not available. */
 import { boundsOf, Lazy, loadModule, type GaussianCloud } from '@gaussian-splat/core';
 import {
   fetchScene,
@@ -24,9 +24,9 @@ import type {
   SentScene,
 } from './protocol.js';
 
-/** Shorter downloads need no preview. */
+/** Delay of the first preview after the start of the load, ms. Shorter downloads need no preview. */
 const PREVIEW_AFTER_MS = 300;
-/** A scene loads even without the code of previews. */
+/** Result if the code of previews cannot be loaded: the scene loads without previews. */
 const none = (): undefined => undefined;
 
 export { fileName, named, throttled };
@@ -34,23 +34,26 @@ export { fileName, named, throttled };
 /** Listeners of a load. */
 export interface LoadListeners {
   readonly onProgress: ProgressListener;
-  /** Absent: no previews. */
+  /** Receives previews of the scene; absent if none are wanted. */
   readonly onPreview?: PreviewListener | undefined;
-  /** Takes the splats of a large scene while they are put in order. Absent: they come with the scene. */
+  /** Receives the splats of a large scene while they are sorted. If it is absent, the splats are part of the result. */
   readonly onPart?: PartListener | undefined;
-  /** Called before the thread is busy for a while, and during that; with false when it has time again. */
+  /**
+   * Called with true before the thread becomes busy and does not respond, perhaps repeatedly. Called with false when it
+   * responds again.
+   */
   readonly onReading?: (isReading: boolean) => void;
   /**
-   * Requests other workers for the packing.
-   * @param most Maximum number.
-   * @param onHelper Is called with a port to each of them when it is available.
+   * Requests other workers for packing.
+   * @param max Maximum number of workers.
+   * @param onHelper Called with a port to each worker when that worker is available.
    */
   readonly askForHelp?: (max: number, onHelper: (port: MessagePort) => void) => void;
 }
 
 /**
- * Loads one scene, or the manifest of several. Throws GaussianSplatError (`network/*`, `decode/*`,
- * `out-of-memory/allocation`), or the signal's reason once that is aborted.
+ * Loads a scene, or the manifest of a sequence of scenes. Throws GaussianSplatError (`network/*`, `decode/*`,
+ * `out-of-memory/*`), or the signal's reason if that is aborted.
  */
 export async function loadScene(
   request: SceneRequest,
@@ -69,7 +72,7 @@ export async function loadScene(
     });
     const pack = (cloud: GaussianCloud, bounds = boundsOf(cloud)): LoadedScene => ({
       packed: packGaussians(cloud, { sh: request.sh }),
-      bounds: { ...bounds, up: cloud.hints?.up },
+      bounds: { ...bounds, ...cloud.hints },
       warnings: cloud.warnings,
       order: cloud.hints?.order,
       hasMeshes: cloud.hints?.meshes,
@@ -82,11 +85,12 @@ export async function loadScene(
     const start = performance.now();
     const previews = new Lazy('the code of previews', async () => {
       const { PreviewSchedule } = await import('./preview-schedule.js');
-      return new PreviewSchedule(name, signal, start, (cloud) => onPreview?.(pack(cloud)), onReading);
+      const within = { name, signal, ...limits() };
+      return new PreviewSchedule(within, start, (cloud) => onPreview?.(pack(cloud)), onReading);
     });
     const shared = askForHelp && new SharedReading(request, name, limits, signal, listeners);
     const onArrival = async (bytes: Uint8Array, total: number | undefined): Promise<void> => {
-      // A large PLY has its own previews.
+      // `LargePly` shows its own previews.
       if (shared?.mayBeShared(bytes, total)) await (await shared.plyIn(bytes, total))?.onArrival(bytes);
       else if (onPreview && performance.now() - start >= PREVIEW_AFTER_MS)
         await (await previews.get().catch(none))?.onArrival(bytes, total);
@@ -99,7 +103,7 @@ export async function loadScene(
       const { parseSequence } = await loadSequenceCode();
       return parseSequence(bytes, name);
     }
-    // Blob and data URLs have no sibling files.
+    // Files beside a `blob:` or `data:` URL do not exist.
     const openFile = /^(blob|data):/.test(url) ? undefined : fileOpenerFor(url, options);
     const level = request.levels ? 'all' : 0;
     const cloud = await readScene(bytes, {
@@ -126,13 +130,19 @@ export async function loadScene(
 export const loadSequenceCode = (): Promise<typeof sequences> =>
   loadModule('the code that reads sequences', () => import('./sequence-of.js'));
 
-/** The limits of a load that starts now, with the remaining seconds at each call. */
+/**
+ * Starts the time limit of a load. Returns a function that returns the limits, with the seconds that remain at each
+ * call.
+ */
 export function limitsFrom({ limits }: Pick<SceneRequest, 'limits'>): () => LoadLimits {
   const start = performance.now();
   return () => ({ ...limits, maxSeconds: (limits?.maxSeconds ?? Infinity) - (performance.now() - start) / 1000 });
 }
 
-/** Limits for one file: a scene takes as much again as its file. */
+/**
+ * Returns the limits of one download. It may use half of the bytes, because an unpacked scene takes about as much
+ * memory as its file.
+ */
 export const fileLimits = ({ maxBytes = Infinity, maxSeconds }: LoadLimits): LoadLimits => ({
   maxBytes: maxBytes / 2,
   maxSeconds,
@@ -141,7 +151,7 @@ export const fileLimits = ({ maxBytes = Infinity, maxSeconds }: LoadLimits): Loa
 /** Minimum size in bytes of a PLY whose rows several workers share. */
 const LARGE_BYTES = 1 << 25;
 
-/** Determines whether a file in transit is a PLY whose rows several workers can share. */
+/** Reads a file in transit with several workers, if it is a PLY whose rows they can share. */
 class SharedReading {
   readonly #of: readonly [
     name: string,
@@ -151,7 +161,10 @@ class SharedReading {
     listeners: LoadListeners,
   ];
   #isRefused = false;
-  /** Undefined for any other file. */
+  /**
+   * The shared PLY; undefined before its header has arrived. Resolves with undefined for a file that must be read as a
+   * whole.
+   */
   ply: Promise<LargePly | undefined> | undefined;
 
   constructor(
@@ -164,7 +177,10 @@ class SharedReading {
     this.#of = [name, request, limits, signal, listeners];
   }
 
-  /** Whether it is a large PLY, unless its rows must be read in order. */
+  /**
+   * Returns whether threads may share a file: a PLY of `LARGE_BYTES` or more that need not be read as a whole. `bytes`:
+   * the received bytes; `total`: size of the file in bytes.
+   */
   mayBeShared(bytes: Uint8Array, total = 0): boolean {
     return total >= LARGE_BYTES && bytes[0] === 0x70 && bytes[1] === 0x6c && bytes[2] === 0x79 && !this.#isRefused;
   }
@@ -177,12 +193,12 @@ class SharedReading {
   }
 
   async #open(bytes: Uint8Array, total: number): Promise<LargePly | undefined> {
-    const { LargePly } = await loadModule('the code that shares the reading of PLY', () => import('./large-ply.js'));
+    const { LargePly } = await loadModule('the code that reads large PLY files', () => import('./large-ply.js'));
     return LargePly.open(bytes, total, ...this.#of);
   }
 }
 
-/** Whether the named file may be the smaller part of the scene. */
+/** Returns whether a file may refer to other files, which then contain most bytes of the scene. */
 function mayHaveParts(name: string): boolean {
   return /\.(json|gltf)$/i.test(name);
 }

@@ -1,4 +1,6 @@
-/** Loaded by the worker for the first streamed SOG scene. */
+/**
+ * Reads streamed SOG scenes box by box. The worker loads this module for the first such scene, and for the first clip.
+ */
 import {
   fetchScene,
   LoadBudget,
@@ -15,11 +17,11 @@ import { fileLimits, fileName, limitsFrom, named, throttled } from './load-scene
 import { ProgressSum } from './progress-sum.js';
 import type { BoxRequest, ClipAnswer, ClipRequest, LoadedBoxes, ProgressListener, SceneRequest } from './protocol.js';
 
-/** Cache for all such scenes of the page. */
+/** Cache of decoded files for all streamed SOG scenes of the page. */
 const files = new SogFiles();
-/** Maximum number of accounts. */
+/** Maximum number of {@link accounts}; the least recently used are removed. */
 const MAX_ACCOUNTS = 64;
-/** Charges of a scene's files since it was opened, by the address of its index. The page counts their bytes. */
+/** Budgets that the files of each scene are charged to, by the address of the scene's index. */
 const accounts = new Map<string, LoadBudget>();
 
 function accountOf(url: string): LoadBudget {
@@ -31,8 +33,9 @@ function accountOf(url: string): LoadBudget {
 }
 
 /**
- * Reads the index of a streamed SOG scene and the coarsest level of each of its boxes. Throws GaussianSplatError
- * (`network/*`, `decode/*`, `out-of-memory/allocation`), or the signal's reason once that is aborted.
+ * Reads the index of a streamed SOG scene and the coarsest level of each of its boxes; or data of a clip, for a request
+ * of one. Throws GaussianSplatError (`network/*`, `decode/*`, `out-of-memory/*`), or the signal's reason if that is
+ * aborted.
  */
 export async function openBoxes(
   request: SceneRequest | ClipRequest,
@@ -66,7 +69,10 @@ export async function openBoxes(
   }
 }
 
-/** As numbers, because a message copies the text of a path for each object that has it. */
+/**
+ * Returns the places of all levels as arrays of numbers, because a message would copy the text of a path for each
+ * object that has it.
+ */
 function placesOf({ boxes, files }: LodScene): Pick<LoadedBoxes, 'files' | 'runs' | 'firstRuns'> {
   const all = boxes.flatMap(({ runs }) => runs);
   const firstRuns = new Uint32Array(boxes.length);
@@ -74,7 +80,7 @@ function placesOf({ boxes, files }: LodScene): Pick<LoadedBoxes, 'files' | 'runs
   return { files, runs: Float64Array.from(all.flatMap(({ file, first, count }) => [file, first, count])), firstRuns };
 }
 
-/** The words of a level of a box: see `packLevelPage`. Throws as {@link openBoxes} does. */
+/** Returns the words of a level of a box: see `packLevelPage`. Throws as {@link openBoxes} does. */
 export async function readBox(
   { url, path, first, count, page, scene, credentials, limits }: BoxRequest,
   signal: AbortSignal,

@@ -1,18 +1,27 @@
-/** Finds the walkable floor of a scene file; loaded by the worker on demand. */
+/** Finds the walkable floor of a scene file. The worker loads this module on demand. */
 import { fetchScene, fileOpenerFor, readScene, type FetchSceneOptions } from '@gaussian-splat/formats';
-import { floorOf, makeWalkMap, readVoxels, voxelTreePath, type WalkMap } from '@gaussian-splat/formats/walk';
+import {
+  decodeWalkMap,
+  floorOf,
+  makeWalkMap,
+  readVoxels,
+  voxelTreePath,
+  type WalkMap,
+} from '@gaussian-splat/formats/walk';
 import { fileLimits, fileName, limitsFrom, named } from './load-scene.js';
 import type { FloorRequest } from './protocol.js';
 
 /**
- * Reads a scene file again, usually from the browser's cache, and finds its floor. Throws GaussianSplatError
- * (`network/*`, `decode/*`, `out-of-memory/*`), or the signal's reason once that is aborted.
+ * Reads a scene file again, usually from the browser's cache, and finds its floor. If the request has a `voxelUrl` or a
+ * `map`, reads that instead. Throws GaussianSplatError (`network/*`, `decode/*`, `out-of-memory/*`), or the signal's
+ * reason if that is aborted.
  */
 export async function makeFloor(request: FloorRequest, signal: AbortSignal): Promise<WalkMap> {
-  const { credentials, options, voxelUrl } = request;
+  const { credentials, options, voxelUrl, map } = request;
   const url = voxelUrl ?? request.url;
   const name = fileName(url);
   try {
+    if (map !== undefined) return decodeWalkMap(new Uint8Array(map));
     const limits = limitsFrom(request);
     const fetchOptions = (): FetchSceneOptions => ({ mode: 'cors', credentials, signal, ...fileLimits(limits()) });
     const bytes = await fetchScene(url, fetchOptions());

@@ -1,4 +1,4 @@
-/** Loaded by the worker for the first streamed scene. */
+/** Reads manifests of streamed scenes. The worker loads this module for the first streamed scene. */
 import { GaussianSplatError } from '@gaussian-splat/core';
 import { fetchScene, LoadBudget } from '@gaussian-splat/formats';
 import { checkManifest, type DetailManifest } from '@gaussian-splat/renderer';
@@ -7,14 +7,17 @@ import type { FileRequest, ProgressListener } from './protocol.js';
 
 export { decodePage } from '@gaussian-splat/renderer/tools';
 
-/** Maximum size: a file takes about 50 bytes, for 5 pages, and the parsed manifest is copied to the main thread. */
+/**
+ * Maximum size of a manifest in bytes. It has about 50 bytes for each file of 5 pages, and its parsed content is copied
+ * to the main thread.
+ */
 const MAX_BYTES = 1 << 24;
-/** CPU memory of a page before it is loaded. */
+/** CPU memory of a page that is not loaded, bytes. */
 const PAGE_BYTES = 128;
 
 /**
- * Fetches and validates a `lod.json`. Throws GaussianSplatError (`network/*`, `decode/*`, `out-of-memory/allocation`),
- * or the signal's reason once that is aborted.
+ * Fetches and validates the manifest of a streamed scene, a `detail.json`. Throws GaussianSplatError (`network/*`,
+ * `decode/*`, `out-of-memory/*`), or the signal's reason if that is aborted.
  */
 export async function openManifest(
   { url, credentials, limits = {} }: FileRequest,

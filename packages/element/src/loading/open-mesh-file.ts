@@ -1,4 +1,4 @@
-/** Loaded by the worker for the first mesh. */
+/** Reads triangle meshes. The worker loads this module for the first mesh. */
 import { GaussianSplatError } from '@gaussian-splat/core';
 import { fileRequest } from '@gaussian-splat/core/fetch';
 import {
@@ -14,8 +14,8 @@ import { ProgressSum } from './progress-sum.js';
 import type { FileRequest, LoadedMesh, ProgressListener } from './protocol.js';
 
 /**
- * Fetches a glTF and the files that it names, checks its costs, and decodes its images. Throws GaussianSplatError
- * (`network/*`, `decode/*`, `out-of-memory/*`), or the signal's reason once that is aborted.
+ * Fetches a glTF and the files that it names, checks their memory costs, and decodes the images. Throws
+ * GaussianSplatError (`network/*`, `decode/*`, `out-of-memory/*`), or the signal's reason if that is aborted.
  */
 export async function openMeshFile(
   request: FileRequest,
@@ -67,7 +67,10 @@ async function withBitmaps(
   return { ...file, images: bitmaps };
 }
 
-/** Same as `GLTFLoader`: the values of the file, without a color profile. */
+/**
+ * Decodes an image to the values of its file, without a color profile, as `GLTFLoader` of three.js does. Throws
+ * GaussianSplatError `decode/corrupt` if it cannot be decoded, or its size differs from its header.
+ */
 async function decoded(image: ImageFile, where: string, ktx2: Ktx2Decoder): Promise<ImageBitmap> {
   const { bytes, type, width, height } = image;
   const fail = (found: string, cause?: unknown): never => {

@@ -1,15 +1,18 @@
 import type { GaussianCloud } from '@gaussian-splat/core';
 
-/** Shorter downloads need no preview. */
+/** Delay of the first preview after the start of the load, ms. Shorter downloads need no preview. */
 const FIRST_AFTER_MS = 300;
-/** Ratio of the shards in consecutive previews. */
+/** Factor by which the number of shards grows from one preview to the next. */
 const GROWTH = 2;
-/** Maximum number of splats in a preview, which must be ready at once. */
+/** Approximate maximum number of splats in a preview, so that packing it takes little time. */
 const MAX_SPLATS = 50_000;
-/** Maximum fraction of the time since the start of the load for previews. */
+/** Maximum fraction of the loading time that previews may take. */
 const MAX_SHARE = 0.05;
 
-/** Previews of a scene from some of its shards: some of their splats, enlarged to represent the rest. */
+/**
+ * Creates previews of a scene from the shards that have been packed. A preview contains some of their splats, enlarged
+ * to represent the rest.
+ */
 export class PartPreviews {
   readonly #show: (cloud: GaussianCloud) => void;
   readonly #parts: (GaussianCloud | undefined)[];
@@ -18,7 +21,10 @@ export class PartPreviews {
   #there = 0;
   #due = 1;
 
-  /** @param shares Number of shards in the scene. @param show Packs and posts a preview. */
+  /**
+   * @param shares Number of shards in the scene.
+   * @param show Packs and posts a preview.
+   */
   constructor(shares: number, show: (cloud: GaussianCloud) => void) {
     this.#show = show;
     this.#parts = new Array<undefined>(shares);
@@ -45,7 +51,10 @@ export class PartPreviews {
   }
 }
 
-/** Merges several clouds, reduced to {@link MAX_SPLATS}: every n-th splat, enlarged. */
+/**
+ * Returns a cloud of every n-th splat of several clouds, about {@link MAX_SPLATS} in total, enlarged by the square root
+ * of n. View-dependent color is omitted.
+ */
 function thinned(parts: readonly GaussianCloud[]): GaussianCloud {
   const all = parts.reduce((sum, { count }) => sum + count, 0);
   const step = Math.ceil(all / MAX_SPLATS);

@@ -1,32 +1,35 @@
-/** Workers that pack shards of a large PLY and sort blocks, in addition to the one that reads it. */
-import type { HelperAnswer, HelperRequest } from './pack-shares.js';
+/**
+ * Distributes the work on a large PLY to helpers: workers that pack shards and sort blocks, in addition to the worker
+ * that reads the file.
+ */
+import type { HelperAnswer, HelperRequest } from './pack-shards.js';
 import { buffersOf } from './protocol.js';
 
-/** Requests of a helper in progress, so that the next one is queued when one is done. */
+/** Number of requests that each helper has at the same time, so that it continues with the next one without waiting. */
 const AT_ONCE = 3;
-/** Time without an answer after which a helper is not awaited any more, ms. */
+/** Time without any answer after which helpers with open requests are given up, ms. */
 const TIMEOUT_MS = 5_000;
 
 interface Helper {
   readonly port: MessagePort;
-  /** Unanswered tickets. */
+  /** Tickets of the requests that the helper has not answered. */
   readonly open: Set<number>;
 }
 
-/** Source and destination of the helpers' work. */
+/** The source of the helpers' requests, and the receiver of their answers. */
 export interface HelperWork {
   next(): HelperRequest | undefined;
   take(answer: HelperAnswer): void;
-  /** Called with the tickets of a lost helper. */
+  /** Called with the unanswered tickets of a lost helper, which must be assigned again. */
   giveBack(tickets: Iterable<number>): void;
 }
 
 export class PlyHelpers {
   readonly #work: HelperWork;
   readonly #helpers: Helper[] = [];
-  /** Memory that helpers have returned. */
+  /** Buffers that helpers have returned, for reuse by later requests. */
   readonly rooms: ArrayBuffer[] = [];
-  /** Epoch of the work: answers to earlier requests are ignored. */
+  /** Current epoch of the work. Answers with an earlier epoch are ignored. */
   #epoch = 0;
   #wake: () => void = () => undefined;
 
@@ -60,7 +63,7 @@ export class PlyHelpers {
     this.feed();
   }
 
-  /** Assigns available work. */
+  /** Assigns available requests to the helpers, evenly, until each has {@link AT_ONCE}. */
   feed(): void {
     for (let round = 0; round < AT_ONCE; round++)
       for (const { port, open } of this.#helpers) {
@@ -72,13 +75,16 @@ export class PlyHelpers {
       }
   }
 
-  /** Restarts the work. */
+  /** Starts a new epoch: the answers to all open requests will be ignored. */
   forget(): void {
     this.#epoch++;
     for (const { open } of this.#helpers) open.clear();
   }
 
-  /** Waits for the next answer, and abandons helpers without any. */
+  /**
+   * Waits for the next answer of any helper. If none arrives within {@link TIMEOUT_MS}, gives up all helpers with open
+   * requests.
+   */
   async answerSoon(): Promise<void> {
     let timer: ReturnType<typeof setTimeout> | undefined;
     const isSilent = await new Promise<boolean>((resolve) => {

@@ -1,50 +1,48 @@
 import type { GaussianCloud } from '@gaussian-splat/core';
-import { readPrefix } from '@gaussian-splat/formats';
+import { readPrefix, type ReadSceneOptions } from '@gaussian-splat/formats';
 
-/** Maximum fraction of the time since the start of the load for previews, so that they do not slow loading. */
+/** Maximum fraction of the loading time that previews may take, so that they do not slow the load. */
 const MAX_SHARE = 0.2;
-/** Ratio of the bytes in consecutive previews of a download. */
+/** Factor by which the number of received bytes grows from one preview to the next. */
 const GROWTH = 1.6;
 
-/** Loaded for slow scenes. Decides when a part of a scene that is still arriving is shown. */
+/** Decides when the received part of a scene is shown as a preview. Loaded only for slow scenes. */
 export class PreviewSchedule {
-  readonly #name: string;
-  readonly #signal: AbortSignal;
+  readonly #options: ReadSceneOptions;
   readonly #onReading: ((isReading: boolean) => void) | undefined;
   readonly #show: (cloud: GaussianCloud) => void;
   readonly #start: number;
   #spentMs = 0;
   #nextBytes = 0;
-  /** Splats of the last preview. */
+  /** Number of splats in the last preview. */
   #shown = 0;
 
   /**
-   * @param start Start of the load, ms.
+   * @param options Name, signal and limits of the load.
+   * @param start Start of the load, in milliseconds of `performance.now()`.
    * @param show Packs and posts a preview.
-   * @param onReading Called before and after it is read.
+   * @param onReading Called with true before the part is read, and with false after.
    */
   constructor(
-    name: string,
-    signal: AbortSignal,
+    options: ReadSceneOptions,
     start: number,
     show: (cloud: GaussianCloud) => void,
     onReading?: (isReading: boolean) => void,
   ) {
     this.#start = start;
     this.#onReading = onReading;
-    this.#name = name;
-    this.#signal = signal;
+    this.#options = options;
     this.#show = show;
   }
 
-  /** For `fetchScene`: shows the received part at intervals. */
+  /** Listener for `fetchScene`: shows the received part if a preview is due. */
   readonly onArrival = async (bytes: Uint8Array, total: number | undefined): Promise<void> => {
     const elapsed = performance.now() - this.#start;
     const isDue = bytes.length >= this.#nextBytes && bytes.length !== total;
     if (!isDue || this.#spentMs > MAX_SHARE * elapsed) return;
     const began = performance.now();
     this.#onReading?.(true);
-    const cloud = await readPrefix(bytes, { name: this.#name, signal: this.#signal });
+    const cloud = await readPrefix(bytes, this.#options);
     if (cloud !== undefined) {
       this.#show(cloud);
       this.#shown = cloud.count;
@@ -54,7 +52,7 @@ export class PreviewSchedule {
     this.#nextBytes = GROWTH * bytes.length;
   };
 
-  /** For `readScene`: shows a selection of the splats, unless more of them are shown already. */
+  /** Listener for `readScene`: shows a selection of the splats, unless the last preview has more. */
   readonly onPreview = (cloud: GaussianCloud): void => {
     if (cloud.count > this.#shown) this.#show(cloud);
   };

@@ -1,13 +1,13 @@
 import type { ProgressListener } from './protocol.js';
 
-/** Adds up the progress of the files of one scene. */
+/** Adds up the received and the total bytes of all files of one scene. */
 export class ProgressSum {
   readonly #onProgress: ProgressListener;
   readonly #files: { loaded: number; total: number | undefined }[] = [];
-  /** Minimum number of files: until then the total is unknown. */
+  /** Number of files from which the total can be known. With fewer files it is reported as undefined. */
   readonly #min: number;
 
-  /** @param hasParts Whether the first file names others, whose lengths count. */
+  /** @param hasParts Whether the first file names other files, whose bytes count. */
   constructor(onProgress: ProgressListener, hasParts: boolean) {
     this.#onProgress = onProgress;
     this.#min = hasParts ? 2 : 1;

@@ -16,10 +16,12 @@ import type {
   ShPrecision,
 } from '@gaussian-splat/renderer/tools';
 
-/** A scene file, and the dimensions of a walker. */
+/** A scene file whose floor is to be found, and the dimensions of the walker. */
 export interface FloorRequest extends FileRequest {
-  /** Absolute address of a `.voxel.json`, the source of the floor instead of the splats. */
+  /** Absolute address of a `.voxel.json`, from which the floor is found instead of the splats. */
   readonly voxelUrl?: string | undefined;
+  /** Bytes of a `.floor` file, which is decoded instead. */
+  readonly map?: ArrayBuffer | undefined;
   readonly options: FloorOptions;
 }
 
@@ -27,20 +29,20 @@ export interface FloorRequest extends FileRequest {
 export interface FileRequest {
   /** Absolute URL, because a worker's own base URL differs from the page's. */
   readonly url: string;
-  /** Its content, for a worker that could not fetch it. */
+  /** Content of the file, for a worker that cannot fetch the URL. */
   readonly file?: Blob | undefined;
   /** Fetch's credentials mode, from the `crossorigin` attribute. */
   readonly credentials: RequestCredentials;
   readonly limits?: SceneLimits | undefined;
-  /** Parameters for decoding a coded file of pages. */
+  /** Parameters for decoding a coded file of pages; absent for other files. */
   readonly coded?: CodedFile | undefined;
 }
 
-/** Limits of a page's loads, and allowed servers: see `GaussianSplatElement.sceneLimits`. */
+/** Limits of the loads of a page, and the servers that they may use: see `GaussianSplatElement.sceneLimits`. */
 export interface SceneLimits extends LoadLimits {
   /**
-   * Origins of other servers that manifests may refer to, such as `https://cdn.example`; they get no cookies. Default:
-   * only the manifest's own.
+   * Origins of other servers that manifests may refer to, such as `https://cdn.example`. Requests to them carry no
+   * cookies. Default: none, so that manifests may refer only to their own server.
    */
   readonly origins?: readonly string[];
 }
@@ -53,30 +55,36 @@ export interface ModelRequest {
 
 /** A scene to fetch. */
 export interface SceneRequest extends FileRequest {
-  /** Precision of the spherical harmonics on the GPU. */
+  /** Precision of the spherical harmonics on the GPU; `auto` chooses it by the size of the scene. */
   readonly sh: ShPrecision | 'auto';
-  /** Whether the file's own levels of detail are needed, besides the finest. */
+  /** Whether all levels of detail in the file are loaded; otherwise only the finest. */
   readonly levels?: boolean;
-  /** Its backend; default WebGPU. */
+  /** Renderer of the scene; default: WebGPU. */
   readonly renderer?: RendererChoice;
   /** Whether a streamed SOG scene is loaded completely, in its finest level. */
   readonly isWhole?: boolean;
-  /** GPU memory limit in bytes of a streamed scene that is drawn without pages: as much of it is loaded as fits. */
+  /**
+   * GPU memory limit, in bytes, of a streamed scene that is drawn without pages. The load takes the finest part that
+   * fits.
+   */
   readonly streamBytes?: number;
-  /** The contract of a generator, if the page provides one: an address, JSON text, or the object. */
+  /** The contract of a generator, if the page provides one, as an address, as JSON text, or as an object. */
   readonly contract?: unknown;
-  /** Absolute URLs of models that each receive the Gaussians of the previous one, the first those of `url`. */
+  /**
+   * Absolute URLs of models that process Gaussians in sequence. Each receives the Gaussians of the previous model; the
+   * first receives those of `url`.
+   */
   readonly chain?: readonly string[];
 }
 
-/** A fetched scene without its splats. */
+/** Properties of a fetched scene, without its splats. */
 export interface LoadedFacts {
   readonly bounds: SceneBounds;
   /** Messages about content that is not drawn: see `GaussianCloud.warnings`. */
   readonly warnings?: readonly string[] | undefined;
   /** Sort order of splats, if the file declares one: see `CloudHints.order`. */
   readonly order?: 'pixel' | undefined;
-  /** Whether the file has triangles, too. */
+  /** Whether the file also contains triangle meshes. */
   readonly hasMeshes?: boolean | undefined;
 }
 
@@ -85,60 +93,66 @@ export interface LoadedScene extends LoadedFacts {
   readonly packed: PackedGaussians;
 }
 
-/** A scene whose splats came before it, as {@link ScenePart}s. */
+/** Properties of a scene whose splats have been sent before, as {@link ScenePart}s. */
 export interface SentScene extends LoadedFacts {
   readonly packed?: undefined;
 }
 
-/** Part of a scene that is uploaded while its splats are sorted: the head comes first, and again if the load restarts. */
+/**
+ * Part of a scene that is uploaded while its splats are sorted. The head is sent first. If the load restarts, another
+ * head is sent, and the earlier parts are void.
+ */
 export type ScenePart = { readonly head: PackedHead } | { readonly portion: PackedPortion };
 
-/** Called with each part. The last one holds the bounds of all chunks. */
+/** Called with each part of a scene. The last part contains the bounds of all chunks. */
 export type PartListener = (part: ScenePart) => void;
 
-/** The triangles of a file, validated, with its images decoded. */
+/** The validated triangles of a file, and its decoded images. */
 export interface LoadedMesh extends Omit<TriangleFile, 'images'> {
-  /** Each used image. */
+  /** Images of the file, by their index; undefined for unused ones. */
   readonly images: readonly (ImageBitmap | undefined)[];
 }
 
-/** The manifest of a sequence of scenes, instead of a scene. Its paths are relative to its own address. */
+/** The manifest of a sequence of scenes. Its paths are relative to its own address. */
 export type LoadedSequence = SceneSequence;
 
 /**
- * A frame of a sequence with the splats of the first: all data that the worker needs, because it may have been
- * restarted meanwhile.
+ * A frame of a sequence that stores differences from its first frame. The request contains all data that the worker
+ * needs, because the worker may have been restarted since the previous request.
  */
 export interface MovedFrameRequest {
   readonly first: FileRequest;
   /**
-   * The file with the differences of this frame, its index there, and the frames of the file; absent for the first
-   * frame.
+   * The file with the differences of this frame, the frame's index in the file, and the number of frames in the file.
+   * Absent for the first frame.
    */
   readonly motion?: (FileRequest & { readonly frame: number; readonly frames: number }) | undefined;
   readonly sh: SceneRequest['sh'];
   readonly limits?: SceneLimits | undefined;
 }
 
-/** The index of a clip, or a part of one of its groups: requested as `boxes`, because both use byte ranges. */
+/**
+ * A request for the index of a clip, or for a part of one of its groups. It is sent as type `boxes`, whose code also
+ * reads by byte ranges.
+ */
 export interface ClipRequest extends FileRequest {
   readonly isClip: true;
-  /** The whole file, if the page has it. */
+  /** Content of the whole file, if the page already has it. */
   readonly whole?: Blob | undefined;
-  /** Absent for the index. */
+  /** The requested part; absent to request the index. */
   readonly part?: {
     readonly part: ClipPart;
-    /** Number of its group. */
+    /** Index of the group that the part belongs to. */
     readonly group: number;
     readonly frames: number;
     readonly origin: Vector3;
   };
 }
 
-/** Result of a {@link ClipRequest}. */
+/** Answer to a {@link ClipRequest}. */
 export interface ClipAnswer<T> {
   readonly clip: T;
-  /** Its buffers are transferred. */
+  /** Object whose buffers are transferred: the clip itself. */
   readonly levels: object;
 }
 
@@ -147,19 +161,25 @@ export interface LoadedBoxes {
   readonly levels: LevelScene;
   /** Paths of the SOG files, relative to the index. */
   readonly files: readonly string[];
-  /** The levels of all boxes, coarsest first within a box: index of the file, first splat, and count of each. */
+  /**
+   * [R, 3] levels of all boxes, coarsest first within a box: index of the file, index of the first splat, and number of
+   * splats.
+   */
   readonly runs: Float64Array;
-  /** Index of the first run of each box. */
+  /** [B] index in `runs` of the first level of each box. */
   readonly firstRuns: Uint32Array;
 }
 
-/** A level of a box of such a scene: all data that the worker needs, because it may have been restarted meanwhile. */
+/**
+ * A request for a level of a box of a streamed SOG scene. It contains all data that the worker needs, because the
+ * worker may have been restarted since the previous request.
+ */
 export interface BoxRequest {
   /** Absolute address of the index. */
   readonly url: string;
   /** Path of the SOG file, relative to the index. */
   readonly path: string;
-  /** Index of its first splat in the file. */
+  /** Index of the level's first splat in the file. */
   readonly first: number;
   readonly count: number;
   readonly page: LevelPage;
@@ -169,18 +189,20 @@ export interface BoxRequest {
 }
 
 /**
- * Called with a part of a scene that is still loading, ready for upload: fewer splats, or splats without their
- * view-dependent colors. Each preview replaces the previous one.
+ * Called with a part of a scene that is still loading, ready for upload. It has fewer splats, or no view-dependent
+ * colors. Each preview replaces the previous one.
  */
 export type PreviewListener = (preview: LoadedScene) => void;
 
 /**
- * Called with the received and total bytes; the total is undefined if unknown.
- * @param share Fraction of the whole work, 0..1; absent if the bytes determine it.
+ * Called with the received and the total bytes; the total is undefined if it is unknown.
+ * @param share Completed fraction of all work of the load, 0..1; absent if the bytes determine it.
  */
 export type ProgressListener = (loaded: number, total: number | undefined, share?: number) => void;
 
-/** Requests to a worker; every request has a number, and one `answer` or `error`. */
+/**
+ * Requests to a worker. Each is sent with an `id`, and results in one `answer` or one `error`, unless it is canceled.
+ */
 export type WorkerRequest =
   | {
       readonly type: 'load';
@@ -201,31 +223,31 @@ export type WorkerRequest =
 export type PageMessage =
   | (WorkerRequest & { readonly id: number })
   | { readonly type: 'cancel'; readonly id: number }
-  /** Answered by `pong`. */
+  /** Requests a `pong`, which shows that the worker responds. */
   | { readonly type: 'ping' }
-  /** A port to another worker that packs splats. */
+  /** Provides a request with a port to another worker that packs splats. */
   | { readonly type: 'helper'; readonly id: number; readonly port: MessagePort }
-  /** Packs the data from the port. */
+  /** Makes the worker a helper, which runs the tasks from the port. */
   | { readonly type: 'pack'; readonly port: MessagePort }
-  /** Sorts splats at these positions for the views from the port. */
+  /** Makes the worker sort splats for the views that arrive on the port. `positions`: [N, 3]; `areas`: [N]. */
   | {
       readonly type: 'sort';
       readonly port: MessagePort;
       readonly positions: Float32Array;
       readonly areas?: Float32Array | undefined;
     }
-  /** Runs a generator once on the CPU, in a worker that is started for it. */
+  /** Makes the worker, which is started for this purpose, run a generator once on the CPU. */
   | CpuCheckMessage;
 
 export type WorkerMessage =
-  /** The script has started. */
+  /** The worker's script has started. */
   | { readonly type: 'ready' }
   | { readonly type: 'pong' }
-  /** It starts reading for a request, and may not answer for long. */
+  /** The worker starts reading for a request, and may not answer messages for a long time. */
   | { readonly type: 'reading'; readonly id: number }
-  /** It has finished reading for a request, or the request was canceled. */
+  /** The worker has finished reading for a request, or the request was canceled. */
   | { readonly type: 'rested'; readonly id: number }
-  /** Other workers could share the packing for a request: at most this many. */
+  /** Other workers can help to pack the scene of a request; `max` is their maximum number. */
   | { readonly type: 'help'; readonly id: number; readonly max: number }
   | { readonly type: 'progress'; readonly id: number; readonly loaded: number; readonly total: number | undefined }
   | { readonly type: 'preview'; readonly id: number; readonly scene: LoadedScene }
@@ -233,7 +255,10 @@ export type WorkerMessage =
   | { readonly type: 'answer'; readonly id: number; readonly answer: unknown }
   | { readonly type: 'error'; readonly id: number; readonly error: ErrorData };
 
-/** All buffers of some plain objects, each once: they are transferred between threads without copies. */
+/**
+ * Returns the buffers of all typed arrays in some plain objects, each once, for transferring them between threads
+ * without copies.
+ */
 export function buffersOf(...parts: readonly object[]): ArrayBuffer[] {
   const buffers = parts
     .flatMap((part) => Object.values(part))

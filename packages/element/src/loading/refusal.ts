@@ -1,6 +1,11 @@
-/** Loaded only if no worker starts. */
+/** Warns of pages without workers. The module is loaded only if no worker starts. */
 
-/** Warns, once for a page, that scenes are read on the main thread, with the reason and a remedy. */
+/**
+ * Logs a warning that scenes are read on the main thread, with the reason and a remedy.
+ * @param reason Message of the failure.
+ * @param violated Directive of the page's policy that has blocked the worker, if known.
+ * @param location Address of the worker's script that the page has set; null if it has set none.
+ */
 export function warnOfRefusal(reason: string, violated: string | undefined, location: string | null): void {
   const directive = violated ?? /Content-Security-Policy: (\S+)/.exec(reason)?.[1];
   const cause = directive ? `the page's Content-Security-Policy forbids it: ${directive}` : reason;

@@ -1,9 +1,9 @@
-/** Serialized contracts by object, so that repeated comparisons serialize each once. */
+/** Serialized contracts by their objects, so that repeated comparisons serialize each object once. */
 const written = new WeakMap<object, unknown>();
 
 /**
- * Whether two values of the property `contract` have equal content. Frameworks create a new object of the same content
- * for every render, which must not reload a generator.
+ * Returns whether two values of the property `contract` have equal content. Frameworks create a new object of the same
+ * content for every render, which must not reload a generator.
  */
 export function isSameContract(a: unknown, b: unknown): boolean {
   return a === b || contentOf(a) === contentOf(b);
@@ -15,7 +15,9 @@ function contentOf(contract: unknown): unknown {
   return written.get(contract);
 }
 
-/** JSON, or the object itself if it cannot be serialized: its faults are reported when it is read. */
+/**
+ * Returns the object as JSON, or the object itself if it cannot be serialized. Its faults are reported when it is read.
+ */
 function write(contract: object): unknown {
   try {
     return JSON.stringify(contract);

@@ -16,25 +16,25 @@ import { WORKER_SOURCES } from './worker-sources.js';
 import { spawnAt } from './spawn-worker.js';
 import { WorkerPool } from './worker-pool.js';
 
-/** The worker's code. */
+/** The module of the worker's code. */
 export type SceneWorker = typeof workerModule;
 
 /**
- * Loads scenes in workers: one for the whole page, started on the first load and ended when idle, and more only if that
- * one does not respond.
+ * Loads scenes in workers. One worker serves the whole page: it starts with the first load and ends when idle. More
+ * workers are started only if it does not respond.
  */
 export class SceneLoader {
-  /** Starts a worker for the caller. */
+  /** Starts a worker that the caller owns and must terminate. */
   readonly spawn: () => Worker;
   readonly #pool: WorkerPool;
-  /** Index of the current way of {@link WORKER_SOURCES}. */
+  /** Index in {@link WORKER_SOURCES} of the current way to start a worker. */
   #way = 0;
-  /** The directive of the page's policy that has blocked a worker. */
+  /** The directive of the page's Content-Security-Policy that has blocked a worker. */
   #violated: string | undefined;
 
   /**
-   * @param spawn Starts a worker; tests pass their own.
-   * @param locationOf Address of the worker's script; null for the element's own.
+   * @param spawn Starts a worker; default: the package's own. Tests pass another function.
+   * @param locationOf Returns the address of the worker's script; null for the element's own.
    */
   constructor(spawn?: () => Worker, locationOf: () => string | null = () => null) {
     this.spawn = spawn ?? (() => this.#spawnAt(locationOf()));
@@ -66,7 +66,7 @@ export class SceneLoader {
 
   /**
    * Fetches, reads and packs a scene. Rejects with GaussianSplatError (`network/*`, `decode/*`, `out-of-memory/*`), or
-   * with the signal's reason as soon as that is aborted.
+   * with the signal's reason as soon as the signal is aborted.
    *
    * @param onPreview Called with previews of a large scene before it is complete; never after the promise has settled.
    */
@@ -81,16 +81,17 @@ export class SceneLoader {
     return loaded;
   }
 
-  /**
-   * The same for an address that may name a sequence: the result is then its manifest.
-   * @param onPart receives the splats of a large scene, before the result: see {@link SentScene}.
-   */
+  /** Loads a scene as {@link load} does, or the manifest of a sequence, if the address names one. */
   open(
     request: SceneRequest,
     signal: AbortSignal,
     onProgress: ProgressListener,
     onPreview?: PreviewListener,
   ): Promise<LoadedScene | LoadedSequence>;
+  /**
+   * Loads a scene or the manifest of a sequence, and may pass on the splats of a large scene as they are read.
+   * @param onPart Receives the splats of a large scene before the promise resolves: see {@link SentScene}.
+   */
   open(
     request: SceneRequest,
     signal: AbortSignal,
@@ -114,16 +115,16 @@ export class SceneLoader {
   }
 
   /**
-   * Fetches the bytes of one file. Rejects with GaussianSplatError `network/*`, `out-of-memory/allocation`, or with the
-   * signal's reason as soon as that is aborted.
+   * Fetches the bytes of one file. Rejects with GaussianSplatError (`network/*`, `out-of-memory/*`), or with the
+   * signal's reason as soon as the signal is aborted.
    */
   fetchFile(request: FileRequest, signal: AbortSignal): Promise<ArrayBuffer> {
     return this.ask({ type: 'file', request }, signal, ({ fetchFile }) => fetchFile(request, signal));
   }
 
   /**
-   * Sends a request to a worker: see `WorkerRequest`. Rejects as {@link load} does.
-   * @param here Runs it on the main thread, if workers are not available.
+   * Sends a request to a worker, and returns its answer: see `WorkerRequest`. Rejects as {@link load} does.
+   * @param here Runs the request on the main thread, if workers are not available.
    */
   ask<T>(
     request: WorkerRequest,
@@ -141,7 +142,8 @@ export class SceneLoader {
     try {
       return await loadModule('the code that reads scenes', () => import('./scene-worker.js'));
     } catch (error) {
-      // If the code cannot be loaded here either, the page's policy was not the cause.
+      // If the code cannot be loaded on the main thread either, the page's policy was not the cause, so workers are
+      // tried again.
       this.#way = 0;
       this.#pool.retry();
       throw error;
@@ -150,8 +152,8 @@ export class SceneLoader {
 }
 
 /**
- * Workers cannot read `blob:` addresses of pages without an origin, from a disk or in a sandboxed frame: they get the
- * file itself.
+ * Adds the content of a `blob:` address to a request. Workers cannot read such addresses of pages without an origin,
+ * which are opened from a disk or in a sandboxed frame.
  */
 async function withFile<T extends { readonly request: FileRequest }>(asked: T): Promise<T> {
   const { url } = asked.request;

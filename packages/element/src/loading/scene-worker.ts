@@ -1,6 +1,6 @@
 /**
- * The module worker that loads scenes. If a page does not allow workers it imports this same module and calls {@link
- * loadScene} and the others itself; then nothing here listens.
+ * The module of the worker that loads scenes. If a page does not allow workers, the page imports this module and calls
+ * {@link loadScene} and the other functions itself. The module then adds no message listener.
  */
 import { loadModule } from '@gaussian-splat/core';
 import type { OpenedModel } from '@gaussian-splat/core/onnx';
@@ -31,8 +31,8 @@ import type { WalkMap } from '@gaussian-splat/formats/walk';
 export { loadScene };
 
 /**
- * The bytes of one file, in a buffer of their own, or the words of coded pages. Throws GaussianSplatError (`network/*`,
- * `decode/*`), or the signal's reason once that is aborted.
+ * Fetches a file. Returns its bytes in a buffer of their own, or the decoded words of a coded file of pages. Throws
+ * GaussianSplatError (`network/*`, `decode/*`, `out-of-memory/*`), or the signal's reason if that is aborted.
  */
 export async function fetchFile(
   { url, credentials, limits, coded }: FileRequest,
@@ -41,7 +41,7 @@ export async function fetchFile(
   const { maxBytes, maxSeconds } = limits ?? {};
   const bytes = await fetchScene(url, { mode: 'cors', credentials, signal, maxBytes, maxSeconds });
   if (coded === undefined) return bytes.slice().buffer;
-  // The code that read the manifest is loaded already.
+  // This code has been loaded before, to read the manifest.
   const { decodePage } = await loadModule('the code that streams scenes', () => import('./open-manifest.js'));
   return decodePage(url, bytes as Uint8Array<ArrayBuffer>, coded);
 }
@@ -97,19 +97,19 @@ const transferablesOf = ({ views, images }: LoadedMesh): Transferable[] => [
   ...images.flatMap((image) => image ?? []),
 ];
 
-/** The used part of a worker's global scope, which TypeScript's DOM types lack. */
+/** The members of a worker's global scope that are used here; TypeScript's DOM types lack them. */
 interface WorkerScope {
   postMessage(message: WorkerMessage, transfer?: Transferable[]): void;
   addEventListener(type: 'message', listener: (event: MessageEvent<PageMessage>) => void): void;
 }
 
-/** Result of a request, and its buffers, which are transferred. */
+/** Result of a request, and those of its buffers that are transferred. */
 type Answer = readonly [answer: unknown, transfer?: Transferable[]];
 
-/** State of one request. */
+/** A request that the worker is processing. */
 interface Work {
   readonly abort: AbortController;
-  /** Called with the ports to other workers, one after the other. */
+  /** Called with a port to each worker that helps with the request. */
   onHelper?: (port: MessagePort) => void;
 }
 
@@ -151,14 +151,17 @@ function serve(scope: WorkerScope): void {
     return [levels, levels ? buffersOf(levels, levels.coarser) : []];
   }
 
-  /** For streamed scenes: reading a response costs its thread more than all other work for a page. */
+  /**
+   * Returns a buffer as an answer, which transfers it. Streamed scenes are fetched in the worker, because reading a
+   * response takes a thread longer than all other work for a page.
+   */
   const whole = async (bytes: Promise<ArrayBuffer>): Promise<Answer> => [await bytes, [await bytes]];
 
   async function answerTo(id: number, work: Work, message: WorkerRequest): Promise<Answer> {
     const { signal } = work.abort;
     if (message.type === 'load') return load(id, work, message);
     if (message.type === 'file') return whole(fetchFile(message.request, signal));
-    // From here on the readers are busy.
+    // All requests below keep the worker from responding for some time.
     scope.postMessage({ type: 'reading', id });
     if (message.type === 'levels') return buildLevels(message, signal);
     if (message.type === 'box') return whole(readBox(message.request, signal));
@@ -183,14 +186,17 @@ function serve(scope: WorkerScope): void {
     return [opened, buffersOf(opened, opened.levels)];
   }
 
-  /** Runs a request, and answers, also with errors without a code. No answer is needed for canceled ones. */
+  /**
+   * Runs a request, and posts its answer or its error. Errors without a code get one. Canceled requests are not
+   * answered.
+   */
   async function run(id: number, message: WorkerRequest): Promise<void> {
     const work: Work = { abort: new AbortController() };
     const { signal } = work.abort;
     running.set(id, work);
     try {
       const asked = 'request' in message && 'file' in message.request ? message.request : undefined;
-      // The name of the file is appended to the address.
+      // The fragment of the new address contains the name of the file.
       if (asked?.file) Object.assign(asked, { url: URL.createObjectURL(asked.file) + new URL(asked.url).hash });
       const [answer, transfer] = await answerTo(id, work, message);
       if (!signal.aborted) scope.postMessage({ type: 'answer', id, answer }, transfer);
@@ -206,7 +212,7 @@ function serve(scope: WorkerScope): void {
     if (data.type === 'ping') scope.postMessage({ type: 'pong' });
     else if (data.type === 'cancel') running.get(data.id)?.abort.abort();
     else if (data.type === 'helper') running.get(data.id)?.onHelper?.(data.port);
-    else if (data.type === 'pack') serveWith(import('./pack-shares.js'), ({ packShares }) => packShares(data.port));
+    else if (data.type === 'pack') serveWith(import('./pack-shards.js'), ({ packShares }) => packShares(data.port));
     else if (data.type === 'sort')
       serveWith(import('./sort-splats.js'), ({ sortSplats }) => sortSplats(data.port, data.positions, data.areas));
     else if (data.type === 'run-on-cpu')
@@ -217,8 +223,8 @@ function serve(scope: WorkerScope): void {
 }
 
 /**
- * In a worker with a single purpose: a failure to load its code must raise an `error` event, which a rejection does
- * not.
+ * Runs code in a worker that has no other purpose. A failure to load the code is thrown from a timer, because only then
+ * does the worker's owner receive an `error` event.
  */
 function serveWith<T>(code: Promise<T>, serve: (code: T) => unknown): void {
   code.then(serve, (error: unknown) =>

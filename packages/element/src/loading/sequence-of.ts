@@ -1,4 +1,7 @@
-/** Loaded only for sequences: for the manifest of one, and for frames that are stored as differences from the first. */
+/**
+ * Reads the manifests of sequences, and frames that are stored as differences from the first frame. The module is
+ * loaded only for sequences.
+ */
 import { boundsOf, type GaussianCloud } from '@gaussian-splat/core';
 import { SharedReads } from '@gaussian-splat/core/fetch';
 import {
@@ -19,22 +22,22 @@ import type { FileRequest, LoadedScene, MovedFrameRequest, ProgressListener } fr
 
 export { parseSequence } from '@gaussian-splat/formats';
 
-/** The first frame of a sequence, and its downloaded bytes. */
+/** The first frame of a sequence; `arrived` is the number of its downloaded bytes. */
 interface First {
   readonly cloud: GaussianCloud;
   readonly bounds: SceneBounds;
   readonly arrived: number;
 }
 
-/** Caches of all sequences of the page. */
+/** Caches of first frames, and of files with differences, for all sequences of the page. */
 const firsts = new SharedReads<First>(({ cloud }) => 4 * cloud.count * (11 + cloud.sh.length / cloud.count));
 const motions = new SharedReads<Motion & { arrived: number }>(({ splats, parts }) =>
   Object.values(parts).reduce((sum, { codes }) => sum + 2 * splats * codes.length, 0),
 );
 
 /**
- * Reads and packs a frame. Files that several frames need are read once. Throws GaussianSplatError (`network/*`,
- * `decode/*`, `out-of-memory/*`), or the signal's reason once that is aborted.
+ * Reads and packs a frame of a sequence. Files that several frames need are read once. Throws GaussianSplatError
+ * (`network/*`, `decode/*`, `out-of-memory/*`), or the signal's reason if that is aborted.
  */
 export async function readMovedFrame(
   { first, motion, sh, limits }: MovedFrameRequest,
@@ -98,5 +101,5 @@ async function readFirst(
     },
     ...left(),
   });
-  return { cloud, bounds: { ...boundsOf(cloud), up: cloud.hints?.up }, arrived: arrived + bytes.length };
+  return { cloud, bounds: { ...boundsOf(cloud), ...cloud.hints }, arrived: arrived + bytes.length };
 }

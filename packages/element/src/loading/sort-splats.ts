@@ -1,21 +1,25 @@
-/** Sorts the splats of one scene for the WebGL renderer, view by view. Loaded by a worker that is started for it. */
+/** Sorts the splats of one scene for each view of the WebGL renderer, in a worker that is started for this purpose. */
 import { SplatOrder, type OrderView } from '@gaussian-splat/renderer/webgl';
 
 export interface SortRequest {
   readonly view: OrderView;
-  /** Buffer for the result, which is transferred back. */
+  /** Buffer for the order, one index for each splat. It is transferred to the worker and back. */
   readonly order: Uint32Array<ArrayBuffer>;
 }
 
 export interface SortAnswer extends SortRequest {
   readonly count: number;
-  /** Total coverage of the image by the splats. */
+  /** Sum over the splats of the fraction of the image that each covers; 0 if it is not computed. */
   readonly covered: number;
   /** Duration of sorting, ms. */
   readonly milliseconds: number;
 }
 
-/** Answers the requests from a port. @param positions [N, 3] @param areas [N] */
+/**
+ * Sorts the splats for each request from a port.
+ * @param positions [N, 3] positions of the splats.
+ * @param areas [N] areas of the splats; undefined if their coverage is not needed.
+ */
 export function sortSplats(port: MessagePort, positions: Float32Array, areas: Float32Array | undefined): void {
   const splats = new SplatOrder(positions, areas);
   port.onmessage = ({ data: { view, order } }: MessageEvent<SortRequest>) => {

@@ -1,6 +1,7 @@
 /**
- * Starts a worker from the address of its script. A worker script must have the page's origin; if it has another (a
- * CDN), or the page has no origin as in a sandboxed frame, a one-line script of the page's own imports it.
+ * Starts a worker from the address of its script. Browsers require that a worker's script has the page's origin. A
+ * script of another origin (a CDN), or for a page without an origin, as in a sandboxed frame, is imported by a one-line
+ * script of the page.
  */
 export function spawnAt(script: URL): Worker {
   if (script.origin !== globalThis.origin) return spawnFromElsewhere(script);
@@ -12,22 +13,23 @@ function spawnFromElsewhere(script: URL): Worker {
 }
 
 /**
- * Starts a worker from the text of a promise of its message handler. Earlier messages are queued, and errors are thrown
- * so that the worker's owner receives them.
+ * Starts a worker from text.
+ * @param code Expression of a promise that resolves when the worker's message handler is added. Messages that arrive
+ * earlier are queued. If the promise rejects, the error is thrown, so that the worker's owner receives it.
  */
 export function spawnText(code: string): Worker {
   const text = `const early=[],keep=(e)=>early.push(e);addEventListener('message',keep);${code}.then(()=>{removeEventListener('message',keep);for(const e of early)dispatchEvent(new MessageEvent('message',{data:e.data,ports:[...e.ports]}))}).catch((e)=>setTimeout(()=>{throw e}))`;
-  // Not a module, because sandboxed frames start no module worker from a blob.
+  // The worker is a classic one, because sandboxed frames start no module worker from a blob.
   const url = URL.createObjectURL(new Blob([text], { type: 'text/javascript' }));
   const worker = new Worker(trustedUrl(url));
-  // The URL is needed only until the script has been fetched, as its first message or its failure shows.
+  // The URL is needed until the browser has fetched the script, which the worker's first message or failure shows.
   const revoke = (): void => URL.revokeObjectURL(url);
   worker.addEventListener('message', revoke, { once: true });
   worker.addEventListener('error', revoke, { once: true });
   return worker;
 }
 
-/** Trusted Types, which TypeScript's DOM types lack. */
+/** The used part of the Trusted Types API, which TypeScript's DOM types lack. */
 interface TrustedTypes {
   createPolicy(
     name: string,
@@ -38,8 +40,8 @@ interface TrustedTypes {
 let policy: ReturnType<TrustedTypes['createPolicy']> | null | undefined;
 
 /**
- * Converts an address for pages with `require-trusted-types-for 'script'`; unchanged if that is not supported, or the
- * page rejects the policy.
+ * Returns the address of a script as a trusted URL, for pages with `require-trusted-types-for 'script'`. Returns it
+ * unchanged if the browser does not support Trusted Types, or the page rejects the policy.
  */
 function trustedUrl(url: string): string {
   const { trustedTypes } = globalThis as { trustedTypes?: TrustedTypes };
@@ -49,7 +51,7 @@ function trustedUrl(url: string): string {
 
 function createPolicy(trustedTypes: TrustedTypes): ReturnType<TrustedTypes['createPolicy']> | null {
   try {
-    // Only addresses that are created in this file are passed here.
+    // The policy accepts all addresses, because only addresses that this file creates are passed to it.
     return trustedTypes.createPolicy('gaussian-splat', { createScriptURL: (url) => url });
   } catch {
     return null;

@@ -1,16 +1,17 @@
-/** Loaded only for scenes that several workers pack. */
+/** Starts helping workers. The module is loaded only for scenes that several workers pack. */
 import type { PageMessage, WorkerMessage } from './protocol.js';
 
-/** Threads that are not used: the main thread, and that of the worker that is helped. */
+/** Number of threads that helpers leave free: the main thread, and the thread of the worker that is helped. */
 const OTHERS = 2;
-/** Maximum number of helpers. More would wait for the worker that distributes the shards. */
+/** Maximum number of helpers. More helpers would wait for the worker that distributes the shards. */
 const MAX_HELPERS = 7;
 
 /**
- * Starts workers that pack shards of a scene for another one.
- * @param id The load that they help with.
- * @param most Maximum number of them.
- * @returns A function that ends them.
+ * Starts workers that pack shards of a scene for another worker.
+ * @param worker The worker that is helped.
+ * @param id Number of the load that they help with.
+ * @param max Maximum number of helpers.
+ * @returns A function that terminates the helpers.
  */
 export function startHelpers(worker: Worker, id: number, max: number, spawn: () => Worker): () => void {
   const { hardwareConcurrency = 2 } = navigator;
@@ -27,7 +28,7 @@ export function startHelpers(worker: Worker, id: number, max: number, spawn: () 
       },
       { once: true },
     );
-    // The others take over the work of one that fails to start, or ends.
+    // If a helper fails to start or ends, the others take over its work.
     helper.addEventListener('error', (event) => event.preventDefault());
     return helper;
   });

@@ -1,6 +1,6 @@
 /**
- * Loaded by the worker for streamed scenes that are drawn without pages: as much of them as fits is read, coarsest
- * first.
+ * Loads streamed scenes that are drawn without pages, coarsest parts first, as much of them as fits into memory. The
+ * worker loads this module for the first such scene.
  */
 import { GaussianSplatError, type GaussianCloud } from '@gaussian-splat/core';
 import { fileRequest } from '@gaussian-splat/core/fetch';
@@ -19,23 +19,24 @@ import type { LoadListeners } from './load-scene.js';
 import { openManifest } from './open-manifest.js';
 import type { LoadedScene, SceneRequest } from './protocol.js';
 
-/** Bytes of a splat with harmonics of degree 3 in 8 bits, including frame data: see `glBytes`. */
+/** GPU memory of a splat in bytes, with harmonics of degree 3 in 8 bits, and with data of each frame: see `glBytes`. */
 const SPLAT_BYTES = 4 * (8 + 14 + 9);
-/** Ratio of the pages in consecutive previews. */
+/** Factor by which the number of pages grows from one preview to the next. */
 const GROWTH = 8;
 
-/** Environment of a scene's load. */
+/** Limits, listeners and functions of the load of a scene. */
 export interface StreamLoad extends Pick<LoadListeners, 'onProgress' | 'onPreview' | 'onReading'> {
   readonly name: string;
   readonly limits: () => LoadLimits;
-  /** Options of each download. */
+  /** Returns the options of another download, which adds to the progress. */
   readonly options: () => FetchSceneOptions;
   readonly pack: (cloud: GaussianCloud) => LoadedScene;
 }
 
 /**
- * Loads the finest part of a `lod-meta.json` or `lod.json` that fits. Throws as `loadScene` does.
- * @param memory Upper limit of its GPU memory in bytes.
+ * Loads the finest version of a streamed scene that fits into memory, from its `lod-meta.json` or `detail.json`. Throws
+ * as `loadScene` does.
+ * @param memory Maximum GPU memory of the scene, in bytes.
  */
 export async function loadWholeStream(
   request: SceneRequest,
@@ -63,7 +64,7 @@ async function loadSog(
   return pack(cloud);
 }
 
-/** Reads pages from the roots down until the next one does not fit. */
+/** Reads the pages of a `detail.json`, from the roots down, until the next page does not fit. */
 async function loadPages(
   request: SceneRequest,
   maxSplats: number,
@@ -101,7 +102,10 @@ async function loadPages(
   return { ...pack(cloudOf(manifest, list, pages, words)), order: manifest.order };
 }
 
-/** The words of a file, in the layout of the GPU for streamed scenes. */
+/**
+ * Returns the words of a file of pages, in the GPU layout of streamed scenes. Throws GaussianSplatError (`decode/*`) if
+ * its length or its coding is invalid.
+ */
 async function wordsOf(
   where: string,
   bytes: Uint8Array,
@@ -109,7 +113,7 @@ async function wordsOf(
   manifest: DetailManifest,
 ): Promise<Uint32Array<ArrayBuffer>> {
   const { coding, shDegree } = manifest;
-  // In a buffer of its own, whose length is that of the file.
+  // Copied to a buffer of exactly the file's length.
   const own = new Uint8Array(bytes);
   if (coding) return new Uint32Array(await decodePage(where, own, { chunks, upper, shDegree, coding }));
   const { total } = pageLayout(manifest, chunks);
@@ -122,7 +126,7 @@ async function wordsOf(
   });
 }
 
-/** The chunks of some pages that are not refined by others of them. */
+/** Returns the splats of some pages, without the chunks that other pages of them refine. */
 function cloudOf(
   manifest: DetailManifest,
   list: InstanceList,

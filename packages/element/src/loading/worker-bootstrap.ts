@@ -1,18 +1,19 @@
-/** Request of a text worker to the page: a chunk of its code. */
+/** Request of a worker that was started from text: the page must send a chunk of its code. */
 export interface CodeQuestion {
   readonly id: number;
   readonly chunk: string;
 }
 
-/** The texts of that chunk and of its missing dependencies; or the reason of a failure. */
+/** The texts of the requested chunk and of its dependencies that were not sent before, or the reason of a failure. */
 export type CodeAnswer =
   { readonly id: number; readonly texts: readonly string[] } | { readonly id: number; readonly failure: string };
 
 /**
- * The script of a text worker, for `spawnText`: a promise of its main chunk. The first message contains the port for
- * its code. Each text is `"name":(exports,require,gaussianSplatChunk)=>{…}`. They run in sequence, and an answer
- * without texts waits, too: the second of two concurrent requests may need the texts of the first, or be the same. It
- * is written as text itself, because bundlers change functions.
+ * The script of a worker that is started from text: an expression for `spawnText`, which resolves when the main chunk
+ * has run. The first message to the worker contains the port on which it requests chunks. Each text is
+ * `"name":(exports,require,gaussianSplatChunk)=>{…}`. Answers are run in sequence, also one without texts, because the
+ * second of two concurrent requests may need the texts of the first. The script is written as a string, because
+ * bundlers change functions.
  */
 export const BOOTSTRAP = `new Promise((start)=>addEventListener('message',({ports})=>{
 early.length=0;

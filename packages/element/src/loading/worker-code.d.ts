@@ -1,10 +1,12 @@
-/** The worker's code as text, a module for each chunk: `npm run build` makes it of scene-worker.js. */
+/**
+ * The worker's code as text, with one module for each chunk. `npm run build` generates the module from scene-worker.js.
+ */
 
 export interface Chunk {
-  /** Chunks that must be there before. */
+  /** Names of the chunks that the worker must have before this one. */
   readonly needs: readonly string[];
   readonly load: () => Promise<{ readonly default: string }>;
 }
 
-/** By the names by which the code asks for them. */
+/** Chunks by the names by which the worker's code requests them. */
 export const CHUNKS: Readonly<Record<string, Chunk>>;

@@ -2,38 +2,60 @@ import { GaussianSplatError, Lazy } from '@gaussian-splat/core';
 import type { WorkerMessage, WorkerRequest } from './protocol.js';
 import { WorkerSlot, type Job } from './worker-slot.js';
 
-/** How long an unused worker is kept, because pages with several elements load one scene after another. */
+/** Time for which an idle worker is kept, ms, because pages with several elements load one scene after another. */
 const IDLE_MS = 5_000;
-/** The same for one that has fetched for a streamed scene, whose camera may move again at any time. */
+/**
+ * Time for which an idle worker is kept after it has fetched for a streamed scene, ms: the camera may move again at any
+ * time.
+ */
 const STREAMING_IDLE_MS = 60_000;
 /** Interval of pings to a busy worker, ms. */
 const TICK_MS = 100;
 /** Number of missed pings after which a worker gets no new requests. */
 const BUSY = 2;
-/** Number after which its other requests restart in another worker, and a worker with a canceled load is terminated. */
+/**
+ * Number of missed pings after which the requests of a worker restart in other workers, except the one that it reads. A
+ * worker that reads none, or a canceled one, is terminated.
+ */
 const SILENT = 5;
-/** Number after which it counts as dead, even while reading, because browsers do not report that. */
+/**
+ * Number of missed pings after which a worker counts as dead, even while it reads, because browsers do not report dead
+ * workers.
+ */
 const DEAD = 600;
-/** Time limit of the start of a worker, ms; after it the load runs without the worker. */
+/**
+ * Time limit for the start of the first worker, ms. After it loads run on the main thread. The second limit applies
+ * once a worker has started.
+ */
 const START_MS = 2_000;
 const RESTART_MS = 15_000;
-/** Additional time for the worker when everything for running without it is loaded, ms. */
+/** Time that a late worker gets after the code for the main thread is loaded, ms. */
 const GRACE_MS = 500;
-/** Maximum number of workers of a page. Untrusted scenes that never finish occupy one each; later loads wait. */
+/**
+ * Maximum number of workers of a page. Each untrusted scene that never finishes occupies one. If all are occupied,
+ * later loads wait.
+ */
 const MAX_WORKERS = 8;
-/** Maximum number of restarts of a load, which may have been in a worker with several that never finish. */
+/**
+ * Maximum number of restarts of a load. Several restarts are allowed, because a load may share workers with scenes that
+ * never finish.
+ */
 const MAX_MOVES = 3;
-/** Restart count of a load after a worker died while reading it: one more attempt. */
+/**
+ * Number that is added to the restarts of a load if its worker died while reading it, so that it restarts at most once
+ * more.
+ */
 const AFTER_DEATH = 2;
 
 const help = new Lazy('the code that starts workers', () => import('./start-helpers.js'));
 
-/** Reports the reason that work runs on the main thread. */
+/** Called with the reason for which work runs on the main thread. */
 export type Refusal = (reason: string) => void;
 
 /**
- * The workers of a page. One serves all loads while it responds. If it does not, because it reads a large or a hostile
- * scene or has died, its other loads restart in another one; canceled work that does not stop is ended with its worker.
+ * The workers of a page. One worker serves all loads while it responds. It does not respond while it reads a large or a
+ * hostile scene, or if it has died. Its other loads then restart in another worker. Canceled work that does not stop is
+ * ended with its worker.
  */
 export class WorkerPool {
   readonly #spawn: () => Worker;
@@ -44,15 +66,17 @@ export class WorkerPool {
   readonly #queue: Job[] = [];
   #isRefused = false;
   #hasWarned = false;
-  /** Whether the script has loaded once: if it does not load at once later, the machine is busy. */
+  /** Whether a worker has started before. If a later one starts slowly, the machine is busy, so it gets more time. */
   #hasStarted = false;
   #nextId = 0;
   #clock: ReturnType<typeof setInterval> | undefined;
 
   /**
+   * @param spawn Starts a worker.
    * @param prepare Loads the code for work on the main thread.
-   * @param onRefused Called once if work runs there.
-   * @param another Switches `spawn` to another way to start workers after a failure; false if there is none.
+   * @param onRefused Called once if work runs on the main thread.
+   * @param another Switches `spawn` to another way to start workers after a failure. Returns false if there is no other
+   * way.
    */
   constructor(
     spawn: () => Worker,
@@ -66,15 +90,15 @@ export class WorkerPool {
     this.#another = another;
   }
 
-  /** Lets the next request try a worker again. */
+  /** Allows the next request to start a worker, although an earlier one could not be started. */
   retry(): void {
     this.#isRefused = false;
   }
 
   /**
-   * Sends a request to a worker. Rejects with GaussianSplatError, or with the signal's reason as soon as that is
-   * aborted.
-   * @param here Runs it on the main thread, if workers are not available.
+   * Sends a request to a worker, and returns its answer. Rejects with GaussianSplatError, or with the signal's reason
+   * as soon as the signal is aborted.
+   * @param here Runs the request on the main thread, if workers are not available.
    */
   async run<T>(
     request: WorkerRequest,
@@ -87,7 +111,7 @@ export class WorkerPool {
     let job!: Job;
     const answer = new Promise<T>((resolve, reject) => {
       const id = this.#nextId++;
-      job = { ...listeners, id, request, transfer, here, resolve: resolve as Job['resolve'], reject, moves: 0 };
+      job = { ...listeners, id, request, signal, transfer, here, resolve: resolve as Job['resolve'], reject, moves: 0 };
       cancel = () => reject(signal.reason);
     });
     signal.addEventListener('abort', cancel, { once: true });
@@ -100,15 +124,19 @@ export class WorkerPool {
     }
   }
 
-  /** Assigns a request to a responsive worker, or to a new one. */
+  /**
+   * Assigns a request to a responsive worker, or to a new one. Runs it on the main thread if no worker can be started. A
+   * request may have been canceled while it waited for a late worker.
+   */
   #place(job: Job): void {
+    if (job.signal.aborted) return;
     if (this.#isRefused) return job.resolve(job.here());
     const slots = [...this.#slots];
     const late = slots.find(({ isLate }) => isLate);
     if (late) return void this.#doWithout(late, job);
     const free = slots.find((slot) => slot.missed < BUSY && slot.mayTake(job));
     const slot = free ?? (slots.length < MAX_WORKERS ? this.#start() : undefined);
-    // The creation of a worker has failed and reported it.
+    // No worker could be created, which `#start` has reported.
     if (this.#isRefused) return job.resolve(job.here());
     if (!slot) return void this.#queue.push(job);
     slot.take(job);
@@ -119,7 +147,7 @@ export class WorkerPool {
     this.#clock ??= setInterval(this.#tick, TICK_MS);
   }
 
-  /** The request was answered, failed or was canceled. */
+  /** Removes a request that was answered, has failed or was canceled. */
   #remove(job: Job): void {
     const { slot } = job;
     const at = this.#queue.indexOf(job);
@@ -134,7 +162,7 @@ export class WorkerPool {
     for (const job of this.#queue.splice(0)) this.#place(job);
   }
 
-  /** An idle worker ends after this time. */
+  /** Ends a worker after `idleMs` milliseconds, if it has no requests and gets none until then. */
   #rest(slot: WorkerSlot, idleMs: number): void {
     if (slot.jobs.size === 0) slot.rest(idleMs, () => this.#end(slot));
   }
@@ -180,13 +208,19 @@ export class WorkerPool {
     else if (job) this.#help(slot, job.id, message.max).catch(() => undefined);
   }
 
-  /** Starts helpers for a worker that packs a large scene: they end with that load. Without their code it packs alone. */
+  /**
+   * Starts helpers for a worker that packs a large scene. They end with that load. If their code cannot be loaded, the
+   * worker packs alone.
+   */
   async #help(slot: WorkerSlot, id: number, max: number): Promise<void> {
     const { startHelpers } = await help.get();
     if (slot.jobs.has(id)) slot.helpers.set(id, startHelpers(slot.worker, id, max, this.#spawn));
   }
 
-  /** The page may not allow workers. */
+  /**
+   * Handles a worker that could not be started, for example because the page does not allow workers. Its requests are
+   * assigned again.
+   */
   #fail(slot: WorkerSlot, reason: string): void {
     const jobs = [...slot.jobs.values()];
     this.#end(slot);
@@ -200,7 +234,10 @@ export class WorkerPool {
     this.#placeQueued();
   }
 
-  /** The worker's script does not load in time, but may later. */
+  /**
+   * Handles a worker that has not started in time, but may start later. Its requests run on the main thread unless it
+   * starts soon.
+   */
   #late(slot: WorkerSlot): void {
     slot.isLate = true;
     for (const job of slot.jobs.values()) {
@@ -210,7 +247,10 @@ export class WorkerPool {
     this.#placeQueued();
   }
 
-  /** The code may load for both: then the worker is only a little later. */
+  /**
+   * Runs a request on the main thread, unless the late worker starts first. The network may delay the code of both. In
+   * that case the worker starts soon after the code for the main thread is loaded.
+   */
   async #doWithout(slot: WorkerSlot, job: Job): Promise<void> {
     job.slot = undefined;
     try {
@@ -243,8 +283,8 @@ export class WorkerPool {
   };
 
   /**
-   * Requests in an unresponsive worker restart in others. Without a load of its own it reads a canceled one, or is
-   * dead.
+   * Restarts the requests of an unresponsive worker in other workers, except the load that it reads. The worker is
+   * ended if it is dead, or reads a canceled load.
    */
   #reassignJobs(slot: WorkerSlot): void {
     const isDead = slot.missed >= DEAD;
@@ -256,7 +296,10 @@ export class WorkerPool {
     this.#placeQueued();
   }
 
-  /** A load restarts alone in a worker, because it may have kept the other one busy. */
+  /**
+   * Restarts a load in another worker. A load that has been restarted does not share its worker, because it may have
+   * blocked the previous one. Rejects the load if it cannot restart.
+   */
   #move(slot: WorkerSlot, job: Job, moves: number, found = 'a worker that gave no sign of life'): void {
     slot.drop(job);
     job.moves += moves;
@@ -266,8 +309,8 @@ export class WorkerPool {
   }
 
   /**
-   * A worker that dies after its start most likely ran out of memory: in its current read, or in its only load. The
-   * others restart.
+   * Handles a worker that died after its start, most likely because memory ran out. The load that it was reading, or
+   * its only load, is rejected. The other loads restart.
    */
   #crash(slot: WorkerSlot, message: string): void {
     const jobs = [...slot.jobs.values()];

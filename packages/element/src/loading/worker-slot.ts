@@ -1,34 +1,39 @@
 import type { PageMessage, PartListener, PreviewListener, ProgressListener, WorkerRequest } from './protocol.js';
 
-/** A request to a worker. */
+/** A request to a worker, with its listeners. */
 export interface Job {
   readonly id: number;
   readonly request: WorkerRequest;
+  /** Signal that cancels the request. */
+  readonly signal: AbortSignal;
   readonly onProgress?: ProgressListener | undefined;
   readonly onPreview?: PreviewListener | undefined;
   readonly onPart?: PartListener | undefined;
-  /** Buffers of the request, which can then be sent only once. */
+  /** Buffers that are transferred with the request. A request with such buffers can be sent only once. */
   readonly transfer?: Transferable[] | undefined;
   /** Runs the request on the main thread. */
   readonly here: () => Promise<unknown>;
   readonly resolve: (answer: unknown) => void;
   readonly reject: (reason: unknown) => void;
-  /** Number of restarts. */
+  /**
+   * Number of restarts of the request in another worker. A restart because the worker died while it read the request
+   * counts more than 1.
+   */
   moves: number;
   slot?: WorkerSlot | undefined;
 }
 
-/** A worker, and its requests. */
+/** A worker, and the requests that it has been assigned. */
 export class WorkerSlot {
   readonly worker: Worker;
   readonly jobs = new Map<number, Job>();
-  /** Functions that end the helpers of a job. */
+  /** Functions that terminate the helpers of a job, by the number of the job. */
   readonly helpers = new Map<number, () => void>();
   isReady = false;
   isLate = false;
-  /** Number of missed pings. */
+  /** Number of intervals without a message of the worker since a ping. */
   missed = 0;
-  /** The request that it is reading, which alone keeps it from responding. */
+  /** Number of the request that the worker is reading, which keeps it from responding; undefined if it reads none. */
   reading: number | undefined;
   startTimer: ReturnType<typeof setTimeout> | undefined;
   #idleTimer: ReturnType<typeof setTimeout> | undefined;
@@ -37,19 +42,19 @@ export class WorkerSlot {
     this.worker = worker;
   }
 
-  /** Whether pings are useful. */
+  /** Whether the worker must be pinged: it has started, and has work. */
   get isAsked(): boolean {
     return this.isReady && (this.jobs.size > 0 || this.reading !== undefined);
   }
 
-  /** The job that it reads, unless that was canceled. */
+  /** The job that the worker is reading; undefined if it reads none, or a canceled one. */
   get reader(): Job | undefined {
     return this.reading === undefined ? undefined : this.jobs.get(this.reading);
   }
 
   /**
-   * A job that cannot restart, or has restarted, does not share its worker; nor does a worker that reads a canceled job
-   * get another.
+   * Returns whether the worker may take a job. A job that cannot restart, or has restarted, does not share its worker.
+   * A worker that reads a canceled job gets no other job.
    */
   mayTake(job: Job): boolean {
     const jobs = [...this.jobs.values()];
@@ -64,7 +69,7 @@ export class WorkerSlot {
     if (this.isReady) this.#send(job);
   }
 
-  /** Call when the script has started. */
+  /** Call when the worker's script has started. Sends all assigned jobs. */
   begin(): void {
     clearTimeout(this.startTimer);
     this.isReady = true;
@@ -72,7 +77,7 @@ export class WorkerSlot {
     for (const job of this.jobs.values()) this.#send(job);
   }
 
-  /** Call when the job is done or canceled. */
+  /** Call when a job is done, canceled or moved. Ends its helpers, and cancels its work in the worker. */
   drop(job: Job): void {
     job.slot = undefined;
     this.helpers.get(job.id)?.();

@@ -2,10 +2,10 @@ import { spawnText } from './spawn-worker.js';
 import { BOOTSTRAP, type CodeAnswer, type CodeQuestion } from './worker-bootstrap.js';
 
 /**
- * Ways to start the worker of the package, in order. First as text: the build converts the worker's code and each
- * reader to strings in separate modules. Bundlers differ in handling workers, but all split and serve lazily imported
- * modules. If a Content-Security-Policy excludes `blob:`, the second way is a file with all readers, which bundlers
- * that know this expression emit.
+ * Ways to start the worker of the package, tried in order. The first starts it from text: the build converts the
+ * worker's code and each reader to strings in separate modules. Bundlers differ in handling workers, but all split and
+ * serve lazily imported modules. The second is for a Content-Security-Policy that excludes `blob:`. It starts a file
+ * with all readers, which only bundlers that recognize this expression emit.
  */
 export const WORKER_SOURCES: readonly (() => Worker)[] = [
   spawnOfText,
@@ -21,13 +21,13 @@ function spawnOfText(): Worker {
   return worker;
 }
 
-/** Sends the missing texts for a chunk of the worker's code, its own last. */
+/** Sends the texts of a chunk and of its dependencies that the worker lacks; the text of the chunk itself is last. */
 async function answer({ id, chunk }: CodeQuestion, port: MessagePort, sent: Set<string>): Promise<void> {
   try {
     const { CHUNKS } = await import('./worker-code.js');
     const names = [...CHUNKS[chunk].needs, chunk].filter((name) => !sent.has(name));
     const modules = await Promise.all(names.map((name) => CHUNKS[name].load()));
-    // Other chunks may have been requested meanwhile: they depend on the texts sent here.
+    // Marked before the texts are posted, because answers to other requests may depend on these texts.
     for (const name of names) sent.add(name);
     port.postMessage({ id, texts: modules.map(({ default: text }) => text) } satisfies CodeAnswer);
   } catch (error) {

@@ -5,21 +5,21 @@
 import { CubeRenderTarget, HalfFloatType, LinearMipmapLinearFilter, type WebGPURenderer } from './three.js';
 
 /**
- * Side of a face in pixels, for mirrors; each level of higher roughness has half of it. Lights are blurred by {@link
- * SHADER}'s SIGMA, so more resolution is invisible.
+ * Side of a face in pixels at the level for mirrors; each rougher level has half of it. Lights are blurred by {@link
+ * SHADER}'s SIGMA, so that a higher resolution would not be visible.
  */
 const SIZE = 128;
-/** The last one has faces of 8 x 8. */
+/** Number of levels. The faces of the last level are 8 x 8 pixels. */
 const LEVELS = 5;
-/** Sharpness level that coarser ones are derived from. */
+/** Level from which all rougher levels are filtered. */
 const SHARPER = 2;
-/** Invocations of a workgroup along each side. */
+/** Number of invocations of a workgroup along each side. */
 const GROUP = 8;
 
 /**
- * Casts rays into boxes instead of rendering a scene with three.js, which would compile the shaders of six materials on
- * the main thread for a quarter of a second, and filter faces of 256 pixels with 256 samples each, which takes a
- * software adapter seconds.
+ * Casts rays into boxes. Rendering the scene with three.js would compile the shaders of six materials on the main
+ * thread for a quarter of a second. It would filter faces of 256 pixels with 256 samples each, which takes a software
+ * adapter seconds.
  */
 const SHADER = /* wgsl */ `
 const SIZE = ${SIZE}.0;
@@ -175,7 +175,7 @@ fn rougher(@builtin(global_invocation_id) id: vec3u) {
 }
 `;
 
-/** Resolves with the light, prefiltered on the GPU; its texture is the environment of three.js's materials. */
+/** Creates the environment, prefiltered on the GPU. Its texture is the `envMap` of three.js's materials. */
 export async function makeEnvironment(device: GPUDevice, renderer: WebGPURenderer): Promise<CubeRenderTarget> {
   const label = 'gs.mesh_environment';
   const module = device.createShaderModule({ label, code: SHADER });
@@ -221,7 +221,7 @@ export async function makeEnvironment(device: GPUDevice, renderer: WebGPURendere
   return target;
 }
 
-/** Allocates a cube texture of three.js with its levels, on the GPU. */
+/** Allocates a cube texture of three.js with its mip levels on the GPU. */
 function targetOf(renderer: WebGPURenderer): CubeRenderTarget {
   const target = new CubeRenderTarget(SIZE, {
     type: HalfFloatType,

@@ -26,41 +26,48 @@ import { makeEnvironment } from './environment.js';
 import { MeshResolve } from './mesh-resolve.js';
 import { light, showAsDisplayed, showThrough } from './shown-colors.js';
 
-/** Samples of a pixel. */
+/** Number of samples per pixel. */
 const SAMPLES = 4;
 
-/** Kinds of triangles, drawn in this order. */
+/** Kinds of triangles, which are drawn in this order. Each is a layer number of three.js. */
 const [OPAQUE, TRANSPARENT] = [0, 1];
 
-/** A texture of three.js, with the depths of its samples and one depth for each pixel. */
+/** Result of drawing one kind of triangles: `color` is three.js's texture, `texture` has one depth per pixel. */
 interface Drawn {
   readonly color: GPUTexture;
   readonly texture: GPUTexture;
 }
 
-/** Result of a ray cast: names as in the file, empty if there are none. */
+/** Result of a ray cast. `mesh` and `material` are the names in the file, empty if there are none. */
 export interface MeshHit {
   readonly model: MeshModel;
   readonly mesh: string;
   readonly material: string;
 }
 
-/** Draws meshes with three.js on the element's device, as layers of color and depth among the splats. */
+/**
+ * Draws meshes with three.js on the element's device, as layers of color and depth that the splats are blended with.
+ */
 export class MeshLayer {
   readonly device: GPUDevice;
   readonly #renderer: WebGPURenderer;
   readonly #scene = new Scene();
   readonly #camera = new ThreeCamera();
   readonly #target = new RenderTarget(1, 1, { type: HalfFloatType, samples: SAMPLES });
-  /** Transparent surfaces that no opaque one hides; its depth starts with the opaque one. */
+  /**
+   * Target of transparent surfaces that no opaque surface hides. Its depth buffer starts with the depth of the opaque
+   * surfaces.
+   */
   readonly #glass = new RenderTarget(1, 1, { type: HalfFloatType, samples: SAMPLES });
   readonly #resolve: MeshResolve;
   #depth: { readonly key: readonly unknown[]; readonly ofSplats: SceneDepth } | undefined;
-  /** The value of the last frame. */
+  /** Projection of the camera of the last frame. */
   #drawnFrom: Pick<Camera, 'near' | 'far' | 'orthographic'> = { near: 1, far: Infinity };
   readonly #shown = new Map<Model, Group>();
   readonly #environment: CubeRenderTarget;
   #size = '1 x 1';
+  /** The running compilation. It uses the targets until it ends. */
+  #compiling: Promise<unknown> | undefined;
 
   private constructor(device: GPUDevice, renderer: WebGPURenderer, environment: CubeRenderTarget) {
     this.device = device;
@@ -82,7 +89,7 @@ export class MeshLayer {
       reversedDepthBuffer: true,
       alpha: true,
     });
-    // The element handles losses itself, and errors of the page's device belong to the page.
+    // The element handles a lost device itself, and errors of the page's device belong to the page.
     renderer.onDeviceLost = () => undefined;
     await renderer.init();
     device.onuncapturederror = onuncapturederror;
@@ -91,10 +98,19 @@ export class MeshLayer {
   }
 
   /**
-   * Compiles the materials of a model, a few milliseconds of the main thread at a time, and on the GPU without blocking
-   * other work.
+   * Compiles the materials of a model without blocking: for a few milliseconds at a time on the main thread, and
+   * asynchronously on the GPU.
    */
   async compile(model: Model): Promise<void> {
+    const compiling = (this.#compiling = this.#compile(model));
+    try {
+      await compiling;
+    } finally {
+      if (this.#compiling === compiling) this.#compiling = undefined;
+    }
+  }
+
+  async #compile(model: Model): Promise<void> {
     this.#show(model);
     for (const [kind, target] of [
       [OPAQUE, this.#target],
@@ -102,7 +118,8 @@ export class MeshLayer {
     ] as const) {
       this.#camera.layers.set(kind);
       this.#renderer.setRenderTarget(target);
-      // The compile list is built before the first await, so culling is disabled for it.
+      // compileAsync collects the objects before its first await. Culling is disabled until then, so that no object is
+      // missing.
       const culled = model.setCulling(false);
       const compiled = this.#renderer.compileAsync(this.#scene, this.#camera);
       model.setCulling(culled);
@@ -115,7 +132,7 @@ export class MeshLayer {
     this.#look(camera, world);
     const { width, height } = camera;
     const size = `${width} x ${height}`;
-    if (size !== this.#size) for (const target of [this.#target, this.#glass]) target.setSize(width, height);
+    if (size !== this.#size) this.#resize(width, height);
     this.#size = size;
     this.#drawnFrom = camera;
     const opaque = this.#drawKind(OPAQUE, this.#target);
@@ -124,7 +141,15 @@ export class MeshLayer {
     return { depth: this.#depthFor(opaque, glass, depth?.out) };
   }
 
-  /** Draws the triangles of a kind. Transparent ones come second, and are hidden by opaque ones. */
+  #resize(width: number, height: number): void {
+    for (const target of [this.#target, this.#glass]) {
+      target.setSize(width, height);
+      // Pipelines need the formats of the textures, which three.js would otherwise create only with the next frame.
+      if (this.#compiling) this.#renderer.initRenderTarget(target);
+    }
+  }
+
+  /** Draws the triangles of one kind. Opaque triangles are drawn first, and hide transparent ones behind them. */
   #drawKind(kind: number, target: RenderTarget): Drawn {
     const renderer = this.#renderer;
     this.#camera.layers.set(kind);
@@ -136,7 +161,10 @@ export class MeshLayer {
     return { color, texture: this.#resolve.run(kind, samples) };
   }
 
-  /** Corrects the probe results of splats behind meshes. */
+  /**
+   * Returns the probe answers, corrected for meshes: the depth of a mesh in front of the splats, and transmittance 0
+   * for a requested depth behind a mesh.
+   */
   async probe(points: readonly ProbePoint[], answers: readonly ProbeAnswer[]): Promise<readonly ProbeAnswer[]> {
     const { width = 0, height = 0 } = this.#resolve.depth ?? {};
     const within = (at: number, size: number): number => Math.min(size - 1, Math.max(0, Math.floor(at)));
@@ -154,7 +182,10 @@ export class MeshLayer {
     });
   }
 
-  /** The first triangle on a ray in the last frame: origin and direction in viewer space. */
+  /**
+   * Returns the first triangle of the last frame that a ray hits; null if there is none. Origin and direction in viewer
+   * space.
+   */
   hit(origin: Point, direction: Point): MeshHit | null {
     const ray = new Raycaster(new Vector3(...origin), new Vector3(...direction));
     ray.layers.enableAll();
@@ -169,7 +200,14 @@ export class MeshLayer {
     return first;
   }
 
+  /** Frees the GPU memory, when a running compilation has ended. */
   destroy(): void {
+    const free = (): void => this.#free();
+    if (this.#compiling) void this.#compiling.then(free, free);
+    else free();
+  }
+
+  #free(): void {
     for (const group of this.#shown.values()) this.#scene.remove(group);
     this.#environment.dispose();
     this.#target.depthTexture?.dispose();
@@ -180,7 +218,10 @@ export class MeshLayer {
     void this.#renderer.dispose();
   }
 
-  /** Bound once for the same textures. @param out receives the depth of the splats */
+  /**
+   * Returns the depth test of the splats against the meshes, which is created again only if a texture changes.
+   * @param out Texture that receives the depth of the splats.
+   */
   #depthFor(opaque: Drawn, second: Drawn | undefined, out: GPUTexture | undefined): SceneDepth {
     const { orthographic } = this.#drawnFrom;
     const far = orthographic ? this.#drawnFrom.far : Infinity;
@@ -193,7 +234,7 @@ export class MeshLayer {
     return this.#depth.ofSplats;
   }
 
-  /** Sets the transforms of models in viewer space, the space of the lights. */
+  /** Adds, removes and places models in three.js's scene. Its space is viewer space, in which the lights are fixed. */
   #arrange(models: readonly PlacedModel[], world: ViewerFrame): void {
     const toViewer = matrixOfFrame(world);
     for (const [model, root] of this.#shown) {
@@ -221,7 +262,7 @@ export class MeshLayer {
       materials.forEach(showAsDisplayed);
       const isGlass = materials.some(({ transparent }) => transparent);
       mesh.layers.set(isGlass ? TRANSPARENT : OPAQUE);
-      // Splats are in front of it or behind it.
+      // Transparent surfaces write depth, because each splat is drawn either in front of them or behind them.
       for (const material of isGlass ? materials : []) {
         material.depthWrite = true;
         material.alphaTest = 1 / 255;
@@ -240,7 +281,8 @@ export class MeshLayer {
     this.#camera.matrix.copy(this.#camera.matrixWorld);
     const [scaleX, scaleY] = [(2 * fx) / width, (2 * fy) / height];
     const [offsetX, offsetY] = [1 - (2 * cx) / width, (2 * cy) / height - 1];
-    // Depth is near / z: 1 at the near plane, 0 at infinity; with parallel rays it falls linearly to 0 at the far plane.
+    // Depth is near / z: 1 at the near plane, 0 at infinity. An orthographic camera has a depth that falls linearly to
+    // 0 at the far plane.
     const projection = orthographic
       ? [
           ...[scaleX, 0, 0, -offsetX],
@@ -254,5 +296,5 @@ export class MeshLayer {
   }
 }
 
-/** From a camera's axes (x right, y down, z forward) to those of OpenGL. */
+/** From the camera's axes (x right, y down, z forward) to those of OpenGL (x right, y up, z backward). */
 const GL_AXES: Matrix4 = [1, 0, 0, 0, 0, -1, 0, 0, 0, 0, -1, 0, 0, 0, 0, 1];

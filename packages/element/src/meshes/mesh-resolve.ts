@@ -1,4 +1,4 @@
-/** Resolves the depths of several samples of three.js to one depth for each pixel. */
+/** Resolves three.js's multisampled depth to one depth for each pixel. */
 
 const SHADER = /* wgsl */ `
 @group(0) @binding(0) var samples: texture_depth_multisampled_2d;
@@ -18,7 +18,7 @@ fn fragment(@builtin(position) position: vec4f) -> @builtin(frag_depth) f32 {
 }
 `;
 
-/** Reads the depth at single points: 0 is at infinity. */
+/** Shader that reads the depth at single pixels; 0 is infinitely far. */
 const PROBE = /* wgsl */ `
 @group(0) @binding(0) var depths: texture_depth_2d;
 @group(0) @binding(1) var<storage, read> points: array<vec2u>;
@@ -33,7 +33,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
 export class MeshResolve {
   readonly #device: GPUDevice;
   readonly #pipeline: GPURenderPipeline;
-  /** For each kind of triangles: the depths of the samples, and those of the pixels. */
+  /** For each kind of triangles: `samples`, the multisampled depth, and `depth`, the depth of the pixels. */
   readonly #resolved: { samples: GPUTexture; depth: GPUTexture; group: GPUBindGroup }[] = [];
 
   constructor(device: GPUDevice) {
@@ -48,13 +48,18 @@ export class MeshResolve {
     });
   }
 
-  /** Depth of opaque triangles in the last frame: `near / z`, 0 without any. */
+  /**
+   * Depth of opaque triangles in the last frame, `near / z`: 0 in pixels without triangles. undefined before the first
+   * frame.
+   */
   get depth(): GPUTexture | undefined {
     return this.#resolved[0]?.depth;
   }
 
   /**
-   * @param kind Kind of triangles, from 0 on.
+   * Resolves the depth of a kind of triangles.
+   * @param kind Kind of triangles, from 0.
+   * @param samples Multisampled depth of the frame.
    * @returns The depth of the frame; the same texture while its size does not change.
    */
   run(kind: number, samples: GPUTexture): GPUTexture {
@@ -78,7 +83,10 @@ export class MeshResolve {
     return depth;
   }
 
-  /** Stored depths at pixels of the last frame; 0 without any. Reads back from the GPU: for clicks and labels. */
+  /**
+   * Returns the stored depth of opaque triangles at pixels [x, y] of the last frame; 0 in pixels without triangles.
+   * Reads back from the GPU, for clicks and labels.
+   */
   async read(pixels: readonly (readonly [number, number])[]): Promise<Float32Array> {
     const { depth } = this;
     if (depth === undefined || pixels.length === 0) return new Float32Array(pixels.length);

@@ -14,21 +14,21 @@ import {
   Texture,
 } from './three.js';
 
-/** Just before the end, because at the end itself an animation restarts. */
+/** Seconds before the end at which an animation stops, because at the end itself it restarts. */
 const BEFORE_END = 1e-4;
-/** The triangles of a glTF as objects of three.js. */
+/** Triangles of a glTF file as objects of three.js. */
 export class Model {
   readonly root: Group;
   readonly triangles: number;
   /** Bytes of GPU memory of geometry and textures. */
   readonly byteLength: number;
-  /** In its own coordinates, y up. */
+  /** Bounds in the model's own coordinates, y up. */
   readonly bounds: Bounds;
-  /** Duration of its longest animation in seconds; NaN without. */
+  /** Duration of the longest animation, seconds; NaN without animations. */
   readonly duration: number;
-  /** Whether it has its own lights. */
+  /** Whether the file contains lights. */
   readonly hasLights: boolean;
-  /** Incremented when an animation has moved it. */
+  /** Incremented when an animation has moved the model. */
   version = 0;
   readonly #mixer: AnimationMixer | undefined;
   readonly #meshes: readonly Mesh[];
@@ -57,16 +57,16 @@ export class Model {
     if (animations.length === 0) return;
     this.#mixer = new AnimationMixer(root);
     for (const clip of animations) this.#mixer.clipAction(clip).play();
-    // Skinned meshes may leave their bounds.
+    // Meshes are not culled, because skinning may move them out of their bounds.
     this.setCulling(false);
     this.setTime(0);
   }
 
   /**
-   * Creates the objects of a validated file: the loader of three.js finds all buffer views and images in its cache, and
-   * fetches nothing.
+   * Creates the objects of a validated file. The loader of three.js finds all buffer views and images in its cache, so
+   * that it fetches nothing.
    * @param url Address for messages.
-   * @param reservation Its GPU memory, which is released with the model, or when this rejects.
+   * @param reservation GPU memory of the model, released with the model or when this call rejects.
    * @throws GaussianSplatError `decode/*`
    */
   static async read(mesh: LoadedMesh, url: string, reservation: Reservation): Promise<Model> {
@@ -74,7 +74,7 @@ export class Model {
       const views = await unpackedViews(mesh.views, url);
       const loader = new GLTFLoader();
       loader.register((parser) => ({ name: 'checked', beforeRoot: () => fill(parser, views, mesh.images) }));
-      // Typed as a file, but the loader accepts JSON as well.
+      // The type of the first parameter is the bytes of a file, but the loader accepts parsed JSON as well.
       return new Model(await loader.parseAsync(mesh.json, ''), reservation);
     } catch (error) {
       reservation.release();
@@ -82,21 +82,23 @@ export class Model {
     }
   }
 
-  /** Sets animations to a time, in seconds. */
+  /** Sets all animations to a time in seconds, clamped to the duration. */
   setTime(seconds: number): void {
     if (this.#mixer === undefined) return;
     this.#mixer.setTime(Math.min(Math.max(0, seconds), this.duration - BEFORE_END));
+    // three.js computes the bounds of a skinned mesh at its first ray cast, for the pose of that time.
+    for (const mesh of this.#meshes) if (mesh.boundingSphere) mesh.boundingSphere = null;
     this.version++;
   }
 
-  /** Culls meshes outside the camera's view, or not. @returns the previous setting */
+  /** Sets whether meshes outside the camera's view are culled. @returns the previous setting */
   setCulling(isOn: boolean): boolean {
     const wasOn = this.#meshes.some(({ frustumCulled }) => frustumCulled);
     for (const mesh of this.#meshes) mesh.frustumCulled = isOn;
     return wasOn;
   }
 
-  /** Calls back with each mesh and its materials. */
+  /** Calls a function with each mesh and its materials. */
   forEachMesh(callback: (mesh: Mesh, materials: readonly Material[]) => void): void {
     for (const mesh of this.#meshes) callback(mesh, [mesh.material].flat());
   }
@@ -126,7 +128,7 @@ const texturesOf = (material: Material): Texture[] =>
     (value): value is Texture => value !== null && typeof value === 'object' && 'isTexture' in value,
   );
 
-/** Puts the bytes of a file into the cache that the loader reads before it fetches. */
+/** Puts the buffer views and images of a file into the cache that the loader reads before it fetches. */
 async function fill(
   { cache, sourceCache }: GLTFParser,
   views: readonly (ArrayBuffer | undefined)[],

@@ -1,16 +1,20 @@
-/** Loaded when an element has meshes: three.js is behind this module. */
+/** Opens mesh files. Loaded on demand, because of three.js, which this module imports. */
 import { GaussianSplatError, loadModule } from '@gaussian-splat/core';
 import { MemoryLedger, type GaussianScene } from '@gaussian-splat/renderer';
 import { LoadedGaussians } from '../gpu/loaded-gaussians.js';
 import { limitScenes } from '../gpu/memory-budget.js';
 import { limited, type OpenOptions } from '../gpu/open-scene.js';
 import { assertWebGpu } from '../gpu/request-device.js';
+import { withLease } from '../gpu/shared-device.js';
 import type { Timeline } from '../dynamic/dynamic-model.js';
 import type { FileRequest, LoadedMesh, SceneRequest } from '../loading/protocol.js';
 import type { SceneLoader, SceneWorker } from '../loading/scene-loader.js';
 import { Model } from './model.js';
 
-/** Fetches a glTF and the files that it names, and checks them. Rejects with GaussianSplatError, or the signal's reason. */
+/**
+ * Fetches and validates a glTF file and the files that it refers to. Rejects with GaussianSplatError, or the signal's
+ * reason.
+ */
 export function fetchMesh(
   loader: SceneLoader,
   { url, credentials, limits }: FileRequest,
@@ -20,7 +24,7 @@ export function fetchMesh(
   const request = { url, credentials, limits };
   const here = ({ openMeshFile }: SceneWorker): Promise<LoadedMesh> => openMeshFile(request, signal, onProgress);
   return loader.ask({ type: 'mesh', request }, signal, here, { onProgress }).catch(async (error: unknown) => {
-    // The worker's script of one file, for strict pages of bundlers, has no decoders.
+    // The worker that bundlers build as a single file for strict pages contains no decoders.
     if (!isMissingDecoder(error)) throw error;
     return here(await loadModule('the code that reads meshes', () => import('../loading/scene-worker.js')));
   });
@@ -30,8 +34,8 @@ const isMissingDecoder = (error: unknown): boolean =>
   error instanceof GaussianSplatError && error.code === 'network/unreachable' && /^the decoder/.test(error.where);
 
 /**
- * Reserves the GPU memory that a mesh takes, and makes its objects. Rejects with GaussianSplatError, or the signal's reason.
- * @param most bytes that it may take; undefined for no limit but the device's
+ * Reserves the GPU memory of a mesh, then creates its objects. `memoryBudget` is the limit in bytes; if it is
+ * undefined, only the device limits the memory. Rejects with GaussianSplatError, or the signal's reason.
  */
 export async function openModel(
   mesh: LoadedMesh,
@@ -53,13 +57,11 @@ export async function openModel(
   }
 }
 
-/** Opens a mesh as a source that has no splats, so that its life is that of all sources. */
+/** Opens a mesh file as a source without splats, which has the same lifecycle as every source. */
 export async function openMesh(request: SceneRequest, options: OpenOptions): Promise<LoadedGaussians> {
   await assertWebGpu();
   const { device, signal, onProgress, live: dynamicRequest, submissions, beforeUpload, loader } = options;
-  const acquiring = device.acquire();
-  acquiring.catch(() => undefined);
-  try {
+  return withLease(device, async (acquiring) => {
     const mesh = await fetchMesh(loader, limited(request, options), signal, onProgress);
     const lease = await acquiring;
     beforeUpload(mesh.byteLength);
@@ -71,16 +73,13 @@ export async function openMesh(request: SceneRequest, options: OpenOptions): Pro
     const loaded = new LoadedGaussians(lease, noSplats(), bounds, submissions, { live, warnings });
     loaded.model = model;
     return loaded;
-  } catch (error) {
-    acquiring.then(
-      (lease) => lease.release(),
-      () => undefined,
-    );
-    throw error;
-  }
+  });
 }
 
-/** Exposes the animations of a model as the timeline of a scene. */
+/**
+ * Returns the animations of a model as the timeline of a scene.
+ * @param onShown Called with each time, in seconds, that is shown.
+ */
 function timelineOf(model: Model, onShown: (seconds: number) => void): Timeline {
   let shown = 0;
   return {
@@ -100,7 +99,7 @@ const noSplats = (): GaussianScene & { byteLength: number; destroy(): void } => 
   shPrecision: 'float16',
   antialiased: false,
   origin: [0, 0, 0],
-  pages: [],
+  blocks: [],
   version: 0,
   byteLength: 0,
   destroy: () => undefined,

@@ -1,18 +1,23 @@
-/** Meshes are drawn in display-referred colors, like the colors of trained splats, so that the two blend. */
+/**
+ * Converts meshes to display-referred colors, like those of trained splats, so that meshes and splats blend correctly.
+ */
 import { neutralToneMapping, output, sRGBTransferOETF, vec4, type Material, type Texture } from './three.js';
 
-/** Intensity of the surrounding light that leaves the base color of a rough gray surface facing the camera unchanged. */
+/** Intensity of the environment at which a rough gray surface that faces the camera has its base color. */
 const EVEN_LIGHT = 0.62;
 
-/** Lit materials go through Khronos' PBR Neutral. An unlit one (`KHR_materials_unlit`) has its base color. */
+/**
+ * Makes a material output sRGB. The colors of lit materials are tone-mapped by Khronos' PBR Neutral; those of unlit
+ * materials (`KHR_materials_unlit`) stay the base color.
+ */
 export function showAsDisplayed(material: Material): void {
   const light = material.isMeshBasicMaterial ? output.rgb : neutralToneMapping(output.rgb, 1);
   material.outputNode = vec4(sRGBTransferOETF(light.clamp(0, 1)), output.a);
 }
 
 /**
- * Glass transmits the splats and meshes behind it by a fraction, like `alphaMode: BLEND`. It does not tint them: a
- * layer has one alpha for red, green and blue.
+ * Replaces the transmission of a material by transparency, like `alphaMode: BLEND`. Glass does not tint what is behind
+ * it, because a layer has one alpha for red, green and blue.
  */
 export function showThrough(material: Material): void {
   if (!material.transmission) return;
@@ -21,7 +26,7 @@ export function showThrough(material: Material): void {
   material.transparent = true;
 }
 
-/** Lights a material from all around. An unlit one has an `envMap`, too, of mirrors. */
+/** Lights a material by the environment. Skips unlit materials, whose `envMap` would be a mirror reflection. */
 export function light(material: Material, environment: Texture): void {
   if (material.isMeshBasicMaterial || !('envMap' in material)) return;
   material.envMap = environment;

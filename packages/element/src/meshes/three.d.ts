@@ -1,6 +1,6 @@
 /**
- * As much of three.js as is used here. `npm run build` makes the module, of scripts/three.mjs: apps need not install three.js, nor its types, which bring
- * eight more packages.
+ * Types of the part of three.js in use. `npm run build` builds the module from scripts/three.mjs, so that apps need
+ * neither three.js nor its types, which depend on eight more packages.
  */
 export class Matrix4 {
   elements: number[];
@@ -14,7 +14,7 @@ export class Vector3 {
   y: number;
   z: number;
 }
-/** Where a ray meets a triangle. */
+/** Intersection of a ray with a triangle. `distance` is from the origin of the ray. */
 export interface Intersection {
   readonly distance: number;
   readonly object: Object3D;
@@ -23,7 +23,7 @@ export interface Intersection {
 export class Raycaster {
   constructor(origin: Vector3, direction: Vector3);
   readonly layers: Layers;
-  /** Nearest first. */
+  /** Returns all intersections, the nearest first. */
   intersectObject(object: Object3D, recursive: boolean): Intersection[];
 }
 export class Box3 {
@@ -32,7 +32,7 @@ export class Box3 {
   setFromObject(object: Object3D, precise?: boolean): this;
   isEmpty(): boolean;
 }
-/** Which of 32 kinds an object is of, or a camera sees. */
+/** Layers of an object or camera, as bits of 32: a camera draws the objects that share one of its layers. */
 export class Layers {
   set(kind: number): void;
   enableAll(): void;
@@ -75,7 +75,7 @@ export class RenderTarget {
   setSize(width: number, height: number): void;
   dispose(): void;
 }
-/** The prefiltered light of all directions, of which three.js reads a level by the roughness of a material. */
+/** Prefiltered light from all directions. Three.js selects a mip level by the roughness of a material. */
 export interface CubeTexture extends Texture {
   readonly mipmaps: { readonly width: number; readonly height: number }[];
   isPMREMTexture: boolean;
@@ -85,13 +85,13 @@ export class CubeRenderTarget {
   constructor(size: number, options: object);
   dispose(): void;
 }
-/** A value of a shader. */
+/** A value in a shader. */
 export interface ShaderNode {
   readonly rgb: ShaderNode;
   readonly a: ShaderNode;
   clamp(low: number, high: number): ShaderNode;
 }
-/** What a material has computed: linear light, and alpha. */
+/** Result of a material: linear light and alpha. */
 export const output: ShaderNode;
 export function neutralToneMapping(color: ShaderNode, exposure: number): ShaderNode;
 export function sRGBTransferOETF(color: ShaderNode): ShaderNode;
@@ -99,17 +99,17 @@ export function vec4(rgb: ShaderNode, a: ShaderNode): ShaderNode;
 
 export class Material {
   name: string;
-  /** Of glTF's `KHR_materials_unlit`. */
+  /** True for the materials of glTF's `KHR_materials_unlit`. */
   readonly isMeshBasicMaterial?: true;
   envMap?: Texture | null;
   envMapIntensity?: number;
-  /** What is written in place of {@link output}. */
+  /** Value that is written instead of {@link output}. */
   outputNode?: ShaderNode;
   transparent: boolean;
   opacity: number;
   depthWrite: boolean;
   alphaTest: number;
-  /** Of glTF's `KHR_materials_transmission`. */
+  /** Fraction of light that passes through, 0..1: glTF's `KHR_materials_transmission`. */
   transmission?: number;
   dispose(): void;
 }
@@ -126,6 +126,8 @@ export class Mesh extends Object3D {
   readonly isMesh: true;
   geometry: BufferGeometry;
   material: Material | Material[];
+  /** Bounds of a skinned mesh; null until a ray is cast. */
+  boundingSphere?: object | null;
 }
 export interface AnimationClip {
   readonly duration: number;
@@ -142,7 +144,7 @@ export class WebGPURenderer {
   readonly backend: { get(object: object): { readonly texture?: GPUTexture } };
   init(): Promise<unknown>;
   setRenderTarget(target: RenderTarget | null): void;
-  initRenderTarget(target: CubeRenderTarget): void;
+  initRenderTarget(target: RenderTarget | CubeRenderTarget): void;
   setClearColor(color: number, alpha: number): void;
   autoClearDepth: boolean;
   render(scene: Scene, camera: Camera): void;
@@ -157,9 +159,9 @@ export const LinearMipmapLinearFilter: number;
 export const WebGPUCoordinateSystem: number;
 
 export interface GLTFParser {
-  /** Buffer views, accessors and so on, by type and number. */
+  /** Promises of buffer views, accessors and other objects, by type and index: `bufferView:0`. */
   readonly cache: { add(key: string, value: Promise<unknown>): void };
-  /** Textures of images, by number. */
+  /** Textures by index of their image. */
   readonly sourceCache: Record<number, Promise<Texture>>;
 }
 export class GLTFLoader {
@@ -171,7 +173,9 @@ export class GLTFLoader {
 }
 
 export interface MeshoptDecoder {
-  /** Rejects if WebAssembly is forbidden; absent if there is none. */
+  /**
+   * Fulfills when the decoder is compiled. Rejects if the page forbids WebAssembly; absent if there is no WebAssembly.
+   */
   readonly ready?: Promise<void>;
   decodeGltfBufferAsync(
     count: number,

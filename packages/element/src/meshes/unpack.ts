@@ -2,7 +2,10 @@ import { GaussianSplatError } from '@gaussian-splat/core';
 import type { LoadedMesh } from '../loading/protocol.js';
 import { loadMeshoptDecoder } from './three.js';
 
-/** Decodes the buffer views that meshoptimizer has compressed. Throws `decode/corrupt`, or `decode/unsupported` if the page forbids WebAssembly. */
+/**
+ * Returns all buffer views of a file, decoding those that meshoptimizer has compressed.
+ * @throws GaussianSplatError `decode/corrupt`, or `decode/unsupported` if the page forbids WebAssembly
+ */
 export async function unpackedViews(
   views: LoadedMesh['views'],
   where: string,

@@ -1,4 +1,4 @@
-/** The shadow of a scene that WebGL draws: beneath it, in the same context. */
+/** Shadow of a scene that WebGL draws: beneath the splats, in the same context. */
 import { multiply, type Camera } from '@gaussian-splat/core';
 import { DATA_WIDTH, GlGaussians, GlRenderer } from '@gaussian-splat/renderer/webgl';
 import type { WebGlBackend } from '../webgl/webgl-backend.js';
@@ -7,7 +7,7 @@ import { alphaOfScene } from './take-alpha-gl.js';
 
 const upTo = (count: number): Uint32Array => Uint32Array.from({ length: count }, (_, i) => i);
 
-/** Takes images of a painter's scene, and draws shadows beneath it. */
+/** Returns the functions that capture images of a backend's scene and draw its shadow. */
 export function glTaker(backend: WebGlBackend): Taker {
   const { lease, textures } = backend.scene;
   const { gl } = lease;
@@ -16,7 +16,7 @@ export function glTaker(backend: WebGlBackend): Taker {
   const show: Taker['show'] = async (packed, map, toWorld) => {
     const gaussians = await GlGaussians.upload(gl, packed);
     const renderer = new GlRenderer(gl, gaussians);
-    // All lie in one plane: any order shows the same.
+    // The splats of a shadow lie in one plane, so any order gives the same image.
     renderer.setOrder(upTo(DATA_WIDTH * Math.max(1, Math.ceil(packed.count / DATA_WIDTH))), packed.count);
     let isSeen = true;
     const beneath = (camera: Camera): void => {

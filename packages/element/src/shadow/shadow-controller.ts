@@ -1,4 +1,4 @@
-/** Draws the shadow under the scene; loaded for elements with the attribute `shadow-intensity`. */
+/** Draws the shadow under the scene. Loaded for elements with the attribute `shadow-intensity`. */
 import { eyeOf, Lazy, multiply, type Camera, type Matrix4 } from '@gaussian-splat/core';
 import { GaussianBuffers, type FrameTarget, type Placement, type World } from '@gaussian-splat/renderer';
 import type { ReactiveController, ReactiveControllerHost } from 'lit';
@@ -16,7 +16,7 @@ import type { WorldEntry } from '../world-entry.js';
 import { shadowSplats, takeShadow, type ShadowMap, type TakeAlpha } from './shadow-map.js';
 import { packSplats } from './splat-file.js';
 
-/** The interface of the element that the shadow uses. */
+/** The part of the element that the shadow uses. */
 export interface ShadowHost {
   readonly element: ReactiveControllerHost & HTMLElement;
   readonly attributes: Pick<Attributes, 'shadowIntensity' | 'shadowSoftness'>;
@@ -38,12 +38,18 @@ export interface ShadowHost {
   warn(sentence: string): void;
 }
 
-/** A moving scene's shadow is updated at most this often, ms, and takes at most a tenth of the time. */
+/**
+ * Limits for the shadow of a moving scene: the minimum interval between updates, milliseconds, and the minimum ratio of
+ * the interval to the time of an update.
+ */
 const [MIN_MS, SHARE] = [500, 10];
-/** Camera height above the ground, in radii, below which the shadow fades out: it is invisible from below. */
+/**
+ * Height of the camera above the ground, in radii of the subject, below which the shadow fades out. From below the
+ * ground the shadow is invisible.
+ */
 const FADE = 0.08;
 
-/** How dark and how soft: `shadow-intensity` and `shadow-softness`. */
+/** Parses `shadow-intensity` and `shadow-softness`, 0..1 each. */
 export function readShadow({ attributes, warn }: Pick<ShadowHost, 'attributes' | 'warn'>): {
   readonly intensity: number;
   readonly softness: number;
@@ -57,23 +63,26 @@ export function readShadow({ attributes, warn }: Pick<ShadowHost, 'attributes' |
   };
 }
 
-/** A shadow in the world of an element. */
+/** A shadow that is drawn in the world of an element. */
 interface Shown {
   readonly context: DeviceOwner['context'];
   readonly map: ShadowMap;
-  /** From its own square to the world. */
+  /** Transform from the square of the shadow to the world. */
   readonly toWorld: Matrix4;
-  /** @param opacity 0..1, visibility of the shadow to the camera */
+  /** Sets the visibility of the shadow. @param opacity 0..1 */
   fade(opacity: number): void;
   remove(): void;
 }
 
 const isGl = ({ place }: Backend): boolean => place.context instanceof WebGL2RenderingContext;
 
-/** Captures images of the scene when it has changed, makes flat splats of them, and puts these under the scene. */
+/**
+ * Captures images of the scene when it has changed, converts them to flat splats, and draws these splats under the
+ * scene.
+ */
 export class ShadowController implements ReactiveController, Mover {
   readonly #core: ShadowHost;
-  /** The content that the current shadow was made for. */
+  /** Key of the content that the current shadow was made for. */
   #key = '';
   #shown: Shown | undefined;
   #isBusy = false;
@@ -94,6 +103,8 @@ export class ShadowController implements ReactiveController, Mover {
     this.#core = core;
     core.element.addController(this);
     core.behaviors.add(this);
+    // Without a scene no frame is drawn that would remove the shadow.
+    core.element.addEventListener('emptied', () => core.view.backend === null && this.#remove());
   }
 
   hostUpdated(): void {
@@ -109,7 +120,7 @@ export class ShadowController implements ReactiveController, Mover {
     const { backend } = view;
     if (this.#shown && this.#shown.context !== backend?.place.context) this.#remove();
     if (!backend || backend.isLost || isImmersed) return false;
-    // This very frame may cut splats, or place them elsewhere.
+    // Waits for the end of the task, because this frame may still cut or move splats.
     queueMicrotask(() => this.#follow(backend, now));
     this.#fade();
     return false;
@@ -127,7 +138,7 @@ export class ShadowController implements ReactiveController, Mover {
     }
   }
 
-  /** Changes whenever the shadow would; empty without a shadow. */
+  /** Text that changes whenever the shadow would change; empty without a shadow. */
   #contentKey(): string {
     const { sources } = this.#core;
     const { intensity, softness } = readShadow(this.#core);
@@ -145,7 +156,7 @@ export class ShadowController implements ReactiveController, Mover {
 
   #renew(backend: Backend, key: string, now: number): void {
     if (now < this.#notBefore) {
-      // The shadow of a finished motion shows the last pose.
+      // When a motion has ended, the shadow must show its last pose.
       this.#timer ??= setTimeout(() => {
         this.#timer = undefined;
         this.#core.requestFrame();
@@ -181,6 +192,7 @@ export class ShadowController implements ReactiveController, Mover {
       if (rows.length === 0) return this.#clear();
       const packed = await packSplats(rows, services.sceneLoader, scene.signal);
       const shown = await taker.show(packed, map, worldOf(map, frame));
+      if (backend.isDestroyed) return shown.remove();
       this.#shown?.remove();
       this.#shown = shown;
     } finally {
@@ -188,7 +200,7 @@ export class ShadowController implements ReactiveController, Mover {
     }
   }
 
-  /** Captures images and shows shadows with the painter's own API. */
+  /** Returns the functions that capture images and draw shadows with the API of the backend. */
   async #taker(backend: Backend): Promise<Taker> {
     if (isGl(backend)) {
       const { glTaker } = await this.#gl.get();
@@ -227,21 +239,21 @@ export class ShadowController implements ReactiveController, Mover {
     this.#clear();
   }
 
-  /** No shadow until the content changes. */
+  /** Removes the shadow until the content changes. */
   #clear(): void {
     this.#shown?.remove();
     this.#shown = undefined;
   }
 }
 
-/** Captures images, and draws shadows. */
+/** Captures images of a scene's opacity, and draws shadows. */
 export interface Taker {
   readonly take: TakeAlpha;
   show(packed: Parameters<typeof GaussianBuffers.upload>[1], map: ShadowMap, toWorld: Matrix4): Promise<Shown>;
   free(): void;
 }
 
-/** From the square of a shadow to the world. */
+/** Returns the transform from the square of a shadow to the world. */
 function worldOf({ middle: [x, y, z], half }: ShadowMap, frame: ViewerFrame): Matrix4 {
   const placed = [half, 0, 0, x, 0, half, 0, y, 0, 0, half, z, 0, 0, 0, 1];
   return multiply(transposed(matrixOfFrame(frame)), placed);

@@ -1,19 +1,23 @@
-/** A contact shadow from images of the subject above the ground: taken from above, within four heights. Pure. */
+/**
+ * Computes a contact shadow from images of the subject above the ground, which are taken from above with four height
+ * limits. Independent of the GPU.
+ */
 import { lookAt, type Camera, type Vector3 } from '@gaussian-splat/core';
 import { toScene, type ViewerFrame } from '../camera/orbit.js';
 import type { SplatRow } from './splat-file.js';
 
-/** Pixels of a side of the images. */
+/** Width and height of the images, pixels. */
 export const SHADOW_PIXELS = 128;
-/** Splats of a side of the shadow; the standard deviation of each, in distances between them. */
+/** Number of splats along a side of the shadow, and standard deviation of a splat in units of their spacing. */
 const [CELLS, SPREAD] = [48, 0.75];
-/** Half of the shadow's side relative to the radius of the subject's sphere: a soft edge extends beyond its caster. */
+/** Half of the shadow's side in radii of the subject: a soft edge extends beyond the subject. */
 const REACH = 1.5;
-/** How far the camera stands away, in radii: its rays are as good as parallel. */
+/** Distance of the camera in radii of the subject. Its rays are nearly parallel. */
 const DISTANCE = 40;
 /**
- * Layers of the shadow: height as a fraction of the subject's, weight of its darkness, and blur radius as a fraction of
- * the side at `shadow-softness="1"`. Parts that touch the ground darken it most and have the sharpest edge.
+ * Layers of the shadow. `height` is a fraction of the subject's height, `weight` a fraction of the darkness, and `blur`
+ * the standard deviation at `shadow-softness="1"` as a fraction of the image's side. Parts that touch the ground cast
+ * the darkest and sharpest shadow.
  */
 const LAYERS = [
   { height: 0.08, weight: 0.25, blur: 0.012 },
@@ -28,7 +32,7 @@ const BELOW = 0.005;
 /** Minimum opacity of a visible splat, 0..255. */
 const MIN_CODE = 1;
 
-/** The caster of the shadow: a sphere in viewer space, and the height of its ground. */
+/** The caster of the shadow: a sphere in viewer space, and the rotation from the scene's frame to viewer space. */
 export interface Subject {
   readonly center: Vector3;
   readonly radius: number;
@@ -38,20 +42,20 @@ export interface Subject {
 /** Opacity of an image of {@link SHADOW_PIXELS} a side, row by row from the top, 0..1. */
 export type Alpha = ArrayLike<number>;
 
-/** Takes such an image. */
+/** Captures the opacity of the subject from a camera. */
 export type TakeAlpha = (camera: Camera) => Promise<Alpha> | Alpha;
 
-/** A shadow on the ground before it is blurred. */
+/** Images of a shadow on the ground, before blurring. */
 export interface ShadowMap {
-  /** Middle of the shadow, viewer space. */
+  /** Center of the shadow in viewer space. */
   readonly middle: Vector3;
-  /** Half of a side, units of viewer space. */
+  /** Half of the side of the shadow, in units of viewer space. */
   readonly half: number;
-  /** By layer. */
+  /** Opacity of each layer, seen from above. */
   readonly layers: readonly Alpha[];
 }
 
-/** Captures the images of a subject's shadow. @returns null without a caster */
+/** Captures the images of a subject's shadow. @returns null if the subject has no visible splats */
 export async function takeShadow(subject: Subject, take: TakeAlpha): Promise<ShadowMap | null> {
   const { center, radius } = subject;
   const side = extent(await take(sideCamera(subject)));
@@ -64,14 +68,17 @@ export async function takeShadow(subject: Subject, take: TakeAlpha): Promise<Sha
   return { middle: [center[0], ground, center[2]], half, layers };
 }
 
-/** Camera in front of the subject, framing its sphere. */
+/** Returns the camera in front of the subject that frames its sphere. */
 const sideCamera = ({ center: [x, y, z], radius, frame }: Subject): Camera => {
   const away = DISTANCE * radius;
   const focal = (SHADOW_PIXELS * away) / (2 * radius);
   return camera(frame, [x, y, z + away], [x, y, z], [0, 1, 0], focal, away - radius, away + radius);
 };
 
-/** Camera above the subject, framing the shadow: parts above the height are clipped. */
+/**
+ * Returns the camera above the subject that frames the shadow. Its near plane clips parts above a height over the
+ * ground.
+ */
 const cameraAbove = ({ center: [x, , z], radius, frame }: Subject, ground: number, height: number): Camera => {
   const away = DISTANCE * radius;
   const focal = (SHADOW_PIXELS * away) / (2 * REACH * radius);
@@ -93,7 +100,10 @@ function camera(
   return { ...size, fx: focal, fy: focal, worldToCamera: lookAt(from, to, above), near, far };
 }
 
-/** First and last row of a silhouette as fractions of the image's height, without specks. */
+/**
+ * Returns the first and last row of a silhouette as fractions of the image's height, ignoring small specks; null for an
+ * empty image.
+ */
 function extent(alpha: Alpha): { first: number; last: number } | null {
   const rows = Array.from({ length: SHADOW_PIXELS }, (_, row) => {
     let sum = 0;
@@ -112,7 +122,7 @@ function extent(alpha: Alpha): { first: number; last: number } | null {
 }
 
 /**
- * The shadow as flat splats in a square of 2 x 2 around the origin, at y = 0.
+ * Returns the shadow as flat splats in a square of 2 x 2 units around the origin, at y = 0.
  * @param intensity 0..1
  * @param softness 0..1
  */
@@ -125,13 +135,13 @@ export function shadowSplats({ layers }: ShadowMap, intensity: number, softness:
   });
   const step = 2 / CELLS;
   const sigma = SPREAD * step;
-  // Sum of all splat weights at each point.
+  // Sum of the weights of all overlapping splats at each point.
   const overlap = 2 * Math.PI * SPREAD * SPREAD;
   const rows: SplatRow[] = [];
   for (let row = 0; row < CELLS; row++)
     for (let column = 0; column < CELLS; column++) {
       const opacity = Math.min(0.99, DARKEST * intensity * meanOf(dark, column, row));
-      // Optical depths are additive; opacities are not.
+      // Divides the optical depth by the overlap, because optical depths are additive and opacities are not.
       const own = 1 - Math.exp(Math.log(1 - opacity) / overlap);
       const code = Math.round(255 * own);
       if (code < MIN_CODE) continue;
@@ -141,7 +151,7 @@ export function shadowSplats({ layers }: ShadowMap, intensity: number, softness:
   return rows;
 }
 
-/** Mean of the pixels of a cell. */
+/** Returns the mean of an image's pixels in a cell. */
 function meanOf(image: Float32Array, column: number, row: number): number {
   const range = (cell: number): [number, number] => {
     const from = Math.floor((cell * SHADOW_PIXELS) / CELLS);
@@ -153,7 +163,10 @@ function meanOf(image: Float32Array, column: number, row: number): number {
   return sum / ((right - left) * (bottom - top));
 }
 
-/** Blurred along rows, then along columns, by a Gaussian of a standard deviation in pixels; nothing lies beyond the edges. */
+/**
+ * Returns an image blurred by a Gaussian, along rows and then along columns. Pixels outside the image are 0.
+ * @param sigma Standard deviation in pixels; no blur below 0.3.
+ */
 function blurredBy(alpha: Alpha, sigma: number): Float32Array {
   const image = Float32Array.from(alpha);
   if (sigma < 0.3) return image;

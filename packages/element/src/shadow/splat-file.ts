@@ -2,25 +2,25 @@ import type { Vector3 } from '@gaussian-splat/core';
 import type { SceneLoader } from '../loading/scene-loader.js';
 import type { LoadedScene } from '../loading/protocol.js';
 
-/** Bytes of a splat in a `.splat` file: position and scale as float32, color and opacity, rotation. */
+/** Bytes of a splat in a `.splat` file: position and scale as float32 (24), color and opacity (4), and rotation (4). */
 const ROW_BYTES = 32;
 
-/** An axis-aligned splat: center, standard deviations, and red, green, blue and opacity, 0..255. */
+/** An axis-aligned splat: its center, its standard deviations, and red, green, blue and opacity, 0..255. */
 export type SplatRow = readonly [place: Vector3, scale: Vector3, color: readonly [number, number, number, number]];
 
-/** Writes splats made by the element as a `.splat` file without a change of axes. */
+/** Returns the bytes of a `.splat` file with splats that the element has created. The axes stay the same. */
 export function splatFile(rows: readonly SplatRow[]): ArrayBuffer {
   const view = new DataView(new ArrayBuffer(ROW_BYTES * rows.length));
   rows.forEach(([place, scale, color], i) => {
     const at = ROW_BYTES * i;
     [...place, ...scale].forEach((value, k) => view.setFloat32(at + 4 * k, value, true));
-    // No rotation: 1, 0, 0, 0.
+    // The quaternion 1, 0, 0, 0: no rotation.
     [...color, 255, 128, 128, 128].forEach((value, k) => view.setUint8(at + 24 + k, value));
   });
   return view.buffer;
 }
 
-/** Packs such splats like those of any scene. */
+/** Packs splats that the element has created, in the same way as a scene file. */
 export async function packSplats(
   rows: readonly SplatRow[],
   loader: SceneLoader,

@@ -1,11 +1,15 @@
-/** Opacity of one scene in small images, with WebGL. Reads back: never for a frame. */
+/**
+ * Captures the opacity of one scene in small images, with WebGL. Reads back from the GPU, so it is never part of a
+ * frame.
+ */
 import type { Camera } from '@gaussian-splat/core';
 import { DATA_WIDTH, type GlRenderer } from '@gaussian-splat/renderer/webgl';
 import { SHADOW_PIXELS, type Alpha, type TakeAlpha } from './shadow-map.js';
 
 /**
- * @param renderer of the scene; its order is replaced, which does not affect opacity
- * @param kept indices of the splats that are drawn
+ * Returns a function that takes images of a scene's opacity, {@link SHADOW_PIXELS} a side. Free it when all are taken.
+ * @param renderer Renderer of the scene. Its order of splats is replaced, which does not affect opacity.
+ * @param kept Indices of the splats that are drawn.
  */
 export function alphaOfScene(
   gl: WebGL2RenderingContext,

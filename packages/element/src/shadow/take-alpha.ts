@@ -1,4 +1,7 @@
-/** Opacity of everything that a WebGPU painter draws, in small images. Reads back, so it is never part of a frame. */
+/**
+ * Captures the opacity of all scenes that WebGPU draws, in small images. Reads back from the GPU, so it is never part
+ * of a frame.
+ */
 import type { Camera, SplatFilter } from '@gaussian-splat/core';
 import {
   capture,
@@ -16,11 +19,14 @@ export interface AlphaSource {
   readonly members: readonly WorldEntry[];
   readonly settings: FrameSettings;
   readonly filter: SplatFilter | undefined;
-  /** Draws the meshes beneath the splats. */
+  /**
+   * Draws the meshes beneath the splats, from a camera.
+   * @returns properties of the target that let the splats blend with the meshes
+   */
   drawBeneath(camera: Camera): Partial<FrameTarget>;
 }
 
-/** Free it when all images are taken. */
+/** Returns a function that captures images of all scenes. Call `free` after the last image. */
 export function alphaOfWorld({ device, members, settings, filter, drawBeneath }: AlphaSource): {
   readonly take: TakeAlpha;
   free(): void;
@@ -40,8 +46,8 @@ export function alphaOfWorld({ device, members, settings, filter, drawBeneath }:
   };
 }
 
-/** A scene in its current state: a view from above requests no pages of a streamed scene. */
+/** Returns a copy of a scene without streaming, so that the view from above requests no pages. */
 const asItIs = (scene: GaussianScene): GaussianScene => {
-  const { count, shDegree, shPrecision, antialiased, filterVariance, origin, pages, version } = scene;
-  return { count, shDegree, shPrecision, antialiased, filterVariance, origin, pages, version };
+  const { count, shDegree, shPrecision, antialiased, filterVariance, origin, blocks, version } = scene;
+  return { count, shDegree, shPrecision, antialiased, filterVariance, origin, blocks: blocks, version };
 };

@@ -1,4 +1,4 @@
-/** A sky with WebGL 2: one triangle beneath the splats, in their context. */
+/** Sky with WebGL 2: one triangle that is drawn beneath the splats, in their context. */
 import type { Camera } from '@gaussian-splat/core';
 import type { ViewerFrame } from '../camera/orbit.js';
 import { viewRays } from './view-rays.js';
@@ -27,7 +27,7 @@ export class SkyGl {
   readonly #rays: WebGLUniformLocation | null;
   readonly #height: WebGLUniformLocation | null;
 
-  /** @param image stays the caller's */
+  /** Uploads the sky. @param image Equirectangular image; the caller closes it. */
   constructor(gl: WebGL2RenderingContext, image: ImageBitmap) {
     this.gl = gl;
     this.#program = gl.createProgram();
@@ -53,7 +53,7 @@ export class SkyGl {
     gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, gl.LINEAR);
   }
 
-  /** Draws into the framebuffer that is bound. */
+  /** Draws the sky into the framebuffer that is bound. */
   draw(camera: Camera, frame: ViewerFrame): void {
     const { gl } = this;
     gl.viewport(0, 0, camera.width, camera.height);

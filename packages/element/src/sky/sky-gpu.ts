@@ -1,4 +1,4 @@
-/** A sky with WebGPU: one triangle over the target, before the splats are drawn on it. */
+/** Sky with WebGPU: one triangle over the target, which is drawn before the splats. */
 import type { Camera } from '@gaussian-splat/core';
 import type { FrameTarget } from '@gaussian-splat/renderer';
 import type { ViewerFrame } from '../camera/orbit.js';
@@ -6,7 +6,10 @@ import type { Frame } from '../dynamic/frame-filter.js';
 import { viewRays } from './view-rays.js';
 
 const LABEL = 'gs.sky';
-/** The convention of three.js and `<model-viewer>`: the middle of an equirectangular image lies at +x. */
+/**
+ * Shader of the sky. The center of the equirectangular image is in the direction +x, as in three.js and
+ * `<model-viewer>`.
+ */
 const SHADER = /* wgsl */ `
 struct Rays { x: vec4f, y: vec4f, base: vec4f }
 @group(0) @binding(0) var<uniform> rays: Rays;
@@ -32,7 +35,7 @@ export class SkyGpu {
   readonly #sampler: GPUSampler;
   readonly #pipelines = new Map<GPUTextureFormat, { pipeline: GPURenderPipeline; group: GPUBindGroup }>();
 
-  /** @param image stays the caller's */
+  /** Uploads the sky. @param image Equirectangular image; the caller closes it. */
   constructor(device: GPUDevice, image: ImageBitmap) {
     this.device = device;
     const { width, height } = image;
@@ -69,7 +72,7 @@ export class SkyGpu {
     pass.draw(3);
     pass.end();
     this.device.queue.submit([encoder.finish()]);
-    return { over: 'target' };
+    return { background: 'load' };
   }
 
   #pipelineFor(format: GPUTextureFormat): { pipeline: GPURenderPipeline; group: GPUBindGroup } {
@@ -99,5 +102,5 @@ export class SkyGpu {
   }
 }
 
-/** Images of splats alone have no sky. */
+/** Whether a frame has a target texture. Images of the splats alone have none, and no sky. */
 export const hasTarget = (frame: Frame): boolean => (frame.target as GPUTexture | undefined) !== undefined;

@@ -1,4 +1,4 @@
-/** Loaded where an element has the attribute `skybox-image`: an environment behind the scene. */
+/** Environment image behind the scene. Loaded for elements with the attribute `skybox-image`. */
 import { bytesOf, fetchPatiently } from '@gaussian-splat/core/fetch';
 import type { FrameTarget } from '@gaussian-splat/renderer';
 import type { ReactiveController, ReactiveControllerHost } from 'lit';
@@ -6,15 +6,16 @@ import { credentialsOf, type Attributes } from '../attributes.js';
 import type { ViewerFrame } from '../camera/orbit.js';
 import type { Mover } from '../controllers/motion.js';
 import type { Backend } from '../gpu/backend.js';
+import { LatestTask } from '../latest-task.js';
 import type { Frame } from '../dynamic/frame-filter.js';
 import type { WebGlBackend } from '../webgl/webgl-backend.js';
 import { SkyGl } from './sky-gl.js';
 import { hasTarget, SkyGpu } from './sky-gpu.js';
 
-/** Bytes of a file. */
+/** Maximum size of the image file, bytes. */
 const MAX_BYTES = 2 ** 26;
 
-/** Interface of the element for a sky. */
+/** The part of the element that the sky uses. */
 export interface SkyHost {
   readonly element: ReactiveControllerHost & HTMLElement;
   readonly attributes: Pick<Attributes, 'skyboxImage' | 'crossorigin'>;
@@ -25,9 +26,10 @@ export interface SkyHost {
   warn(sentence: string): void;
 }
 
-/** Fetches the image, and draws it beneath the splats with what draws these. */
+/** Fetches the image, and draws it beneath the splats with the API that draws the splats. */
 export class Sky implements ReactiveController, Mover {
   readonly #host: SkyHost;
+  readonly #loading = new LatestTask();
   #url: string | null = null;
   #image: ImageBitmap | undefined;
   #gpu: SkyGpu | undefined;
@@ -37,6 +39,8 @@ export class Sky implements ReactiveController, Mover {
     this.#host = host;
     host.element.addController(this);
     host.behaviors.add(this);
+    // Without a scene nothing is drawn, so that the sky must not wait for a frame to be freed.
+    host.element.addEventListener('emptied', () => host.view.backend === null && this.#free());
     this.hostUpdated();
   }
 
@@ -44,11 +48,15 @@ export class Sky implements ReactiveController, Mover {
     const { skyboxImage: url } = this.#host.attributes;
     if (url === this.#url) return;
     this.#url = url;
-    if (url) void this.#load(url);
-    else this.#show(undefined);
+    if (url) return this.#loading.run((signal) => this.#load(url, signal), this.#fail);
+    this.#loading.renew();
+    this.#show(undefined);
   }
 
-  /** Puts the sky beneath splats that WebGL draws, before each frame. */
+  /**
+   * Attaches the sky to splats that WebGL draws. Called before each frame.
+   * @returns false, because the sky does not move
+   */
   advance(): boolean {
     const { backend } = this.#host.view;
     if (!backend || backend.isLost || !(backend.place.context instanceof WebGL2RenderingContext)) return false;
@@ -58,7 +66,10 @@ export class Sky implements ReactiveController, Mover {
     return false;
   }
 
-  /** Draws it into the target of a frame. @returns what is behind the splats then */
+  /**
+   * Draws the sky into the target of a WebGPU frame.
+   * @returns properties of the target that let the splats blend over the sky; none without a sky
+   */
   draw(frame: Frame): Partial<FrameTarget> {
     const { backend } = this.#host.view;
     if (!this.#image || !backend || !hasTarget(frame)) return {};
@@ -76,34 +87,39 @@ export class Sky implements ReactiveController, Mover {
     return (this.#gl = new SkyGl(gl, image));
   }
 
-  async #load(url: string): Promise<void> {
+  async #load(url: string, signal: AbortSignal): Promise<void> {
     const { element, attributes, view } = this.#host;
-    try {
-      const address = new URL(url, element.baseURI);
-      const response = await fetchPatiently(address, { credentials: credentialsOf(attributes.crossorigin) });
-      if (!response.ok) throw new Error(`expected an image at ${address.href}, found status ${response.status}`);
-      const image = await decode(await bytesOf(response, undefined, MAX_BYTES), view.backend);
-      if (url === this.#url) this.#show(image);
-    } catch (error) {
-      if (url !== this.#url) return;
-      this.#show(undefined);
-      this.#host.warn(`<gaussian-splat> skybox-image: ${error instanceof Error ? error.message : String(error)}`);
-    }
+    const address = new URL(url, element.baseURI);
+    const response = await fetchPatiently(address, { credentials: credentialsOf(attributes.crossorigin), signal });
+    if (!response.ok) throw new Error(`expected an image at ${address.href}, found status ${response.status}`);
+    const image = await decode(await bytesOf(response, undefined, MAX_BYTES), view.backend);
+    if (signal.aborted) image.close();
+    else this.#show(image);
   }
 
-  /** @param image undefined for none */
-  #show(image: ImageBitmap | undefined): void {
-    this.#image?.close();
-    this.#image = image;
+  readonly #fail = (error: unknown): void => {
+    this.#show(undefined);
+    this.#host.warn(`<gaussian-splat> skybox-image: ${error instanceof Error ? error.message : String(error)}`);
+  };
+
+  /** Frees the GPU memory. The next frame uploads the image again. */
+  #free(): void {
     this.#gpu?.destroy();
     this.#gl?.destroy();
     this.#gpu = this.#gl = undefined;
+  }
+
+  /** Replaces the image. @param image undefined for no sky */
+  #show(image: ImageBitmap | undefined): void {
+    this.#image?.close();
+    this.#image = image;
+    this.#free();
     this.#host.view.backend?.filter?.invalidate();
     this.#host.requestFrame();
   }
 }
 
-/** An image that the GPU can hold. */
+/** Decodes an image file, and reduces an image that exceeds the maximum texture size of the GPU. */
 async function decode(bytes: Uint8Array<ArrayBuffer>, backend: Backend | null): Promise<ImageBitmap> {
   const blob = new Blob([bytes]);
   const image = await createImageBitmap(blob);

@@ -1,30 +1,34 @@
-/** Camera paths: through a list of views, along the keyframes of a file, or once around the target. Pure. */
+/**
+ * Camera paths: through a list of views, along the keyframes of a file, or once around the target. Independent of the
+ * DOM.
+ */
 import type { CameraPose } from '../camera/orbit.js';
 import { poseOf } from '../camera/settings.js';
 import { poseOfView, type ViewContext } from './camera-view.js';
 import { pathThrough } from './path.js';
 import type { ViewList } from './read-views.js';
 
-/** Seconds from one view of a list to the next, where its file has no times. */
+/** Seconds from one view of a list to the next if the file declares no times. */
 const PART_SECONDS = 3;
-/** Seconds of one turn. */
+/** Duration of one turn, seconds. */
 const TURN_SECONDS = 8;
 
-/** Path of the camera: through the views of the list, or once around its target. */
+/** Name of a camera path: through the views of the list, or once around the target. */
 export type PathName = 'views' | 'turntable';
 
 export interface CameraPath {
-  /** Length. */
+  /** Duration of the path. */
   readonly seconds: number;
-  /** True for a path that ends where it begins. */
+  /** Whether the path ends where it begins. */
   readonly isClosed: boolean;
-  /** The pose at a fraction of the path, 0..1. */
+  /** Returns the pose at a fraction of the path, 0..1. */
   at(share: number): CameraPose;
 }
 
 /**
- * The path of a list: its keyframes if it has any, else through its views. null for an empty list. What views leave out is that of the attributes, wherever the camera is now: it moves along this
- * very path.
+ * Returns the path along the keyframes of a list, or through its views if it has none; null for an empty list. Parts
+ * that a view omits have the values of the attributes, not those of the camera, because the camera moves along this
+ * path.
  */
 export function pathOfList({ views, path }: ViewList, place: Omit<ViewContext, 'from'>): CameraPath | null {
   const context = { ...place, from: poseOf(place.settings, place.bounds, place.aspect) };
@@ -39,18 +43,21 @@ export function pathOfList({ views, path }: ViewList, place: Omit<ViewContext, '
   return { seconds, isClosed: false, at: (share) => along(first + share * seconds) };
 }
 
-/** One turn around the target of a pose, in the direction of `auto-rotate`. */
+/** Returns one turn around the target of a pose, in the direction of `auto-rotate`. */
 export const turntable = (pose: CameraPose): CameraPath => ({
   seconds: TURN_SECONDS,
   isClosed: true,
   at: (share) => ({ ...pose, theta: pose.theta + 2 * Math.PI * share }),
 });
 
-/** Fractions of a path at its frames: from 0 to 1, or, if it is closed, to the frame before its beginning. */
+/**
+ * Returns the fraction of the path at each frame: from 0 to 1. For a closed path, the last frame is one step before 1,
+ * because 1 would repeat the first frame.
+ */
 export function frameShares(frames: number, { isClosed }: Pick<CameraPath, 'isClosed'>): number[] {
   const steps = Math.max(1, isClosed ? frames : frames - 1);
   return Array.from({ length: frames }, (_, frame) => frame / steps);
 }
 
-/** Frames of a video, 1 or more. */
+/** Returns the number of frames of a video, at least 1. `frameRate` is frames per second. */
 export const frameCount = (seconds: number, frameRate: number): number => Math.max(1, Math.round(seconds * frameRate));

@@ -1,16 +1,16 @@
-/** Camera views in all forms used by pages and files, and their poses. */
+/** Camera views in all forms that pages and files use, and their conversion to poses. */
 import { GaussianSplatError, inverse, length, normalize, subtract, type Vector3 } from '@gaussian-splat/core';
 import { fieldOfViewGrammar, orbitGrammar, targetGrammar, type AttributeGrammar } from '../camera/grammar.js';
 import { toViewer, type CameraPose, type ViewerFrame } from '../camera/orbit.js';
 import { poseOf, type CameraSettings, type SceneBounds } from '../camera/settings.js';
 
-/** A view in the syntax of the attributes. Omitted parts keep their value. */
+/** A view in the syntax of the attributes. Omitted parts keep their current value. */
 export interface OrbitView {
-  /** As `camera-orbit`. */
+  /** Value in the syntax of `camera-orbit`. */
   readonly orbit?: string;
-  /** As `camera-target`. */
+  /** Value in the syntax of `camera-target`. */
   readonly target?: string;
-  /** As `field-of-view`. */
+  /** Value in the syntax of `field-of-view`. */
   readonly fieldOfView?: string;
 }
 
@@ -18,49 +18,55 @@ export interface OrbitView {
 export interface TrainerView {
   /** Position of the eye, world units. */
   readonly position: readonly number[];
-  /** 3x3 camera to world, rows outermost: its columns are the camera's axes. */
+  /** 3x3 rotation from camera to world as an array of rows. Its columns are the axes of the camera. */
   readonly rotation: readonly (readonly number[])[];
-  /** Image height and focal length in pixels, for the field of view; without both it stays. */
+  /**
+   * Image height in pixels, which with the focal length `fy` in pixels defines the field of view. Without both, the
+   * current field of view remains.
+   */
   readonly height?: number;
   readonly fy?: number;
 }
 
-/** A camera by its matrix: in the scene's own frame, OpenCV axes. 16 numbers row by row, or four rows of four. */
+/** A camera as a matrix in the scene's own frame, with OpenCV axes: 16 numbers row by row, or four rows of four. */
 export interface MatrixView {
   readonly worldToCamera: readonly number[] | readonly (readonly number[])[];
-  /** 3x3 intrinsics in pixels, and the image's height, for the field of view; without both it stays. */
+  /**
+   * 3x3 intrinsic matrix in pixels, which with the image height in pixels defines the field of view. Without both, the
+   * current field of view remains.
+   */
   readonly K?: readonly (readonly number[])[];
   readonly height?: number;
 }
 
-/** A camera by eye and target, as three numbers each. */
+/** A camera as the positions of its eye and its target, three numbers each. */
 export interface LookView {
   readonly position: readonly number[];
   readonly lookAt: readonly number[];
   /**
-   * Coordinate system of the numbers. Default: `viewer`, the space of `camera-target`. The viewer of SuperSplat turns
-   * every scene by half a turn around z.
+   * Coordinate system of the positions. Default: `viewer`, the space of `camera-target`. `supersplat` is the space of
+   * SuperSplat's viewer, which rotates every scene by 180 degrees around z.
    */
   readonly space?: 'viewer' | 'supersplat';
-  /** Degrees, along the longer side of the image; without it the field of view stays. */
+  /** Field of view along the longer side of the image, degrees. Default: the current one. */
   readonly fov?: number;
 }
 
 /** A camera view. The camera stays upright: the roll of a matrix is ignored. */
 export type CameraView = OrbitView | TrainerView | MatrixView | LookView;
 
-/** Context that a view is resolved in. */
+/** State of the element that {@link poseOfView} needs. */
 export interface ViewContext {
   readonly settings: CameraSettings;
   readonly bounds: SceneBounds;
   readonly frame: ViewerFrame;
   /** Aspect ratio of the image, width / height. */
   readonly aspect: number;
-  /** Goal of the camera; provides the parts that a view omits. */
+  /** Current goal of the camera, with the values for parts that a view omits. */
   readonly from: CameraPose;
 }
 
-/** The pose of a view. Throws `argument/camera` for one that is malformed. */
+/** Returns the pose of a view. @throws GaussianSplatError `argument/camera` for a malformed view */
 export function poseOfView(view: CameraView, context: ViewContext): CameraPose {
   if (typeof view !== 'object' || view === null) throw fail('view', FORMS, view);
   if ('worldToCamera' in view) return ofMatrix(view, context);
@@ -94,7 +100,7 @@ function ofOrbit(
       ...settings,
       orbit: wanted.orbit ?? settings.orbit,
       target: wanted.target ?? settings.target,
-      // The radius that frames the scene depends on it.
+      // The framing distance depends on the field of view.
       fieldOfView: wanted.fieldOfView ?? from.fieldOfView,
     },
     bounds,
@@ -135,20 +141,27 @@ function ofLook({ position, lookAt, space, fov }: LookView, context: ViewContext
   );
   const way = subtract(target, eye);
   if (!(length(way) > 0)) throw fail('view.lookAt', 'another point than view.position', lookAt);
-  // The angle is along the longer side of the image; the element uses the vertical one.
+  // `fov` is the angle along the longer side of the image; poses have the vertical one.
   const half = fov === undefined ? undefined : Math.tan((fov * Math.PI) / 360) / Math.max(1, context.aspect);
   const pose = ofRay(eye, way, half === undefined ? undefined : 2 * Math.atan(half), context);
   return { ...pose, radius: length(way), x: target[0], y: target[1], z: target[2] };
 }
 
-/** Vertical angle of a calibrated camera. */
+/**
+ * Returns the vertical field of view, radians, of a camera with the image height and focal length in pixels; undefined
+ * without both.
+ */
 const vertical = (height: number | undefined, focal: number | undefined): number | undefined =>
   height! > 0 && focal! > 0 ? 2 * Math.atan(height! / (2 * focal!)) : undefined;
 
 /** Minimum distance of the pivot in front of the eye, in radii of the scene. */
 const MIN_AHEAD = 0.1;
+/** Sine of the angle to the vertical below which a view is straight down or up, for matrices in float32. */
+const UPRIGHT = 1e-6;
 
-/** A camera with an eye and a direction pivots around the point ahead that is nearest to the center of the scene. */
+/**
+ * Returns the pose for an eye and a direction. Its target is the point on the ray nearest to the center of the scene.
+ */
 function ofRay(eye: Vector3, direction: Vector3, fieldOfView: number | undefined, context: ViewContext): CameraPose {
   const { bounds, frame, from } = context;
   const forward = normalize(direction);
@@ -156,8 +169,10 @@ function ofRay(eye: Vector3, direction: Vector3, fieldOfView: number | undefined
   const along = toMiddle[0] * forward[0] + toMiddle[1] * forward[1] + toMiddle[2] * forward[2];
   const radius = Math.max(MIN_AHEAD * bounds.radius, along);
   const [x, y, z] = eye.map((value, axis) => value + radius * forward[axis]);
+  const isUpright = Math.hypot(forward[0], forward[2]) < UPRIGHT;
   return {
-    theta: Math.atan2(-forward[0], -forward[2]),
+    // A view straight down or up has no azimuth of its own.
+    theta: isUpright ? from.theta : Math.atan2(-forward[0], -forward[2]),
     phi: Math.acos(Math.min(1, Math.max(-1, -forward[1]))),
     radius,
     ...{ x, y, z },

@@ -1,10 +1,11 @@
 /**
- * A camera motion along a path over time, advanced per frame until it arrives or the camera is moved by something else.
+ * A motion of the camera along a path over time. Each frame advances it until it arrives or something else moves the
+ * camera.
  */
 import type { CameraPose } from '../camera/orbit.js';
 import type { CameraController } from '../controllers/camera-controller.js';
 
-/** Grace period after its end for a flight whose frames have stopped, ms. */
+/** Milliseconds after its planned end at which a flight without frames arrives, for example in a hidden page. */
 const GRACE_MS = 100;
 
 export class Flight {
@@ -15,10 +16,13 @@ export class Flight {
   #placed: CameraPose | undefined;
   #end: ((arrived: boolean) => void) | undefined;
   readonly #timer: ReturnType<typeof setTimeout> | undefined;
-  /** Fulfills at the end with true on arrival. */
+  /** Fulfills at the end: true on arrival, false if the flight was canceled. */
   readonly finished: Promise<boolean>;
 
-  /** @param durationMs 0 jumps; Infinity never arrives */
+  /**
+   * @param path Returns the pose for the milliseconds since the start.
+   * @param durationMs Duration in milliseconds: 0 jumps to the end, Infinity never arrives.
+   */
   constructor(camera: CameraController, path: (elapsedMs: number) => CameraPose, durationMs: number) {
     this.#camera = camera;
     this.#path = path;
@@ -32,10 +36,13 @@ export class Flight {
     return this.#end === undefined;
   }
 
-  /** @param now requestAnimationFrame's clock, ms */
+  /**
+   * Moves the camera to its pose at a time, or cancels the flight if something else has moved the camera.
+   * @param now Time of requestAnimationFrame, milliseconds.
+   */
   advance(now: number): void {
     if (this.isOver) return;
-    // User input, attributes or another scene that moves the camera takes over.
+    // A visitor, an attribute or another scene has moved the camera.
     if (this.#isElsewhere) return this.cancel();
     this.#start ??= now;
     const elapsed = now - this.#start;

@@ -1,4 +1,4 @@
-/** Interpolated paths between poses. Pure. */
+/** Interpolation of paths between poses. Independent of the DOM. */
 import type { CameraPose } from '../camera/orbit.js';
 
 /** Acceleration and deceleration of a flight: a CSS easing name, or a function of 0..1. */
@@ -16,30 +16,30 @@ export const easingOf = (easing: Easing): ((share: number) => number) =>
 
 const KEYS = ['theta', 'phi', 'radius', 'x', 'y', 'z', 'fieldOfView'] as const;
 
-/** The same view with its azimuth at most half a turn from another's. */
+/** Returns the same view with an azimuth that differs from that of `before` by at most half a turn. */
 export function unwound(pose: CameraPose, before: CameraPose): CameraPose {
   const turns = Math.round((pose.theta - before.theta) / (2 * Math.PI));
   return turns === 0 ? pose : { ...pose, theta: pose.theta - turns * 2 * Math.PI };
 }
 
-/** Distances are interpolated geometrically: halfway from 1 m to 4 m is 2 m. */
+/** Value of a component for interpolation. Distances are interpolated geometrically: halfway from 1 m to 4 m is 2 m. */
 const rise = (pose: CameraPose, key: (typeof KEYS)[number]): number =>
   key === 'radius' ? Math.log(pose.radius) : pose[key];
 
-/** Maps a time to a pose. */
+/** Returns the pose at a time. */
 export type Path = (time: number) => CameraPose;
 
 /**
- * A smooth path through poses: a Catmull-Rom cubic through values and times.
- * @param times one for each pose, ascending.
- * @returns a function of a time, which is clamped to those; at the time of a pose it returns exactly that pose
+ * Returns a smooth path through poses: a Catmull-Rom cubic through values and times. At the time of a pose the path
+ * returns exactly that pose, and it clamps other times to the range.
+ * @param times Ascending times, one per pose.
  */
 export function pathThrough(poses: readonly CameraPose[], times: readonly number[]): Path {
   const last = poses.length - 1;
   const chain: CameraPose[] = [];
   for (const pose of poses) chain.push(chain.length === 0 ? pose : unwound(pose, chain[chain.length - 1]));
   const slope = (k: number, key: (typeof KEYS)[number]): number => {
-    // At its ends the path is straight.
+    // At the ends of the path, the slope is that of the straight line to the neighbor.
     const [a, b] = [Math.max(0, k - 1), Math.min(last, k + 1)];
     return (rise(chain[b], key) - rise(chain[a], key)) / (times[b] - times[a] || 1);
   };
@@ -61,7 +61,10 @@ export function pathThrough(poses: readonly CameraPose[], times: readonly number
   };
 }
 
-/** An index `i` with `times[i] <= time < times[i + 1]` for a time between the first and the last, by bisection. */
+/**
+ * Returns, by bisection, an index `i` with `times[i] <= time < times[i + 1]`, for a time between the first and the
+ * last.
+ */
 function indexBefore(times: readonly number[], time: number): number {
   let [low, high] = [0, times.length - 1];
   while (high - low > 1) {

@@ -1,13 +1,15 @@
-/** Lists of views: a page's own, a trainer's `cameras.json`, and the settings of SuperSplat's viewer. */
+/**
+ * Reads lists of views: in the page's own syntax, a trainer's `cameras.json`, or the settings of SuperSplat's viewer.
+ */
 import { fail, type CameraView } from './camera-view.js';
 
-/** A view that visitors can choose. */
+/** A view that visitors can select. */
 export interface NamedView {
   readonly name: string;
   readonly view: CameraView;
 }
 
-/** Camera pose at a time of a path, in seconds. */
+/** View at a time of a path, in seconds. */
 export interface Keyframe {
   readonly time: number;
   readonly view: CameraView;
@@ -15,14 +17,14 @@ export interface Keyframe {
 
 export interface ViewList {
   readonly views: readonly NamedView[];
-  /** A path that the file also contains; empty if the views themselves are the path. */
+  /** Keyframes of a path in the file; empty if the path leads through the views. */
   readonly path: readonly Keyframe[];
 }
 
 const EXPECTED =
   'a list of views { name, orbit, target, fieldOfView }, the list of a cameras.json, or the settings of SuperSplat (version 1 or 2)';
 
-/** Reads parsed JSON, or an equal object. Throws `argument/camera`. */
+/** Reads a list of views from parsed JSON or an equal object. @throws GaussianSplatError `argument/camera` */
 export function readViews(json: unknown): ViewList {
   const list = isObject(json) && Array.isArray(json.views) ? json.views : json;
   if (Array.isArray(list)) return { views: list.map(readView), path: [] };
@@ -38,7 +40,7 @@ function readView(entry: unknown, index: number): NamedView {
   return { name: String(given ?? index + 1), view: entry as CameraView };
 }
 
-/** SuperSplat's camera format: degrees along the longer side, points in the space of its viewer. */
+/** Camera in SuperSplat's format: `fov` in degrees along the longer side, points in the space of its viewer. */
 interface SuperSplatPose {
   readonly position: readonly number[];
   readonly target: readonly number[];
@@ -61,7 +63,7 @@ function readSuperSplat(settings: Readonly<Record<string, unknown>>): ViewList {
   const first = camera?.position && camera.target ? [{ initial: camera as SuperSplatPose }] : [];
   const starts = [...(cameras ?? []), ...first].map(({ initial }, i) => ({ name: `${i + 1}`, view: look(initial) }));
   const stops = (annotations ?? []).flatMap(({ title, camera: from }, i) =>
-    from ? [{ name: title || `${i + 1}`, view: look(from.initial) }] : [],
+    from ? [{ name: String(title || i + 1), view: look(from.initial) }] : [],
   );
   return { views: [...starts, ...stops], path: readTrack(animTracks?.[0], camera?.fov, look) };
 }
@@ -85,7 +87,7 @@ function readTrack(
 ): Keyframe[] {
   if (track === undefined) return [];
   const { times, values } = track.keyframes;
-  // Early files lack the frame rate and count seconds.
+  // Old files have no frame rate, and their times are seconds.
   const rate = track.frameRate || 1;
   return times.map((time, i) => ({
     time: time / rate,

@@ -2,12 +2,12 @@ import { bytesOf, fetchPatiently } from '@gaussian-splat/core/fetch';
 import { css, html, nothing, render, type ReactiveController, type ReactiveControllerHost } from 'lit';
 import type { Attributes } from '../attributes.js';
 import { adoptStyles } from '../styles.js';
-import type { Behaviors } from '../behaviours.js';
+import type { Behaviors } from '../behaviors.js';
 import type { CameraPose } from '../camera/orbit.js';
 import type { CameraController } from '../controllers/camera-controller.js';
 import { prefersReducedMotion, type Mover } from '../controllers/motion.js';
 import type { GaussianSplatEventMap } from '../events.js';
-import { languageOf, type A11yStrings, type ViewString } from '../words.js';
+import { languageOf, type A11yStrings, type ViewString } from '../strings.js';
 import { fail, poseOfView, type CameraView } from './camera-view.js';
 import { Flight } from './flight.js';
 import { pathOfList, turntable, type CameraPath, type PathName } from './camera-path.js';
@@ -16,33 +16,33 @@ import { readViews, type NamedView, type ViewList } from './read-views.js';
 
 /** Options of a flight. */
 export interface FlightOptions {
-  /** Milliseconds; 0 jumps. Default 1200. */
+  /** Duration of the flight, milliseconds; 0 jumps. Default 1200. */
   readonly duration?: number;
-  /** Default `ease-in-out`. */
+  /** Acceleration and deceleration of the flight. Default `ease-in-out`. */
   readonly easing?: Easing;
 }
 
 /** Options of a flight along a path. */
 export interface PathOptions {
-  /** Milliseconds for the entire path. Default: according to its keyframes, else 3000 per segment. */
+  /** Duration of the entire path, milliseconds. Default: that of its keyframes, or 3000 per view. */
   readonly duration?: number;
-  /** Default `linear`. */
+  /** Acceleration and deceleration over the path. Default `linear`. */
   readonly easing?: Easing;
-  /** Restarts at the end, until a visitor takes over the camera. */
+  /** Whether the flight restarts at the end, until a visitor takes over the camera. Default false. */
   readonly loop?: boolean;
-  /** Default `views`: the list. `turntable`: once around the target, in 8 s. */
+  /** Path of the flight. Default `views`: through the list. `turntable`: once around the target, in 8 s. */
   readonly path?: PathName;
 }
 
 export interface TourHost {
   readonly camera: CameraController;
   readonly behaviors: Behaviors;
-  /** Fulfills, and never rejects, when nothing is pending. */
+  /** Fulfills when no scene is loading or pending. Never rejects. */
   readonly settled: Promise<unknown>;
   readonly surface: HTMLElement | null;
   readonly strings: A11yStrings;
   readonly attributes: Pick<Attributes, 'views'>;
-  /** The scene is visible. */
+  /** Whether the scene is visible. */
   readonly isOnShow: boolean;
   warn(sentence: string): void;
   requestFrame(): void;
@@ -89,7 +89,7 @@ const STYLES = css`
   }
 `;
 
-/** The views of an element: the list, flights between them, and the bar, keys and texts for choosing. */
+/** Views of an element: the list, flights between views, and the bar, keys and texts to select a view. */
 export class Tour implements ReactiveController, Mover {
   readonly #element: ReactiveControllerHost & HTMLElement;
   readonly #of: TourHost;
@@ -128,7 +128,7 @@ export class Tour implements ReactiveController, Mover {
   advance(now: number): boolean {
     const flight = this.#flight;
     if (flight === undefined || flight.isOver) return false;
-    // Automatic rotation waits until the camera has arrived.
+    // Delays automatic rotation until the camera has arrived.
     this.#of.behaviors.rest();
     flight.advance(now);
     return !flight.isOver;
@@ -145,9 +145,11 @@ export class Tour implements ReactiveController, Mover {
   async step(by: number, options: FlightOptions = {}): Promise<boolean> {
     const { views } = await this.#ready();
     if (views.length === 0) return false;
-    // Without a current view, next is the first and previous is the last.
+    // Without a current view, the next view is the first, and the previous view is the last.
     const from = this.#current < 0 && by < 0 ? 0 : this.#current;
-    return this.flyTo((from + by + views.length) % views.length, options);
+    const index = (from + by + views.length) % views.length;
+    // At once, so that a later call finds this view as the current one.
+    return this.#fly(views[index].view, options, index);
   }
 
   async flyPath({ duration, easing = 'linear', loop = false, path: name }: PathOptions = {}): Promise<boolean> {
@@ -165,10 +167,13 @@ export class Tour implements ReactiveController, Mover {
     const path = await this.path();
     if (path === null) return;
     this.#flight?.cancel();
-    this.#of.camera.moveTo(path.at(Math.min(1, Math.max(0, share))));
+    this.#of.camera.moveTo(path.at(Math.min(1, Math.max(0, share || 0))));
   }
 
-  /** The list after it and the scene are loaded, so that percentages and `auto` can be resolved. */
+  /**
+   * Waits for the list and the scene, which percentages and `auto` depend on, then returns the list with the views of
+   * the children.
+   */
   async #ready(): Promise<ViewList> {
     await this.#element.updateComplete;
     await this.#of.settled;
@@ -177,10 +182,13 @@ export class Tour implements ReactiveController, Mover {
     return { views: this.#views, path };
   }
 
-  /** The last computed path is cached: a page that scrolls asks for it in every frame. */
+  /** The last computed path, because a page that scrolls requests it in every frame. */
   #known: { readonly list: ViewList; readonly place: string; readonly path: CameraPath | null } | undefined;
 
-  /** @param aspect width / height of the frames; default: of the element */
+  /**
+   * Returns a path of the camera by name; null if the list has no views.
+   * @param aspect Width / height of the frames. Default: that of the element.
+   */
   async path(name: PathName = 'views', aspect = this.#of.camera.context.aspect): Promise<CameraPath | null> {
     const list = await this.#ready();
     const { from, ...context } = this.#of.camera.context;
@@ -197,7 +205,10 @@ export class Tour implements ReactiveController, Mover {
     index: number,
   ): Promise<boolean> {
     const { camera } = this.#of;
-    const from = camera.goal;
+    // A flight begins where the camera is, which may still be on the way to its goal.
+    const { theta, phi, radius } = camera.orbit;
+    const { x, y, z } = camera.target;
+    const from: CameraPose = { theta, phi, radius, x, y, z, fieldOfView: camera.fieldOfView.radians };
     const to = unwound(poseOfView(view, camera.context), from);
     const ease = easingOf(easing);
     const along = pathThrough([from, to], [0, 1]);
@@ -253,7 +264,10 @@ export class Tour implements ReactiveController, Mover {
     this.#join();
   }
 
-  /** Children of the page with `data-orbit`: hotspots, and buttons of the slot `view`. A hotspot without a target looks at its point. */
+  /**
+   * Reads the children with `data-orbit`: hotspots, and buttons in the slot `view`. Without a target, a hotspot looks
+   * at its own point.
+   */
   #readChildren(): void {
     this.#children = [...this.#element.querySelectorAll<HTMLElement>(':scope > [data-orbit]')];
     this.#join();
@@ -278,8 +292,14 @@ export class Tour implements ReactiveController, Mover {
   };
 
   #go(index: number): void {
-    this.flyTo(index).catch((error: Error) => this.#of.warn(`<gaussian-splat> views: ${error.message}`));
+    this.flyTo(index).catch(this.#warnOf);
   }
+
+  #step(by: number): void {
+    this.step(by).catch(this.#warnOf);
+  }
+
+  readonly #warnOf = ({ message }: Error): void => this.#of.warn(`<gaussian-splat> views: ${message}`);
 
   #show(): void {
     const root = this.#element.shadowRoot;
@@ -304,7 +324,7 @@ export class Tour implements ReactiveController, Mover {
     const hasSlot = this.#children.some(({ slot }) => slot === 'view');
     const name = this.#views[this.#current]?.name ?? `${this.#views.length}`;
     const button = (key: 'next-view' | 'previous-view', by: number, sign: string): unknown =>
-      html`<button type="button" part=${key} aria-label=${word(key)} lang=${lang} @click=${() => void this.step(by)}>
+      html`<button type="button" part=${key} aria-label=${word(key)} lang=${lang} @click=${() => this.#step(by)}>
         <svg viewBox="0 0 24 24" width="20" height="20" aria-hidden="true" fill="currentColor"><path d=${sign} /></svg>
       </button>`;
     return html`<div part="views" role="group" aria-label=${word('views')} lang=${lang}>
@@ -325,17 +345,20 @@ export class Tour implements ReactiveController, Mover {
     if (event.ctrlKey || event.altKey || event.metaKey || this.#views.length === 0) return;
     const key = event.key.toLowerCase();
     const index = Number(key) - 1;
-    if (key === 'n' || key === 'p') void this.step(key === 'n' ? 1 : -1);
+    if (key === 'n' || key === 'p') this.#step(key === 'n' ? 1 : -1);
     else if (index >= 0 && index < this.#views.length) this.#go(index);
     else return;
     event.preventDefault();
   };
 }
 
-/** Maximum size of a views file, bytes: it is parsed on the main thread. */
+/** Maximum size of a file of views, bytes: it is parsed on the main thread. */
 const MAX_VIEWS = 2 ** 22;
 
-/** Views of children are read again each time. */
+/**
+ * Whether two lists have the same views. Compares each view, because every call creates a new list with the views of
+ * the children.
+ */
 const isSameList = (a: ViewList, b: ViewList): boolean =>
   a.path === b.path && a.views.length === b.views.length && a.views.every(({ view }, i) => view === b.views[i].view);
 
@@ -349,7 +372,7 @@ async function readJson(source: string, base: string): Promise<unknown> {
   return JSON.parse(new TextDecoder().decode(await bytesOf(response, undefined, MAX_VIEWS)));
 }
 
-/** Beside what Lit renders, with a style sheet of its own. */
+/** Appends the bar to the shadow tree, next to the content that Lit renders, and adds its style sheet. */
 function addBar(root: ShadowRoot): HTMLElement {
   const bar = root.ownerDocument.createElement('div');
   root.append(bar);

@@ -1,10 +1,10 @@
-/** A stick for the left thumb: shown on touch screens, over the lower left corner of the scene. Values are -1..1. */
+/** Joystick for the left thumb, shown on touch screens in the lower left corner of the scene. Its values are -1..1. */
 export class Joystick {
   readonly element: HTMLElement;
   readonly #knob: HTMLElement;
   readonly #onChange: () => void;
   #pointer: number | undefined;
-  /** To the right, and forward. */
+  /** Deflection to the right. */
   right = 0;
   forward = 0;
 
@@ -13,7 +13,7 @@ export class Joystick {
     this.element = document.createElement('div');
     this.#knob = document.createElement('div');
     this.element.setAttribute('part', 'joystick');
-    // People who cannot see it have the arrow keys.
+    // Screen readers ignore the joystick, because their users have the arrow keys.
     this.element.setAttribute('aria-hidden', 'true');
     Object.assign(this.element.style, {
       ...{ position: 'absolute', left: '16px', bottom: '16px', width: '96px', height: '96px', borderRadius: '50%' },
@@ -41,7 +41,7 @@ export class Joystick {
     try {
       this.element.setPointerCapture(event.pointerId);
     } catch {
-      // The pointer is gone, or a script made it.
+      // The pointer has left the page, or a script has dispatched the event.
     }
     this.#onMove(event);
   };
@@ -56,10 +56,19 @@ export class Joystick {
   };
 
   readonly #onUp = (event: PointerEvent): void => {
-    if (event.pointerId !== this.#pointer) return;
+    if (event.pointerId === this.#pointer) this.#release();
+  };
+
+  /** Removes the joystick from the page. A thumb on it is then not reported to it any more. */
+  remove(): void {
+    this.element.remove();
+    if (this.#pointer !== undefined) this.#release();
+  }
+
+  #release(): void {
     this.#pointer = undefined;
     this.#set(0, 0);
-  };
+  }
 
   #set(right: number, forward: number): void {
     [this.right, this.forward] = [right, forward];

@@ -1,4 +1,5 @@
-import type { Vector3 } from '@gaussian-splat/core';
+import { subtract, type Vector3 } from '@gaussian-splat/core';
+import type { WalkMap } from '@gaussian-splat/formats/walk';
 import type { ReactiveController, ReactiveControllerHost } from 'lit';
 import type { Attributes } from '../attributes.js';
 import { readAttribute } from '../camera/grammar.js';
@@ -8,10 +9,12 @@ import type { ScenePoint } from '../camera/values.js';
 import type { AnnouncerController } from '../controllers/announcer-controller.js';
 import type { CameraController } from '../controllers/camera-controller.js';
 import { MAX_MOVER_STEP_MS, prefersReducedMotion, type Mover } from '../controllers/motion.js';
+import { LatestTask } from '../latest-task.js';
 import type { SceneRequest } from '../loading/protocol.js';
 import type { SceneLoader } from '../loading/scene-loader.js';
-import type { A11yStrings, WalkWord } from '../words.js';
+import type { A11yStrings, WalkWord } from '../strings.js';
 import { openFloor } from './floor-source.js';
+import { Gamepads } from './gamepads.js';
 import { Joystick } from './joystick.js';
 import { Walker } from './walker.js';
 
@@ -24,7 +27,7 @@ export interface WalkHost {
   readonly frame: ViewerFrame;
   readonly strings: A11yStrings;
   readonly services: { readonly sceneLoader: SceneLoader };
-  /** The request of the displayed scene; null without one, and for sources without a file. */
+  /** Request of the displayed scene; null while no scene is shown, and for one that moves. */
   readonly walkable: SceneRequest | null;
   requestFrame(): void;
   positionFromPoint(clientX: number, clientY: number): Promise<ScenePoint | null>;
@@ -39,14 +42,14 @@ const WORDS: Readonly<Record<WalkWord, string>> = {
 };
 /** Minimum area of a floor, m². */
 const MIN_AREA = 4;
-/** Minimum duration of a short press, ms. */
+/** Duration of motion that a short key press causes at least, milliseconds. */
 const FIRST_STEP_MS = 50;
-/** Turning speed of the arrow keys, radians per second. */
+/** Speed of rotation by the arrow keys, radians per second. */
 const TURN = 1.5;
-/** Deflection of a stick below which it is ignored. */
-const DEAD_ZONE = 0.15;
+/** Distance of the camera from the walker's eyes, meters, above which something else has moved the camera. */
+const STRAYED = 0.01;
 
-/** Motion of each key: right, forward, and turn to the left. */
+/** Motion of each key, by KeyboardEvent.code: to the right, forward, and rotation to the left, -1..1. */
 const KEYS: Readonly<Record<string, readonly [right: number, forward: number, turn: number]>> = {
   KeyW: [0, 1, 0],
   KeyS: [0, -1, 0],
@@ -58,28 +61,33 @@ const KEYS: Readonly<Record<string, readonly [right: number, forward: number, tu
   ArrowRight: [0, 0, -1],
 };
 
-/** Walks on the floor of the scene: by keys, by clicks and taps on the floor, by a stick for the thumb, and by a gamepad. */
+/** Moves the camera on the floor of the scene: by keys, clicks and taps on the floor, a joystick, and gamepads. */
 export class WalkController implements ReactiveController, Mover {
   readonly #host: ReactiveControllerHost & HTMLElement;
   readonly #of: WalkHost;
   readonly #held = new Map<string, readonly [number, number, number]>();
   readonly #joystick: Joystick;
+  readonly #gamepads: Gamepads;
   #walker: Walker | undefined;
+  /** Point near the start of the walk, viewer space in meters. */
+  #start: Vector3 = [0, 0, 0];
+  /** Position of the camera's eye after the last motion of the walker, viewer space in scene units. */
+  #eye: Vector3 = [0, 0, 0];
   #isFast = false;
   #lastStep: number | undefined;
   #listening: AbortController | undefined;
-  /** The scene and settings that the floor was asked for with. */
+  /** Key of the scene and settings that the floor was requested for; undefined before a request. */
   #askedFor: string | undefined;
-  #opening: AbortController | undefined;
-  /** The scene has no floor: the camera flies. */
+  readonly #opening = new LatestTask();
+  /** Whether the scene has no floor, so that the camera flies. */
   #isRefused = false;
   #isSaid = false;
-  #gamepads = 0;
 
   constructor(host: ReactiveControllerHost & HTMLElement, of: WalkHost) {
     this.#host = host;
     this.#of = of;
     this.#joystick = new Joystick(host.ownerDocument, () => of.requestFrame());
+    this.#gamepads = new Gamepads(host.ownerDocument.defaultView, () => of.requestFrame());
     host.addController(this);
   }
 
@@ -87,7 +95,7 @@ export class WalkController implements ReactiveController, Mover {
     return this.#isRefused;
   }
 
-  /** Help text for the keys; undefined unless walking. */
+  /** Help text for the keys; undefined if the camera does not walk. */
   get keys(): string | undefined {
     return this.#of.attributes.navigation === 'walk' && !this.#isRefused ? this.#word('keys-walk') : undefined;
   }
@@ -101,15 +109,14 @@ export class WalkController implements ReactiveController, Mover {
     if (this.#listening !== undefined) return;
     this.#listening = new AbortController();
     const { signal } = this.#listening;
-    // Registered before the keys that orbit.
+    // Capturing listeners are called before the listener for the keys that orbit.
     surface.addEventListener('keydown', this.#onDown, { signal, capture: true });
     surface.addEventListener('keyup', this.#onUp, { signal });
     surface.addEventListener('blur', this.#release, { signal });
     surface.addEventListener('click', this.#onClick, { signal });
-    const { defaultView } = surface.ownerDocument;
-    defaultView?.addEventListener('gamepadconnected', this.#onGamepad, { signal });
+    this.#host.addEventListener('click', this.#onSceneClick, { signal });
+    this.#gamepads.listen(signal);
     surface.after(this.#joystick.element);
-    if (defaultView?.navigator.getGamepads?.().some(Boolean)) this.#onGamepad();
   }
 
   hostDisconnected(): void {
@@ -117,14 +124,15 @@ export class WalkController implements ReactiveController, Mover {
   }
 
   advance(now: number): boolean {
-    const walker = this.#walker;
-    if (walker === undefined) return false;
+    if (this.#walker === undefined) return false;
+    // A reset of the camera also returns the walker to the start. A new scene has its own start.
+    if (!this.#of.camera.isTouched && this.#of.walkable !== null) this.#begin(this.#walker.map);
     const stick = this.#stick();
     const [right, forward, turn] = [...this.#held.values(), stick].reduce(
       (sum, held) => [sum[0] + held[0], sum[1] + held[1], sum[2] + held[2]] as const,
       [0, 0, 0] as const,
     );
-    if (right === 0 && forward === 0 && turn === 0 && !walker.isMoving) {
+    if (right === 0 && forward === 0 && turn === 0 && !this.#walker.isMoving) {
       this.#lastStep = undefined;
       return false;
     }
@@ -134,10 +142,11 @@ export class WalkController implements ReactiveController, Mover {
     return true;
   }
 
-  /** Walks forward by some meters, for the wheel and pinch gestures. */
+  /** Walks forward, or backward if negative, by a distance in meters. For the wheel and pinch gestures. */
   ahead(meters: number): void {
     const walker = this.#walker;
     if (walker === undefined) return;
+    this.#land();
     const { theta } = this.#of.camera.goal;
     walker.step(Math.abs(meters) / 1.4, -Math.sin(theta) * Math.sign(meters), -Math.cos(theta) * Math.sign(meters));
     this.#follow();
@@ -147,6 +156,7 @@ export class WalkController implements ReactiveController, Mover {
     const { camera } = this.#of;
     if (stepMs === 0) return;
     const seconds = stepMs / 1000;
+    this.#land();
     if (turn !== 0) camera.lookBy(turn * TURN * seconds, 0);
     const { theta } = camera.goal;
     const [sin, cos] = [Math.sin(theta), Math.cos(theta)];
@@ -155,16 +165,34 @@ export class WalkController implements ReactiveController, Mover {
     this.#follow();
   }
 
-  /** Puts the camera's eye above the feet. */
+  /** Moves the walker to its start at once, and levels the view. */
+  #begin(map: WalkMap): void {
+    const { camera } = this.#of;
+    this.#walker = new Walker(map, this.#start);
+    camera.lookBy(0, Math.PI / 2 - camera.goal.phi);
+    this.#follow();
+    camera.jumpToGoal();
+  }
+
+  /** Moves the camera's eye to its height above the feet. */
   #follow(): void {
     const { camera } = this.#of;
     const { at, eyeFloor } = this.#walker!;
     const { unit = 1, eyeHeight } = this.#settings();
     camera.walkTo([at[0] / unit, (eyeFloor + eyeHeight) / unit, at[2] / unit]);
+    this.#eye = eyeOfPose(camera.goal);
     this.#of.requestFrame();
   }
 
-  /** A wall is announced to screen readers once. */
+  /** Moves the walker to the floor below the camera if a view, a flight or an attribute has moved the camera. */
+  #land(): void {
+    const { unit = 1 } = this.#settings();
+    const eye = eyeOfPose(this.#of.camera.goal);
+    const [x, y, z] = subtract(eye, this.#eye);
+    if (Math.hypot(x, y, z) * unit > STRAYED) this.#walker!.land(inMeters(eye, unit));
+  }
+
+  /** Announces to screen readers, once, that a wall blocks the way. */
   #notifyBlocked(isWalking: boolean): void {
     const isBlocked = isWalking && this.#walker!.isBlocked;
     if (isBlocked && !this.#isSaid) this.#of.behaviors.announcer.value?.say(this.#word('blocked'));
@@ -172,7 +200,7 @@ export class WalkController implements ReactiveController, Mover {
     this.#isSaid = isBlocked || (this.#isSaid && !isWalking);
   }
 
-  /** Makes or fetches the floor of the scene once. */
+  /** Computes or fetches the floor, once for each scene and settings. */
   #ask(): void {
     const { walkable: request, camera, frame, services } = this.#of;
     if (request === null) return;
@@ -181,28 +209,20 @@ export class WalkController implements ReactiveController, Mover {
     if (key === this.#askedFor) return;
     this.#forget();
     this.#askedFor = key;
-    this.#opening = new AbortController();
-    const { signal } = this.#opening;
     const metersPerUnit = unit ?? 1;
-    const eye = eyeOfPose(camera.goal).map((value) => value * metersPerUnit) as [number, number, number];
-    const mapUrl = walkMap === 'auto' ? null : new URL(walkMap, this.#of.element.baseURI).href;
-    openFloor(
-      { loader: services.sceneLoader, request, mapUrl, frame, metersPerUnit, eyeHeight, near: eye },
-      signal,
-    ).then(
-      (map) => {
+    const near = (this.#start = inMeters(eyeOfPose(camera.goal), metersPerUnit));
+    const options = { loader: services.sceneLoader, request, frame, metersPerUnit, eyeHeight, near };
+    this.#opening.run(
+      async (signal) => {
+        const mapUrl = walkMap === 'auto' ? null : new URL(walkMap, this.#of.element.baseURI).href;
+        const map = await openFloor({ ...options, mapUrl }, signal);
         if (signal.aborted) return;
         if (map.area < MIN_AREA) return this.#refuse(`its floor has ${map.area.toFixed(1)} m², ${MIN_AREA} are needed`);
-        this.#walker = new Walker(map, eye);
-        camera.level();
-        this.#follow();
-        camera.jumpToGoal();
+        this.#begin(map);
         this.#host.requestUpdate();
         this.#of.element.dispatchEvent(new CustomEvent('walk-ready', { detail: { area: map.area } }));
       },
-      (error: Error) => {
-        if (!signal.aborted) this.#refuse(error.message);
-      },
+      (error) => this.#refuse((error as Error).message),
     );
   }
 
@@ -219,12 +239,12 @@ export class WalkController implements ReactiveController, Mover {
     const keys = event.code in KEYS ? event.code : event.key;
     const direction = KEYS[keys];
     if (!direction || event.ctrlKey || event.altKey || event.metaKey || !this.#walker) return;
-    // Shift with the arrow keys looks up and down, like in flight.
+    // Shift with the arrow keys rotates the view up and down, as in flight.
     if (event.shiftKey && keys.startsWith('Arrow')) return;
     event.preventDefault();
     event.stopImmediatePropagation();
     this.#isFast = event.shiftKey;
-    // A short press may be over before the next frame.
+    // A short key press may end before the next frame, so it moves the camera at once.
     if (!event.repeat && !this.#held.has(event.code)) this.#move(...direction, FIRST_STEP_MS);
     this.#held.set(event.code, direction);
     this.#of.requestFrame();
@@ -239,16 +259,27 @@ export class WalkController implements ReactiveController, Mover {
 
   readonly #release = (): void => this.#held.clear();
 
-  /** A click or tap on the floor walks there; visitors who prefer reduced motion jump there at once. */
-  readonly #onClick = ({ clientX, clientY }: MouseEvent): void => {
+  /** Walks to a click on the frame. If it may belong to an interactive child, {@link #onSceneClick} follows. */
+  readonly #onClick = (event: MouseEvent): void => {
+    const children = [...this.#host.children] as (HTMLElement & { readonly interactive?: boolean })[];
+    if (!children.some(({ interactive, hidden }) => interactive && !hidden)) this.#walkTo(event);
+  };
+
+  /** Walks to a click that was dispatched to the element itself, because it hits no interactive child. */
+  readonly #onSceneClick = (event: MouseEvent): void => {
+    if (event.target === this.#host && 'hit' in event) this.#walkTo(event);
+  };
+
+  /** Walks to the point of a click or tap on the floor. Visitors who prefer reduced motion jump there at once. */
+  #walkTo({ clientX, clientY }: MouseEvent): void {
     const walker = this.#walker;
     if (walker === undefined) return;
     const { unit = 1 } = this.#settings();
     this.#of.positionFromPoint(clientX, clientY).then(
       (point) => {
         if (point === null || this.#walker !== walker) return;
-        const to: Vector3 = [point.x * unit, point.y * unit, point.z * unit];
-        if (!walker.goTo(to)) return;
+        this.#land();
+        if (!walker.goTo(inMeters([point.x, point.y, point.z], unit))) return;
         if (prefersReducedMotion()) {
           walker.jump();
           this.#follow();
@@ -257,35 +288,15 @@ export class WalkController implements ReactiveController, Mover {
       },
       (error: Error) => this.#of.warn(error.message),
     );
-  };
-
-  /** Reads gamepads between frames while any is connected; only a deflected stick asks for frames. */
-  readonly #onGamepad = (): void => {
-    const view = this.#host.ownerDocument.defaultView;
-    if (this.#gamepads !== 0 || view === null) return;
-    const poll = (): void => {
-      const isThere = view.navigator.getGamepads().some(Boolean);
-      this.#gamepads = isThere && this.#listening !== undefined ? view.requestAnimationFrame(poll) : 0;
-      if (this.#stick().some((value) => value !== 0)) this.#of.requestFrame();
-    };
-    this.#gamepads = view.requestAnimationFrame(poll);
-  };
-
-  /** Input of the joystick and the gamepads. */
-  #stick(): readonly [right: number, forward: number, turn: number] {
-    const pads = this.#gamepads === 0 ? [] : this.#host.ownerDocument.defaultView!.navigator.getGamepads();
-    const beyond = (value = 0): number => (Math.abs(value) > DEAD_ZONE ? value : 0);
-    let [right, forward, turn] = [this.#joystick.right, this.#joystick.forward, 0];
-    for (const pad of pads) {
-      if (pad === null) continue;
-      right += beyond(pad.axes[0]);
-      forward -= beyond(pad.axes[1]);
-      turn -= beyond(pad.axes[2]);
-    }
-    return [right, forward, turn];
   }
 
-  /** Settings of the attributes, in meters. */
+  /** Sum of the inputs of the joystick and the gamepads. Each input is -1..1. */
+  #stick(): readonly [right: number, forward: number, turn: number] {
+    const [right, forward, turn] = this.#gamepads.deflection;
+    return [right + this.#joystick.right, forward + this.#joystick.forward, turn];
+  }
+
+  /** Returns the settings of the attributes. Lengths are in meters; `unit` is undefined if the page does not set it. */
   #settings(): { walkMap: string; eyeHeight: number; unit: number | undefined } {
     const { walkMap, eyeHeight, unit } = this.#of.attributes;
     const warn = (sentence: string): void => this.#of.warn(sentence);
@@ -301,7 +312,7 @@ export class WalkController implements ReactiveController, Mover {
   }
 
   #forget(): void {
-    this.#opening?.abort();
+    this.#opening.renew();
     this.#askedFor = undefined;
     this.#walker = undefined;
     this.#isRefused = this.#isSaid = false;
@@ -311,7 +322,7 @@ export class WalkController implements ReactiveController, Mover {
     this.#listening?.abort();
     this.#listening = undefined;
     this.#held.clear();
-    this.#joystick.element.remove();
+    this.#joystick.remove();
   }
 
   #stop(): void {
@@ -320,5 +331,7 @@ export class WalkController implements ReactiveController, Mover {
   }
 }
 
-/** Whether fingers are the main pointer. */
+const inMeters = ([x, y, z]: Vector3, unit: number): Vector3 => [x * unit, y * unit, z * unit];
+
+/** Whether the primary pointer is coarse, such as a finger. */
 const isTouchScreen = (): boolean => globalThis.matchMedia?.('(pointer: coarse)').matches ?? false;

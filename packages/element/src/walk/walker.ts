@@ -6,58 +6,64 @@ const SPEED = 1.4;
 const FAST = 2.5;
 /** Time constant with which the eyes follow steps of the floor, seconds. */
 const EYE_SECONDS = 0.08;
-/** Waypoints closer than this count as reached, meters. */
+/** Distance to a waypoint, meters, below which it is reached. */
 const REACHED = 0.05;
 
 type Place = readonly [x: number, y: number, z: number];
 
-/** A body on a walk map: meters, viewer space. It knows no page and no camera. */
+/** A body on a map of the floor: meters in viewer space. Independent of page and camera. */
 export class Walker {
   readonly map: WalkMap;
   #at: Place;
-  /** Smoothed height of the floor under the eyes. */
+  /** Height of the floor under the eyes, smoothed over time, meters. */
   #eyeFloor: number;
   #path: readonly Place[] = [];
   #isBlocked = false;
 
   constructor(map: WalkMap, near: Vector3) {
     this.map = map;
-    const below = floorBelow(map, near);
-    this.#at = below === undefined ? map.start : [near[0], below, near[2]];
+    this.#at = map.start;
     this.#eyeFloor = this.#at[1];
+    this.land(near);
   }
 
-  /** Position of the feet. */
+  /** Position of the feet in viewer space, meters. */
   get at(): Place {
     return this.#at;
   }
 
-  /** Height of the floor for the eyes, which follows steps smoothly. */
+  /** Height of the floor for the eyes, meters. It follows steps of the floor smoothly. */
   get eyeFloor(): number {
     return this.#eyeFloor;
   }
 
-  /** The last step did not move the body. */
+  /** Whether the last step did not move the body. */
   get isBlocked(): boolean {
     return this.#isBlocked;
   }
 
-  /** Whether it needs more steps: it follows a path, or the eyes have not reached their height. */
+  /** Whether the motion needs more steps: the body follows a path, or the eyes have not reached their height. */
   get isMoving(): boolean {
     return this.#path.length > 0 || this.#eyeFloor !== this.#at[1];
   }
 
-  /**
-   * Starts walking to a place on the floor.
-   * @returns whether there is a way
-   */
+  /** Moves the body at once to the floor below a point. It stays where it is if there is no floor. */
+  land(near: Vector3): void {
+    const below = floorBelow(this.map, near);
+    if (below === undefined) return;
+    this.#path = [];
+    this.#at = [near[0], below, near[2]];
+    this.#eyeFloor = below;
+  }
+
+  /** Starts to walk to a point on the floor. @returns whether there is a path to it */
   goTo(to: Vector3): boolean {
     const height = floorAt(this.map, to[0], to[2], to[1]);
     this.#path = height === undefined ? [] : wayTo(this.map, this.#at, [to[0], height, to[2]]);
     return this.#path.length > 0;
   }
 
-  /** Jumps to the end of its path. */
+  /** Moves the body to the end of its path at once. */
   jump(): void {
     const end = this.#path.at(-1);
     this.#path = [];
@@ -66,8 +72,8 @@ export class Walker {
   }
 
   /**
-   * Walks for some time.
-   * @param x direction in viewer space; 0 and 0 follow the path, lengths above 1 count as 1
+   * Moves the body for some seconds in the direction x, z of viewer space. A direction longer than 1 counts as 1; 0, 0
+   * follows the path.
    */
   step(seconds: number, x: number, z: number, isFast = false): void {
     const way = SPEED * (isFast ? FAST : 1) * seconds;
@@ -101,7 +107,7 @@ export class Walker {
   }
 }
 
-/** The highest floor below a point; undefined if there is none. */
+/** Returns the height of the highest floor below a point, meters; undefined if there is none. */
 function floorBelow({ corner, cell, width, depth, layers }: WalkMap, [x, y, z]: Vector3): number | undefined {
   const [i, j] = [Math.floor((x - corner[0]) / cell), Math.floor((z - corner[1]) / cell)];
   if (!(i >= 0 && j >= 0 && i < width && j < depth)) return undefined;

@@ -2,17 +2,20 @@ import { DATA_WIDTH, SplatOrder, type OrderView } from '@gaussian-splat/renderer
 import type { PageMessage, WorkerMessage } from '../loading/protocol.js';
 import type { SortAnswer, SortRequest } from '../loading/sort-splats.js';
 
-/** Maximum wait for an order, ms: a worker that has not started by then may never start. */
+/**
+ * Maximum milliseconds from the first request to the first order. A worker that has not started by then may never
+ * start.
+ */
 const LATE_MS = 2_000;
 
-/** The worker that sorts for all scenes of a page. */
+/** The one worker that sorts for all scenes of a page. */
 class SortWorker {
   static #current: SortWorker | undefined;
-  /** Rejects if no worker can be made. */
+  /** Fulfills when the worker has started. Rejects if the page cannot create a worker. */
   readonly ready: Promise<Worker>;
   readonly #spawn: () => Worker;
   #worker: Worker | undefined;
-  /** Callbacks of the users for an error of the worker. */
+  /** Callbacks of the sorters in use, called if the worker fails. */
   readonly #users = new Set<() => void>();
 
   private constructor(spawn: () => Worker) {
@@ -49,68 +52,69 @@ class SortWorker {
   }
 }
 
-/** A view, and the time of its request, by the page's clock. */
+/** A requested view, and the time of the request by `performance.now`. */
 interface Asked {
   readonly view: OrderView;
   readonly askedAt: number;
 }
 
-/** An order, and the view that it was sorted for. */
+/** An order of splats, and the view that it was sorted for. */
 export interface SortedSplats extends Asked {
   /** Indices of splats from near to far, in complete rows of `DATA_WIDTH`. */
   readonly order: Uint32Array;
   readonly count: number;
-  /** Average number of splats per pixel. */
+  /** Average number of splats that cover a pixel. */
   readonly covered: number;
 }
 
 export interface DepthSorterOptions {
-  /** [N, 3] relative to the scene's origin */
+  /** [N, 3] positions relative to the scene's origin. */
   readonly positions: Float32Array;
-  /** Areas of the splats' largest cross-sections; [N] */
+  /** [N] area of each splat's largest cross-section. */
   readonly areas?: Float32Array | undefined;
   readonly spawn: () => Worker;
-  /** Receives each order; its buffer is reused afterwards. */
+  /** Called with each order. Its buffer is reused after the call. */
   readonly onOrder: (sorted: SortedSplats) => void;
 }
 
 /**
- * Sorts splats in a worker, one view at a time; the latest request made meanwhile is next. If the page forbids the
- * worker, or it does not answer, the main thread sorts.
+ * Sorts splats in a worker, one view at a time. Among the requests made meanwhile, only the latest is sorted next. If
+ * the page forbids the worker, or it does not answer, the main thread sorts.
  */
 export class DepthSorter {
   readonly #options: DepthSorterOptions;
   readonly #worker: SortWorker;
   #port: MessagePort | undefined;
   #here: SplatOrder | undefined;
-  /** Transferred to the worker while it sorts. */
+  /** Buffer of the order; empty while the worker has it. */
   #buffer: Uint32Array<ArrayBuffer>;
   #sorting: Asked | undefined;
   #next: Asked | undefined;
   #isHere = false;
   #isOver = false;
-  readonly #late: ReturnType<typeof setTimeout>;
-  /** Duration of the worker's last sort. */
+  /** Timer that starts with the first request, because a hidden page requests no order. */
+  #late: ReturnType<typeof setTimeout> | undefined;
+  /** Duration of the worker's last sort, milliseconds; Infinity before the first. */
   milliseconds = Infinity;
 
   constructor(options: DepthSorterOptions) {
     this.#options = options;
     this.#buffer = this.#makeBuffer();
     this.#worker = SortWorker.acquire(options.spawn, this.#giveUp);
-    this.#late = setTimeout(this.#giveUp, LATE_MS);
     this.#worker.ready.then((worker) => this.#connect(worker), this.#giveUp);
   }
 
-  /** Asks for the order of a view. */
+  /** Requests the order of a view. `onOrder` receives it later. */
   request(view: OrderView): void {
+    this.#late ??= setTimeout(this.#giveUp, LATE_MS);
     this.#next = { view, askedAt: performance.now() };
     this.#proceed();
   }
 
-  /** The order of a view, at once. */
+  /** Sorts on the main thread and returns the order of a view. Its buffer is reused after the next request. */
   sortNow(view: OrderView): SortedSplats {
     const here = (this.#here ??= new SplatOrder(this.#options.positions, this.#options.areas));
-    // The buffer may be with the worker.
+    // The worker may have the buffer.
     const order = this.#buffer.length > 0 ? this.#buffer : this.#makeBuffer();
     const askedAt = performance.now();
     const count = here.sort(view, order);
@@ -145,7 +149,7 @@ export class DepthSorter {
     const next = this.#next;
     if (next === undefined || this.#sorting !== undefined) return;
     if (this.#isHere) return void setTimeout(this.#sortHere);
-    // The request is already sent, or the worker is abandoned.
+    // Without a port, the worker has not started yet. The request is sent after its start.
     if (this.#port === undefined) return;
     this.#next = undefined;
     this.#sorting = next;
@@ -171,7 +175,7 @@ export class DepthSorter {
     if (next !== undefined) this.#options.onOrder(this.sortNow(next.view));
   };
 
-  /** No worker answers, so the main thread sorts from now on. */
+  /** Makes the main thread sort from this call on, because no worker answers. */
   readonly #giveUp = (): void => {
     if (this.#isOver || this.#isHere) return;
     this.#isHere = true;

@@ -12,15 +12,15 @@ export interface GlUploadOptions {
   readonly spawn: () => Worker;
 }
 
-/** A scene in textures: it is drawn alone, without levels of detail. */
+/** A scene in WebGL textures. It is drawn alone, without levels of detail. */
 export class GlLoaded extends LoadedGaussians {
   override readonly renderer = 'webgl';
   readonly lease: GlLease;
   readonly frames: GlRenderer;
   readonly textures: GlGaussians;
-  /** [N, 3] relative to the scene's origin */
+  /** [N, 3] positions relative to the scene's origin. */
   readonly positions: Float32Array;
-  /** Areas of the splats' largest cross-sections; [N] */
+  /** [N] area of each splat's largest cross-section. */
   readonly areas: Float32Array;
   readonly spawn: () => Worker;
 
@@ -30,6 +30,7 @@ export class GlLoaded extends LoadedGaussians {
     textures: GlGaussians,
     gaussians: OwnedGaussians,
     { packed, bounds, warnings = [], hasMeshes = false }: LoadedScene,
+    areas: Float32Array,
     spawn: () => Worker,
   ) {
     super(lease, gaussians, bounds, 1, { warnings: hasMeshes ? [...warnings, NO_MESHES] : warnings });
@@ -38,10 +39,13 @@ export class GlLoaded extends LoadedGaussians {
     this.textures = textures;
     this.spawn = spawn;
     this.positions = positionsIn(packed.geometry);
-    this.areas = areasIn(packed.geometry);
+    this.areas = areas;
   }
 
-  /** Puts a scene on the GPU, which then owns the lease. Rejects with GaussianSplatError `out-of-memory/*` or the signal's reason. */
+  /**
+   * Uploads a scene. The result owns the lease and releases it when it is destroyed. Rejects with GaussianSplatError
+   * `out-of-memory/*`, or the signal's reason.
+   */
   static async open(lease: GlLease, scene: LoadedScene, options: GlUploadOptions): Promise<GlLoaded> {
     const { signal, memoryBudget, spawn } = options;
     const { packed } = scene;
@@ -58,10 +62,12 @@ export class GlLoaded extends LoadedGaussians {
     };
     try {
       textures = await GlGaussians.upload(lease.gl, packed);
+      await GlRenderer.prepare(lease.gl);
+      const areas = await areasIn(packed.geometry);
       signal.throwIfAborted();
       frames = new GlRenderer(lease.gl, textures);
-      const gaussians = { ...textures.facts, pages: [], version: 0, byteLength, destroy };
-      return new GlLoaded(lease, frames, textures, gaussians, scene, spawn);
+      const gaussians = { ...textures.facts, blocks: [], version: 0, byteLength, destroy };
+      return new GlLoaded(lease, frames, textures, gaussians, scene, areas, spawn);
     } catch (error) {
       destroy();
       throw error;
@@ -72,7 +78,7 @@ export class GlLoaded extends LoadedGaussians {
     return new WebGlBackend(this, events);
   }
 
-  /** None are built. */
+  /** True, so that no levels of detail are built. */
   override get hasOwnLevels(): boolean {
     return true;
   }

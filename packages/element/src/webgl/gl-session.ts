@@ -1,6 +1,6 @@
 /**
- * One WebGL context for all elements of a page, because browsers drop the oldest of more than 8 or 16. Elements show
- * copies of its image.
+ * One WebGL context for all elements of a page, because browsers drop the oldest of more than 8 or 16 contexts.
+ * Elements show copies of the context's image.
  */
 import { GaussianSplatError } from '@gaussian-splat/core';
 import { MemoryLedger } from '@gaussian-splat/renderer';
@@ -12,7 +12,7 @@ import type { DeviceLease } from '../gpu/shared-device.js';
 export interface GlLease extends DeviceLease {
   readonly gl: WebGL2RenderingContext;
   readonly clock: GlClock;
-  /** Makes the canvas at least so large, in pixels. Clears it if it has to grow. */
+  /** Enlarges the canvas to at least this size, pixels. A canvas that grows is cleared. */
   fit(width: number, height: number): void;
 }
 
@@ -24,7 +24,7 @@ class GlSession {
   readonly limits: DeviceOwner['limits'];
   readonly memory: MemoryLedger;
   isLost = false;
-  /** Listeners of a loss. A shared promise would retain every listener that ever waited for it. */
+  /** Listeners of a lost context. A shared promise would retain every listener that ever waited for it. */
   readonly #listeners = new Set<() => void>();
   #users = 0;
 
@@ -81,14 +81,14 @@ class GlSession {
 
   #end(): void {
     if (current === this) current = undefined;
-    // Else its memory stays until the canvas is collected.
+    // Without this call, the memory of the context would stay until the canvas is garbage-collected.
     this.gl.getExtension('WEBGL_lose_context')?.loseContext();
   }
 }
 
 let current: GlSession | undefined;
 
-/** A lease of the page's context; undefined if the browser gives none. */
+/** Returns a lease of the page's context; undefined if the browser supports no WebGL 2. */
 export function acquireGl(): GlLease | undefined {
   current ??= start();
   return current?.lease();
@@ -97,7 +97,7 @@ export function acquireGl(): GlLease | undefined {
 function start(): GlSession | undefined {
   const gl = document.createElement('canvas').getContext('webgl2', {
     alpha: true,
-    // A headset's image cannot be drawn on another GPU.
+    // A headset may be connected to another GPU, which could not draw from an incompatible context.
     xrCompatible: document.querySelector('gaussian-splat:is([vr],[ar])') !== null,
     antialias: false,
     depth: false,
@@ -107,7 +107,11 @@ function start(): GlSession | undefined {
   return gl && !gl.isContextLost() ? new GlSession(gl) : undefined;
 }
 
-/** Error for a feature that WebGL lacks. @param cause reason that WebGPU is not used */
+/**
+ * Returns the error for a feature that WebGL lacks.
+ * @param what The feature.
+ * @param cause Reason that WebGPU is not used.
+ */
 export const cannotShow = (what: string, cause?: unknown): GaussianSplatError =>
   new GaussianSplatError('unsupported/webgl', {
     where: 'this page, which draws with WebGL 2 in place of WebGPU',
@@ -117,7 +121,7 @@ export const cannotShow = (what: string, cause?: unknown): GaussianSplatError =>
     cause,
   });
 
-/** Error for a page that requests WebGL explicitly. */
+/** Returns the error for a page that requests WebGL in a browser without it. */
 export const noWebGl = (): GaussianSplatError =>
   new GaussianSplatError('unsupported/webgl', {
     where: 'this browser',

@@ -1,4 +1,4 @@
-/** Loaded for pages without WebGPU, or with `renderer="webgl"`. */
+/** Opens scenes with WebGL 2. Loaded for pages without WebGPU, or with `renderer="webgl"`. */
 import { faultsOf } from '@gaussian-splat/renderer/tools';
 import { glBytes } from '@gaussian-splat/renderer/webgl';
 import type { LoadedGaussians } from '../gpu/loaded-gaussians.js';
@@ -8,13 +8,13 @@ import type { LoadedScene, SceneRequest } from '../loading/protocol.js';
 import { GlLoaded } from './gl-loaded.js';
 import { acquireGl, cannotShow, noWebGl, type GlLease } from './gl-session.js';
 
-/** Children that add to the element's own scene. */
+/** Selector of children that add sources to the element's own scene. */
 const CHILDREN = 'splat-scene, splat-mesh';
 
 /**
  * Opens a scene file with WebGL 2.
- * @param reason why there is no WebGPU; undefined if it was not requested
- * @throws GaussianSplatError `reason` without WebGL 2; `unsupported/webgl` for features that it lacks; errors of
+ * @param reason Error that WebGPU failed with; undefined if the page requests WebGL.
+ * @throws GaussianSplatError `reason` without WebGL 2; `unsupported/webgl` for features that WebGL lacks; errors of
  * loading; or the signal's reason
  */
 export async function openGlScene(
@@ -22,7 +22,7 @@ export async function openGlScene(
   options: OpenOptions,
   reason: unknown,
 ): Promise<LoadedGaussians> {
-  // Levels of detail need WebGPU: here the finest level is drawn, and for streamed scenes as much as fits.
+  // Levels of detail need WebGPU. WebGL draws the finest level, or as much of a streamed scene as fits into memory.
   const { memoryBudget = Infinity } = options;
   const streamBytes = isStreamed(asked) ? Math.min(memoryBudget, streamCaps().bytes) : undefined;
   const request = { ...asked, levels: false, streamBytes };
@@ -61,7 +61,7 @@ const openOptions = (
   signal: AbortSignal,
 ): Parameters<typeof GlLoaded.open>[2] => ({ memoryBudget, spawn, signal });
 
-/** Shows the previews of one load, one at a time; those that arrive meanwhile are skipped. */
+/** Shows the previews of one load, one at a time. Previews that arrive while another one is uploaded are skipped. */
 class Previews {
   readonly #options: OpenOptions;
   readonly #over = new AbortController();

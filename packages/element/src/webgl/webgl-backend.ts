@@ -2,10 +2,11 @@ import type { Camera } from '@gaussian-splat/core';
 import type { ProbeAnswer, ProbePoint, WorkTime } from '@gaussian-splat/renderer/tools';
 import {
   distanceView,
-  isSameView,
+  isSameImage,
   orderView,
   OverdrawLimit,
   drawn as whenDrawn,
+  type GlFrameRequest,
   type OrderView,
 } from '@gaussian-splat/renderer/webgl';
 import type {
@@ -22,43 +23,50 @@ import type { GlLoaded } from './gl-loaded.js';
 import { cannotShow } from './gl-session.js';
 
 /**
- * An order older than this when drawn, ms, is sorted again on the main thread if that takes no longer than the second
- * value.
+ * Maximum age of an order that is drawn, milliseconds. An older order is sorted again on the main thread, if that takes
+ * at most the second value.
  */
 const [OLDEST_MS, LONGEST_SORT_MS] = [80, 30];
-/** Minimum fraction of a full frame's time that is proportional to pixels. */
+/**
+ * Average counts of splats per pixel. A first frame above the first value is drawn in parts, each of about the second
+ * value.
+ */
+const [MAX_COVERED, COVERED_BY_PART] = [256, 32];
+/** Fraction of a full frame's time that is certainly proportional to the number of pixels. */
 const SURE_SHARE = 0.5;
 
 type Beneath = (camera: Camera) => void;
 
-/** A canvas with copies of the images that the page's context draws. */
+/** Canvas of an element, which gets copies of the images that the page's context draws. */
 interface CopySurface extends Surface {
   readonly context: CanvasRenderingContext2D;
 }
 
-/** Draws one scene with WebGL, in orders that a worker finds. */
+/** Draws one scene with WebGL. A worker sorts its splats. */
 export class WebGlBackend implements Backend {
   readonly filter = undefined;
   readonly isPrepared = true;
   readonly scene: GlLoaded;
-  /** Draw the sky and the shadow beneath the splats, in this order, into the context's canvas. */
+  /** Functions that draw the sky and the shadow, in this order, into the context's canvas beneath the splats. */
   readonly beneath: { sky?: Beneath | undefined; shadow?: Beneath | undefined } = {};
   readonly #sorter: DepthSorter;
   readonly #overdraw = new OverdrawLimit();
-  /** The view of the order on the GPU. */
+  /** View that the order on the GPU was sorted for; undefined before the first order. */
   #sorted: OrderView | undefined;
-  /** Time of the order's request, by the page's clock. */
+  /** Time at which the order on the GPU was requested, by `performance.now`. */
   #sortedAt = 0;
-  /** The view of the last request. */
+  /** Average number of splats per pixel of the frame, with the order on the GPU. */
+  #covered = 0;
+  /** View of the last request for an order. */
   #asked: OrderView | undefined;
   /** Fulfills when the first order has arrived. */
   readonly #ordered: Promise<void>;
-  /** A frame was asked for before there was an order to draw it in. */
+  /** Whether a frame was requested before the first order arrived. */
   #isOwed = false;
-  /** The first frame is drawn. */
+  /** Fulfills when the first frame is drawn. */
   readonly #shown: Promise<void>;
   #resolveShown: () => void = () => undefined;
-  /** Time of a full frame as far as known, ms. */
+  /** Measured time of a full frame, milliseconds; 0 while unknown. */
   #wholeMs = 0;
   #rendering: Rendering = { quality: 'default', shDegree: 3, order: 'center' };
   #isDestroyed = false;
@@ -72,7 +80,7 @@ export class WebGlBackend implements Backend {
     this.#sorter = new DepthSorter({
       ...{ positions, areas, spawn },
       onOrder: (sorted) => {
-        // A caller that waits for the first order draws it.
+        // The first order is drawn by the caller that waits for it.
         const isDue = this.#isOwed || this.#sorted !== undefined;
         this.#isOwed = false;
         this.#setOrder(sorted);
@@ -128,14 +136,14 @@ export class WebGlBackend implements Backend {
   render(frame: CanvasFrame, _: string, onTime?: (time: WorkTime) => void): void {
     if (this.isLost) return;
     const view = this.#viewOf(frame);
-    if (this.#sorted === undefined || !isSameView(view, this.#sorted)) {
-      // Code that reads the image at once cannot wait for the worker.
+    if (this.#sorted === undefined || !isSameImage(view, this.#sorted)) {
+      // A script that reads the image in the same task cannot wait for the worker.
       if (frame.isRead || this.#isOld) {
         this.#asked = view;
         this.#setOrder(this.#sorter.sortNow(view));
       } else this.#ask(view);
     }
-    // A scene that was loaded without a size had no first frame, and has no order yet.
+    // A scene that was loaded while the element had no size has no first frame and no order yet.
     if (this.#sorted === undefined) return void (this.#isOwed = true);
     if (onTime === undefined) return this.#draw(frame);
     const { resolutionScale = 1 } = frame.settings ?? {};
@@ -149,17 +157,29 @@ export class WebGlBackend implements Backend {
       .catch(() => undefined);
   }
 
-  /** Waits for the order of the first frame, and until the GPU has drawn it. */
+  /** Draws the first frame when its order has arrived, and waits until the GPU has drawn it. */
   async renderFirst(frame: CanvasFrame): Promise<void> {
     this.#ask(this.#viewOf(frame));
-    // A painter that is destroyed meanwhile gets no order, and the next scene waits for the end of this frame.
+    // A backend that is destroyed meanwhile gets no order, and the next scene waits for the end of this frame.
     await Promise.race([this.#ordered, this.#shown, this.scene.lost]);
     if (this.isLost || this.#isDestroyed) return;
     const begin = performance.now();
-    this.#paint(frame);
-    await whenDrawn(this.scene.lease.gl).catch(() => undefined);
+    await this.#paintInParts(frame);
     this.#wholeMs = performance.now() - begin;
     if (!this.isLost && !this.#isDestroyed) this.#show(frame);
+  }
+
+  /**
+   * Paints a frame, and waits until the GPU has drawn it. A costly frame is painted in parts, so that other scenes can
+   * be drawn in between.
+   */
+  async #paintInParts(frame: CanvasFrame): Promise<void> {
+    const covered = this.#covered * this.pixelShare ** 2;
+    const parts = covered > MAX_COVERED ? Math.ceil(covered / COVERED_BY_PART) : 1;
+    for (let part = 0; part < parts && !this.isLost && !this.#isDestroyed; part++) {
+      this.#paint(frame, [part / parts, (part + 1) / parts]);
+      await whenDrawn(this.scene.lease.gl).catch(() => undefined);
+    }
   }
 
   async probe(points: readonly ProbePoint[]): Promise<ProbeAnswer[]> {
@@ -168,7 +188,7 @@ export class WebGlBackend implements Backend {
   }
 
   async readCounts(): Promise<ReadCounts> {
-    return { drawn: this.scene.frames.countDrawn(), left: 0, contributed: null };
+    return { drawn: this.scene.frames.countDrawn(), left: 0, contributing: null };
   }
 
   destroy(): void {
@@ -189,16 +209,17 @@ export class WebGlBackend implements Backend {
   }
 
   #ask(view: OrderView): void {
-    if (this.#asked && isSameView(view, this.#asked)) return;
+    if (this.#asked && isSameImage(view, this.#asked)) return;
     this.#asked = view;
     this.#sorter.request(view);
   }
 
   #setOrder({ view, order, count, covered, askedAt }: SortedSplats): void {
-    // An order that was sorted synchronously meanwhile is newer.
+    // A newer order was sorted on the main thread meanwhile.
     if (this.isLost || this.#isDestroyed || askedAt < this.#sortedAt) return;
     this.#sorted = view;
     this.#sortedAt = askedAt;
+    this.#covered = covered;
     this.#overdraw.note(covered, this.scene.gaussians.count);
     this.scene.frames.setOrder(order, count);
   }
@@ -208,10 +229,10 @@ export class WebGlBackend implements Backend {
     this.#show(frame);
   }
 
-  #paint({ camera, settings }: CanvasFrame): void {
+  #paint({ camera, settings }: CanvasFrame, rows?: GlFrameRequest['rows']): void {
     const { quality, shDegree, filter } = this.#rendering;
     this.scene.frames.render({
-      ...{ camera, shDegree, filter },
+      ...{ camera, shDegree, filter, rows },
       accumulation: quality === 'balanced' || quality === 'fast' ? 'rgba16float' : 'rgba32float',
       resolutionScale: this.pixelShare * (settings?.resolutionScale ?? 1),
     });
@@ -233,7 +254,7 @@ export class WebGlBackend implements Backend {
       this.scene.frames.present(undefined, { keeps: true });
     } else this.scene.frames.present(background);
     const { canvas } = lease.gl;
-    // WebGL counts rows from the bottom, so a smaller image lies there.
+    // WebGL counts rows from the bottom, so an image smaller than the canvas is in its lower left corner.
     context.globalCompositeOperation = 'copy';
     context.drawImage(canvas, 0, canvas.height - height, width, height, 0, 0, width, height);
     this.#resolveShown();

@@ -3,7 +3,7 @@ import { parsePoint } from '../camera/grammar.js';
 import type { ViewerFrame } from '../camera/orbit.js';
 import { LabelBox, LabelView, type Located } from '../controllers/label-box.js';
 
-/** Labels move by whole device pixels and more. */
+/** Minimum movement of a label, device pixels. Smaller movements are not applied. */
 const MIN_MOVE = 0.5;
 
 interface ArLabel {
@@ -11,7 +11,10 @@ interface ArLabel {
   readonly place: Located;
 }
 
-/** The element's labels over the camera's image of a phone: their slots come before those of the element while the session lasts. */
+/**
+ * Shows the labels of the element over the camera image of a phone during an AR session. Slots in a separate layer
+ * receive the labels, because they precede the element's own slots of the same names.
+ */
 export class ArLabels {
   readonly #element: HTMLElement;
   readonly #layer: HTMLElement;
@@ -34,7 +37,7 @@ export class ArLabels {
     });
   }
 
-  /** Moves labels to where a camera has their points. @param camera in the scene's own frame */
+  /** Moves the labels to the projections of their points. @param camera Camera in the scene's own frame. */
   place(camera: Camera, frame: ViewerFrame): void {
     if (this.#labels.length === 0) return;
     const { clientWidth, clientHeight } = this.#layer.parentElement!;

@@ -1,7 +1,7 @@
 import { css } from 'lit';
 import { ArLabels } from './ar-labels.js';
 import type { XrHost } from './xr-host.js';
-import { languageOf } from '../words.js';
+import { languageOf } from '../strings.js';
 import { WORDS } from './xr-offer.js';
 
 export const AR_STYLES = css`
@@ -32,7 +32,10 @@ export const AR_STYLES = css`
   }
 `;
 
-/** Overlay of an AR session on a phone: an exit button, the author's prompt until the object is placed, and its labels from then on. */
+/**
+ * Overlay of an AR session on a phone: an exit button, the author's prompt until the object is placed, and labels after
+ * that.
+ */
 export class ArOverlay {
   readonly root: HTMLElement;
   readonly labels: ArLabels;
@@ -52,13 +55,13 @@ export class ArOverlay {
     this.#exit.setAttribute('part', 'exit-ar-button');
     slot.append(this.#exit);
     slot.addEventListener('click', () => this.onExit());
-    // A touch of the button must not move the object.
+    // A touch of the button is no input for the session, which would move the object.
     this.root.addEventListener('beforexrselect', (event) => {
       if (event.composedPath().includes(slot)) event.preventDefault();
     });
     this.labels = new ArLabels(element, this.root);
     this.root.append(this.#prompt, slot);
-    // The first slot of a name gets the children that ask for it.
+    // If several slots have the same name, the browser assigns the children to the first.
     element.shadowRoot!.prepend(this.root);
   }
 

@@ -1,4 +1,4 @@
-import { multiply, type Camera, type Vector3 } from '@gaussian-splat/core';
+import { dot, multiply, subtract, type Vector3 } from '@gaussian-splat/core';
 import type { ReactiveControllerHost } from 'lit';
 import { toViewer } from '../camera/orbit.js';
 import type { XrHost } from './xr-host.js';
@@ -7,55 +7,76 @@ import { AR_STYLES, ArOverlay } from './ar-overlay.js';
 import { readShadow } from '../shadow/shadow-controller.js';
 import { shadowSplats, takeShadow } from '../shadow/shadow-map.js';
 import { alphaOfScene } from '../shadow/take-alpha-gl.js';
-import { MarkerSplats, placeOf } from './marker-splats.js';
+import { fingersOn, type Fingers, type Plane } from './fingers.js';
+import { GlDrawing } from './gl-drawing.js';
+import { placeOf } from './marker-splats.js';
 import type { XrScene } from './xr-scene.js';
 import { SimplifiedModel } from './simplified-model.js';
 import { metersOf, unitOf } from './vr.js';
-import type { XrFrame, XrHit, XrAnchor, XrHitTestSource, XrInput, XrPose } from './webxr.js';
+import type { XrFrame, XrHit, XrAnchor, XrHitTestSource, XrPose } from './webxr.js';
 import { XrOffer, type XrKind, type XrStarted } from './xr-offer.js';
+import type { XrEye, XrMarker } from './xr-drawing.js';
 import type { XrGuide } from './xr-session.js';
 
-/** Range of an object's initial size, meters. */
+/** Minimum and maximum initial size of an object, meters. */
 const [SMALLEST, LARGEST] = [0.5, 1];
-/** Range of scales for gestures. */
+/** Minimum and maximum scale that gestures can set, as a factor of true size. */
 const [MIN_SCALE, MAX_SCALE] = [0.05, 20];
-/** Scales this close to true size snap to it. */
+/** Maximum difference from true size, as a scale, within which the scale snaps to 1. */
 const SNAP = 0.05;
-/** Downward angle of the ray that searches for the floor, from the center of the view, radians. */
+/** Downward angle, radians, of the ray that searches for the floor, from the center of the view. */
 const DOWN = (20 * Math.PI) / 180;
-/** Fraction of the subject's splats that may lie below the floor. */
+/** Vertical component of a unit normal, 0..1, above which a surface is a floor, and below which it is a wall. */
+const LEVEL = 0.75;
+/** Seconds for which a floor is preferred to walls in the view ray, or a wall to floors. */
+const PREFERENCE_TIMEOUT = 1;
+/** Fraction of the subject's splats that may be below the floor. */
 const BELOW = 0.01;
+/** Maximum number of splats whose heights are sorted, because the session waits for that. */
+const MAX_HEIGHTS = 65_536;
 
-/** The subject's footprint on the floor. */
+/** Size of the subject and its position on the floor, in units of viewer space. */
 interface Footprint {
-  /** Center of its base, viewer space, units. */
+  /** Center of the subject's base in viewer space. */
   readonly base: Vector3;
   readonly height: number;
   readonly radius: number;
-  /** Positions, with NaN for splats outside the subject. */
+  /** [N, 3] positions of all splats; NaN for those outside the subject. */
   readonly positions: Float32Array;
+  /** Indices of the splats of the subject. */
+  readonly splats: Uint32Array;
 }
 
-/** Footprint of the subject: splats within the sphere that framing has found, without the lowest hundredth. */
+/**
+ * Computes the footprint of the splats in the framing sphere. Its height ignores the lowest and the highest hundredth
+ * of them.
+ * @param positions [N, 3] relative to `origin`
+ */
 export function footprintOf(core: XrHost, positions: Float32Array, origin: Vector3): Footprint {
   const { center, radius } = core.camera.bounds;
   const { frame } = core;
   const kept = positions.slice();
-  const heights: number[] = [];
+  const inside = new Uint32Array(positions.length / 3);
+  let count = 0;
+  const from = subtract(origin, center);
   for (let at = 0; at < positions.length; at += 3) {
-    const p: Vector3 = [positions[at] + origin[0], positions[at + 1] + origin[1], positions[at + 2] + origin[2]];
-    const away = Math.hypot(p[0] - center[0], p[1] - center[1], p[2] - center[2]);
-    if (away <= radius) heights.push(toViewer(frame, p)[1]);
-    else kept.fill(NaN, at, at + 3);
+    const [x, y, z] = [positions[at] + from[0], positions[at + 1] + from[1], positions[at + 2] + from[2]];
+    if (x * x + y * y + z * z <= radius * radius) inside[count++] = at / 3;
+    else kept[at] = kept[at + 1] = kept[at + 2] = NaN;
   }
-  const sorted = Float64Array.from(heights).sort();
+  const splats = inside.subarray(0, count);
+  const step = Math.max(1, Math.ceil(count / MAX_HEIGHTS));
+  const sorted = Float64Array.from({ length: Math.ceil(count / step) }, (_, k) => {
+    const at = 3 * splats[k * step];
+    return dot(frame[1], [positions[at] + origin[0], positions[at + 1] + origin[1], positions[at + 2] + origin[2]]);
+  }).sort();
   const low = sorted[Math.floor(BELOW * sorted.length)] ?? 0;
   const high = sorted[Math.floor((1 - BELOW) * (sorted.length - 1))] ?? 0;
   const [x, , z] = toViewer(frame, center);
-  return { base: [x, low, z], height: high - low, radius, positions: kept };
+  return { base: [x, low, z], height: high - low, radius, positions: kept, splats };
 }
 
-/** Offers AR: WebXR if available, else the author's model on iPhones. */
+/** Offers AR: with WebXR if it is available, or on iPhones with the author's own model. */
 export function offerAr(element: ReactiveControllerHost & HTMLElement, core: XrHost, place: HTMLElement): XrOffer {
   adoptStyles(element.shadowRoot!, AR_STYLES);
   const overlay = new ArOverlay(element, core);
@@ -73,17 +94,19 @@ const arKind = (core: XrHost, overlay: ArOverlay): XrKind => ({
     optionalFeatures: ['anchors', 'local-floor', 'dom-overlay'],
     domOverlay: { root: overlay.root },
   }),
+  canShow: () => core.walkable !== null,
   spaces: ['local-floor', 'local'],
+  open: (session, source) => GlDrawing.open(session, core, source),
   guide: (started) => new ArGuide(core, started, overlay),
 });
 
-/** Places the subject at the hit point of the view ray with the room, and lets gestures move, turn and scale it. */
+/** Places the subject where the view ray first hits a real surface. Gestures then move, turn and scale it. */
 class ArGuide implements XrGuide {
   readonly background = [0, 0, 0, 0] as const;
   readonly #core: XrHost;
   readonly #of: XrStarted;
   readonly #overlay: ArOverlay;
-  #shadow: { readonly splats: MarkerSplats; readonly half: number } | undefined;
+  #shadow: { readonly splats: XrMarker; readonly half: number } | undefined;
   readonly #unit: number;
   #source: XrHitTestSource | undefined;
   #footprint: Footprint | undefined;
@@ -91,7 +114,8 @@ class ArGuide implements XrGuide {
   #turn = 0;
   #scale = 1;
   #anchor: XrAnchor | undefined;
-  #isAnchored = false;
+  /** Seconds with hits of other surfaces than the wanted ones. */
+  #waited = 0;
   #fingers: Fingers | undefined;
   #placed: Float64Array | undefined;
 
@@ -110,57 +134,58 @@ class ArGuide implements XrGuide {
       overlay.hide();
       this.#source?.cancel();
     });
-    void this.#listen();
+    this.#listen().catch(({ message }: Error) => {
+      // Without hit tests, no place can be found.
+      if (!of.signal.aborted) of.drawing.onLost(message);
+    });
   }
 
-  place(frame: XrFrame, pose: XrPose): Float64Array | null {
-    const { loop } = this.#of.offer;
-    const found = loop?.scene;
+  place(frame: XrFrame, pose: XrPose, seconds: number): Float64Array | null {
+    const found = this.#drawing.scene;
     if (!found) return null;
     if (!this.#footprint) {
       this.#footprint = footprintOf(this.#core, found.positions, found.origin);
-      loop.crop(this.#footprint.positions);
+      this.#drawing.crop(this.#footprint.positions);
       this.#scale = this.#firstScale(this.#footprint);
       this.#castShadow(found, this.#footprint).catch(({ message }: Error) => this.#core.warn(message));
     }
-    if (!this.#at) this.#look(frame, pose);
+    if (!this.#at) this.#look(frame, pose, seconds);
     if (!this.#at) return null;
     this.#follow(frame);
     this.#touch(frame);
     return (this.#placed = this.#matrix(this.#at, this.#footprint));
   }
 
-  drawAbove(room: Camera): void {
+  drawAbove({ room }: XrEye): void {
     if (!this.#placed) return;
     const worldToCamera = multiply(room.worldToCamera, this.#placed);
     this.#overlay.labels.place({ ...room, worldToCamera }, this.#core.frame);
   }
 
-  drawBelow(
-    camera: Parameters<NonNullable<XrGuide['drawBelow']>>[0],
-    at: Parameters<NonNullable<XrGuide['drawBelow']>>[1],
-  ): void {
+  drawBelow(eye: XrEye): void {
     if (!this.#at || !this.#footprint || this.#isWall) return;
     if (!this.#shadow) return;
     const { splats, half } = this.#shadow;
-    splats.draw(camera, at, placeOf(this.#at, half * this.#scale * this.#unit, this.#turn));
+    splats.draw(eye, placeOf(this.#at, half * this.#size * this.#unit, this.#turn));
   }
 
-  /** The same shadow as in the page, for the subject alone. */
-  async #castShadow({ renderer }: XrScene, { positions, radius }: Footprint): Promise<void> {
-    const { gl, signal } = this.#of;
-    const { camera, frame, services, attributes } = this.#core;
-    const kept = Uint32Array.from(positions.keys()).filter(
-      (i) => 3 * i < positions.length && positions[3 * i] === positions[3 * i],
-    );
-    const { take, free } = alphaOfScene(gl, renderer, kept);
+  /** Creates the shadow of the page for the subject alone. */
+  async #castShadow({ renderer }: XrScene, { splats: kept, radius }: Footprint): Promise<void> {
+    const { signal } = this.#of;
+    const { camera, frame, attributes } = this.#core;
+    const { take, free } = alphaOfScene(this.#drawing.gl, renderer, kept);
     const center = toViewer(frame, camera.bounds.center);
     const map = await takeShadow({ center, radius, frame }, take).finally(free);
     if (map === null || signal.aborted) return;
     const { intensity, softness } = readShadow(this.#core);
     const rows = shadowSplats(map, attributes.shadowIntensity ? intensity : 1, softness);
-    const splats = new MarkerSplats(gl, rows, services.sceneLoader, signal);
+    const splats = this.#drawing.marker(rows, signal);
     this.#shadow = { splats, half: map.half };
+  }
+
+  /** The drawing of the session; AR always draws with WebGL. */
+  get #drawing(): GlDrawing {
+    return this.#of.drawing as GlDrawing;
   }
 
   get #isWall(): boolean {
@@ -190,16 +215,24 @@ class ArGuide implements XrGuide {
     else this.#source = source;
   }
 
-  /** First surface hit by the view ray. */
-  #look(frame: XrFrame, pose: XrPose): void {
-    const [hit] = (this.#source && frame.getHitTestResults?.(this.#source)) ?? [];
-    const at = hit?.getPose(this.#of.space)?.transform;
-    if (!at) return;
+  /** Places the subject at the first surface that the view ray hits, with a preference for floors, or for walls. */
+  #look(frame: XrFrame, pose: XrPose, seconds: number): void {
+    const hits = ((this.#source && frame.getHitTestResults?.(this.#source)) ?? []).flatMap((hit) => {
+      const at = hit.getPose(this.#of.space)?.transform;
+      return at ? [{ hit, at }] : [];
+    });
+    // The y axis of a hit is the normal of its surface.
+    const isWanted = ({ at }: (typeof hits)[number]): boolean =>
+      this.#isWall ? Math.abs(at.matrix[5]) < LEVEL : at.matrix[5] > LEVEL;
+    if (hits.length > 0) this.#waited += seconds;
+    const found = hits.find(isWanted) ?? (this.#waited > PREFERENCE_TIMEOUT ? hits[0] : undefined);
+    if (!found) return;
+    const { hit, at } = found;
     const { x, y, z } = at.position;
     this.#at = [x, y, z];
     const viewer = pose.transform.position;
     const [towardX, towardZ] = this.#isWall ? [at.matrix[4], at.matrix[6]] : [viewer.x - x, viewer.z - z];
-    // Turns its front, +z, to the person, or away from the wall.
+    // Turns the front of the subject, +z, toward the user, or away from the wall.
     this.#turn = Math.atan2(towardX, towardZ);
     this.#source?.cancel();
     this.#source = undefined;
@@ -209,67 +242,60 @@ class ArGuide implements XrGuide {
   }
 
   async #holdOn(hit: XrHit): Promise<void> {
+    const at = this.#at;
     const anchor = await hit.createAnchor?.().catch(() => undefined);
-    this.#anchor = anchor;
-    this.#isAnchored = anchor !== undefined;
+    // A finger may have moved the subject meanwhile.
+    if (this.#at === at) this.#anchor = anchor;
+    else anchor?.delete();
   }
 
-  /** Tracking of the room improves over time. */
+  /** Follows the anchor, because tracking of the real environment improves over time. */
   #follow(frame: XrFrame): void {
-    if (!this.#isAnchored || !this.#anchor) return;
+    if (!this.#anchor) return;
     const place = frame.getPose(this.#anchor.anchorSpace, this.#of.space)?.transform.position;
     if (place) this.#at = [place.x, place.y, place.z];
   }
 
-  /** One finger moves the object on its plane, two turn and scale it. */
+  /** Axes of the plane that the subject stands on or hangs at. */
+  get #axes(): Plane['axes'] {
+    const right: Vector3 = this.#isWall ? [Math.cos(this.#turn), 0, -Math.sin(this.#turn)] : [1, 0, 0];
+    return [right, this.#isWall ? [0, 1, 0] : [0, 0, 1]];
+  }
+
+  /**
+   * Applies gestures: one finger moves the object on its plane, two fingers scale it, and turn it unless it hangs at a
+   * wall.
+   */
   #touch(frame: XrFrame): void {
-    const touched = [...frame.session.inputSources].flatMap((input) => this.#onPlane(frame, input) ?? []);
-    const fingers = touched.length > 0 ? fingersOf(touched) : undefined;
+    const axes = this.#axes;
+    const fingers = fingersOn({ point: this.#at!, axes }, frame, this.#of.space);
     const before = this.#fingers;
     this.#fingers = fingers;
     if (!fingers || !before || fingers.count !== before.count) return;
-    this.#isAnchored = false;
-    const [x, y, z] = this.#at!;
-    this.#at = [x + fingers.x - before.x, y, z + fingers.z - before.z];
+    this.#anchor?.delete();
+    this.#anchor = undefined;
+    const [u, v] = [fingers.u - before.u, fingers.v - before.v];
+    this.#at = this.#at!.map((value, k) => value + u * axes[0][k] + v * axes[1][k]) as unknown as Vector3;
     if (fingers.count < 2) return;
-    this.#turn -= fingers.angle - before.angle;
+    if (!this.#isWall) this.#turn -= fingers.angle - before.angle;
     if (this.#isFixed || before.apart === 0) return;
     this.#scale = Math.min(MAX_SCALE, Math.max(MIN_SCALE, (this.#scale * fingers.apart) / before.apart));
-    if (this.#core.attributes.unit && Math.abs(this.#scale - 1) < SNAP) this.#scale = 1;
   }
 
-  #onPlane(frame: XrFrame, input: XrInput & { targetRayMode?: string }): { x: number; z: number } | undefined {
-    if (input.targetRayMode !== 'screen') return undefined;
-    const m = frame.getPose(input.targetRaySpace, this.#of.space)?.transform.matrix;
-    if (!m) return undefined;
-    const far = (m[13] - this.#at![1]) / m[9];
-    return far > 0 ? { x: m[12] - far * m[8], z: m[14] - far * m[10] } : undefined;
+  /** Scale of the subject, which snaps to true size. The scale of the gestures does not, or it could not leave 1. */
+  get #size(): number {
+    return this.#core.attributes.unit && Math.abs(this.#scale - 1) < SNAP ? 1 : this.#scale;
   }
 
   #matrix([x, y, z]: Vector3, { base, height, radius }: Footprint): Float64Array {
-    const size = this.#scale;
+    const size = this.#size;
     const [sin, cos] = [size * Math.sin(this.#turn), size * Math.cos(this.#turn)];
     const meters = metersOf(this.#core.frame, this.#unit);
-    // The center of its base is placed there; on a wall, the center of its back.
+    // The center of the subject's base is placed at the hit point; on a wall, the center of its back.
     const [lift, back] = this.#isWall ? [height / 2, -radius] : [0, 0];
     const [px, py, pz] = [base[0], base[1] + lift, base[2] + back].map((value) => value * this.#unit);
     const turn = [cos, 0, sin, x, 0, size, 0, y, -sin, 0, cos, z, 0, 0, 0, 1];
     const move = [1, 0, 0, -px, 0, 1, 0, -py, 0, 0, 1, -pz, 0, 0, 0, 1];
     return Float64Array.from(multiply(multiply(turn, move), meters));
   }
-}
-
-interface Fingers {
-  readonly count: number;
-  readonly x: number;
-  readonly z: number;
-  readonly angle: number;
-  readonly apart: number;
-}
-
-function fingersOf(places: readonly { readonly x: number; readonly z: number }[]): Fingers {
-  const [a, b = a] = places;
-  const [dx, dz] = [b.x - a.x, b.z - a.z];
-  const middle = { x: (a.x + b.x) / 2, z: (a.z + b.z) / 2 };
-  return { count: Math.min(2, places.length), ...middle, angle: Math.atan2(dz, dx), apart: Math.hypot(dx, dz) };
 }

@@ -1,4 +1,6 @@
-/** Code for the attributes `vr`, `ar`, `measure`, `shadow-intensity` and `skybox-image`, loaded if one of them is set. */
+/**
+ * Code for the attributes `vr`, `ar`, `measure`, `shadow-intensity` and `skybox-image`. Loaded if one of these is set.
+ */
 import { css, type ReactiveControllerHost } from 'lit';
 import { Lazy } from '../lazy.js';
 import type { ShadowHost } from '../shadow/shadow-controller.js';

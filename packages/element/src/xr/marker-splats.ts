@@ -2,19 +2,25 @@ import { multiply, type Camera, type Matrix4, type Vector3 } from '@gaussian-spl
 import { DATA_WIDTH, GlGaussians, GlRenderer } from '@gaussian-splat/renderer/webgl';
 import type { SceneLoader } from '../loading/scene-loader.js';
 import { packSplats, type SplatRow } from '../shadow/splat-file.js';
-import type { XrRectangle } from './xr-session.js';
 
-/** Number of splats of the ring, its radius in meters, and its thickness. */
+/** Number of splats of the ring, its radius in meters, and standard deviation of a splat in meters. */
 const [RING_SPLATS, RING_RADIUS, RING_SIGMA] = [48, 0.25, 0.012];
 
-/**
- * A few splats made by the element: a ring at the destination of a teleport, or the shadow under an object. Neither
- * needs a mesh.
- */
+/** Position of a view's rectangle in a framebuffer, pixels. */
+interface Rectangle {
+  readonly framebuffer: WebGLFramebuffer | null;
+  readonly x: number;
+  readonly y: number;
+}
+
+/** A few splats that the element has created, drawn with WebGL. */
 export class MarkerSplats {
   #renderer: GlRenderer | undefined;
 
-  /** @param rows all in one plane, so that their order does not matter */
+  /**
+   * Uploads the splats, which are drawn when that is done.
+   * @param rows Splats in one plane, so that their order does not matter.
+   */
   constructor(gl: WebGL2RenderingContext, rows: readonly SplatRow[], loader: SceneLoader, signal: AbortSignal) {
     this.#load(gl, rows, loader, signal).catch(() => undefined);
   }
@@ -43,8 +49,11 @@ export class MarkerSplats {
     this.#renderer = renderer;
   }
 
-  /** Draws the markers over the current image. @param toWorld from their own frame to the camera's world */
-  draw(camera: Camera, target: XrRectangle, toWorld: Matrix4): void {
+  /**
+   * Draws the markers over the current image.
+   * @param toWorld Transform from the markers' own frame to the world of the camera.
+   */
+  draw(camera: Camera, target: Rectangle, toWorld: Matrix4): void {
     const renderer = this.#renderer;
     if (!renderer) return;
     const placed = { ...camera, worldToCamera: multiply(camera.worldToCamera, toWorld) };
@@ -53,13 +62,13 @@ export class MarkerSplats {
   }
 }
 
-/** Transform of markers: center in meters, y up; size; and angle about y, radians. */
+/** Returns the transform of markers: center in meters with y up, scale, and rotation about y in radians. */
 export const placeOf = ([x, y, z]: Vector3, size = 1, turn = 0): Matrix4 => {
   const [sin, cos] = [size * Math.sin(turn), size * Math.cos(turn)];
   return [cos, 0, sin, x, 0, size, 0, y, -sin, 0, cos, z, 0, 0, 0, 1];
 };
 
-/** A ring on the floor. */
+/** Returns a horizontal ring around the origin. */
 export const ring = (): SplatRow[] =>
   Array.from({ length: RING_SPLATS }, (_, i): SplatRow => {
     const angle = (2 * Math.PI * i) / RING_SPLATS;

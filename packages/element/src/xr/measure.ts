@@ -5,7 +5,7 @@ import type { ScenePoint } from '../camera/values.js';
 import type { MeasureDetail } from '../events.js';
 import type { XrHost } from './xr-host.js';
 import { adoptStyles } from '../styles.js';
-import { languageOf, type ExtraWord } from '../words.js';
+import { languageOf, type ExtraWord } from '../strings.js';
 import { unitOf } from './vr.js';
 import { WORDS } from './xr-offer.js';
 
@@ -47,9 +47,9 @@ const STYLES = css`
   }
 `;
 const SVG = 'http://www.w3.org/2000/svg';
-/** Minimum distance between press and release of a drag, CSS pixels. */
+/** Distance between press and release, CSS pixels, from which a movement is a drag and no click. */
 const DRAG = 5;
-/** Significant digits of a length. */
+/** Number of significant digits of a length. */
 const DIGITS = 3;
 
 /** A ruler: two ends on surfaces of the scene, a line, and its length with its uncertainty. */
@@ -61,6 +61,8 @@ export class Measure implements ReactiveController {
   readonly #drawing: SVGSVGElement;
   readonly #label: HTMLElement;
   #ends: readonly ScenePoint[] = [];
+  /** URL of the scene that the ends belong to. */
+  #url = '';
   #listening: AbortController | undefined;
   #pressed: readonly [number, number] | undefined;
   #hasKeyboard = false;
@@ -85,8 +87,12 @@ export class Measure implements ReactiveController {
   }
 
   hostUpdated(): void {
-    const { attributes, isOnShow, strings } = this.#core;
+    const { attributes, isOnShow, strings, sources } = this.#core;
     if (!attributes.measure || !isOnShow) return this.#stop();
+    const { url } = sources.ownEntry.scene;
+    if (url !== this.#url) this.#ends = [];
+    this.#url = url;
+    if (this.#listening) this.#draw();
     this.#button.textContent = this.#word('measure');
     this.#button.lang = languageOf(strings) ?? '';
     this.#button.setAttribute('aria-pressed', String(this.#listening !== undefined));
@@ -127,7 +133,7 @@ export class Measure implements ReactiveController {
     observer.observe(surface);
     signal.addEventListener('abort', () => observer.disconnect());
     surface.after(this.#drawing, this.#label);
-    // The ends are set in the center of the image when using a keyboard, so that gets the focus.
+    // Keyboard users set the ends in the center of the image, so the image gets the focus.
     this.#hasKeyboard = this.#button.matches(':focus-visible');
     if (surface.tabIndex < 0) {
       surface.tabIndex = 0;
@@ -176,6 +182,7 @@ export class Measure implements ReactiveController {
     if (event.key !== 'Enter') return;
     event.preventDefault();
     event.stopImmediatePropagation();
+    if (event.repeat) return;
     const { left, top, width, height } = this.#core.surface!.getBoundingClientRect();
     void this.#setEnd(left + width / 2, top + height / 2);
   };
@@ -203,7 +210,7 @@ export class Measure implements ReactiveController {
     return { from, to, length, uncertainty, meters: unit === undefined ? null : length * unit, unit: unit ?? null };
   }
 
-  /** Draws the ruler at its ends' positions in the last frame. */
+  /** Draws the ruler at the projections of its ends in the last frame. */
   readonly #draw = (): void => {
     const { drawnFrom: camera, surface, frame } = this.#core;
     this.#drawing.replaceChildren();
@@ -234,7 +241,10 @@ export class Measure implements ReactiveController {
   }
 }
 
-/** `1.24 m ± 0.01 m`, both with as many decimals; plain numbers if the file has no unit. */
+/**
+ * Returns a text such as `1.24 m ± 0.01 m`, both numbers with the same decimals. If `unit` is null, the numbers are in
+ * units of the scene and have no suffix.
+ */
 function textOf({ length, uncertainty, unit }: MeasureDetail): string {
   const factor = unit ?? 1;
   const suffix = unit === null ? '' : ' m';

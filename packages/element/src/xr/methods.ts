@@ -1,16 +1,19 @@
-/** Methods of elements with `vr` or `ar`, present once their code has loaded. */
+/** Methods of elements with `vr` or `ar`. They are undefined until their code is loaded. */
 export interface ImmersiveMethods {
   /**
-   * Starts VR, like a click on its button: call it in a click handler, without an earlier await. Rejects with
-   * GaussianSplatError `unsupported/xr`, `argument/activation`.
+   * Starts VR, like a click on its button. Call it in a click handler, without an earlier await. Rejects with
+   * GaussianSplatError `unsupported/xr`, or `argument/activation` outside a click.
    */
   activateVR?(): Promise<void>;
-  /** The same for AR. */
+  /**
+   * Starts AR, like a click on its button. Call it in a click handler, without an earlier await. Rejects with
+   * GaussianSplatError `unsupported/xr`, or `argument/activation` outside a click.
+   */
   activateAR?(): Promise<void>;
-  /** Leaves VR or AR. */
+  /** Ends the VR or AR session. */
   exitXR?(): void;
-  /** Whether VR can be started now. */
+  /** Whether {@link activateVR} can start a session at present. */
   readonly canActivateVR?: boolean;
-  /** Whether AR can be started now. */
+  /** Whether {@link activateAR} can start a session at present. */
   readonly canActivateAR?: boolean;
 }

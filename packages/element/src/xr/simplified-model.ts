@@ -1,13 +1,16 @@
 import type { ReactiveController } from 'lit';
 import type { XrHost } from './xr-host.js';
-import { languageOf } from '../words.js';
+import { languageOf } from '../strings.js';
 import { WORDS, type XrOffer } from './xr-offer.js';
 
-/** Browsers that hand models to Quick Look say so of links; their scripts see no WebXR. */
+/**
+ * Whether the browser opens models in Quick Look. Such browsers declare the link type `ar`, and provide no WebXR to
+ * scripts.
+ */
 const opensModels = (page: Document): boolean =>
   page.createElement('a').relList.supports('ar') || /iPhone|iPad/.test(page.defaultView?.navigator.userAgent ?? '');
 
-/** On iPhones there is no WebXR: the author's own mesh, by its name, if the page has one. */
+/** Link to the author's own mesh for iPhones, which have no WebXR. Not shown if the page names no mesh. */
 export class SimplifiedModel implements ReactiveController {
   readonly #core: XrHost;
   readonly #place: HTMLElement;
@@ -40,7 +43,7 @@ export class SimplifiedModel implements ReactiveController {
     const image = this.#link.querySelector('img')!;
     image.alt = text;
     this.#link.lang = languageOf(strings) ?? '';
-    this.#link.href = new URL(attributes.iosSrc!, this.#element.baseURI).href;
+    this.#link.href = attributes.iosSrc!;
     if (!this.#link.isConnected) this.#place.append(this.#link);
   }
 }

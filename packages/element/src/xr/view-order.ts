@@ -10,16 +10,19 @@ import {
 import { DepthSorter } from '../webgl/depth-sorter.js';
 import type { XrScene } from './xr-scene.js';
 
-/** A sort that takes longer, ms, is left to a worker, in an order that turning the head does not change. */
+/**
+ * Maximum duration of a sort on this thread, milliseconds. Slower sorts are left to a worker, by distance, so that
+ * turning the head does not change the order.
+ */
 const QUICK_SORT_MS = 8;
-/** Weight of the last sort in the moving average of sort times. */
+/** Weight of the last sort in the moving average of durations, 0..1. */
 const SMOOTHING = 0.2;
-/** Eyes whose axes differ by less than this look in the same direction: sine of the angle. */
+/** Sine of the angle below which the viewing directions of two eyes count as parallel. */
 const PARALLEL = 1e-4;
-/** Head movement, as a fraction of its distance from the center of the scene, after which a worker sorts again. */
+/** Movement of the head, as a fraction of its distance to the center of the scene, after which a worker sorts again. */
 const MOVED = 0.002;
 
-/** Keeps the splats of a session in order: one order for all views of a frame. */
+/** Sorts the splats of a session, in one order for all views of a frame. */
 export class ViewOrder {
   readonly #scene: XrScene;
   readonly #byDistance: boolean;
@@ -28,7 +31,7 @@ export class ViewOrder {
   readonly #order: Uint32Array;
   #worker: DepthSorter | undefined;
   #sorted: OrderView | undefined;
-  /** How long sorts on this thread take, ms. */
+  /** Average duration of sorts on this thread, milliseconds; 0 before the first. */
   milliseconds = 0;
 
   constructor(scene: XrScene, byDistance: boolean, spawn: () => Worker) {
@@ -39,7 +42,7 @@ export class ViewOrder {
     this.#order = new Uint32Array(DATA_WIDTH * Math.max(1, Math.ceil(scene.positions.length / 3 / DATA_WIDTH)));
   }
 
-  /** Sorts for the views of a frame, at once or soon. */
+  /** Sorts for the views of a frame if they have moved: immediately, or in the worker. */
   update(cameras: readonly Camera[]): void {
     const view = this.#viewOf(cameras);
     if (this.#sorted && isSameView(view, this.#sorted)) return;
@@ -51,7 +54,10 @@ export class ViewOrder {
     this.#worker?.destroy();
   }
 
-  /** Eyes that look the same way have one order by depth, to the last splat. Others, and slow sorts, have one by distance from the middle of the eyes. */
+  /**
+   * Returns an order by depth if the views are parallel and sorts are fast: it is exact for all eyes. Otherwise returns
+   * an order by distance from the center of the eyes.
+   */
   #viewOf(cameras: readonly Camera[]): OrderView {
     const [first] = cameras;
     const { origin } = this.#scene;
@@ -63,12 +69,14 @@ export class ViewOrder {
   }
 
   #sortNow(view: OrderView): void {
-    // The first sort includes compilation, so its time does not count.
+    // Sorts once before the measurement, because the first sort includes compilation.
     if (this.#sorted === undefined) this.#sorter.sort(view, this.#order);
     const begin = performance.now();
     const count = this.#sorter.sort(view, this.#order);
     const took = performance.now() - begin;
-    this.milliseconds = this.#sorted === undefined ? took : this.milliseconds + SMOOTHING * (took - this.milliseconds);
+    // A single sort that was interrupted for long does not count as slow: slower sorts are not measured again.
+    const excess = Math.min(took, 2 * QUICK_SORT_MS) - this.milliseconds;
+    this.milliseconds = this.#sorted === undefined ? took : this.milliseconds + SMOOTHING * excess;
     this.#set(view, this.#order, count);
   }
 

@@ -5,48 +5,62 @@ import type { XrFrame, XrInput, XrPose, XrSpace } from './webxr.js';
 
 /** Assumed height of the eyes above the floor, meters. */
 const EYE_HEIGHT = 1.6;
-/** Angle of a turn by the stick, radians. */
+/** Angle of one snap turn, radians. */
 const TURN = Math.PI / 6;
-/** Deflection of a stick below which it is ignored, and above which it turns. */
+/** Deflection of a stick, 0..1, below which it is ignored, and deflection above which it causes a snap turn. */
 const [DEAD_ZONE, TURN_ZONE] = [0.2, 0.7];
-/** Buttons of a controller, as `xr-standard` numbers them. */
+/** Indices of a controller's buttons in the mapping `xr-standard`. */
 const [TRIGGER, LEAVE] = [0, 5];
-/** Time that the exit button must be held, seconds. */
+/** Seconds for which the exit button must be held. */
 const LEAVE_SECONDS = 1;
-/** Maximum distance of a teleport, and step size along its ray, meters. */
+/** Maximum distance of a teleport, and length of the steps along its ray, meters. */
 const [REACH, RAY_STEP] = [12, 0.05];
 
-/** State of a stick and of buttons in the previous frame. */
+/** Horizontal distance of the head from the walker, meters, above which the walker moves under the head. */
+const STRAYED = 0.05;
+
+/**
+ * State of an input in the previous frame: `turn` and `trigger` are pressed, `leave` is the seconds of the exit button,
+ * and `target` is the place on the floor that a held trigger aims at.
+ */
 interface Held {
+  input: XrInput;
   turn: boolean;
   trigger: boolean;
   leave: number;
+  target: Vector3 | undefined;
 }
 
 export interface VrStart {
-  /** Position of the camera's eye, meters, viewer space. */
+  /** Position of the page's camera in viewer space, meters. */
   readonly eye: Vector3;
-  /** Viewing direction around the vertical axis, radians. */
+  /** Azimuth of the viewing direction, radians. */
   readonly heading: number;
-  /** The scene's frame to viewer space, scaled to meters, row-major. */
+  /** Transform from the scene's frame to viewer space in meters, 4x4, row-major. */
   readonly toViewer: Float64Array;
   /** Whether the space's origin is on the floor instead of at the eyes. */
   readonly isFloor: boolean;
-  /** Smooth locomotion is off. */
+  /**
+   * Whether smooth motion by the stick is off, for users who prefer reduced motion. Snap turns and teleports remain.
+   */
   readonly stepsOnly: boolean;
 }
 
-/** Pose of a headset's user in the scene: snap turns, walking on the floor, and teleports. */
+/** Pose of a headset's user in the scene, changed by snap turns, motion on the floor, and teleports. */
 export class VrRig {
   readonly #start: VrStart;
   readonly #onLeave: () => void;
-  readonly #held = new Map<string, Held>();
+  #held = new Map<string, Held>();
+  /** Inputs without a trigger button, such as hands, that are selecting. */
+  readonly #selecting = new Set<XrInput>();
+  /** Pose of the head in the last frame. */
+  #pose: XrPose | undefined;
   #heading: number;
-  /** Position of the space's origin, viewer space, meters; undefined before the first pose. */
+  /** Position of the session space's origin in viewer space, meters; undefined before the first pose. */
   #origin: Vector3 | undefined;
   #map: WalkMap | undefined;
   #walker: Walker | undefined;
-  /** Destination of a teleport while aiming. */
+  /** Destination of a teleport, viewer space in meters; undefined if the user does not aim at the floor. */
   target: Vector3 | undefined;
 
   constructor(start: VrStart, onLeave: () => void) {
@@ -55,24 +69,53 @@ export class VrRig {
     this.#heading = start.heading;
   }
 
-  /** Sets the floor once it is loaded. */
+  /** Sets the map of the floor when it is loaded. */
   set map(map: WalkMap) {
     this.#map = map;
-    if (this.#origin) this.#walker = new Walker(map, this.#start.eye);
-    if (this.#walker && this.#origin)
-      this.#origin = [this.#origin[0], this.#floorY(this.#walker.at[1]), this.#origin[2]];
+    if (!this.#pose) return;
+    // Visitors may have moved before the map is loaded.
+    const walker = this.#walkerUnder(this.#headAt(this.#pose));
+    const [x, , z] = this.#origin!;
+    this.#origin = [x, this.#floorY((walker?.at ?? map.start)[1]), z];
   }
 
-  /** Advances to a frame. @returns the scene's frame to the space, row-major */
+  /** Starts to aim with an input that has no trigger button, at its event `selectstart`. */
+  aim(input: XrInput): void {
+    this.#selecting.add(input);
+  }
+
+  /** Teleports to the place that such an input aimed at in the last frame, at its event `selectend`. */
+  choose(input: XrInput): void {
+    const held = [...this.#held.values()].find((each) => each.input === input);
+    if (!this.#selecting.delete(input) || !held || hasTrigger(input)) return;
+    if (held.target && this.#pose) this.#jump(held.target, this.#pose);
+    held.trigger = false;
+  }
+
+  /**
+   * Advances the pose to a frame.
+   * @param seconds Time since the previous frame.
+   * @returns the transform from the scene's frame to the session's space, 4x4, row-major
+   */
   place(frame: XrFrame, pose: XrPose, space: XrSpace, seconds: number): Float64Array {
     const { x, z } = pose.transform.position;
+    this.#pose = pose;
     this.#origin ??= this.#begin(x, z);
     this.target = undefined;
-    for (const input of frame.session.inputSources) this.#read(frame, space, pose, input, seconds);
+    const before = this.#held;
+    // The state of an input that has vanished is dropped, so that its return with another state is no press or release.
+    this.#held = new Map();
+    [...frame.session.inputSources].forEach((input, i) => {
+      const key = `${i} ${input.handedness}`;
+      const known = before.get(key) ?? { turn: false, trigger: false, leave: 0, target: undefined };
+      const held = { ...known, input };
+      this.#held.set(key, held);
+      this.#read(frame, space, pose, held, seconds);
+    });
     return this.#matrix();
   }
 
-  /** The destination in the session's space. */
+  /** Destination of a teleport in the session's space, meters; undefined without one. */
   get targetInSpace(): Vector3 | undefined {
     if (!this.target) return undefined;
     const [x, y, z] = [0, 1, 2].map((k) => this.target![k] - this.#origin![k]);
@@ -94,7 +137,7 @@ export class VrRig {
     return this.#start.isFloor ? floor : floor + EYE_HEIGHT;
   }
 
-  /** Direction from the session's space to viewer space. */
+  /** Converts a direction from the session's space to viewer space. */
   #turned([x, y, z]: Vector3): Vector3 {
     const [sin, cos] = [Math.sin(this.#heading), Math.cos(this.#heading)];
     return [cos * x + sin * z, y, -sin * x + cos * z];
@@ -108,15 +151,13 @@ export class VrRig {
     return Float64Array.from(multiply(multiply(turn, move), this.#start.toViewer));
   }
 
-  #read(frame: XrFrame, space: XrSpace, pose: XrPose, input: XrInput, seconds: number): void {
-    const pad = input.gamepad;
+  #read(frame: XrFrame, space: XrSpace, pose: XrPose, held: Held, seconds: number): void {
+    const { gamepad: pad, handedness } = held.input;
+    this.#aim(frame, space, pose, held);
     if (!pad) return;
-    const held = this.#held.get(input.handedness) ?? { turn: false, trigger: false, leave: 0 };
-    this.#held.set(input.handedness, held);
     const [x, y] = [pad.axes[2] ?? pad.axes[0] ?? 0, pad.axes[3] ?? pad.axes[1] ?? 0];
-    if (input.handedness === 'left') this.#walk(x, y, pose, seconds);
+    if (handedness === 'left') this.#walk(x, y, pose, seconds);
     else this.#turnBy(x, pose, held);
-    this.#aim(frame, space, pose, input, held);
     held.leave = pad.buttons[LEAVE]?.pressed ? held.leave + seconds : 0;
     if (held.leave >= LEAVE_SECONDS) {
       held.leave = 0;
@@ -124,13 +165,13 @@ export class VrRig {
     }
   }
 
-  /** Position of the head, viewer space. */
+  /** Returns the position of the head in viewer space, meters. */
   #headAt({ transform: { position } }: XrPose): Vector3 {
     const head = this.#turned([position.x, position.y, position.z]);
     return [0, 1, 2].map((k) => this.#origin![k] + head[k]) as unknown as Vector3;
   }
 
-  /** Snap turns rotate around the head. */
+  /** Turns the user around the head if a stick is deflected to a side, once per deflection. */
   #turnBy(x: number, pose: XrPose, held: Held): void {
     const isTurning = Math.abs(x) > TURN_ZONE;
     if (isTurning && !held.turn) {
@@ -142,7 +183,10 @@ export class VrRig {
     held.turn = isTurning;
   }
 
-  /** Motion along the floor in the direction of the head. */
+  /**
+   * Moves the user along the floor, relative to the direction of the head. `x` and `y` are the deflection of the stick,
+   * -1..1.
+   */
   #walk(x: number, y: number, pose: XrPose, seconds: number): void {
     if (this.#start.stepsOnly || Math.hypot(x, y) < DEAD_ZONE || seconds === 0) return;
     const m = pose.transform.matrix;
@@ -151,7 +195,8 @@ export class VrRig {
     const [aheadX, aheadZ] = [ahead[0] / length, ahead[2] / length];
     const [dx, dz] = [-aheadZ * x - aheadX * y, aheadX * x - aheadZ * y];
     const origin = this.#origin!;
-    const walker = this.#walker;
+    // Visitors also move by steps of their own.
+    const walker = this.#walkerUnder(this.#headAt(pose));
     if (!walker) {
       const way = 1.4 * seconds;
       this.#origin = [origin[0] + way * dx, origin[1], origin[2] + way * dz];
@@ -163,13 +208,27 @@ export class VrRig {
     this.#origin = [origin[0] + at[0] - before[0], this.#floorY(eyeFloor), origin[2] + at[2] - before[2]];
   }
 
-  /** Holding the trigger aims; releasing it teleports. */
-  #aim(frame: XrFrame, space: XrSpace, pose: XrPose, input: XrInput, held: Held): void {
-    const isHeld = input.gamepad?.buttons[TRIGGER]?.pressed ?? false;
+  /**
+   * Returns the walker, which moves under the head if there is a floor. Undefined without a map, and while the head has
+   * been over no floor yet.
+   */
+  #walkerUnder(head: Vector3): Walker | undefined {
+    const isUnder = ({ at }: Walker): boolean => Math.hypot(head[0] - at[0], head[2] - at[2]) <= STRAYED;
+    if (!this.#walker && this.#map) {
+      const walker = new Walker(this.#map, head);
+      if (isUnder(walker)) this.#walker = walker;
+    } else if (this.#walker && !isUnder(this.#walker)) this.#walker.land(head);
+    return this.#walker;
+  }
+
+  /** Aims while the trigger is held, and teleports when it is released. */
+  #aim(frame: XrFrame, space: XrSpace, pose: XrPose, held: Held): void {
+    const { input } = held;
+    const isHeld = input.gamepad?.buttons[TRIGGER]?.pressed ?? this.#selecting.has(input);
     const ray = isHeld || held.trigger ? frame.getPose(input.targetRaySpace, space) : undefined;
-    const target = ray ? this.#hit(ray) : undefined;
-    if (isHeld) this.target = target ?? this.target;
-    if (held.trigger && !isHeld && target) this.#jump(target, pose);
+    held.target = ray ? this.#hit(ray) : undefined;
+    if (isHeld) this.target = held.target ?? this.target;
+    else if (held.trigger && held.target) this.#jump(held.target, pose);
     held.trigger = isHeld;
   }
 
@@ -177,10 +236,13 @@ export class VrRig {
     const head = this.#headAt(pose);
     const origin = this.#origin!;
     this.#origin = [origin[0] + to[0] - head[0], this.#floorY(to[1]), origin[2] + to[2] - head[2]];
-    if (this.#map) this.#walker = new Walker(this.#map, [to[0], to[1] + EYE_HEIGHT, to[2]]);
+    if (this.#map) this.#walker = new Walker(this.#map, to);
   }
 
-  /** Only a ray that meets the floor has a valid destination. */
+  /**
+   * Returns the point where a ray meets the floor, viewer space in meters; undefined if it does not within the maximum
+   * distance.
+   */
   #hit({ transform: { matrix: m } }: XrPose): Vector3 | undefined {
     const from = this.#turned([m[12], m[13], m[14]]);
     const way = this.#turned([-m[8], -m[9], -m[10]]);
@@ -193,3 +255,5 @@ export class VrRig {
     return undefined;
   }
 }
+
+const hasTrigger = ({ gamepad }: XrInput): boolean => gamepad?.buttons[TRIGGER] !== undefined;

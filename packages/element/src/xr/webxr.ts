@@ -1,4 +1,4 @@
-/** The part of WebXR in use; TypeScript has no types of it. */
+/** Types of the part of WebXR in use, which TypeScript does not provide. */
 
 export type XrMode = 'immersive-vr' | 'immersive-ar';
 
@@ -41,7 +41,7 @@ export interface XrPose {
 
 export interface XrTransform {
   readonly position: { readonly x: number; readonly y: number; readonly z: number };
-  /** Column-major. */
+  /** 4x4 matrix, column-major. */
   readonly matrix: Float32Array;
   readonly inverse: XrTransform;
 }
@@ -60,8 +60,14 @@ export interface XrFrame {
 
 export interface XrInput {
   readonly handedness: string;
+  readonly targetRayMode?: string;
   readonly targetRaySpace: XrSpace;
   readonly gamepad?: Gamepad | null | undefined;
+}
+
+/** Event of an input, such as `selectstart`. */
+export interface XrInputEvent extends Event {
+  readonly inputSource: XrInput;
 }
 
 export interface XrViewport {
@@ -78,6 +84,22 @@ export interface XrLayer {
   getViewport(view: XrView): XrViewport | null;
 }
 
+/** WebGPU's counterpart of `XRWebGLLayer`: <https://immersive-web.github.io/WebXR-WebGPU-Binding/>. */
+export interface XrGpuBinding {
+  getPreferredColorFormat(): GPUTextureFormat | null;
+  createProjectionLayer(options: { readonly colorFormat: GPUTextureFormat }): object;
+  getViewSubImage(layer: object, view: XrView): XrGpuSubImage;
+}
+
+/** The part of a texture that belongs to a view. */
+export interface XrGpuSubImage {
+  readonly colorTexture: GPUTexture;
+  readonly viewport: XrViewport;
+  getViewDescriptor(): GPUTextureViewDescriptor;
+}
+
+type GpuBindingClass = new (session: XrSession, device: GPUDevice) => XrGpuBinding;
+
 type LayerClass = new (session: XrSession, gl: WebGL2RenderingContext, options: object) => XrLayer;
 
 export const xrOf = (view: Window | null): XrSystem | undefined =>
@@ -85,6 +107,10 @@ export const xrOf = (view: Window | null): XrSystem | undefined =>
 
 export const makeLayer = (session: XrSession, gl: WebGL2RenderingContext): XrLayer => {
   const { XRWebGLLayer } = globalThis as unknown as { XRWebGLLayer: LayerClass };
-  // Splats are blended in a texture of the renderer: multisampling and depth of the layer would be unused.
+  // The renderer blends the splats in a texture of its own. Multisampling and depth of the layer would be unused.
   return new XRWebGLLayer(session, gl, { antialias: false, depth: false, stencil: false, ignoreDepthValues: true });
 };
+
+/** Returns the class of the WebXR-WebGPU binding; undefined in browsers without it. */
+export const gpuBindingClass = (): GpuBindingClass | undefined =>
+  (globalThis as { XRGPUBinding?: GpuBindingClass }).XRGPUBinding;

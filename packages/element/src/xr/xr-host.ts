@@ -1,16 +1,18 @@
 import type { Camera } from '@gaussian-splat/core';
+import type { World } from '@gaussian-splat/renderer';
 import type { Attributes } from '../attributes.js';
 import type { ViewerFrame } from '../camera/orbit.js';
 import type { ScenePoint } from '../camera/values.js';
 import type { AnnouncerController } from '../controllers/announcer-controller.js';
 import type { CameraController } from '../controllers/camera-controller.js';
+import type { Backend } from '../gpu/backend.js';
 import type { LoadedGaussians } from '../gpu/loaded-gaussians.js';
 import type { Lazy } from '../lazy.js';
 import type { SceneRequest } from '../loading/protocol.js';
 import type { SceneLoader } from '../loading/scene-loader.js';
-import type { A11yStrings } from '../words.js';
+import type { A11yStrings } from '../strings.js';
 
-/** The interface of the element that VR, AR and the ruler use. */
+/** The part of the element that VR, AR and the ruler use. */
 export interface XrHost {
   readonly element: HTMLElement;
   readonly attributes: Attributes;
@@ -19,17 +21,31 @@ export interface XrHost {
   readonly strings: A11yStrings;
   readonly frame: ViewerFrame;
   readonly services: { readonly sceneLoader: SceneLoader };
-  /** The request of the displayed scene; null without one, and for sources without a file. */
+  /** Request of the displayed scene; null while no scene is shown, and for one that moves. */
   readonly walkable: SceneRequest | null;
   readonly sources: {
-    readonly ownEntry: { readonly scene: { readonly scene: LoadedGaussians | null; readonly isOutgoing: boolean } };
+    /** All displayed scenes. */
+    readonly shown: readonly LoadedGaussians[];
+    readonly isPreview: boolean;
+    /** Stops the clocks of moving scenes until the next frame, so that the time until then does not count. */
+    suspend(): void;
+    readonly ownEntry: {
+      readonly scene: { readonly scene: LoadedGaussians | null; readonly isOutgoing: boolean; readonly url: string };
+    };
   };
+  /** The world with all displayed scenes. */
+  readonly world: World;
+  readonly view: { readonly backend: Backend | null };
+  /** Advances moving scenes to the time of a frame. @param now requestAnimationFrame's clock, ms. */
+  advanceScene(camera: Camera, now: number): void;
+  /** Updates the world before a frame. Returns a text that changes whenever the frame would change. */
+  prepareFrame(): string;
   readonly reveal: { dismiss(): void };
   readonly behaviors: { readonly announcer: Lazy<AnnouncerController> };
   readonly isOnShow: boolean;
-  /** The camera of the last frame, in its pixels; undefined before there is one. */
+  /** The camera of the last frame, with the size of the frame in pixels; undefined before the first frame. */
   readonly drawnFrom: Camera | undefined;
-  /** A session shows the scene, so the page does not draw it. */
+  /** Whether a VR or AR session shows the scene. The page does not draw meanwhile. */
   isImmersed: boolean;
   requestFrame(): void;
   positionFromPoint(clientX: number, clientY: number): Promise<ScenePoint | null>;

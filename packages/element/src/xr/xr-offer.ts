@@ -2,24 +2,34 @@ import { GaussianSplatError } from '@gaussian-splat/core';
 import type { ReactiveController, ReactiveControllerHost } from 'lit';
 import type { LoadedGaussians } from '../gpu/loaded-gaussians.js';
 import type { XrHost } from './xr-host.js';
-import type { ExtraWord } from '../words.js';
-import { contextFor, openXrScene, unsupported, type XrContext, type XrScene } from './xr-scene.js';
+import type { ExtraWord } from '../strings.js';
+import type { XrDrawing } from './xr-drawing.js';
+import { unsupported, type XrShown } from './xr-scene.js';
 import { XrLoop, type XrGuide } from './xr-session.js';
 import { xrOf, type XrMode, type XrSession, type XrSpace } from './webxr.js';
 
 export type XrStatus = 'not-presenting' | 'session-started' | 'object-placed' | 'failed';
 
-/** Definition of a kind of session. */
+/** Definition of a kind of session, VR or AR. */
 export interface XrKind {
   readonly mode: XrMode;
-  /** Name of the attribute, of its button's slot, and of its status. */
+  /** Name of the attribute and of the button's slot, and prefix of the status event. */
   readonly name: 'vr' | 'ar';
   readonly word: ExtraWord;
-  /** Whether the page enables it. */
+  /** Whether the attributes of the page enable the session. */
   readonly isWanted: () => boolean;
-  /** For `requestSession`; called in the click. */
+  /** Returns the options for `requestSession`. Called in the click handler. */
   options(): object;
-  /** Reference spaces, the best first. */
+  /**
+   * Omits options that a browser may have refused from the next {@link options}.
+   * @returns whether there are such options
+   */
+  simplify?(): boolean;
+  /** Whether sessions can show what the element displays. */
+  canShow(): boolean;
+  /** Opens the drawing of a session. */
+  open(session: XrSession, shown: XrShown): Promise<XrDrawing>;
+  /** Types of reference spaces, the preferred one first. */
   readonly spaces: readonly string[];
   guide(started: XrStarted): XrGuide;
 }
@@ -28,8 +38,8 @@ export interface XrStarted {
   readonly session: XrSession;
   readonly space: XrSpace;
   readonly spaceType: string;
-  readonly gl: WebGL2RenderingContext;
-  /** Aborted when the session ends. */
+  readonly drawing: XrDrawing;
+  /** Signal that is aborted when the session ends. */
   readonly signal: AbortSignal;
   readonly offer: XrOffer;
 }
@@ -39,12 +49,11 @@ interface Running {
   readonly session: XrSession;
   readonly over: AbortController;
   readonly shown: LoadedGaussians | null;
-  context?: XrContext;
-  loop?: XrLoop;
-  scene?: XrScene;
+  drawing?: XrDrawing;
+  frames?: XrLoop;
 }
 
-/** Offers one kind of session: a button if sessions are supported, the session itself, and its status. */
+/** Offers one kind of session: shows a button if the browser supports it, runs the session, and reports its status. */
 export class XrOffer implements ReactiveController {
   readonly core: XrHost;
   readonly kind: XrKind;
@@ -68,25 +77,20 @@ export class XrOffer implements ReactiveController {
     this.#button = Object.assign(page.createElement('button'), { type: 'button' });
     this.#button.setAttribute('part', `${kind.name}-button`);
     this.#slot.append(this.#button);
-    // Also handles the author's button in the slot.
+    // The listener also handles a button that the author has put into the slot.
     this.#slot.addEventListener('click', () => {
       this.activate().catch((error: Error) => core.warn(error.message));
     });
     element.addController(this);
   }
 
-  /** Whether a session could start now. */
+  /** Whether a session can start: it is supported, enabled, and the scene is displayed. */
   get canActivate(): boolean {
-    return this.#isSupported && this.kind.isWanted() && this.core.walkable !== null;
+    return this.#isSupported && this.kind.isWanted() && this.kind.canShow();
   }
 
   get isPresenting(): boolean {
     return this.#running !== undefined;
-  }
-
-  /** Draws the session; undefined outside one. */
-  get loop(): XrLoop | undefined {
-    return this.#running?.loop;
   }
 
   hostConnected(): void {
@@ -107,12 +111,12 @@ export class XrOffer implements ReactiveController {
   }
 
   /**
-   * The session ends if another source is requested, which does not load out of view, or if the page's splats, which it
-   * draws, are gone.
+   * Whether the session must end: another source is requested, which does not load while the element is out of view, or
+   * the page's splats that the session draws were replaced or destroyed.
    */
-  #isOutdated({ context, shown }: Running): boolean {
+  #isOutdated({ drawing, shown }: Running): boolean {
     const { scene } = this.core.sources.ownEntry;
-    return scene.isOutgoing || (context?.isOwn === false && scene.scene !== shown);
+    return scene.isOutgoing || (drawing?.isOfPage === true && scene.scene !== shown);
   }
 
   hostDisconnected(): void {
@@ -124,16 +128,21 @@ export class XrOffer implements ReactiveController {
   }
 
   /**
-   * Starts a session. Calls the browser without an earlier await, so call it in a click handler.
-   * @throws GaussianSplatError `unsupported/xr` if it is not available, `argument/activation` outside a click
+   * Starts a session. Call it in a click handler, without an earlier await.
+   * @throws GaussianSplatError `unsupported/xr` if no session is available, `argument/activation` outside a click
    */
   activate(): Promise<void> {
     const xr = xrOf(this.#element.ownerDocument.defaultView);
     if (!xr || !this.canActivate) return Promise.reject(unsupported('a headset or a phone, and a scene file', 'none'));
     if (this.#isStarting || this.#running) return Promise.resolve();
     this.#isStarting = true;
-    return xr
-      .requestSession(this.kind.mode, this.kind.options())
+    const request = (): Promise<XrSession> => xr.requestSession(this.kind.mode, this.kind.options());
+    return request()
+      .catch((error: unknown) => {
+        // The browser accepts a second request, because the activation by the click has not expired.
+        if ((error as Error).name !== 'SecurityError' && this.kind.simplify?.()) return request();
+        throw error;
+      })
       .then(
         (session) => this.#start(session),
         (error: unknown) => {
@@ -151,7 +160,7 @@ export class XrOffer implements ReactiveController {
     this.#running?.session.end().catch(() => undefined);
   }
 
-  /** Reports the status to the page and to CSS. */
+  /** Reports the status in an attribute, for CSS, and by an event. @param reason Reason of a failure. */
   status(status: XrStatus, reason?: string): void {
     const name = `${this.kind.name}-status` as const;
     this.#element.setAttribute(name, status);
@@ -160,11 +169,14 @@ export class XrOffer implements ReactiveController {
 
   async #start(session: XrSession): Promise<void> {
     const { core } = this;
+    // The element has left the page, or lost its attribute, while the browser asked the visitor.
+    if (!this.#watching) return session.end().catch(() => undefined);
     const running: Running = { session, over: new AbortController(), shown: core.sources.ownEntry.scene.scene };
     this.#running = running;
     session.addEventListener('end', () => this.#ended(running), { once: true });
     core.reveal.dismiss();
     core.isImmersed = true;
+    core.sources.suspend();
     this.#element.requestUpdate();
     this.status('session-started');
     try {
@@ -181,31 +193,19 @@ export class XrOffer implements ReactiveController {
     const { core, kind } = this;
     const { session, over, shown } = running;
     const { signal } = over;
-    const request = core.walkable;
-    if (request === null) throw unsupported('a scene that has loaded', 'none');
-    const context = (running.context = await contextFor(shown));
+    const drawing = (running.drawing = await kind.open(session, { shown, request: core.walkable }));
     if (signal.aborted) return this.#free(running);
-    context.gl.canvas.addEventListener('webglcontextlost', () => this.#lost(running), { signal });
+    drawing.onLost = (what) => this.#lost(running, what);
     const [spaceType, space] = await spaceOf(session, kind.spaces);
     if (signal.aborted) return;
-    const guide = kind.guide({ ...{ session, space, spaceType, signal }, gl: context.gl, offer: this });
-    running.loop = new XrLoop(session, context, space, guide);
-    const { sceneLoader: loader } = core.services;
-    const scene = await openXrScene(context, { shown, request, loader }, signal);
-    running.scene = scene;
-    if (signal.aborted) return this.#free(running);
-    const { maxShDegree: shDegree, filter, order } = core.attributes;
-    running.loop.show(scene, {
-      shDegree,
-      filter: filter === 'auto' ? undefined : filter,
-      byDistance: order === 'distance',
-      spawn: loader.spawn,
-    });
+    const guide = kind.guide({ ...{ session, space, spaceType, signal, drawing }, offer: this });
+    running.frames = new XrLoop(session, drawing, space, guide);
+    await drawing.open(signal);
   }
 
-  #lost(running: Running): void {
+  #lost(running: Running, what: string): void {
     if (running !== this.#running) return;
-    this.status('failed', 'the WebGL context was lost');
+    this.status('failed', what);
     this.end();
   }
 
@@ -214,17 +214,17 @@ export class XrOffer implements ReactiveController {
     this.#free(running);
     this.#running = undefined;
     this.core.isImmersed = false;
+    // The page has drawn no frames meanwhile, so that this time does not count.
+    this.core.sources.suspend();
     if (this.#element.getAttribute(`${this.kind.name}-status`) !== 'failed') this.status('not-presenting');
     this.core.requestFrame();
     this.#element.requestUpdate();
   }
 
   #free(running: Running): void {
-    running.loop?.stop();
-    running.scene?.destroy();
-    running.scene = undefined;
-    if (running.context?.isOwn) running.context.gl.getExtension('WEBGL_lose_context')?.loseContext();
-    running.context = undefined;
+    running.frames?.stop();
+    running.drawing?.destroy();
+    running.drawing = undefined;
   }
 
   #watch(): void {

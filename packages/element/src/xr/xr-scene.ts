@@ -7,7 +7,7 @@ import type { SceneRequest } from '../loading/protocol.js';
 import type { SceneLoader } from '../loading/scene-loader.js';
 import { GlLoaded } from '../webgl/gl-loaded.js';
 
-/** Timeout for making a context compatible with a headset, ms: browsers without a headset never answer. */
+/** Timeout for making a context compatible with a headset, milliseconds: browsers without a headset never answer. */
 const COMPATIBLE_MS = 2_000;
 
 /**
@@ -16,28 +16,37 @@ const COMPATIBLE_MS = 2_000;
  */
 const STREAM_BYTES = { handheld: 50e6, computer: 186e6 };
 
-/** A scene that a session draws. */
+/** A scene that a session draws with WebGL. */
 export interface XrScene {
   readonly renderer: GlRenderer;
-  /** [N, 3] relative to `origin` */
+  /** [N, 3] positions relative to `origin`. */
   readonly positions: Float32Array;
   readonly origin: GlGaussians['facts']['origin'];
   destroy(): void;
 }
 
-/** A context for a session, and whether the session owns it. */
+/** WebGL context of a session. `isOwn` is false if it is the context of the page. */
 export interface XrContext {
   readonly gl: WebGL2RenderingContext;
   readonly isOwn: boolean;
 }
 
-export interface XrSceneSource {
+/** The element's own scene when a session starts. */
+export interface XrShown {
   readonly shown: LoadedGaussians | null;
+  /** Request of a scene file; null for a scene that moves, and if the element has no scene of its own. */
+  readonly request: SceneRequest | null;
+}
+
+export interface XrSceneSource extends XrShown {
   readonly request: SceneRequest;
   readonly loader: SceneLoader;
 }
 
-/** The page's context if it draws with WebGL and is compatible with the headset, else one owned by the session. */
+/**
+ * Returns the page's context if the page draws with WebGL and the headset is compatible with it; otherwise a new
+ * context.
+ */
 export async function contextFor(shown: LoadedGaussians | null): Promise<XrContext> {
   if (shown instanceof GlLoaded && !shown.isLost && (await becomesCompatible(shown.lease.gl)))
     return { gl: shown.lease.gl, isOwn: false };
@@ -60,7 +69,10 @@ async function becomesCompatible(gl: WebGL2RenderingContext): Promise<boolean> {
   return Promise.race([made, late]);
 }
 
-/** Opens the scene in a context: the displayed splats, or the same file again, usually from the browser's cache. */
+/**
+ * Opens the scene in a context: with the displayed splats, or from the same file again, usually from the browser's
+ * cache.
+ */
 export async function openXrScene(
   { gl, isOwn }: XrContext,
   { shown, request, loader }: XrSceneSource,

@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
+from shlex import quote
 from typing import cast, get_args
 
 import onnx
@@ -26,7 +27,7 @@ from .contract import METADATA_KEY, Coordinates, DType, Facts, Filter, Json, Lay
 from .cost import cost_of, report
 from .errors import ExportError
 from .families.avatar import PoseFormat, export_avatar
-from .families.classic import Colours, export_classic
+from .families.classic import Colors, export_classic
 from .families.deformable import export_deformable
 from .families.feed_forward import export_feed_forward
 from .families.gaussian4d import Rotation4D, export_gaussian4d
@@ -37,7 +38,7 @@ from .families.spacetime import export_spacetime
 from .frames import write_frames
 from .graph import Weights
 from .header import contract_faults, header_faults
-from .outputs import Options, refuse_instances, save
+from .outputs import Options, refuse_instances, refuse_place, save
 from .placement import gpu_findings, told
 from .written import Fault
 
@@ -50,7 +51,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     given = parser().parse_args(arguments)
     try:
         {"check": check, "cost": cost, "frames": frames}.get(given.family, export)(given)
-    except ExportError as error:
+    except (ExportError, OSError) as error:
+        # The message of the system names the file.
         print(f"gaussian-export: {error}", file=sys.stderr)
         return 1
     return 0
@@ -94,7 +96,7 @@ def add_common(family: Command) -> None:
     )
     facts.add_argument("--up", choices=get_args(Up), default="-y", help="the axis that points up; default -y")
     facts.add_argument("--left-handed", action="store_true")
-    facts.add_argument("--metres-per-unit", type=float)
+    facts.add_argument("--meters-per-unit", type=float)
     facts.add_argument("--duration", type=float, help="seconds that time 0 to 1 plays")
     facts.add_argument("--fps", type=float)
     what = "tensors, properties and settings of the checkpoint that change nothing that is drawn, separated by commas"
@@ -113,7 +115,7 @@ def add_common(family: Command) -> None:
 def facts_of(given: argparse.Namespace) -> Facts:
     """The contract's facts among the options."""
     handedness: Json = {"handedness": "left"} if given.left_handed else {}
-    coordinates = Coordinates(up=given.up, metres_per_unit=given.metres_per_unit, **handedness)  # type: ignore[arg-type]
+    coordinates = Coordinates(up=given.up, meters_per_unit=given.meters_per_unit, **handedness)  # type: ignore[arg-type]
     return Facts(
         name=given.name or given.out.stem,
         license=given.license,
@@ -129,8 +131,9 @@ def facts_of(given: argparse.Namespace) -> Facts:
 def export(given: argparse.Namespace) -> None:
     """Reads the checkpoint, writes the file, and reports on it."""
     _, _, build = FAMILIES[given.family]
+    refuse_place(given.out, given.checkpoint)
     model = build(given, facts_of(given), Options(given.layout, given.dtype, given.weights, given.instances))
-    size = save(model, str(given.out))
+    size = save(model, given.out)
     shapes = ", ".join(
         f"{o.name} {[d.dim_param or d.dim_value for d in o.type.tensor_type.shape.dim]}" for o in model.graph.output
     )
@@ -139,8 +142,8 @@ def export(given: argparse.Namespace) -> None:
 
 
 def cost(given: argparse.Namespace) -> None:
-    """Prints what a run of a file costs, without running it."""
-    model = loaded(given.file)
+    """Prints the estimated cost of a run, without running the file."""
+    model = with_contract(loaded(given.file), given.file)
     for line in report(cost_of(model, given.instances), given.rows):
         print(line)
 
@@ -149,22 +152,22 @@ def frames(given: argparse.Namespace) -> None:
     """Writes moments of a generator, and says how to make a clip of them."""
     if not given.fps > 0:
         raise ExportError("argument/value", where="--fps", expected="more than 0", found=str(given.fps), remedy="30")
-    count = write_frames(loaded(given.file), given.file, given.folder, given.fps, given.duration)
-    print(f"{given.folder}/frames.json: {count} frames")
-    print(f"a clip: npx gaussian-splat sequence {given.folder}/frames.json --out {given.file.stem}.gsv")
+    model = with_contract(loaded(given.file), given.file)
+    count = write_frames(model, given.file, given.folder, given.fps, given.duration)
+    manifest, clip = given.folder / "frames.json", f"{given.file.stem}.gsv"
+    print(f"{manifest}: {count} frames")
+    command = f"npm run gaussian-splat -- sequence {quote(str(manifest))} --out {quote(clip)}"
+    print(f"a clip, by a command of this repository: {command}")
 
 
 def check(given: argparse.Namespace) -> None:
-    """Holds a file against its contract, and reports what would leave the GPU."""
+    """Checks a file against its contract, and reports the nodes that would leave the GPU."""
     path = given.file
-    model = loaded(path)
-    beside = path.with_suffix(".contract.json")
-    if METADATA_KEY not in {prop.key for prop in model.metadata_props} and beside.exists():
-        model.metadata_props.add(key=METADATA_KEY, value=beside.read_text(errors="replace"))
+    model = with_contract(loaded(path), path)
     try:
         contract = of_metadata({prop.key: prop.value for prop in model.metadata_props}, str(path))
     except ExportError:
-        # What leaves the GPU is known without one.
+        # Nodes that leave the GPU can be found without a contract.
         report_findings(model)
         raise
     wrong = list(contract_faults(contract))
@@ -176,6 +179,14 @@ def check(given: argparse.Namespace) -> None:
         for name, values in check_outputs(model, path=path).items():
             print(f"ran on the CPU: {name} {list(values.shape)} {values.dtype}, all checks passed")
     report_findings(model)
+
+
+def with_contract(model: onnx.ModelProto, path: Path) -> onnx.ModelProto:
+    """The model with the contract beside its file, unless it has one of its own."""
+    beside = path.with_suffix(".contract.json")
+    if METADATA_KEY not in {prop.key for prop in model.metadata_props} and beside.exists():
+        model.metadata_props.add(key=METADATA_KEY, value=beside.read_text(encoding="utf-8", errors="replace"))
+    return model
 
 
 def loaded(path: Path) -> onnx.ModelProto:
@@ -201,7 +212,7 @@ def raise_faults(faults: Sequence[Fault]) -> None:
 
 
 def report_findings(model: onnx.ModelProto) -> None:
-    """Prints what would leave the GPU, or that nothing would."""
+    """Prints the nodes that would leave the GPU, or that there are none."""
     findings = gpu_findings(model)
     for line in told(findings):
         print(line)
@@ -210,7 +221,7 @@ def report_findings(model: onnx.ModelProto) -> None:
 
 
 def _classic_options(family: Command) -> None:
-    family.add_argument("--colours", choices=get_args(Colours), default="sh", help="view: harmonics in the graph")
+    family.add_argument("--colors", choices=get_args(Colors), default="sh", help="view: harmonics in the graph")
 
 
 def _scaffold_options(family: Command) -> None:
@@ -230,7 +241,7 @@ def _no_options(family: Command) -> None:
 
 
 def _classic(given: argparse.Namespace, facts: Facts, options: Options) -> onnx.ModelProto:
-    return export_classic(read_cloud(given.checkpoint, given.ignore), facts, options, cast(Colours, given.colours))
+    return export_classic(read_cloud(given.checkpoint, given.ignore), facts, options, cast(Colors, given.colors))
 
 
 def _scaffold(given: argparse.Namespace, facts: Facts, options: Options) -> onnx.ModelProto:
@@ -261,7 +272,7 @@ def _gaussian4d(given: argparse.Namespace, facts: Facts, options: Options) -> on
         print("4dgs: rotations as its code has them since 2024-09-15; --rotation straight is for older trainings")
         given.rotation = "reversed"
     model = read_gaussian4d(given.checkpoint, given.ignore, given.time_duration, given.rotation)
-    # What is played is known: the seconds of the training.
+    # The file gives the duration that a page plays: the seconds of the training.
     return export_gaussian4d(model, replace(facts, duration=facts.duration or model.end - model.start), options)
 
 
@@ -296,7 +307,7 @@ def _image_filter_options(family: Command) -> None:
 
 
 def size(text: str) -> tuple[int, int]:
-    """A picture's size, written as 640x480."""
+    """Parses width and height of an image in pixels, written as 640x480."""
     width, height = text.split("x")
     return int(width), int(height)
 

@@ -1,4 +1,4 @@
-"""Running a file on the CPU and holding what it writes against the contract."""
+"""Runs a file on the CPU and checks its outputs against the contract."""
 
 from __future__ import annotations
 
@@ -16,15 +16,18 @@ from .contract import Json, of_metadata
 from .errors import ExportError
 from .written import Fault, bounds_faults, read, value_faults
 
-# No simple shares of a period: a loop would be tried in the same state again and again.
+# Fractions of the duration. Simple ones would test a looping motion in the same state each time.
 SHARES = (0.13, 0.25, 0.37, 0.5, 0.62, 0.75, 0.89, 1.0)
 
 
 def default_feeds(model: onnx.ModelProto, contract: Json) -> dict[str, AnyArray]:
-    """Something for every input: declared defaults, zeros, and a camera five units in front of the bounds' centre; of a
+    """Something for every input: declared defaults, zeros, and a camera five units in front of the bounds' center; of a
     file of several instances for one."""
     bindings = _bindings(contract)
-    return {value.name: _default(value, bindings.get(value.name), contract) for value in model.graph.input}
+    # An input that is an initializer, too, keeps the value of the file, as in pages.
+    stored = {tensor.name for tensor in model.graph.initializer}
+    given = (value for value in model.graph.input if value.name not in stored)
+    return {value.name: _default(value, bindings.get(value.name), contract) for value in given}
 
 
 def _default(value: onnx.ValueInfoProto, binding: Json | None, contract: Json) -> AnyArray:
@@ -46,8 +49,12 @@ def _default(value: onnx.ValueInfoProto, binding: Json | None, contract: Json) -
         return np.array([1, 0, 0.5, 0, 1, 0.5, 0, 0, 1] if _flat(shape) == 9 else [1, 1, 0.5, 0.5], dtype).reshape(
             shape
         )
-    if binding.get("format") == "matrix" and "default" not in binding:
-        return np.tile(np.eye(3).reshape(-1), _flat(shape) // 9).astype(dtype).reshape(shape)
+    if binding["role"] == "pose" and "default" not in binding:
+        unit = {"matrix": np.eye(3).reshape(-1), "quaternion": _no_turn(binding.get("quaternionOrder"))}
+        joint = unit.get(str(binding["format"]), np.zeros(1))
+        return np.tile(joint, _flat(shape) // len(joint)).astype(dtype).reshape(shape)
+    if binding["role"] == "gaussians":
+        return _gaussians(binding, shape).astype(dtype).reshape(shape)
     if binding["role"] == "depth":
         # Nothing in the first columns, then a surface that recedes.
         across = np.linspace(0, 1, shape[-1], endpoint=False)
@@ -59,13 +66,36 @@ def _default(value: onnx.ValueInfoProto, binding: Json | None, contract: Json) -
     )
 
 
+def _no_turn(order: object) -> AnyArray:
+    """The quaternion of no rotation."""
+    return np.array([0, 0, 0, 1] if order == "xyzw" else [1, 0, 0, 0])
+
+
+def _gaussians(binding: Json, shape: list[int]) -> AnyArray:
+    """An attribute of small round Gaussians of another model."""
+    size, attribute = _flat(shape), binding["attribute"]
+    color = 0.5 if binding.get("color") == "rgb" or attribute == "colors" else 0.1
+    opacity = 0.0 if binding.get("opacityActivation") == "logit" else 0.5
+    ball = [0.01, 0, 0, 0.01, 0, 0.01]
+    if attribute == "packed":
+        return np.tile([0, 0, 0, *ball, *[color] * (shape[-1] - 10), opacity], size // shape[-1])
+    if attribute == "covariances":
+        row = ball if shape[-1] == 6 else [0.01, 0, 0, 0, 0.01, 0, 0, 0, 0.01]
+        return np.tile(row, size // len(row))
+    if attribute == "rotations":
+        return np.tile(_no_turn(binding.get("rotationOrder")), size // 4)
+    scale = np.log(0.1) if binding.get("scaleActivation") == "log" else 0.1
+    numbers = {"positions": 0.0, "scales": scale, "opacities": opacity, "count": 1.0}
+    return np.full(size, numbers.get(str(attribute), color))
+
+
 def _flat(shape: list[int]) -> int:
     return int(np.prod(shape))
 
 
 @contextmanager
 def running(doing: str) -> Iterator[None]:
-    """What ONNX Runtime says of a model, as contract/run."""
+    """Raises errors of ONNX Runtime as contract/run."""
     try:
         yield
     except Exception as error:  # the runtime has a class for each of its errors
@@ -124,7 +154,7 @@ def _raise_first(contract: Json, results: dict[str, AnyArray], label: str, is_de
 
 
 def faults_of(contract: Json, results: dict[str, AnyArray]) -> Iterator[Fault]:
-    """Everything that is wrong with what one run wrote."""
+    """All faults of the outputs of one run."""
     faults, attributes = read(cast(Json, contract["outputs"]), results, cast("int | None", contract.get("nMax")))
     yield from faults
     yield from value_faults(attributes)
@@ -137,14 +167,29 @@ def _bindings(contract: Json) -> dict[str, Json]:
 
 def _states(contract: Json, given: dict[str, AnyArray]) -> Iterator[tuple[str, bool, dict[str, AnyArray]]]:
     """Other times; all controls at the least, and all at the most that their ranges allow: people will go there."""
-    clocks = {name: each for name, each in _bindings(contract).items() if each["role"] == "time" and name in given}
-    for share in SHARES if clocks else ():
-        ends = {n: 1.0 if b["unit"] == "normalized" else contract.get("duration", 1.0) for n, b in clocks.items()}
-        yield f"{share} of the time", True, {n: np.full_like(given[n], share * cast(float, ends[n])) for n in ends}
+    end = cast(float, contract.get("duration", 1.0))
+    for share in SHARES:
+        if clocks := clocks_at(share * end, contract, given):
+            yield f"{share} of the time", True, clocks
     ranges = {name: cast(Any, each)["range"] for name, each in _bindings(contract).items() if each["role"] == "control"}
     for end in (0, 1) if ranges else ():
         label = f"controls at {('least', 'most')[end]}"
         yield label, False, {name: np.full_like(given[name], limits[end]) for name, limits in ranges.items()}
+
+
+def clocks_at(seconds: float, contract: Json, given: dict[str, AnyArray]) -> dict[str, AnyArray]:
+    """Inputs with the roles time and frame at a time, of those that are given."""
+    duration = cast(float, contract.get("duration", np.inf))
+    rate = cast(float, contract.get("fps", 0.0))
+    # The end of the duration belongs to the last frame; in float64, 29/25 s times 25 is less than 29.
+    last = np.ceil(duration * rate - 1e-6) - 1 if rate > 0 else 0
+    values = {
+        ("time", "seconds"): seconds,
+        ("time", "normalized"): seconds / duration,
+        ("frame", None): max(0, min(np.floor(seconds * rate + 1e-6), last)),
+    }
+    found = {name: values.get((str(each["role"]), each.get("unit"))) for name, each in _bindings(contract).items()}  # type: ignore[arg-type]
+    return {name: np.full_like(given[name], x) for name, x in found.items() if x is not None and name in given}
 
 
 def _violation(code: str, where: str, expected: str, found: str, remedy: str) -> ExportError:

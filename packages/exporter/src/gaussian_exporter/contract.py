@@ -17,7 +17,7 @@ METADATA_KEY = "gaussian_contract"
 VERSION = 1
 
 Layout = Literal["packed", "split"]
-# What a split layout says of the shape: covariances, or scales and rotations.
+# Tensors of a split layout that define the shape: covariances, or scales and rotations.
 Shape = Literal["covariances", "axes"]
 ScaleActivation = Literal["linear", "log"]
 OpacityActivation = Literal["linear", "logit"]
@@ -29,7 +29,7 @@ Json = dict[str, object]
 
 @dataclass(frozen=True)
 class Input:
-    """One ONNX input and the role that feeds it: its name, and what the contract says of it."""
+    """One ONNX input: its name, and its entry in the contract with the role that feeds it."""
 
     name: str
     binding: Json
@@ -41,7 +41,7 @@ def camera_position(name: str = "camera_position") -> Input:
 
 
 def normalized_time(name: str = "time") -> Input:
-    """[1]: a share 0..1 of the contract's duration, which must be declared."""
+    """[1]: fraction 0..1 of the contract's duration, which must be declared."""
     return Input(name, {"role": "time", "unit": "normalized"})
 
 
@@ -72,28 +72,28 @@ def image(name: str = "image") -> Input:
 
 @dataclass(frozen=True)
 class Coordinates:
-    """The frame that Gaussians are written in: which axis points up, the handedness, metres in a unit if known."""
+    """The frame that Gaussians are written in: which axis points up, the handedness, meters in a unit if known."""
 
     up: Up = "-y"
     handedness: Literal["right", "left"] = "right"
-    metres_per_unit: float | None = None
+    meters_per_unit: float | None = None
 
     @staticmethod
     def of(given: Any) -> Coordinates:
-        """Those that are given, as themselves or as a dict of these fields, or of the contract's; `y` is +y."""
+        """Converts Coordinates, a dict of these fields or of the contract's, or an up axis alone; `y` is +y."""
         if given is None or isinstance(given, Coordinates):
             fields = vars(given or Coordinates())
         else:
             fields = dict(given) if isinstance(given, Mapping) else {"up": given}
-        fields = {"metres_per_unit" if key == "metresPerUnit" else key: value for key, value in fields.items()}
+        fields = {"meters_per_unit" if key == "metresPerUnit" else key: value for key, value in fields.items()}
         up = fields.get("up", "-y")
         fields["up"] = f"+{up}" if up in ("x", "y", "z") else up
         is_known = fields["up"] in get_args(Up) and fields.get("handedness", "right") in ("right", "left")
-        if not is_known or fields.keys() - {"up", "handedness", "metres_per_unit"}:
+        if not is_known or fields.keys() - {"up", "handedness", "meters_per_unit"}:
             raise ExportError(
                 "argument/value",
                 where="coordinates",
-                expected=f"up, one of {', '.join(get_args(Up))}; handedness, right or left; metres_per_unit",
+                expected=f"up, one of {', '.join(get_args(Up))}; handedness, right or left; meters_per_unit",
                 found=repr(given),
                 remedy='write coordinates={"up": "+y"}, or Coordinates(up="+y")',
             )
@@ -101,19 +101,19 @@ class Coordinates:
 
     def json(self) -> Json:
         """As the contract writes it."""
-        scale = {} if self.metres_per_unit is None else {"metresPerUnit": self.metres_per_unit}
+        scale = {} if self.meters_per_unit is None else {"metresPerUnit": self.meters_per_unit}
         return {"up": self.up, "handedness": self.handedness, **scale}
 
 
 @dataclass(frozen=True)
 class Facts:
-    """What only the person who exports can know. `duration` in seconds, `fps` in frames to a second."""
+    """Facts from the caller, as no checkpoint contains them. `duration` in seconds, `fps` in frames per second."""
 
     name: str
     license: str
     attribution: str
     antialiased: bool = False
-    # The filter it was trained with, where antialiased does not say all.
+    # The filter of the training, if antialiased does not define it.
     filter: Filter | None = None
     coordinates: Coordinates = field(default_factory=Coordinates)
     duration: float | None = None
@@ -122,7 +122,7 @@ class Facts:
 
 @dataclass(frozen=True)
 class GaussianOutputs:
-    """How Gaussians are written. sh_degree is None for plain colours; names are those of the layout's tensors."""
+    """How Gaussians are written. sh_degree is None for plain colors; names are those of the layout's tensors."""
 
     layout: Layout
     shape: Shape
@@ -130,7 +130,7 @@ class GaussianOutputs:
     dtype: DType
     sh_degree: int | None
     bounds: tuple[Sequence[float], Sequence[float]]
-    # Most instances that one run computes; None without an axis for them.
+    # Maximum number of instances in one run; None if the outputs have no axis of instances.
     instances: int | None = None
     scale_activation: ScaleActivation = "linear"
     opacity_activation: OpacityActivation = "linear"
@@ -204,7 +204,7 @@ def metadata(contract: Json) -> dict[str, str]:
 
 
 def of_metadata(props: dict[str, str], where: str) -> Json:
-    """The contract of a file's metadata_props. Raises contract/violation where there is none."""
+    """The contract of a file's metadata_props. Raises contract/violation without one."""
     try:
         found = json.loads(props[METADATA_KEY].removeprefix("\ufeff"))
     except (KeyError, ValueError, RecursionError) as error:

@@ -1,8 +1,8 @@
-"""Where a graph's time goes, without a GPU: dispatches, bytes and multiplications of every node, and an estimate.
+"""Cost of a graph, computed without a GPU: dispatches, bytes and multiplications of every node, and an estimated time.
 
-What ONNX Runtime's WebGPU provider does with a node was read in its kernels: a node is one dispatch that reads its
-inputs and writes its outputs; what hangs on constants alone is computed once, when the session is made; a reshape costs
-nothing, unless the file writes it out, which is a copy. Estimates are for comparing graphs with one another.
+The model follows the kernels of ONNX Runtime's WebGPU provider. A node is one dispatch that reads its inputs and writes
+its outputs. Nodes that depend on constants alone run once, when the session is created. A reshape costs nothing, unless
+its result is an output of the file, which needs a copy. Use the estimates only to compare graphs with one another.
 """
 
 from __future__ import annotations
@@ -15,7 +15,8 @@ import onnx
 from onnx import helper
 
 from .errors import ExportError
-from .graph import ALIASES
+from .graph import ALIASES, INSTANCES_AXIS
+from .placement import axis_of_instances
 
 # Fitted, by relative squares, to ten recorded graphs of 30,000 to 2.5 million Gaussians measured on one NVIDIA H200:
 # nine come out within 30 %, one (80,000 Gaussians) at half its time. The bus could carry 4.8 TB/s; the kernels of the
@@ -38,8 +39,9 @@ Dims = tuple[int, ...]
 
 @dataclass(frozen=True)
 class NodeCost:
-    """What one node costs in every run. Bytes as float32 numbers go over the bus once; flops of products of matrices
-    and convolutions, whole tiles; `remark`: which slow kernel it gets, empty if none. dispatches 0: nothing is done."""
+    """Cost of one node in every run. `read` and `written` are bytes, with each float32 number counted once. `flops` are
+    those of matrix products and convolutions in whole tiles. `remark` names the slow kernel, empty if none. A node of
+    0 dispatches does no work."""
 
     name: str
     operator: str
@@ -58,7 +60,7 @@ class NodeCost:
 
 @dataclass(frozen=True)
 class Cost:
-    """What a run costs, node by node in the order of the file; nodes of constants are left out."""
+    """Cost of a run, node by node in the order of the file; nodes of constants are omitted."""
 
     nodes: Sequence[NodeCost]
 
@@ -84,9 +86,9 @@ class Cost:
 
 
 def cost_of(model: onnx.ModelProto, instances: int = 1) -> Cost:
-    """The cost of a run; of `instances` at once where the file has an axis for them.
+    """The cost of a run; of `instances` at once if the file has an axis for them.
 
-    Raises graph/invalid where a size is not known, since nothing can then be said.
+    Raises graph/invalid if a size is unknown, since the cost then is unknown too.
     """
     values = _Values(model, instances)
     outputs = {output.name for output in model.graph.output}
@@ -131,14 +133,15 @@ class _Values:
     def __init__(self, model: onnx.ModelProto, instances: int):
         fixed = onnx.ModelProto()
         fixed.CopyFrom(model)
+        axis = axis_of_instances(model) or INSTANCES_AXIS
         for value in [*fixed.graph.input, *fixed.graph.output]:
             for dim in value.type.tensor_type.shape.dim:
-                if dim.dim_param:
+                if dim.dim_param == axis:
                     dim.dim_value = instances
         try:
             graph = onnx.shape_inference.infer_shapes(fixed, data_prop=True).graph
         except onnx.shape_inference.InferenceError:
-            # Operators of a foreign domain; what the file itself declares must do.
+            # The file has operators of an unknown domain, so only its own declarations are used.
             graph = fixed.graph
         self.constants = {each.name for each in graph.initializer}
         self._dims: dict[str, Dims] = {each.name: tuple(each.dims) for each in graph.initializer}
@@ -151,7 +154,7 @@ class _Values:
                 self._types[value.name] = tensor.elem_type
 
     def dims(self, name: str) -> Dims:
-        """The shape of a value. Raises graph/invalid where it depends on the run."""
+        """The shape of a value. Raises graph/invalid if it depends on the run."""
         if name not in self._dims:
             raise ExportError(
                 "graph/invalid",
@@ -209,7 +212,7 @@ def _product(node: onnx.NodeProto, values: _Values) -> tuple[int, str]:
 
 
 def _broadcast(left: Dims, right: Dims) -> str:
-    """Why an operator of two arguments gets the kernel that looks every number up by itself, if it does."""
+    """The reason why a binary operator gets the slow kernel, which computes the index of each number; else empty."""
     if left == right or prod(left) == 1 >= len(left) or prod(right) == 1 >= len(right):
         return ""
     if any(dims and dims[-1] % 4 == 0 for dims in (left, right)):

@@ -1,6 +1,7 @@
-"""Errors for people: what was expected, what was found, where, and what to do; with a code that never changes."""
+"""Errors for users: place, expected and found state, and remedy, with a stable code."""
 
 from collections.abc import Sequence
+from importlib.util import find_spec
 from typing import Literal
 
 ErrorCode = Literal[
@@ -11,6 +12,7 @@ ErrorCode = Literal[
     "checkpoint/unsupported",
     "checkpoint/other-family",  # a known model with a part that has no exporter
     "argument/value",  # an option outside its range
+    "argument/package",  # a call that needs a package that is not installed
     "graph/invalid",  # a graph that ONNX refuses
 ]
 
@@ -27,6 +29,18 @@ class ExportError(Exception):
         self.expected = expected
         self.found = found
         self.remedy = remedy
+
+
+def require_package(name: str, extra: str) -> None:
+    """Raises argument/package if a package is not installed that only some calls need. `extra`: that installs it."""
+    if find_spec(name) is None:
+        raise ExportError(
+            "argument/package",
+            where="this Python",
+            expected=f"the package {name}",
+            found="none",
+            remedy=f"pip install 'gaussian-splat-exporter[{extra}]'",
+        )
 
 
 def listed(names: Sequence[str], limit: int = 8) -> str:

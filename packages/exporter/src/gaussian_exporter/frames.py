@@ -10,9 +10,9 @@ import numpy as np
 import onnx
 
 from .arrays import AnyArray, Doubles
-from .conformance import default_feeds, running
+from .conformance import clocks_at, default_feeds, running
 from .contract import Json, of_metadata
-from .errors import ExportError
+from .errors import ExportError, require_package
 from .written import Attributes, read
 
 SH_C0 = 0.28209479177387814
@@ -24,14 +24,14 @@ LEAST_SCALE = 1e-9
 def write_frames(model: onnx.ModelProto, path: Path, folder: Path, fps: float, duration: float | None) -> int:
     """Runs a generator at the times of all frames and writes one PLY file each, as INRIA's trainer does, and
     frames.json. Returns how many. Raises contract/... and argument/... errors; needs onnxruntime."""
+    require_package("onnxruntime", "check")
     import onnxruntime as ort
 
     contract = of_metadata({prop.key: prop.value for prop in model.metadata_props}, str(path))
     inputs = cast("dict[str, Json]", contract["inputs"])
-    clocks = {name: each for name, each in inputs.items() if each["role"] == "time"}
     seconds = duration or cast("float | None", contract.get("duration"))
-    if not clocks:
-        raise _wrong("an input of the role time", "none", "export a model that moves")
+    if not any(each["role"] in ("time", "frame") for each in inputs.values()):
+        raise _wrong("an input of the role time or frame", "none", "export a model that moves")
     if not seconds:
         raise _wrong("a duration", "none in the contract", "give --duration")
     with running("loading"):
@@ -41,22 +41,29 @@ def write_frames(model: onnx.ModelProto, path: Path, folder: Path, fps: float, d
     count = max(1, round(seconds * fps))
     folder.mkdir(parents=True, exist_ok=True)
     for frame in range(count):
-        share = {name: frame / fps / (seconds if each["unit"] == "normalized" else 1) for name, each in clocks.items()}
-        given = feeds | {name: np.full_like(feeds[name], value) for name, value in share.items()}
+        given = feeds | clocks_at(frame / fps, {**contract, "duration": seconds}, feeds)
         with running("running"):
             written = dict(zip(names, session.run(None, given), strict=True))
         faults, attributes = read(cast(Json, contract["outputs"]), written, cast("int | None", contract.get("nMax")))
         if faults:
             raise faults[0].error(f" (frame {frame})")
-        write_ply(folder / f"frame-{frame + 1:04}.ply", columns_of(attributes))
+        write_ply(folder / f"frame-{frame + 1:04}.ply", columns_of(attributes, cast(Json, contract["outputs"])))
     manifest = {"gaussianSplatSequence": 1, "framesPerSecond": fps, "frames": "frame-{0001}.ply", "count": count}
     (folder / "frames.json").write_text(json.dumps(manifest) + "\n")
     return count
 
 
-def columns_of(attributes: Attributes) -> dict[str, AnyArray]:
-    """Properties of INRIA's PLY files."""
+def columns_of(attributes: Attributes, outputs: Json) -> dict[str, AnyArray]:
+    """Properties of INRIA's PLY files. `outputs`: the contract's, for the orders of quaternions and harmonics."""
     wide = {name: np.asarray(each.rows, np.float64) for name, each in attributes.items()}
+    if "rotations" in wide and outputs.get("rotationOrder") == "xyzw":
+        wide["rotations"] = wide["rotations"][:, [3, 0, 1, 2]]
+    if "scales" in wide:
+        wide["scales"] = np.broadcast_to(wide["scales"], (len(wide["scales"]), 3))
+    if "sh" in wide and outputs.get("shOrder") == "channel-major":
+        wide["sh"] = wide["sh"].reshape(len(wide["sh"]), 3, -1).transpose(0, 2, 1)
+    if "covariances" in wide and wide["covariances"].shape[1] == 9:
+        wide["covariances"] = wide["covariances"][:, [0, 1, 2, 4, 5, 8]]
     kinds = {name: each.activation for name, each in attributes.items()}
     opacities = wide["opacities"]
     if kinds["opacities"] != "logit":

@@ -43,7 +43,7 @@ Number = float | int
 
 @dataclass(frozen=True)
 class Tensor:
-    """A value in a graph: float32 (or whatever `cast` made of it) of a known shape."""
+    """A value in a graph, with a known shape: float32, or the type that `cast` converted it to."""
 
     graph: Graph
     name: str
@@ -111,7 +111,7 @@ class Tensor:
             raise wrong_shape("Reshape", f"{prod(self.shape)} elements", str(shape))
         if shape == self.shape:
             return self
-        # At most one size depends on the instances: the one that ONNX finds by itself.
+        # At most one size depends on the instances; ONNX infers it from -1.
         written = [-1 if size % INSTANCES == 0 else size for size in shape]
         return self.graph.node("Reshape", [self, self.graph.integers(written)], shape)
 
@@ -165,7 +165,7 @@ def reduced(shape: Shape, axes: Sequence[int], keep: bool) -> Shape:
 
 
 def wrong_shape(operator: str, expected: str, found: str) -> ExportError:
-    """The error of an operator that is given what it cannot take."""
+    """The error of an operator whose inputs have an unsupported shape."""
     return ExportError(
         "graph/invalid",
         where=f"operator {operator}",
@@ -285,7 +285,7 @@ class Graph:
     def node(
         self, operator: str, inputs: Sequence[Tensor], shape: Shape, **attributes: int | float | str | Sequence[int]
     ) -> Tensor:
-        """Adds an operator of one result, whose shape the caller knows. The same on the same inputs is there once."""
+        """Adds an operator of one result with the given shape. Equal operators on equal inputs share one node."""
         key = (operator, tuple(tensor.name for tensor in inputs), repr(sorted(attributes.items())))
         if key in self._by_node:
             return self._by_node[key]

@@ -19,9 +19,9 @@ from jsonschema.exceptions import ValidationError, best_match
 from onnx import TensorProto, helper
 
 from .placement import RULES, gpu_findings, operators_of
-from .written import FIELDS, Fault, FaultCode, bare, rules_of
+from .written import FIELDS, Fault, FaultCode, bare, degree_of, rules_of
 
-_SCHEMA: dict[str, Any] = json.loads(files(__package__).joinpath("contract_schema.json").read_text())
+_SCHEMA: dict[str, Any] = json.loads(files(__package__).joinpath("contract_schema.json").read_text(encoding="utf-8"))
 _OLDEST_OPSET = 7
 _DOMAINS = ("", "ai.onnx", "com.microsoft", "ai.onnx.ml")
 _FLOATS, _INTEGERS = ("float32", "float16"), ("int32", "int64")
@@ -50,7 +50,7 @@ Dims = tuple[int | str | None, ...]
 
 
 class Tensor:
-    """An input or output as the file declares it; dims are None where it does not even tell the rank."""
+    """An input or output as the file declares it; dims are None if the file does not declare the rank."""
 
     def __init__(self, value: onnx.ValueInfoProto, axis: str | None = None):
         """`axis`: that of instances, which is left out."""
@@ -84,7 +84,7 @@ def _shown(dims: Sequence[object]) -> str:
 
 
 def contract_faults(contract: object) -> Iterator[Fault]:
-    """What is wrong with the JSON itself."""
+    """Faults of the JSON itself: against the schema, and between its fields."""
     error: ValidationError | None = best_match(Draft202012Validator(_SCHEMA).iter_errors(contract))
     if error is not None:
         place = "".join(f".{part}" if isinstance(part, str) else f"[{part}]" for part in error.absolute_path)
@@ -101,7 +101,12 @@ def _conflicts(contract: Mapping[str, Any]) -> Iterator[Fault]:
     for name, binding in contract["inputs"].items():
         role, where = binding["role"], f"inputs.{name}"
         if role == "time" and binding["unit"] == "normalized" and "duration" not in contract:
-            yield conflict(f"{where}.unit", "the duration that it is a share of", "none", "declare duration in seconds")
+            yield conflict(
+                f"{where}.unit",
+                "the duration that normalized time is a fraction of",
+                "none",
+                "declare duration in seconds",
+            )
         if role == "control":
             (low, high), default = binding["range"], binding["default"]
             values = default if isinstance(default, list) else [default]
@@ -322,6 +327,15 @@ def _outputs(written: Mapping[str, Tensor], contract: Mapping[str, Any]) -> Iter
     if shapes and not fixed and n_max is None:
         name = shapes[0][1].name
         yield _fault("rows", name, f"output {name}", "a number of rows, or nMax", "neither", "declare nMax")
+    declared = contract.get("shDegree")
+    if declared is not None and shapes:
+        degrees = [(tensor, degree_of(outputs, field, dims)) for field, tensor, dims in shapes]
+        # Plain colors count as degree 0.
+        with_degree, degree = next(((t, d) for t, d in degrees if d is not None), (shapes[0][1], 0))
+        if degree != declared and ("sh" not in outputs or any(field == "sh" for field, _, _ in shapes)):
+            expected = f"harmonics of degree {declared}, as the contract declares"
+            where, remedy = f"output {with_degree.name}", "correct shDegree in the contract, or leave it out"
+            yield _fault("sh-degree", with_degree.name, where, expected, f"degree {degree} ({with_degree})", remedy)
     floats = [tensor for _, tensor, _ in shapes if tensor.dtype in _FLOATS]
     wanted = contract.get("dtype") or (floats[0].dtype if floats else "")
     for tensor in floats:

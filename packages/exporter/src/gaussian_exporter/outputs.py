@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
+from pathlib import Path
 
 import onnx
 
@@ -19,15 +21,17 @@ from .contract import (
     Shape,
     gaussian_contract,
     metadata,
+    of_metadata,
 )
 from .errors import ExportError
 from .graph import INSTANCES, Graph, Tensor, Weights
+from .header import contract_faults
 from .pieces.covariance import covariance_of_scale_and_rotation
 
 
 @dataclass(frozen=True)
 class Options:
-    """How a generator is written. dtype float16 halves what it writes and needs the device feature shader-f16. Where a
+    """How a generator is written. dtype float16 halves the output and needs the device feature shader-f16. Where a
     family has scales and rotations the split layout writes them in place of covariances, which cost a graph more than
     the rest of it and in float16 lose what makes needles thin. The default layout is split, where nothing is copied
     together and what never changes is written once; packed for files without inputs, which run once. Weights `compact`
@@ -48,9 +52,9 @@ class Options:
 
 @dataclass(frozen=True)
 class Gaussians:
-    """What every family makes. positions (N,3) world units; covariances (N,6) or scales (N,3) standard deviations, or
+    """Outputs of every family. positions (N,3) world units; covariances (N,6) or scales (N,3) standard deviations, or
     their logarithms, with rotations (N,4) w x y z of any length; colors (N,3) 0..1 or sh (N,(d+1)^2,3); opacities (N,1)
-    0..1, or their logits. Where a graph has instances, any of them may have their axis before these."""
+    0..1, or their logits. If a graph has instances, any tensor may have their axis before these."""
 
     positions: Tensor
     opacities: Tensor | None = None
@@ -86,8 +90,8 @@ class Gaussians:
             raise ValueError("Gaussians need opacities")
         return self.opacity_logits.unary("Sigmoid")
 
-    def colour(self) -> Tensor:
-        """Colours (N,3), or harmonics as rows of (d+1)^2 * 3, all channels of a coefficient together."""
+    def color(self) -> Tensor:
+        """Colors (N,3), or harmonics as rows of (d+1)^2 * 3, all channels of a coefficient together."""
         if self.sh is not None:
             return self.sh.reshape(*self.sh.shape[:-2], self.sh.shape[-2] * 3)
         if self.colors is None:
@@ -99,11 +103,11 @@ class Gaussians:
         return self.rotations is not None
 
     def sh_degree(self) -> int:
-        """Degree of the harmonics; 0 with plain colours."""
+        """Degree of the harmonics; 0 with plain colors."""
         return 0 if self.sh is None else {1: 0, 4: 1, 9: 2, 16: 3}[self.sh.shape[-2]]
 
     def of_all_instances(self) -> Gaussians:
-        """With every part once for each instance, if any part is: what does not move is written for all of them."""
+        """Repeats constant tensors for each instance, if any tensor has an axis of instances."""
         parts = [part for field in fields(self) if (part := getattr(self, field.name)) is not None]
         like = next((part for part in parts if part.shape[0] == INSTANCES), None)
         if like is None:
@@ -161,8 +165,8 @@ def refuse_instances(options: Options, family: str) -> None:
 
 
 def write_packed(graph: Graph, gaussians: Gaussians, options: Options) -> None:
-    """One tensor: position 3, covariance 6, colour 3 or harmonics, opacity 1."""
-    columns = [gaussians.positions, gaussians.covariance(), gaussians.colour(), gaussians.opacity()]
+    """One tensor: position 3, covariance 6, color 3 or harmonics, opacity 1."""
+    columns = [gaussians.positions, gaussians.covariance(), gaussians.color(), gaussians.opacity()]
     graph.output("gaussians", graph.concat(columns, -1), options.dtype == "float16")
 
 
@@ -187,17 +191,45 @@ def write_split(graph: Graph, gaussians: Gaussians, options: Options, shape: Sha
         graph.output(name, graph.written_anew(tensor), not raw)
 
 
-def save(model: onnx.ModelProto, path: str) -> int:
-    """Writes the file and returns its bytes. Protobuf ends at 2 GiB."""
+def refuse_place(path: Path, *read: Path) -> None:
+    """Raises argument/value, before the work, if no file can be written at a path, or if it is one that is read."""
+    found = None
+    if path.is_dir():
+        found = "a folder"
+    elif not path.absolute().parent.is_dir():
+        found = f"no folder {path.parent}"
+    elif any(each.exists() and path.exists() and path.samefile(each) for each in read):
+        found = "the file that is read"
+    if found is not None:
+        raise ExportError(
+            "argument/value",
+            where=str(path),
+            expected="a place for a file",
+            found=found,
+            remedy="name the .onnx file to write, in a folder that is there",
+        )
+
+
+def save(model: onnx.ModelProto, path: Path) -> int:
+    """Writes the file, complete or not at all, and returns its bytes. Raises contract/... if pages refuse its contract,
+    and argument/value above 2 GiB, where protobuf ends."""
+    contract = of_metadata({prop.key: prop.value for prop in model.metadata_props}, str(path))
+    for fault in contract_faults(contract):
+        raise fault.error()
     size = int(model.ByteSize())
     if size >= 2**31 - 1:
         raise ExportError(
             "argument/value",
-            where=path,
+            where=str(path),
             expected="a model of less than 2 GiB",
             found=f"{size / 2**30:.1f} GiB",
             remedy="export fewer Gaussians, or a lower degree of harmonics",
         )
-    with open(path, "wb") as file:
-        file.write(model.SerializeToString())
+    part = path.with_name(f"{path.name}.{os.getpid()}.part")
+    try:
+        part.write_bytes(model.SerializeToString())
+        part.replace(path)
+    except BaseException:
+        part.unlink(missing_ok=True)
+        raise
     return size

@@ -1,10 +1,9 @@
 """Which nodes of a file would leave the GPU, found without a GPU.
 
-A node without a WebGPU kernel runs on the CPU, in the middle of the graph: in every frame the page waits for all GPU
-work before it, its own drawing included; and a graph with one such node cannot be captured, which costs 2.5 to 11 times
-more JavaScript time. What has a kernel was measured, operator by operator, with ONNX Runtime's native WebGPU
-provider (onnxruntime-webgpu 1.27.0); tests/test_webgpu.py compares these rules with where the provider really puts
-each node.
+A node without a WebGPU kernel runs on the CPU, in the middle of the graph. In every frame the page then waits for all
+earlier GPU work, including its own drawing. A graph with one such node cannot be captured, which costs 2.5 to 11 times
+more JavaScript time. The list of kernels was measured, operator by operator, with ONNX Runtime's native WebGPU provider
+(onnxruntime-webgpu 1.27.0). tests/test_webgpu.py compares these rules with the provider's placement of each node.
 """
 
 from __future__ import annotations
@@ -23,7 +22,7 @@ from .errors import ExportError
 from .graph import ALIASES
 
 # One rule set with the checker of pages and shells: packages/core/src/onnx/webgpu-rules.ts, of which this is the copy.
-RULES: dict[str, Any] = json.loads(files(__package__).joinpath("webgpu_rules.json").read_text())
+RULES: dict[str, Any] = json.loads(files(__package__).joinpath("webgpu_rules.json").read_text(encoding="utf-8"))
 KERNELS = frozenset(RULES["kernels"])
 INSTEAD: dict[str, str] = RULES["instead"]
 _EXPORT = f"export opset {RULES['exportOpset']}"
@@ -41,7 +40,7 @@ class Finding:
     operator: str
     reason: str
     remedy: str
-    # What the node writes first, or the tensor that is meant.
+    # Name of the tensor concerned, or of the node's first output.
     tensor: str = ""
 
     @property
@@ -50,7 +49,7 @@ class Finding:
         return self.kind == "failure" and self.operator in ("Cast", "file", "bfloat16")
 
     def error(self) -> ExportError:
-        """To be raised where it is refused."""
+        """The error to raise if the file is refused."""
         return ExportError(
             "contract/operator",
             where=f"{self.operator} {self.node}".strip(),
@@ -65,7 +64,7 @@ class Finding:
 
 
 def told(findings: Sequence[Finding]) -> list[str]:
-    """Findings for people: of those that one change mends, the first, and how many there are."""
+    """Findings as lines of text: for each remedy the first finding, and the number of others."""
     by_remedy: dict[tuple[str, str], list[Finding]] = {}
     for finding in findings:
         by_remedy.setdefault((finding.kind, finding.remedy), []).append(finding)
@@ -74,31 +73,35 @@ def told(findings: Sequence[Finding]) -> list[str]:
     ]
 
 
-def _axis_of_instances(model: onnx.ModelProto) -> str | None:
+def axis_of_instances(model: onnx.ModelProto) -> str | None:
+    """The symbol of the axis of instances in the file's own contract, if it has one."""
     for prop in model.metadata_props:
         if prop.key == METADATA_KEY:
-            contract = json.loads(prop.value)
-            return str(contract["instances"]["axis"]) if "instances" in contract else None
+            try:
+                return str(json.loads(prop.value.removeprefix("\ufeff"))["instances"]["axis"])
+            except (ValueError, KeyError, TypeError, RecursionError):
+                # A contract that is faulty has no axis; its faults are found elsewhere.
+                return None
     return None
 
 
 def _size(dim: onnx.TensorShapeProto.Dimension, axis: str | None) -> int | None:
-    """A size, or None where the file leaves it open. The axis of instances is a number in every session."""
+    """A size, or None if the file does not declare it. The axis of instances is a number in every session."""
     if axis is not None and dim.dim_param == axis:
         return 1
     return dim.dim_value if dim.HasField("dim_value") else None
 
 
 class _Values:
-    """What shape inference knows of every value."""
+    """Types, sizes and producers of all values, from shape inference."""
 
     def __init__(self, model: onnx.ModelProto):
         try:
             graph = onnx.shape_inference.infer_shapes(model).graph
         except onnx.shape_inference.InferenceError:
-            # Operators of a foreign domain; what the file itself declares must do.
+            # The file has operators of an unknown domain, so only its own declarations are used.
             graph = model.graph
-        self.axis = _axis_of_instances(model)
+        self.axis = axis_of_instances(model)
         self.makers = {name: node for node in graph.node for name in node.output}
         self.functions = {(function.domain, function.name) for function in model.functions}
         self.constants = {initializer.name for initializer in graph.initializer}
@@ -118,7 +121,7 @@ def gpu_findings(model: onnx.ModelProto) -> list[Finding]:
     opset = next((entry.version for entry in model.opset_import if entry.domain in ("", "ai.onnx")), 0)
     found = list(_of_file(model, opset, values))
     for node in model.graph.node:
-        # What hangs on constants alone is computed once, when the session is made.
+        # Nodes that depend on constants alone run once, when the session is created.
         if is_folded(node, values):
             values.constants.update(node.output)
             found += _casts(node, opset, values)

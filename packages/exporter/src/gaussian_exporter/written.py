@@ -1,6 +1,6 @@
-"""What a run wrote, held against the contract's `outputs`: shapes, rows, numbers.
+"""Checks the outputs of a run against the contract's `outputs`: shapes, rows, numbers.
 
-One rule set with the checker of pages and shells, packages/core/src/contract (tensor-rules.ts, check-outputs.ts,
+The rules are those of the checker of pages and shells, packages/core/src/contract (tensor-rules.ts, check-outputs.ts,
 gaussian-values.ts): tests/fixtures/written.json holds both.
 """
 
@@ -34,7 +34,7 @@ _SHAPES: dict[str, list[Rule]] = {
     "image": [(1, 3, "H", "W"), (1, 4, "H", "W"), (3, "H", "W"), (4, "H", "W")],
 }
 _COEFFICIENTS = (1, 4, 9, 16)
-# Of a packed row; colours are what it has left.
+# Columns of a packed row; colors take the remaining columns.
 _WIDTHS = {"positions": 3, "covariances": 6, "scales": 3, "rotations": 4, "opacities": 1}
 _HALF = 2.0**-11
 
@@ -60,7 +60,7 @@ class Fault:
 
 @dataclass(frozen=True)
 class Attribute:
-    """The living rows of one attribute, and what is to be undone of its numbers."""
+    """The live rows of one attribute, and the activation of its numbers."""
 
     tensor: str
     rows: AnyArray
@@ -86,11 +86,22 @@ def rules_of(outputs: Mapping[str, Any], field: str) -> list[Rule]:
     return _SHAPES[field]
 
 
+def degree_of(outputs: Mapping[str, Any], field: str, dims: Sequence[Any]) -> int | None:
+    """Degree of the harmonics in a tensor of an allowed shape; None for a tensor that has none."""
+    numbers = 0
+    if field == "sh":
+        numbers = int(np.prod(dims[1:]))
+    elif field == "gaussians" and outputs.get("color") == "sh":
+        others = outputs.get("columns", ("positions", "covariances", "opacities"))
+        numbers = dims[1] - sum(_WIDTHS.get(each, 0) for each in others)
+    return _COEFFICIENTS.index(numbers // 3) if numbers // 3 in _COEFFICIENTS else None
+
+
 Shape = TypeVar("Shape", bound=tuple[Any, ...])
 
 
 def bare(shape: Shape, rules: Sequence[Rule]) -> Shape | None:
-    """The shape without ones before it, as few left away as it takes; None where no rule allows it."""
+    """The shape without ones before it, as few left away as it takes; None if no rule allows it."""
     for rule in rules:
         if len(rule) == len(shape) and all(_fits(b, a) for a, b in zip(rule, shape, strict=True)):
             return shape
@@ -107,8 +118,8 @@ def _fits(dim: object, rule: int | str) -> bool:
 def read(
     outputs: Mapping[str, Any], written: Mapping[str, AnyArray], n_max: int | None = None
 ) -> tuple[list[Fault], Attributes]:
-    """What is wrong with the shapes and numbers of rows, and, where nothing is, the attributes of the living rows. A
-    picture is the one attribute of a post-processor."""
+    """Returns the faults of shapes and numbers of rows, and without faults the attributes of the live rows. A
+    post-processor has one attribute, its image."""
     faults: list[Fault] = []
     read: dict[str, AnyArray] = {}
     first: str | None = None
@@ -160,8 +171,8 @@ def read(
 def _attributes(outputs: Mapping[str, Any], rows: Mapping[str, AnyArray]) -> Iterator[tuple[str, Attribute]]:
     activations = {"scales": outputs.get("scaleActivation"), "opacities": outputs.get("opacityActivation")}
     if "gaussians" in rows:
-        colour = "sh" if outputs.get("color") == "sh" else "colors"
-        order = ["positions", "covariances", colour, "opacities"]
+        color = "sh" if outputs.get("color") == "sh" else "colors"
+        order = ["positions", "covariances", color, "opacities"]
         if outputs["layout"] == "visionary":
             order = ["positions", "opacities", "covariances"]
         order = outputs.get("columns", order)
@@ -173,7 +184,7 @@ def _attributes(outputs: Mapping[str, Any], rows: Mapping[str, AnyArray]) -> Ite
             start = end
     for each, values in rows.items():
         if each not in ("gaussians", "count"):
-            # Of colours with alpha the fourth is not read.
+            # The alpha of colors with four columns is not read.
             part = values[:, :3] if each == "colors" else values
             yield each, Attribute(outputs[each], part, activations.get(each) or "linear")
 
@@ -214,7 +225,7 @@ def _fault(
 def _are_covariances(rows: AnyArray) -> AnyArray:
     full = rows.astype(np.float64)[:, [0, 1, 2, 1, 3, 4, 2, 4, 5] if rows.shape[1] == 6 else range(9)].reshape(-1, 3, 3)
     is_half = rows.dtype == np.float16
-    # Rounding moves an eigenvalue by no more than the norm of the errors, of some 16 roundings.
+    # Rounding moves an eigenvalue by at most the norm of the errors, of about 16 roundings.
     slack = (2.0**-20 + is_half * _HALF) * np.abs(full.trace(axis1=1, axis2=2)) + is_half * 3 * 2.0**-25
     return cast(AnyArray, np.linalg.eigvalsh(full)[:, 0] >= -slack)
 
@@ -264,19 +275,19 @@ def box_of(attributes: Attributes) -> tuple[AnyArray, AnyArray] | None:
     """Corners around the finite centers of the rows that are drawn; None if there are none."""
     if "positions" not in attributes:
         return None
-    centres = attributes["positions"].rows.astype(np.float64)
-    shown = np.isfinite(centres).all(1)
+    centers = attributes["positions"].rows.astype(np.float64)
+    shown = np.isfinite(centers).all(1)
     if "opacities" in attributes:
         opacities = attributes["opacities"]
         is_logit = opacities.activation == "logit"
         least = np.log(_LEAST_OPACITY / (1 - _LEAST_OPACITY)) if is_logit else _LEAST_OPACITY
         shown &= ~(opacities.rows.reshape(-1).astype(np.float64) < least)
-    centres = centres[shown]
-    return (centres.min(0), centres.max(0)) if len(centres) else None
+    centers = centers[shown]
+    return (centers.min(0), centers.max(0)) if len(centers) else None
 
 
 def bounds_faults(contract: Mapping[str, Any], attributes: Attributes) -> Iterator[Fault]:
-    """Centres outside the bounds that the contract declares: those of all times, with the other inputs at defaults."""
+    """Centers outside the bounds that the contract declares: those of all times, with the other inputs at defaults."""
     box = box_of(attributes)
     if box is None or "bounds" not in contract:
         return
@@ -289,5 +300,5 @@ def bounds_faults(contract: Mapping[str, Any], attributes: Attributes) -> Iterat
             " to ".join(" ".join(f"{x:.4g}" for x in end) for end in ends) for ends in ((low, high), box)
         )
         tensor = attributes["positions"].tensor
-        expected = f"centres within the declared bounds, {declared}"
+        expected = f"centers within the declared bounds, {declared}"
         yield Fault("conflict", tensor, f"output {tensor}, positions", expected, found, "widen bounds in the contract")

@@ -1,4 +1,4 @@
-/** Chunks of a `.4dgs` file: which there are, by their heads alone, and the integers of each. */
+/** Chunks of a `.4dgs` file: {@link chunksOf} reads their heads, and {@link stateOf} decodes their integers. */
 import type { LoadBudget } from '../budget.js';
 import { grouped } from '../bytes.js';
 import { damaged } from '../faults.js';
@@ -13,46 +13,57 @@ import {
 } from './streams.js';
 import { Cursor, OPCODE, type FileRecord, type TemporalModel } from './wire.js';
 
-/** Contents of the head of a chunk. */
+/** A chunk whose head is decoded. `from` and `until`, the times of its state, are in seconds. */
 export interface Chunk {
   readonly from: number;
   readonly until: number;
   readonly level: number;
-  /** Byte of the file at which its record begins. */
+  /** Byte offset in the file of the chunk's record. */
   readonly offset: number;
+  /** Bytes of the record, including the head. */
   readonly content: Uint8Array;
-  /** Records of spherical harmonics that follow it. */
+  /** Contents of the records of spherical harmonics that follow the chunk. */
   readonly bands: Uint8Array[];
-  /** Number of splats after its changes. */
+  /** Number of splats that exist after the changes of the chunk. */
   readonly live: number;
-  /** Splats that it says something of. */
+  /** Number of splats that the chunk contains: all, or those that it updates, adds or removes. */
   readonly splats: number;
-  /** Splats that it is the first to have, since the keyframe. */
+  /** Number of splats that the chunk adds; all splats of a keyframe. */
   readonly births: number;
-  /** Number among the chunks of the one that it changes; undefined: it is whole. */
+  /** Index of the chunk whose state this delta changes. Undefined for a keyframe. */
   readonly reference?: number;
+  /** Index of the keyframe that the state is based on; the chunk's own index if it is a keyframe. */
+  readonly keyframe: number;
+  /** Number of deltas from the keyframe to the state; 0 for a keyframe. */
+  readonly depth: number;
 }
 
 const DELTA_MODE = { keyframe: 0, chained: 1 } as const;
 
-/** Reads the heads of all chunks, and checks what the index says of them. */
+/**
+ * Reads the heads of all chunks in the order of the file, and compares them with the index.
+ * @throws GaussianSplatError `decode/header`, `decode/truncated`, `decode/corrupt`
+ */
 export function chunksOf(records: readonly FileRecord[], model: TemporalModel, name: string): Chunk[] {
   const chunks: Chunk[] = [];
+  /** Index of each chunk by its byte offset. */
+  const places = new Map<number, number>();
   for (const { opcode, offset, content } of records) {
-    if (opcode === OPCODE.chunk) chunks.push(wholeChunk(content, offset, name));
+    if (opcode === OPCODE.chunk) places.set(offset, chunks.push(wholeChunk(content, offset, chunks.length, name)) - 1);
     else if (opcode === OPCODE.deltaChunk && model === 'keyframe-delta')
-      chunks.push(deltaChunk(content, offset, chunks, name));
+      places.set(offset, chunks.push(deltaChunk(content, offset, chunks, places, name)) - 1);
     else if (opcode === OPCODE.shBand && chunks.length > 0) chunks[chunks.length - 1].bands.push(content);
-    else if (opcode === OPCODE.chunkIndex) checkEntry(content, chunks, name);
+    else if (opcode === OPCODE.chunkIndex) checkEntry(content, chunks, places, name);
   }
   if (model === 'keyframe-delta') requireTiles(chunks, name);
   return chunks;
 }
 
-function wholeChunk(content: Uint8Array, offset: number, name: string): Chunk {
+function wholeChunk(content: Uint8Array, offset: number, keyframe: number, name: string): Chunk {
   const cursor = new Cursor(content, name);
   const [from, until, level, live] = [cursor.f64(), cursor.f64(), cursor.u32(), cursor.u32()];
-  return { ...span(from, until, name), level, offset, content, bands: [], live, splats: live, births: live };
+  const counts = { live, splats: live, births: live };
+  return { ...span(from, until, name), level, offset, content, bands: [], ...counts, keyframe, depth: 0 };
 }
 
 function span(from: number, until: number, name: string): Pick<Chunk, 'from' | 'until'> {
@@ -60,34 +71,41 @@ function span(from: number, until: number, name: string): Pick<Chunk, 'from' | '
   throw damaged(name, 'chunks that begin before they end', `${from} to ${until} s`, 'decode/header');
 }
 
-function deltaChunk(content: Uint8Array, offset: number, chunks: readonly Chunk[], name: string): Chunk {
+function deltaChunk(
+  content: Uint8Array,
+  offset: number,
+  chunks: readonly Chunk[],
+  places: ReadonlyMap<number, number>,
+  name: string,
+): Chunk {
   const cursor = new Cursor(content, name);
   const [from, until, level, mode] = [cursor.f64(), cursor.f64(), cursor.u32(), cursor.u8()];
   const [referenceAt, keyframeAt, depth] = [cursor.u64(), cursor.u64(), cursor.u16()];
   const [updates, births, deaths] = [cursor.u32(), cursor.u32(), cursor.u32()];
-  const reference = chunks.findIndex((chunk) => chunk.offset === referenceAt);
-  const chain = chainOf(chunks, reference);
-  const isPrevious = mode === DELTA_MODE.keyframe ? chain.length === 1 : reference === chunks.length - 1;
-  if (mode > DELTA_MODE.chained || !isPrevious || chunks[chain[0]].offset !== keyframeAt || chain.length !== depth)
+  const reference = places.get(referenceAt) ?? -1;
+  const before = reference < 0 ? undefined : chunks[reference];
+  const isPrevious = mode === DELTA_MODE.keyframe ? before?.depth === 0 : reference === chunks.length - 1;
+  const isDeep = before?.depth === depth - 1 && chunks[before.keyframe].offset === keyframeAt;
+  if (before === undefined || mode > DELTA_MODE.chained || !isPrevious || !isDeep)
     throw damaged(name, 'changes of a chunk before, as deep as they say', `a reference to byte ${referenceAt}`);
-  const { live, level: other } = chunks[reference];
+  const { live, level: other, keyframe } = before;
   if (level !== other) throw damaged(name, `changes of level ${other}, as their reference`, `level ${level}`);
   if (updates + deaths > live || live + births > 2 ** 32)
     throw damaged(name, `changes of ${grouped(live)} splats`, grouped(updates + deaths), 'decode/header');
   return {
-    ...{ ...span(from, until, name), level, offset, content, bands: [], reference, births },
+    ...{ ...span(from, until, name), level, offset, content, bands: [], reference, births, keyframe, depth },
     ...{ live: live + births - deaths, splats: updates + births + deaths },
   };
 }
 
-/** Chunks that make a state, from a whole one on. */
+/** Returns the indices of the chunks that lead to the state of chunk `last`: its keyframe, then the deltas in order. */
 export function chainOf(chunks: readonly Chunk[], last: number): number[] {
   const chain: number[] = [];
-  for (let k: number | undefined = last; k !== undefined && k >= 0; k = chunks[k].reference) chain.unshift(k);
-  return chain;
+  for (let k: number | undefined = last; k !== undefined; k = chunks[k].reference) chain.push(k);
+  return chain.reverse();
 }
 
-/** States follow one another without a gap. */
+/** Throws unless the first chunk begins at 0 s and each chunk begins at the end of the previous one. */
 function requireTiles(chunks: readonly Chunk[], name: string): void {
   let end = 0;
   for (const { from, until } of chunks) {
@@ -96,13 +114,18 @@ function requireTiles(chunks: readonly Chunk[], name: string): void {
   }
 }
 
-function checkEntry(content: Uint8Array, chunks: readonly Chunk[], name: string): void {
+function checkEntry(
+  content: Uint8Array,
+  chunks: readonly Chunk[],
+  places: ReadonlyMap<number, number>,
+  name: string,
+): void {
   const cursor = new Cursor(content, `${name}, index`);
   cursor.numbers(2);
   const offset = cursor.u64();
   cursor.u64();
   const [splats, bands] = [cursor.u32(), cursor.u32()];
-  const chunk = chunks.find((own) => own.offset === offset);
+  const chunk = chunks[places.get(offset) ?? -1] as Chunk | undefined;
   if (!chunk) throw damaged(cursor.name, 'places of chunks', `byte ${offset}`, 'decode/header');
   cursor.take(17 * bands);
   const isLong = cursor.left >= 28;
@@ -113,7 +136,10 @@ function checkEntry(content: Uint8Array, chunks: readonly Chunk[], name: string)
   throw damaged(cursor.name, said(chunk.splats, chunk.live), said(splats, live), 'decode/header');
 }
 
-/** Integers of a state: attributes, and bytes of spherical harmonics. */
+/**
+ * Stored integers of all splats at one point in time: the attributes, and the coefficients of spherical harmonics above
+ * the constant one. `bands[k]` contains those of degree k + 1: [N, 3, 2k + 3], 0 to 255.
+ */
 export interface State {
   readonly bins: Bins;
   readonly bands: readonly Int32Array[];
@@ -125,7 +151,10 @@ export interface Decoding {
   readonly shDegree: number;
 }
 
-/** @param chain see {@link chainOf} */
+/**
+ * Decodes the state of the last chunk of a chain.
+ * @param chain Indices that {@link chainOf} returns.
+ */
 export async function stateOf(chunks: readonly Chunk[], chain: readonly number[], decoding: Decoding): Promise<State> {
   let state = await wholeState(chunks[chain[0]], decoding);
   for (const k of chain.slice(1)) state = await changedState(state, chunks[k], decoding);
@@ -158,9 +187,9 @@ async function bandsOf(records: readonly Uint8Array[], count: number, decoding: 
   throw damaged(name, `${shDegree} bands of spherical harmonics`, String(records.length), 'decode/header');
 }
 
-/** Attributes that a delta may not change, because grids depend on them. */
+/** Attributes that a delta may not change, because the quantization steps of other attributes depend on them. */
 const FIXED: readonly AttributeId[] = [ATTRIBUTE.sigma, ATTRIBUTE.flags, ATTRIBUTE.window];
-/** Attributes that a delta replaces. It adds to all others. */
+/** Attributes whose values a delta replaces. To all other attributes, a delta adds its values. */
 const REPLACED: readonly AttributeId[] = [ATTRIBUTE.rotationIndex, ATTRIBUTE.rotation];
 
 async function changedState(before: State, chunk: Chunk, decoding: Decoding): Promise<State> {
@@ -204,7 +233,7 @@ async function changedState(before: State, chunk: Chunk, decoding: Decoding): Pr
   return { bins, bands };
 }
 
-/** Rows that stay, and those that come. */
+/** Returns the `kept` rows of `values`, followed by the added rows. Each row has `channels` values. */
 function joined(
   values: Int32Array,
   kept: readonly number[],
@@ -224,7 +253,7 @@ function joined(
 
 const idsOf = (bins: Bins, count: number): number[] => Array.from(bins.get(ATTRIBUTE.id) ?? new Int32Array(count));
 
-/** Rows by the indices of their splats. */
+/** Returns the row of each splat by its id. Throws `decode/header` without ids, `decode/corrupt` if one occurs twice. */
 export function rowsById(bins: Bins, name: string): Map<number, number> {
   const ids = bins.get(ATTRIBUTE.id);
   if (!ids) throw damaged(name, 'numbers of splats', 'none', 'decode/header');

@@ -1,4 +1,4 @@
-/** Reads `.4dgs` files, whose splats come, move and fade: https://github.com/avala-ai/4dgs. */
+/** Reader of `.4dgs` files, whose splats appear, move and fade: https://github.com/avala-ai/4dgs. */
 import type { GaussianCloud, Vector3 } from '@gaussian-splat/core';
 import { LoadBudget, type LoadLimits } from '../budget.js';
 import { damaged } from '../faults.js';
@@ -8,19 +8,19 @@ import { presence, splatsFrom, type ChangingSplats, type Scene } from './splats.
 import { poseAt, product, readTrack, turnedPoint, type ObjectTrack } from './tracks.js';
 import { Cursor, OPCODE, readGrids, readHeader, readUp, readWindows, recordsOf } from './wire.js';
 
-/** Grids farther out than this have an origin of their own, so that places keep their precision. */
+/** Distance from which the origin of the grid becomes the origin of the scene, so that float32 positions are precise. */
 const FAR = 1000;
-/** States that are kept, since frames that follow one another need the same. */
+/** Maximum number of decoded populations in the cache, because consecutive frames need the same ones. */
 const MAX_STATES = 4;
 
-/** Splats of a moment or a span of time, and the numbers that identify them. */
+/** Splats of a time or a range of time, and their ids. */
 export interface Population {
   readonly splats: ChangingSplats;
-  /** Absent where splats of other moments are others. */
+  /** Id of each splat, [count], which identifies the splat in other populations. Absent without deltas. */
   readonly ids?: Int32Array | undefined;
 }
 
-/** An opened file: its chunks are decoded when they are asked for. */
+/** An opened `.4dgs` file. Its chunks are decoded on demand. */
 export class FourDgs {
   readonly scene: Scene;
   readonly chunks: readonly Chunk[];
@@ -32,7 +32,7 @@ export class FourDgs {
   readonly #states = new Map<string, Promise<Population>>();
 
   /**
-   * Reads what a file says of itself, and the heads of its chunks.
+   * Reads the header records of a file, and the heads of its chunks.
    * @throws GaussianSplatError `decode/header`, `decode/truncated`, `decode/corrupt`, `decode/unsupported`, `out-of-memory/budget`
    */
   constructor(bytes: Uint8Array, name: string, limits: LoadLimits = {}) {
@@ -64,18 +64,18 @@ export class FourDgs {
     return this.scene.header.model === 'keyframe-delta';
   }
 
-  /** Number of the chunk that is the state of a time. */
+  /** Returns the index of the first chunk that ends after a time in seconds; the last chunk if none does. */
   stateAt(seconds: number): number {
     const next = this.chunks.findIndex(({ until }) => seconds < until);
     return next < 0 ? this.chunks.length - 1 : next;
   }
 
-  /** Chunks whose splats may be seen in a span of time. */
+  /** Returns the indices of the chunks whose splats may be visible within a range of seconds. */
   chunksWithin(from: number, until: number): number[] {
     return [...this.chunks.keys()].filter((k) => this.chunks[k].from <= until && from < this.chunks[k].until);
   }
 
-  /** Splats of some chunks, none of which needs others. */
+  /** Decodes the splats of some chunks, by their indices. The file must not have deltas. */
   population(chunks: readonly number[]): Promise<Population> {
     return this.#kept(`${chunks}`, async (decoding) => {
       const states = await Promise.all(chunks.map((k) => stateOf(this.chunks, [k], decoding)));
@@ -83,7 +83,7 @@ export class FourDgs {
     });
   }
 
-  /** Splats of a state, after all changes that lead to it. */
+  /** Decodes the splats of a chunk, by its index, after all deltas that lead to its state. */
   keyedPopulation(chunk: number): Promise<Population> {
     return this.#kept(`to ${chunk}`, async (decoding) => {
       const state = await stateOf(this.chunks, chainOf(this.chunks, chunk), decoding);
@@ -94,7 +94,7 @@ export class FourDgs {
   }
 
   /**
-   * Splats at a time, as section 3 of the specification has them.
+   * Returns the visible splats at a time in seconds, as section 3 of the specification defines.
    * @throws GaussianSplatError as the constructor does
    */
   async cloudAt(seconds: number): Promise<GaussianCloud> {
@@ -105,7 +105,7 @@ export class FourDgs {
     return this.cloudOf(splats, rows, seconds);
   }
 
-  /** Rows of some splats at a time, whether they are seen or not. */
+  /** Returns a cloud of the given rows at a time in seconds. Rows that are not visible then have opacity 0. */
   cloudOf(splats: ChangingSplats, rows: readonly number[], seconds: number): GaussianCloud {
     const { shDegree, cutoff } = this.scene.header;
     const pick = (values: Float32Array, width: number): Float32Array => {
@@ -133,7 +133,7 @@ export class FourDgs {
     };
   }
 
-  /** Motion of the splat itself first, then that of its object. */
+  /** Writes position and rotation of a splat at a time in seconds: first its own motion, then that of its object. */
   #place(splats: ChangingSplats, row: number, seconds: number, position: Float32Array, rotation: Float32Array): void {
     const { grids } = this.scene;
     const elapsed = seconds - splats.centers[row];
@@ -174,7 +174,7 @@ function tracksOf(records: readonly { content: Uint8Array }[], name: string): Ma
   return tracks;
 }
 
-/** States of chunks without common splats. */
+/** Concatenates the states of chunks that have no splat in common. */
 function mergedStates(states: readonly State[], shDegree: number): State {
   if (states.length === 1) return states[0];
   const ids = new Set(states.flatMap(({ bins }) => [...bins.keys()]));

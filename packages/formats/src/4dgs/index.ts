@@ -1,23 +1,26 @@
-/** `.4dgs` files as clips: https://github.com/avala-ai/4dgs. */
+/** Conversion of `.4dgs` files to clips: https://github.com/avala-ai/4dgs. */
 import { boundsOf, type GaussianCloud } from '@gaussian-splat/core';
-import type { LoadLimits } from '../budget.js';
-import { type ClipGroup, type ClipIndex, type ClipPartContent } from '../clip.js';
+import { LoadBudget, type LoadLimits } from '../budget.js';
+import { clipPartBytes, type ClipGroup, type ClipIndex, type ClipPartContent } from '../clip.js';
 import { damaged } from '../faults.js';
 import { ANIMATED_ATTRIBUTES, ANIMATED_ATTRIBUTE_NAMES } from '../motion.js';
 import { FourDgs, type Population } from './four-dgs.js';
 import { sampledMotion, type Moments } from './sampled-motion.js';
 import { presence, type ChangingSplats } from './splats.js';
 
-export { isFourDgs } from './wire.js';
-
-/** Frames a second, unless the file has states or windows of equal length. Then the rate is theirs, multiplied until it reaches the minimum. */
+/**
+ * Frame rates in frames per second: the default, and the minimum and maximum of a rate that follows from the states or
+ * windows of a file.
+ */
 const [USUAL_RATE, MIN_RATE, MAX_RATE] = [30, 24, 120];
-/** Frames of a group at most, and what the largest group may take on the GPU before groups become shorter. */
+/** Maximum numbers of frames of a group; smaller ones are tried while a group exceeds {@link MAX_GROUP_BYTES} of the GPU. */
 const GROUP_FRAMES = [15, 8, 4, 2, 1];
 const MAX_GROUP_BYTES = 64 << 20;
+/** Bytes charged for each frame, whose group may contain only this frame. The search for its chunks is charged, too. */
+const FRAME_BYTES = 256;
 const ALL_PLANES = ANIMATED_ATTRIBUTE_NAMES.reduce((sum, name) => sum + ANIMATED_ATTRIBUTES[name], 0);
 
-/** A `.4dgs` file that is played as a clip is. Its groups are made when they are asked for. */
+/** A `.4dgs` file with the interface of a clip. Its groups are decoded on demand. */
 export class FourDgsClip {
   readonly index: ClipIndex;
   readonly #file: FourDgs;
@@ -29,6 +32,7 @@ export class FourDgsClip {
 
   /**
    * Reads the heads of a file's records, and the splats of its first frame.
+   * @param bytes The whole file.
    * @throws GaussianSplatError `decode/header`, `decode/truncated`, `decode/corrupt`, `decode/unsupported`, `decode/empty`, `out-of-memory/budget`
    */
   static async open(bytes: Uint8Array, name: string, limits?: LoadLimits): Promise<FourDgsClip> {
@@ -37,6 +41,7 @@ export class FourDgsClip {
     if (header.splats === 0 || file.chunks.length === 0) throw damaged(name, 'splats', 'none', 'decode/header');
     const framesPerSecond = rateOf(file);
     const frameCount = Math.max(1, Math.ceil(header.durationSeconds * framesPerSecond - 1e-6));
+    new LoadBudget(bytes.length, limits).take(frameCount * (FRAME_BYTES + file.chunks.length), name);
     const groups = groupsOf(file, framesPerSecond, frameCount);
     const first = await firstSplats(file);
     const bounds = { ...boundsOf(first), ...(file.up && { up: file.up }) };
@@ -47,7 +52,9 @@ export class FourDgsClip {
     });
   }
 
-  /** The splats of a group and what they do: frames show the middle of their time. Throws as {@link open} does. */
+  /**
+   * Decodes a group, by its index. Each frame has the splats at the middle of its duration. Throws as {@link open} does.
+   */
   async group(number: number): Promise<ClipPartContent> {
     const { first, frames } = this.index.groups[number];
     const times = Array.from({ length: frames }, (_, f) => (first + f + 0.5) / this.index.framesPerSecond);
@@ -55,7 +62,7 @@ export class FourDgsClip {
     return sampledMotion(moments);
   }
 
-  /** The splats at a time, seconds, as the specification has them. Throws as {@link open} does. */
+  /** Returns the visible splats at a time in seconds, as the specification defines. Throws as {@link open} does. */
   at(seconds: number): Promise<GaussianCloud> {
     return this.#file.cloudAt(seconds);
   }
@@ -96,7 +103,7 @@ export class FourDgsClip {
     const isThere = states.map(({ splats, rows }, f) =>
       Uint8Array.from(rows, (row) => (row >= 0 && presence(splats, row, times[f], cutoff) > 0 ? 1 : 0)),
     );
-    // Splats that are never seen have a frame all the same: there they have no opacity.
+    // A lifetime has one frame or more, so that splats that are never visible get one frame, with opacity 0.
     const { length } = states[0].rows;
     for (let k = 0; k < length; k++)
       if (!isThere.some((there) => there[k]))
@@ -131,19 +138,22 @@ async function firstSplats(file: FourDgs): Promise<GaussianCloud> {
   return { ...cloud, opacities: splats.opacities };
 }
 
-/** Edges of states or windows that lie at equal distances are those of frames. */
+/**
+ * Returns the frame rate of a clip. If the edges of states or windows are at equal distances, each edge becomes that of a
+ * frame. The rate is then a multiple of the rate of the edges, at least {@link MIN_RATE}.
+ */
 function rateOf(file: FourDgs): number {
   const spans = file.isKeyed ? file.chunks.map(({ from, until }) => [from, until]) : file.scene.windows;
   const edges = [...new Set(spans.flat())].filter((edge) => edge >= 0 && edge < 1e6).sort((a, b) => a - b);
   const steps = edges.slice(1).map((edge, k) => edge - edges[k]);
-  const rate = 1 / Math.min(...steps);
+  const rate = 1 / steps.reduce((min, step) => Math.min(min, step), Infinity);
   const isEven = steps.length > 1 && steps.every((step) => Math.abs(step * rate - Math.round(step * rate)) < 0.01);
   if (!isEven || !(rate > 0 && rate <= MAX_RATE)) return USUAL_RATE;
-  const whole = Math.abs(rate - Math.round(rate)) < 1e-3 ? Math.round(rate) : rate;
+  const whole = Math.abs(rate - Math.round(rate)) < 1e-3 ? Math.round(rate) || rate : rate;
   return whole * Math.ceil(MIN_RATE / whole);
 }
 
-/** Groups of equal length, as long as memory allows; keyframes begin a group. */
+/** Divides the frames into groups of the greatest length that memory allows. A keyframe begins a new group. */
 function groupsOf(file: FourDgs, rate: number, frameCount: number): ClipGroup[] {
   let groups: ClipGroup[] = [];
   for (const max of GROUP_FRAMES) {
@@ -153,13 +163,12 @@ function groupsOf(file: FourDgs, rate: number, frameCount: number): ClipGroup[] 
       groups.push({ first, frames, parts: [partOf(file, first, frames, rate)] });
       first += frames;
     }
-    const largest = Math.max(...groups.map(({ parts: [{ splats, planes }] }) => splats * (56 + 2 * planes)));
-    if (largest <= MAX_GROUP_BYTES) break;
+    if (groups.every(({ parts: [part] }) => clipPartBytes(part) <= MAX_GROUP_BYTES)) break;
   }
   return groups;
 }
 
-/** The first frame that shows a keyframe behind the one that a frame shows. */
+/** Returns the first frame of the next keyframe after frame `first`; `frameCount` if there is none. */
 function endOfGroup(file: FourDgs, first: number, rate: number, frameCount: number): number {
   if (!file.isKeyed) return frameCount;
   const own = file.stateAt((first + 0.5) / rate);
@@ -167,14 +176,14 @@ function endOfGroup(file: FourDgs, first: number, rate: number, frameCount: numb
   return next < 0 ? frameCount : Math.max(first + 1, Math.round(file.chunks[next].from * rate - 1e-6));
 }
 
-/** Splats and planes at most; it has no bytes of its own in the file. */
+/** Returns the part of a group with the maximum count of splats and planes. The part has no range of bytes in the file. */
 function partOf(file: FourDgs, first: number, frames: number, rate: number): ClipGroup['parts'][number] {
   const [from, until] = [(first + 0.5) / rate, (first + frames - 0.5) / rate];
   const own = file.chunksWithin(from, until).map((k) => file.chunks[k]);
   const splats = file.isKeyed
     ? own.reduce((sum, { births }, k) => sum + (k === 0 ? 0 : births), own[0]?.live ?? 0)
     : own.reduce((sum, { live }) => sum + live, 0);
-  // Splats that no object carries move along straight lines and fade.
+  // Splats without an object move along straight lines (3 planes), and fade (1 plane for each frame).
   const planes = file.isKeyed ? ALL_PLANES * frames : file.tracks.size > 0 ? 7 * frames : 3 + frames;
   return { start: 0, sceneBytes: 0, motionBytes: 0, splats: Math.max(1, splats), planes: Math.max(planes, 3) };
 }

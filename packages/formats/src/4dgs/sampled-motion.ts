@@ -1,4 +1,4 @@
-/** Splats at some moments as a base and curves, which the GPU adds up: the same form that clips of our own have. */
+/** Converts the splats of several frames to a base cloud and motion curves, as a part of a clip has them. */
 import { shCoefficientCount, type GaussianCloud } from '@gaussian-splat/core';
 import type { ClipPartContent } from '../clip.js';
 import {
@@ -9,18 +9,21 @@ import {
 } from '../motion.js';
 import { product } from './tracks.js';
 
-/** The same rows at every moment. */
+/** Clouds of consecutive frames. Row i is the same splat in each cloud. */
 export interface Moments {
   readonly clouds: readonly GaussianCloud[];
-  /** [rows] of each moment: whether a row exists. The numbers of one that does not are undefined. */
+  /** For each frame, [rows]: 1 if the splat exists. Attributes of splats that do not exist are undefined. */
   readonly isThere: readonly Uint8Array[];
 }
 
 const MAX_CODE = 32_767;
-/** Fraction of the largest change below which a change is ignored. */
+/** Fraction of the largest change of positions; smaller deviations from a straight line are ignored. */
 const NOTHING = 1e-6;
 
-/** One base, and for each attribute that changes either one straight line or as many curves as there are moments. */
+/**
+ * Returns a base cloud and its motion over the frames. Positions that follow straight lines get one curve. Each other
+ * attribute that changes gets one curve for each frame.
+ */
 export function sampledMotion({ clouds, isThere }: Moments): ClipPartContent {
   const [{ count, shDegree }] = clouds;
   const frames = clouds.length;
@@ -44,7 +47,7 @@ export function sampledMotion({ clouds, isThere }: Moments): ClipPartContent {
   return { cloud: { ...base, shDegree }, motion: { splats: count, frames, parts, lives: { first, end } } };
 }
 
-/** Each row as it is when it is there for the first time. */
+/** Returns a cloud whose row i is copied from the frame `moments[i]`. */
 function rowsAt(clouds: readonly GaussianCloud[], moments: Uint16Array): GaussianCloud {
   const [{ count }] = clouds;
   const pick = (of: (cloud: GaussianCloud) => Float32Array): Float32Array => {
@@ -64,7 +67,7 @@ function rowsAt(clouds: readonly GaussianCloud[], moments: Uint16Array): Gaussia
   };
 }
 
-/** Differences of an attribute of a row from its base, in the numbers of `Motion`. */
+/** Writes the change of an attribute of a row relative to the base, in the units of {@link AnimatedAttribute}. */
 function putChange(
   name: AnimatedAttributeName,
   base: GaussianCloud,
@@ -87,7 +90,7 @@ function putChange(
     }
 }
 
-/** An axis as long as the angle of the rotation from one to the other. */
+/** Returns the rotation vector from one quaternion to another. Its length is the angle in radians. */
 function turnBetween(from: Float32Array, to: Float32Array, row: number): readonly number[] {
   const at = 4 * row;
   let same = true;
@@ -114,7 +117,7 @@ function partOf(
   if (largest === 0) return still;
   const lines = name === 'position' ? linesOf(changes, first, end, frames, minOf(base, largest)) : undefined;
   if (lines) {
-    // Bases move back to where the line is at frame 0.
+    // Positions of the base become those of the line at frame 0, even if the splat begins later.
     lines.forEach((own, k) => own.forEach((slope, row) => (base.positions[3 * row + k] -= slope * first[row])));
     const codes = coded(lines, 1);
     return {
@@ -129,11 +132,11 @@ function partOf(
   return { rank: frames, curves, ...coded(changes, frames) };
 }
 
-/** Change that is not ignored: positions are rounded to 32 bits. */
+/** Returns the smallest change of positions that is not ignored. It includes the rounding errors of float32 positions. */
 const minOf = ({ positions }: GaussianCloud, largest: number): number =>
   Math.max(NOTHING * largest, positions.reduce((max, value) => Math.max(max, Math.abs(value)), 0) * 2 ** -22);
 
-/** Slopes of rows that all follow straight lines; undefined if one does not. */
+/** Returns the slope of each row, in units per frame, for each axis. Undefined if a row does not follow a straight line. */
 function linesOf(
   changes: readonly Float32Array[],
   first: Uint16Array,
@@ -154,7 +157,7 @@ function linesOf(
   return slopes;
 }
 
-/** Rounds numbers to 16 bits: [rank] values of each row become a plane each. */
+/** Quantizes numbers, [rows, rank], to 16-bit codes. Each of the `rank` columns becomes an array of codes. */
 function coded(numbers: readonly Float32Array[], rank: number): { step: number; codes: Int16Array[] } {
   const largest = numbers.reduce((max, own) => own.reduce((m, value) => Math.max(m, Math.abs(value)), max), 0);
   const step = largest > 0 ? largest / MAX_CODE : 1;

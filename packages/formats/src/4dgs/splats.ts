@@ -1,20 +1,20 @@
-/** From integers to splats that change over time: sections 3 and 6 of the specification of `.4dgs`. */
+/** Conversion of integers to splats that change over time: sections 3 and 6 of the specification of `.4dgs`. */
 import { shCoefficientCount } from '@gaussian-splat/core';
 import { damaged } from '../faults.js';
 import type { Grids, Header } from './wire.js';
 import { ATTRIBUTE, REQUIRED, type Bins } from './streams.js';
 
-/** Numbers of a splat's constant term, from a color of 0 to 1. */
+/** Value of the constant spherical harmonic, 1/(2·sqrt(pi)): color = 0.5 + SH_C0·coefficient. */
 const SH_C0 = 0.28209479177387814;
-/** Values of bytes of spherical harmonics: from -4 to 4. */
+/** Minimum and step of the coefficients that bytes represent, in -4..4. */
 const [SH_MIN, SH_STEP] = [-4, 8 / 255];
 
-/** Splats of one state, each with what it does over time. */
+/** Splats of one state, with their changes over time. */
 export interface ChangingSplats {
   readonly count: number;
-  /** [count, 3] relative to the origin of the grid. */
+  /** [count, 3] positions at the times {@link centers}, relative to the origin of the grid. */
   readonly positions: Float32Array;
-  /** [count, 3] units a second. */
+  /** [count, 3] velocities in units per second. */
   readonly velocities: Float32Array;
   /** [count, 3] standard deviations. */
   readonly scales: Float32Array;
@@ -23,14 +23,15 @@ export interface ChangingSplats {
   readonly opacities: Float32Array;
   /** [count, coefficients, 3], see `GaussianCloud.sh`. */
   readonly sh: Float32Array;
-  /** Seconds at which a splat is where its position says, and most opaque. */
+  /** [count] times in seconds at which each splat has its position and its maximum opacity. */
   readonly centers: Float64Array;
-  /** Standard deviations of how it fades, seconds; infinite: not at all. */
+  /** [count] standard deviations in seconds of the Gaussian by which each splat fades; Infinity if it does not fade. */
   readonly fades: Float64Array;
-  /** Seconds from which it exists, and until. */
+  /** [count] times in seconds from which each splat exists. */
   readonly from: Float64Array;
+  /** [count] times in seconds at which each splat ceases to exist. */
   readonly until: Float64Array;
-  /** Objects that carry splats along; 0: none. */
+  /** [count] ids of the rigid objects that move the splats; 0 if none does. */
   readonly objects: Uint32Array;
 }
 
@@ -41,7 +42,11 @@ export interface Scene {
   readonly name: string;
 }
 
-/** @param bands bytes of spherical harmonics, [count, 3, 2 · band + 1] for each band */
+/**
+ * Converts the integers of a state to splats.
+ * @param bands Bytes of spherical harmonics, [count, 3, 2·degree + 1] for each degree above 0.
+ * @throws GaussianSplatError `decode/header`, `decode/corrupt`
+ */
 export function splatsFrom(bins: Bins, bands: readonly Int32Array[], scene: Scene): ChangingSplats {
   const { header, grids, name } = scene;
   for (const id of REQUIRED)
@@ -83,19 +88,23 @@ function spansOf(windows: Int32Array, { windows: table, name }: Scene): [Float64
   ];
 }
 
-/** Section 6.3: splats that are seen for longer have finer velocities. */
+/**
+ * Returns the power of 2 by which the step of velocities is divided, section 6.3: splats with longer lives have smaller
+ * steps.
+ * @param half Seconds from the center of the life to its end.
+ */
 function lifeClass(half: number): number {
   const clamped = Math.min(2, Math.max(0.02, half));
   return Math.min(2, Math.max(-4, Math.ceil(Math.log2(clamped / 0.5))));
 }
 
-/** Section 6.3: splats that fade quickly have finer times. */
+/** Returns the step of times in seconds, section 6.3. Splats that fade quickly have smaller steps. */
 function timeStep(fade: number, step: number): number {
   const target = Math.min(step, 0.05 * fade);
   return step * 2 ** Math.min(0, Math.max(-10, Math.floor(Math.log2(target / step))));
 }
 
-/** Section 6.4: the largest component of (x, y, z, w) is left out. */
+/** Returns quaternions (w, x, y, z), section 6.4. The file omits the largest component of (x, y, z, w). */
 function rotationsFrom(indexes: Int32Array, bins: Int32Array, step: number, name: string): Float32Array {
   const rotations = new Float32Array(4 * indexes.length);
   const xyzw = [0, 0, 0, 1];
@@ -114,7 +123,7 @@ function rotationsFrom(indexes: Int32Array, bins: Int32Array, step: number, name
   return rotations;
 }
 
-/** Color bins are (g, r - g, b - g). */
+/** Returns coefficients as in `GaussianCloud.sh`. Integers of colors are (g, r - g, b - g). */
 function harmonicsFrom(colors: Int32Array, bands: readonly Int32Array[], { header, grids, name }: Scene): Float32Array {
   if (bands.length !== header.shDegree)
     throw damaged(name, `${header.shDegree} bands of spherical harmonics`, String(bands.length), 'decode/header');
@@ -137,7 +146,7 @@ function harmonicsFrom(colors: Int32Array, bands: readonly Int32Array[], { heade
   return sh;
 }
 
-/** Fraction of its opacity that a splat has at a time; 0 if it does not exist then. */
+/** Returns the factor of a splat's opacity at a time, 0..1: 0 outside its life, and if the factor is below `cutoff`. */
 export function presence(splats: ChangingSplats, i: number, seconds: number, cutoff: number): number {
   if (!(splats.from[i] <= seconds && seconds < splats.until[i])) return 0;
   if (splats.fades[i] === Infinity) return 1;

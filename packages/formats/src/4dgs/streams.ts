@@ -1,6 +1,7 @@
-/** Attribute streams of a `.4dgs` file: compressed integers. */
+/** Attribute streams of a `.4dgs` file, which are compressed integers. */
 import type { LoadBudget } from '../budget.js';
 import { grouped } from '../bytes.js';
+import { decompressing } from '../decompression.js';
 import { damaged } from '../faults.js';
 import { decompressZstd } from '../zstd/decompress.js';
 import type { Cursor } from './wire.js';
@@ -11,7 +12,7 @@ export const ATTRIBUTE = {
 } as const;
 export type AttributeId = (typeof ATTRIBUTE)[keyof typeof ATTRIBUTE];
 
-/** Numbers of a splat. */
+/** Count of integers of each attribute for a splat. */
 export const CHANNELS: Readonly<Record<AttributeId, number>> = {
   ...{ 0: 3, 1: 3, 2: 1, 3: 3, 4: 3, 5: 1, 6: 3, 7: 1 },
   ...{ 8: 1, 9: 1, 10: 1, 13: 1, 14: 1 },
@@ -22,7 +23,7 @@ export const REQUIRED: readonly AttributeId[] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 1
 const MODE = { raw: 0, delta: 1, constant: 2 } as const;
 const CODECS = ['deflate', 'zstd'] as const;
 
-/** Integers of some splats, one attribute after the other. */
+/** Integers of some splats by attribute, [splats, channels]. */
 export type Bins = ReadonlyMap<AttributeId, Int32Array>;
 
 export interface StreamFile {
@@ -30,7 +31,7 @@ export interface StreamFile {
   readonly budget: LoadBudget;
 }
 
-/** Reads streams that lie end to end; unknown attributes are skipped. */
+/** Reads the streams up to the end of the cursor's bytes. Unknown attributes are skipped. */
 export async function readStreams(cursor: Cursor, count: number, file: StreamFile): Promise<Bins> {
   const found = new Map<AttributeId, Int32Array>();
   while (cursor.left > 0) {
@@ -43,7 +44,7 @@ export async function readStreams(cursor: Cursor, count: number, file: StreamFil
   return found;
 }
 
-/** Bytes of a band of spherical harmonics: coefficients of red, then of green, then of blue, of each splat. */
+/** Reads the bytes 0..255 of the spherical harmonics of degree `band`, [splats, 3, 2·band + 1]. */
 export async function readBand(cursor: Cursor, count: number, band: number, file: StreamFile): Promise<Int32Array> {
   const stream = readStreamHead(cursor);
   requireCounts(stream, count, 3 * (2 * band + 1), file.name);
@@ -92,7 +93,7 @@ async function decodeStream(stream: Stream, { name, budget }: StreamFile): Promi
   for (let i = 0; i < symbols; i++) {
     let code = 0;
     for (let plane = width - 1; plane >= 0; plane--) code = 256 * code + raw[plane * symbols + i];
-    // Signs alternate: 0, -1, 1, -2, ...
+    // Codes 0, 1, 2, 3, ... are the integers 0, -1, 1, -2, ...
     values[i] = code % 2 === 0 ? code / 2 : -(code + 1) / 2;
   }
   if (mode === MODE.constant) for (let i = channels; i < values.length; i++) values[i] = values[i % channels];
@@ -101,18 +102,18 @@ async function decodeStream(stream: Stream, { name, budget }: StreamFile): Promi
   return values;
 }
 
-/** Sums of codes stay 32 bits wide. */
+/** Returns `sum` if it is an integer of 32 bits. Throws `decode/corrupt` otherwise. */
 export function wholeNumber(sum: number, where: string): number {
   if (sum === (sum | 0)) return sum;
   throw damaged(where, 'sums of 32 bits', String(sum));
 }
 
-/** Undoes the compression of a block by the codec's number. */
+/** Decompresses a block to `length` bytes. @param codec Index in {@link CODECS}. */
 async function decompressed(bytes: Uint8Array, codec: number, length: number, where: string): Promise<Uint8Array> {
   return CODECS[codec] === 'zstd' ? unpackedZstd(bytes, length, where) : inflated(bytes, length, where);
 }
 
-/** A block that may be compressed as a whole, by a codec that it names. */
+/** Reads a block, and decompresses it if it names a codec. */
 export async function unpackedBlock(cursor: Cursor, budget: LoadBudget): Promise<Uint8Array> {
   const { name } = cursor;
   const [compression, length, stored] = [cursor.text(), cursor.u64(), cursor.block()];
@@ -135,12 +136,7 @@ function unpackedZstd(bytes: Uint8Array, length: number, where: string): Uint8Ar
 }
 
 async function inflated(bytes: Uint8Array, length: number, where: string): Promise<Uint8Array> {
-  const { readable, writable } = new DecompressionStream('deflate');
-  const writer = writable.getWriter();
-  // Errors of the stream come through the reader.
-  writer.write(bytes as Uint8Array<ArrayBuffer>).catch(() => {});
-  writer.close().catch(() => {});
-  const reader = readable.getReader();
+  const reader = decompressing(bytes, 'deflate');
   const found = new Uint8Array(length);
   let at = 0;
   try {

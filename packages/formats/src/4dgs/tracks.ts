@@ -1,11 +1,11 @@
-/** Objects of a `.4dgs` file that move as rigid bodies: section 5.15.7 of its specification. */
+/** Tracks of the objects of a `.4dgs` file, which move as rigid bodies: section 5.15.7 of its specification. */
 import { grouped } from '../bytes.js';
 import { damaged } from '../faults.js';
 import type { Cursor } from './wire.js';
 
 type Quaternion = readonly [w: number, x: number, y: number, z: number];
 
-/** Placement of an object, from the positions of its splats. */
+/** Rotation and translation, in this order, from the stored positions of an object's splats to those in the scene. */
 export interface Pose {
   readonly rotation: Quaternion;
   readonly translation: readonly [number, number, number];
@@ -44,10 +44,16 @@ export function readTrack(cursor: Cursor): ObjectTrack {
   return { object, isStepped: interpolation === 1, samples };
 }
 
-/** The pose at a time: that of the nearest sample before the first and behind the last. */
+/** Returns the interpolated pose at a time in seconds. Outside the samples it is the pose of the nearest sample. */
 export function poseAt({ samples, isStepped }: ObjectTrack, seconds: number): Pose {
-  const next = samples.findIndex((sample) => sample.seconds > seconds);
-  if (next <= 0) return samples[next === 0 ? 0 : samples.length - 1];
+  // Binary search, because each splat of an object needs the pose.
+  let [next, end] = [0, samples.length];
+  while (next < end) {
+    const middle = (next + end) >> 1;
+    if (samples[middle].seconds > seconds) end = middle;
+    else next = middle + 1;
+  }
+  if (next === 0 || next === samples.length) return samples[next === 0 ? 0 : next - 1];
   const [a, b] = [samples[next - 1], samples[next]];
   if (isStepped) return a;
   const share = (seconds - a.seconds) / (b.seconds - a.seconds);
@@ -58,7 +64,7 @@ export function poseAt({ samples, isStepped }: ObjectTrack, seconds: number): Po
   };
 }
 
-/** The shorter way from one rotation to another. */
+/** Interpolates spherically between two rotations, over the smaller angle. @param share 0 at `a`, 1 at `b`. */
 function between(a: Quaternion, b: Quaternion, share: number): Quaternion {
   const dot = a.reduce((sum, value, k) => sum + value * b[k], 0);
   const angle = Math.acos(Math.min(1, Math.abs(dot)));
@@ -71,7 +77,7 @@ function between(a: Quaternion, b: Quaternion, share: number): Quaternion {
   return sum.map((value) => value / length) as unknown as Quaternion;
 }
 
-/** Hamilton's product a ⊗ b. */
+/** Returns Hamilton's product a ⊗ b of quaternions (w, x, y, z). */
 export function product([w, x, y, z]: ArrayLike<number> & Iterable<number>, b: ArrayLike<number>): Quaternion {
   return [
     w * b[0] - x * b[1] - y * b[2] - z * b[3],
@@ -81,7 +87,7 @@ export function product([w, x, y, z]: ArrayLike<number> & Iterable<number>, b: A
   ];
 }
 
-/** A point turned by a rotation. */
+/** Returns a point (x, y, z) rotated about the origin by a unit quaternion. */
 export function turnedPoint(rotation: Quaternion, point: readonly number[]): number[] {
   const [w, x, y, z] = rotation;
   const inverse: Quaternion = [w, -x, -y, -z];

@@ -11,10 +11,10 @@ export const OPCODE = {
   ...{ chunkIndex: 0x08, deltaChunk: 0x10, frame: 0x20, objectTrack: 0x25 },
 } as const;
 
-/** Records that describe the scene: they must precede its splats. */
+/** Opcodes of records that must precede the first splats, because they describe the scene. */
 const IN_FRONT = new Set([0x01, 0x03, 0x04, 0x09, 0x0a, 0x0b, 0x0d, 0x11, 0x12, 0x20, 0x21, 0x22, 0x23, 0x24, 0x25]);
 
-/** Reads little-endian fields, one after the other. */
+/** Reads little-endian fields in sequence. All methods throw `decode/truncated` at the end of the bytes. */
 export class Cursor {
   readonly name: string;
   readonly #bytes: Uint8Array;
@@ -60,14 +60,15 @@ export class Cursor {
 
 export interface FileRecord {
   readonly opcode: number;
-  /** Byte of the file at which the record, not its content, begins. */
+  /** Byte offset in the file of the record; its content begins 9 bytes later. */
   readonly offset: number;
   readonly content: Uint8Array;
 }
 
-export const isFourDgs = (bytes: Uint8Array): boolean => startsWith(bytes, '\x894DGS');
-
-/** All records that are whole: a file that was cut keeps what lies before the cut. */
+/**
+ * Returns the complete records of a file; those of a truncated file before its end.
+ * @throws GaussianSplatError `decode/header`, `decode/unsupported` for other versions
+ */
 export function recordsOf(bytes: Uint8Array, name: string): FileRecord[] {
   requireMagic(bytes, name);
   const view = viewOf(bytes);
@@ -99,14 +100,17 @@ function requireMagic(bytes: Uint8Array, name: string): void {
   throw damaged(name, 'a .4dgs file', 'another signature', 'decode/header');
 }
 
-/** How splats come, change and go. */
+/**
+ * Model of changes over time. `gaussian-birth`: chunks are independent, and each splat has a time. `keyframe-delta`: a
+ * chunk is a keyframe, or adds, changes and removes splats of a previous chunk.
+ */
 export type TemporalModel = 'gaussian-birth' | 'keyframe-delta';
 const MODELS: readonly string[] = ['gaussian-birth', 'keyframe-delta'] satisfies TemporalModel[];
 
 export interface Header {
   readonly durationSeconds: number;
   readonly splats: number;
-  /** Splats that fade below this fraction of their opacity are not drawn. */
+  /** Minimum fraction of its opacity, 0..1, at which a splat that fades is drawn. */
   readonly cutoff: number;
   readonly model: TemporalModel;
   readonly shDegree: ShDegree;
@@ -128,7 +132,10 @@ export function readHeader(cursor: Cursor): Header {
   return { durationSeconds, splats, cutoff, model: model as TemporalModel, shDegree: degree as ShDegree };
 }
 
-/** Origin and pitches of the grids that attributes lie on. */
+/**
+ * Quantization of attributes: the origin of positions, and the step of each attribute. Steps of `scaleLog` and `sigmaLog`
+ * are in natural logarithms, `time` is in seconds, and `motion` in units per second.
+ */
 export interface Grids {
   readonly origin: Vector3;
   readonly position: number;
@@ -153,7 +160,7 @@ export function readGrids(cursor: Cursor): Grids {
   return { origin: [x, y, z], position, scaleLog, rotation, color, opacity, motion, time, sigmaLog };
 }
 
-/** Spans of time, seconds, outside of which splats that name them do not exist. */
+/** Reads the ranges of time [from, until] in seconds. The attribute `window` of a splat is an index of these ranges. */
 export function readWindows(cursor: Cursor): (readonly [number, number])[] {
   const count = cursor.u32();
   if (16 * count > cursor.left)
@@ -166,7 +173,7 @@ const AXES: readonly Vector3[] = [
   ...([[-1, 0, 0], [0, -1, 0], [0, 0, -1]] as const),
 ]; // prettier-ignore
 
-/** The direction up of the scene's own coordinates; undefined for another frame's. */
+/** Returns the direction up in the scene's coordinates; undefined if the record describes another coordinate frame. */
 export function readUp(cursor: Cursor): Vector3 | undefined {
   const isOwn = cursor.text() === '';
   cursor.u8();

@@ -1,6 +1,6 @@
 /**
- * Splats whose accessors hold logarithms, logits or other coordinates than the extension specifies: tools wrote such
- * files while it was a draft, and some still do.
+ * Conversion of splats whose accessors contain logarithms, logits, or coordinates that `KHR_gaussian_splatting` does not
+ * specify. Tools wrote such files while the extension was a draft, and some still do.
  */
 import type { GaussianCloud } from '@gaussian-splat/core';
 import { expInPlace, sigmoidInPlace, type DraftCloud } from '../cloud.js';
@@ -8,7 +8,7 @@ import { warn } from '../faults.js';
 import { isObject } from '../json.js';
 import type { Json } from './container.js';
 
-/** Encoding of all uncompressed splats of a document. */
+/** Encoding of all uncompressed splats of a document: logarithms in place of scales, logits in place of opacities. */
 export interface Activation {
   readonly hasLogarithms: boolean;
   readonly hasLogits: boolean;
@@ -16,14 +16,15 @@ export interface Activation {
   readonly isInPlyFrame: boolean;
 }
 
-/** Tolerance of opacities outside 0..1. */
+/** Distance of opacities from 0..1 that is considered a rounding error. */
 const ROUNDING = 1e-3;
 
 /**
- * Infers the encoding. The extension forbids scales below 0 and opacities outside 0..1, so a single one proves
- * logarithms or logits. splat-transform wrote logarithms before June 2026, up to version 2.3 with any sign, and version
- * 1 wrote the coordinates of PLY, as gsbox does.
- * @param clouds Uncompressed splats with the values of the accessors.
+ * Infers the encoding of a document. The extension forbids scales below 0 and opacities outside 0..1, so that a single
+ * such value proves logarithms or logits. Documents of splat-transform up to version 2.3 have logarithms. Those of its
+ * version 1 and of gsbox also have the coordinates of PLY.
+ * @param json JSON of the glTF, whose `asset.generator` names the program that wrote it.
+ * @param clouds Scales and opacities of all uncompressed splats, as stored in the accessors.
  */
 export function activationOf(json: Json, clouds: readonly Pick<GaussianCloud, 'scales' | 'opacities'>[]): Activation {
   const { asset } = json;
@@ -41,7 +42,7 @@ export function activationOf(json: Json, clouds: readonly Pick<GaussianCloud, 's
 /** Whether the encoding matches the specification. */
 export const isPlain = ({ hasLogarithms, hasLogits }: Activation): boolean => !hasLogarithms && !hasLogits;
 
-/** Converts the values of the accessors to scales and opacities, in place. */
+/** Converts stored values of a cloud to scales and opacities in place, and adds a warning if they differed. */
 export function activate(cloud: DraftCloud, { hasLogarithms, hasLogits }: Activation): void {
   if (hasLogarithms) expInPlace(cloud.scales);
   if (hasLogits) sigmoidInPlace(cloud.opacities);

@@ -5,29 +5,31 @@ import { parseJson, show, type JsonSource } from '../json.js';
 
 export type Json = Record<string, unknown>;
 
-/** The parts of a glTF file. */
+/** JSON and binary chunk of a glTF file. */
 export interface GltfFile {
   readonly json: Json;
-  /** The binary chunk of a GLB: the first buffer. */
+  /** Binary chunk of a GLB, which is the content of its first buffer. Undefined for glTF in JSON. */
   readonly binary: Uint8Array | undefined;
 }
 
 const MAX_JSON_BYTES = 1 << 26;
-/** Buffers may be embedded in the JSON; browsers do not support much longer strings. */
+/** Maximum size of a glTF in JSON, whose buffers may be embedded. Browsers do not support much longer strings. */
 const MAX_TEXT_BYTES = 500_000_000;
 const HEADER_BYTES = 12;
 
 /**
- * Extensions that a file may require without affecting splats: materials, textures, lights, metadata and similar, and
- * compression of meshes. Integer attributes (`KHR_mesh_quantization`) are supported.
+ * Matches extensions that do not prevent drawing splats if a file requires them: materials, textures, lights, metadata,
+ * and compression of meshes. Integer attributes (`KHR_mesh_quantization`) are supported.
  */
 const HARMLESS =
   /^(KHR_mesh_quantization|KHR_draco_mesh_compression|[A-Z0-9]+_(animation|audio|lights?|materials?|mesh_features|structural_metadata|textures?|xmp)(_|$))|^KHR_gaussian_splatting(_compression_spz(_2)?)?$/;
 
 /**
- * Parses the container of a GLB or of a glTF in JSON. Throws `decode/unsupported` if it requires unknown extensions, as
- * the specification demands.
- * @param known Extensions that a file may require.
+ * Parses the container of a GLB, or a glTF in JSON.
+ * @param known Matches the extensions that a file may require.
+ * @throws GaussianSplatError `decode/unsupported` for a required extension that `known` does not match, as the
+ * specification demands, or another version; `decode/header`, `decode/truncated`, `decode/corrupt`,
+ * `out-of-memory/budget`
  */
 export function openContainer(source: JsonSource, known = HARMLESS): GltfFile {
   const { bytes, name } = source;
@@ -56,7 +58,7 @@ export function openContainer(source: JsonSource, known = HARMLESS): GltfFile {
 
 const CONVERT =
   'convert the scene to SPZ or PLY with a tool that knows the extension, or export it with KHR_gaussian_splatting alone';
-/** Remedies for common unsupported extensions. */
+/** Remedies for required extensions that are common and unsupported. */
 const WITHOUT: readonly (readonly [extension: RegExp, remedy: string])[] = [
   [
     /meshopt/i,
@@ -65,7 +67,7 @@ const WITHOUT: readonly (readonly [extension: RegExp, remedy: string])[] = [
   [/spz/i, 'export the scene again with KHR_gaussian_splatting_compression_spz_2, or give the SPZ that it was made of'],
 ];
 
-/** Returns the extensions that a file uses without support here: their content is not drawn. */
+/** Returns the names of the extensions that a file uses and this package does not support, without duplicates. */
 export function unknownExtensions({ extensionsUsed }: Json): string[] {
   const used: unknown[] = Array.isArray(extensionsUsed) ? extensionsUsed : [];
   return [...new Set(used.map(String))].filter((extension) => !HARMLESS.test(extension));
@@ -101,7 +103,7 @@ function openGlb({ bytes, name, budget }: JsonSource): GltfFile {
   if (asciiOf(bytes, 16, 20) !== 'JSON') throw damaged(where(16), 'a chunk of JSON', 'another', 'decode/header');
   need(jsonEnd);
   let textEnd = jsonEnd;
-  // Some writers pad with zeros instead of spaces.
+  // Some programs pad the JSON with zeros instead of spaces.
   while (bytes[textEnd - 1] === 0) textEnd--;
   const text = bytes.subarray(HEADER_BYTES + 8, textEnd);
   const json = parseJson({ bytes: text, name: `${name}, JSON of the GLB`, budget }, MAX_JSON_BYTES);

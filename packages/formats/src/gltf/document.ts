@@ -7,14 +7,14 @@ import type { OpenFile, SceneSource, SplatRange } from '../scene-format.js';
 import { isObject, show } from '../json.js';
 import type { GltfFile, Json } from './container.js';
 
-/** A component type: its size in bytes, its maximum, and its getter. */
+/** A component type of accessors. `max` is the integer that represents 1 in normalized accessors. */
 interface Component {
   readonly bytes: number;
   readonly max: number;
   readonly get: (view: DataView, at: number) => number;
 }
 
-/** Component types of glTF. */
+/** Component types of glTF, by their numbers. */
 export const COMPONENTS: ReadonlyMap<unknown, Component> = new Map([
   [5120, { bytes: 1, max: 127, get: (view: DataView, at: number) => view.getInt8(at) }],
   [5121, { bytes: 1, max: 255, get: (view: DataView, at: number) => view.getUint8(at) }],
@@ -31,20 +31,20 @@ const WIDTHS: ReadonlyMap<unknown, number> = new Map([
   ['VEC4', 4],
 ]);
 
-/** Numbers of an accessor. */
+/** Values that {@link GltfDocument.readAccessor} reads. */
 export interface AccessorData {
-  /** Total number of elements of the accessor, including those outside the range. */
+  /** Number of all elements of the accessor, including those outside the requested range. */
   readonly count: number;
-  /** Numbers of one element. */
+  /** Count of numbers in each element, 1 to 4. */
   readonly width: number;
-  /** [requested elements, width], normalized if the accessor requires it. Read-only: it may be the file's own memory. */
+  /** [requested elements, width], normalized if the accessor requires it. Do not modify: it may be memory of the file. */
   readonly values: Float32Array;
 }
 
-/** Fetches a file by its URI in a glTF, relative or absolute. */
+/** Fetches a file by its URI in a glTF, which may be relative or absolute. */
 export type OpenUri = (uri: string) => Promise<Uint8Array>;
 
-/** Validated access to the parts of a glTF file by index. */
+/** Access to the objects of a glTF file by index, with validation. */
 export class GltfDocument {
   readonly json: Json;
   readonly name: string;
@@ -53,10 +53,13 @@ export class GltfDocument {
   readonly #open: OpenFile | undefined;
   readonly #openUri: OpenUri | undefined;
   readonly #buffers = new Map<number, Promise<Uint8Array>>();
-  /** Each file is fetched once, even if several buffers name it. */
+  /** Files by URI, so that a file of several buffers is fetched once. */
   readonly #files = new Map<string, Promise<Uint8Array>>();
 
-  /** @param open Opens files relative to it by their paths, or any file by its address. */
+  /**
+   * @param open Opens other files of the scene. `part` opens a file by its path relative to the glTF, `uri` any file by
+   * its URI.
+   */
   constructor(
     { json, binary }: GltfFile,
     { name, budget }: Pick<SceneSource, 'name' | 'budget'>,
@@ -70,24 +73,24 @@ export class GltfDocument {
     this.#openUri = 'uri' in open ? open.uri : undefined;
   }
 
-  /** Throws `decode/header`. */
+  /** Throws `decode/header` for a property. @param path Path of the property in the JSON. */
   fail(path: string, expected: string, found: unknown): never {
     throw damaged(`${this.name}, ${path}`, expected, show(found), 'decode/header');
   }
 
-  /** Charges bytes before they are allocated. Throws `out-of-memory/budget`. */
+  /** Charges bytes to the budget before they are allocated. Throws `out-of-memory/budget`. */
   take(bytes: number): void {
     this.budget.take(bytes, this.name);
   }
 
-  /** Element `index` of an array of objects at the top level of the file. */
+  /** Returns element `index` of a top-level array, such as `nodes`. Throws `decode/header` if it is not an object. */
   item(list: string, index: unknown): Json {
     const array = this.json[list];
     const found: unknown = Array.isArray(array) && this.isIndex(index) ? array[index] : undefined;
     return isObject(found) ? found : this.fail(`${list}[${String(index)}]`, 'an object', found);
   }
 
-  /** Whether a buffer is another file. */
+  /** Whether any buffer is in another file. */
   get hasFilesBeside(): boolean {
     const { buffers } = this.json;
     return Array.isArray(buffers) && buffers.some((buffer: unknown) => isObject(buffer) && isFile(buffer.uri));
@@ -97,15 +100,18 @@ export class GltfDocument {
     return Number.isSafeInteger(value) && (value as number) >= 0;
   }
 
-  /** Declared number of elements of an accessor; its size in bytes is checked when it is read. */
+  /** Returns the declared number of elements of an accessor. Only {@link readAccessor} checks that the file has them. */
   accessorCount(index: unknown): number {
     const { count } = this.item('accessors', index);
     return this.isIndex(count) ? count : this.fail(`accessors[${String(index)}].count`, 'a whole number', count);
   }
 
   /**
-   * @param range Elements to read; default all.
-   * @param maxZeros Maximum number of elements of a sparse accessor without a buffer: they are zeros.
+   * Reads elements of an accessor as float32, with its sparse values, and normalized if the accessor is.
+   * @param range Range of elements to read; default all.
+   * @param maxZeros Maximum number of elements of a sparse accessor without a buffer view, whose other values are 0.
+   * @throws GaussianSplatError `decode/header`, `decode/corrupt`, `decode/truncated`, `decode/unsupported`,
+   * `out-of-memory/budget`; errors of opening another file
    */
   async readAccessor(index: unknown, range?: SplatRange, maxZeros = 0): Promise<AccessorData> {
     const accessor = this.item('accessors', index);
@@ -125,18 +131,21 @@ export class GltfDocument {
         : await this.#readDense(accessor, path, count, width, component, own);
     let whole = values;
     if (isSparse) {
-      // They may be the file's own memory.
+      // Sparse values are written to a copy, because `values` may be memory of the file.
       this.take(values.byteLength);
       whole = values.slice();
       const { putSparse } = await loadModule('the code that reads sparse accessors', () => import('./sparse.js'));
       await putSparse(this, sparse, { path, componentType, count, range: own, width, values: whole });
     }
-    // The lowest signed integer means -1, as does the one above it.
-    if (normalized === true && componentType !== FLOAT) normalise(whole, component.max);
+    // Normalization maps the two lowest signed integers to -1, for example -128 and -127.
+    if (normalized === true && componentType !== FLOAT) normalize(whole, component.max);
     return { count, width, values: whole };
   }
 
-  /** Without a view and without sparse data, an extension must provide the numbers. */
+  /**
+   * Returns `length` zeros for a sparse accessor without a buffer view. Throws `decode/unsupported` if `length` is
+   * undefined: the accessor is not sparse, or has more elements than `maxZeros`.
+   */
   #zeros(path: string, length: number | undefined): Float32Array {
     if (length !== undefined) {
       this.take(4 * length);
@@ -146,7 +155,7 @@ export class GltfDocument {
     throw damaged(`${this.name}, ${path}`, expected, 'one without "bufferView"', 'decode/unsupported');
   }
 
-  /** Reads numbers as stored. */
+  /** Returns a range of elements as float32, not normalized. The array may be memory of the file. */
   async #readDense(
     accessor: Json,
     path: string,
@@ -171,7 +180,7 @@ export class GltfDocument {
     this.take(4 * elements * width);
     const start = byteOffset + first * byteStride;
     if (accessor.componentType === FLOAT && byteStride === 4 * width && hostIsLittleEndian) {
-      // Numbers in the required layout share the file's memory. The start of a view need not be a multiple of 4.
+      // Contiguous float32 are not copied, unless their offset in memory is no multiple of 4.
       const own = alignedTo4(bytes.subarray(start, start + 4 * elements * width));
       return new Float32Array(own.buffer, own.byteOffset, elements * width);
     }
@@ -184,12 +193,15 @@ export class GltfDocument {
     return values;
   }
 
-  /** The bytes of a buffer view. */
+  /** Returns the bytes of a buffer view, by its index. */
   async readView(index: unknown): Promise<Uint8Array> {
     return this.readRange(this.item('bufferViews', index), `bufferViews[${String(index)}]`);
   }
 
-  /** The bytes of a range of a buffer. */
+  /**
+   * Returns the bytes of a range of a buffer.
+   * @param path Path of the range's object in the JSON, for error messages.
+   */
   async readRange({ buffer, byteOffset = 0, byteLength }: Json, path: string): Promise<Uint8Array> {
     if (!this.isIndex(buffer) || !this.isIndex(byteOffset) || !this.isIndex(byteLength)) {
       return this.fail(path, 'a buffer, an offset and a length', { buffer, byteOffset, byteLength });
@@ -209,8 +221,8 @@ export class GltfDocument {
   }
 
   /**
-   * Gives an accessor a buffer of its own, with a buffer view, as a decoder of an extension does.
-   * @param stride Bytes from one element to the next; undefined for packed elements.
+   * Replaces the content of an accessor by decoded bytes: adds a buffer and a buffer view to the JSON.
+   * @param stride Bytes from the beginning of an element to the next; undefined for packed elements.
    */
   provide(accessor: number, bytes: Uint8Array, stride?: number): void {
     const { json } = this;
@@ -233,7 +245,10 @@ export class GltfDocument {
     return this.readUri(uri, `buffers[${index}].uri`);
   }
 
-  /** The bytes at a URI of the file; each URI is fetched once. */
+  /**
+   * Returns the bytes of a URI, which may be a data URL. Each file is fetched once.
+   * @param path Path of the URI in the JSON, for error messages.
+   */
   async readUri(uri: unknown, path: string): Promise<Uint8Array> {
     if (typeof uri !== 'string') return this.fail(path, 'an address', uri);
     if (/^data:/i.test(uri)) return this.#decodeDataUri(uri, path);
@@ -241,7 +256,7 @@ export class GltfDocument {
       const expected = 'a relative address: a file beside the scene, or "data:"';
       throw damaged(`${this.name}, ${path}`, expected, show(uri), 'decode/unsupported');
     }
-    // A query after the path is for servers; a local file is found without it.
+    // The query is separate from the path, because only servers need it.
     const [, file, query] = /^([^?#]*)(\?[^#]*)?/.exec(uri)!;
     const found = this.#files.get(uri) ?? this.#openUri?.(uri) ?? this.#open!(decodeSafely(file), query);
     this.#files.set(uri, found);
@@ -253,20 +268,20 @@ export class GltfDocument {
     try {
       if (match) return bytesOf(atob(uri.slice(match[0].length)));
     } catch {
-      // Said below.
+      // The error is thrown below.
     }
     return this.fail(path, 'base64', uri.slice(0, 40));
   }
 }
 
-/** Converts characters to bytes in a loop, which is 25 times as fast as `Uint8Array.from` with a function. */
+/** Converts characters 0..255 to bytes. A loop is 25 times as fast as `Uint8Array.from` with a function. */
 function bytesOf(text: string): Uint8Array {
   const bytes = new Uint8Array(text.length);
   for (let i = 0; i < bytes.length; i++) bytes[i] = text.charCodeAt(i);
   return bytes;
 }
 
-function normalise(values: Float32Array, max: number): void {
+function normalize(values: Float32Array, max: number): void {
   for (let i = 0; i < values.length; i++) values[i] = Math.max(-1, values[i] / max);
 }
 

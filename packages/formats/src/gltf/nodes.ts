@@ -2,10 +2,10 @@ import type { Json } from './container.js';
 import type { GltfDocument } from './document.js';
 import { isObject } from '../json.js';
 
-/** 3 x 4 affine map, row by row: [a b c tx, d e f ty, g h i tz]. */
+/** Affine transform, a row-major 3x4 matrix: [a, b, c, tx, d, e, f, ty, g, h, i, tz]. */
 export type Affine = readonly number[];
 
-/** An instance of a mesh in the scene. */
+/** An instance of a mesh: its index, and the transform from its coordinates to those of the scene. */
 export interface PlacedMesh {
   readonly mesh: number;
   readonly toScene: Affine;
@@ -13,13 +13,12 @@ export interface PlacedMesh {
 
 const IDENTITY: Affine = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0];
 
-/** A scene may contain the same mesh many times; more than this is implausible for splats. */
+/** Maximum number of visited nodes. A scene may contain the same mesh many times. */
 const MAX_PLACES = 10_000;
 const MAX_DEPTH = 1_000;
 
 /**
- * Returns the meshes of the default scene (of all nodes if there is none), each with the product of its nodes'
- * transforms.
+ * Returns the meshes of the default scene, or of all nodes if the file has no scenes. Throws as {@link walkNodes} does.
  */
 export function placedMeshes(document: GltfDocument): PlacedMesh[] {
   const placed: PlacedMesh[] = [];
@@ -30,12 +29,12 @@ export function placedMeshes(document: GltfDocument): PlacedMesh[] {
 }
 
 /**
- * Visits each node of the default scene (of all nodes if there is none), once for each instance. Throws `decode/header`
- * for more than 10,000 visits, or a depth above 1,000.
- * @param visit Called with the node, the product of its and its parents' transforms, and its index.
+ * Visits each node of the default scene, or each node if the file has no scenes. A node with several parents is visited
+ * several times. Throws `decode/header` for more than 10,000 visits, or a depth above 1,000.
+ * @param visit Called with the node, the transform from its coordinates to those of the scene, and its index.
  */
 export function walkNodes(document: GltfDocument, visit: (node: Json, toScene: Affine, index: number) => void): void {
-  // Stack of node lists with positions, because many nodes may refer to the same long list.
+  // Stack of lists of children. Lists are not copied, because many nodes may have the same long list.
   const open = [{ nodes: rootNodes(document), next: 0, parent: IDENTITY }];
   for (let visited = 0; open.length > 0;) {
     const list = open[open.length - 1];
@@ -53,7 +52,7 @@ export function walkNodes(document: GltfDocument, visit: (node: Json, toScene: A
   }
 }
 
-/** The nodes that have no parent in the default scene, or in the file if there is none. */
+/** Returns the indices of the root nodes of the default scene; of all nodes without a parent if the file has no scenes. */
 export function rootNodes(document: GltfDocument): unknown[] {
   const { scenes, scene = 0, nodes } = document.json;
   if (Array.isArray(scenes) && scenes.length > 0) {
@@ -87,7 +86,7 @@ function localTransform(node: Json, document: GltfDocument): Affine {
   ];
 }
 
-/** First `b`, then `a`. */
+/** Returns the product a · b, which applies `b` first. */
 export function multiply(a: Affine, b: Affine): Affine {
   const product: number[] = [];
   for (let row = 0; row < 12; row += 4) {

@@ -10,18 +10,18 @@ import type { SceneSource, SplatRange } from '../scene-format.js';
 import type { GltfDocument } from './document.js';
 
 const EXTENSION = 'KHR_gaussian_splatting';
-/** Its name as a draft, and the later one. */
+/** Names of the extension for SPZ: the name in drafts, and the later one. */
 const SPZ_EXTENSIONS = [`${EXTENSION}_compression_spz_2`, `${EXTENSION}_compression_spz`];
 
-/** From the coordinates of a cloud (right, down, forward) to left, up, forward: the extension unpacks SPZ to these. */
+/** Transform, row-major 3x4, from the axes of a cloud (right, down, forward) to those of SPZ in glTF (left, up, forward). */
 const SPZ_TO_GLTF = [-1, 0, 0, 0, 0, -1, 0, 0, 0, 0, 1, 0];
 
-/** Whether a primitive holds splats. */
+/** Whether a primitive of a mesh has splats (`KHR_gaussian_splatting`). */
 export function isSplats(primitive: unknown): primitive is Json {
   return isObject(primitive) && isObject(primitive.extensions) && isObject(primitive.extensions[EXTENSION]);
 }
 
-/** Whether a primitive of splats is uncompressed. */
+/** Whether the splats of a primitive are in uncompressed accessors. */
 export function isUncompressed(primitive: Json): boolean {
   const { extensions } = splatsOf(primitive);
   return !isObject(extensions) || Object.keys(extensions).length === 0;
@@ -29,7 +29,7 @@ export function isUncompressed(primitive: Json): boolean {
 
 const splatsOf = ({ extensions }: Json): Json => (extensions as Json)[EXTENSION] as Json;
 
-/** Number of splats of an uncompressed primitive, and the degree of their spherical harmonics. */
+/** Returns the number of splats of an uncompressed primitive, and the degree of their spherical harmonics. */
 export function splatsIn(
   document: GltfDocument,
   { attributes }: Json,
@@ -37,10 +37,14 @@ export function splatsIn(
 ): { count: number; shDegree: ShDegree } {
   const own = isObject(attributes) ? attributes : {};
   if (own.POSITION === undefined) document.fail(`${path}, attributes`, 'an attribute POSITION', Object.keys(own));
-  return { count: document.accessorCount(own.POSITION), shDegree: degreeOf((name) => own[`${EXTENSION}:${name}`]) };
+  return { count: document.accessorCount(own.POSITION), shDegree: degreeOf((name) => attributeIn(own, name)) };
 }
 
-/** Reads scales and opacities of an uncompressed primitive as stored; missing ones are empty. */
+/** Returns the accessor of an attribute of splats. Drafts of the extension have attributes such as _SCALE. */
+const attributeIn = (attributes: Json, name: string): unknown =>
+  attributes[`${EXTENSION}:${name}`] ?? attributes[`_${name}`];
+
+/** Reads the stored scales and opacities of an uncompressed primitive. A missing attribute becomes an empty array. */
 export async function shapesIn(
   document: GltfDocument,
   { attributes }: Json,
@@ -48,16 +52,17 @@ export async function shapesIn(
 ): Promise<Pick<GaussianCloud, 'scales' | 'opacities'>> {
   if (!isObject(attributes)) return document.fail(`${path}.attributes`, 'an object', attributes);
   const read = async (name: string): Promise<Float32Array> => {
-    const index = attributes[`${EXTENSION}:${name}`] ?? attributes[`_${name}`];
+    const index = attributeIn(attributes, name);
     return index === undefined ? new Float32Array(0) : (await document.readAccessor(index)).values;
   };
   return { scales: await read('SCALE'), opacities: await read('OPACITY') };
 }
 
 /**
- * Reads a primitive with `KHR_gaussian_splatting` into a cloud in the coordinates of its node. Scales and opacities of
- * an uncompressed one are as stored: see `activationOf`. Their color space is given by {@link hasLinearColors}.
- * @param range Splats of an uncompressed primitive to read; default all.
+ * Reads a primitive with `KHR_gaussian_splatting` into a cloud in the coordinates of its node. The caller converts scales
+ * and opacities of an uncompressed primitive as `activationOf` finds, and colors if {@link hasLinearColors}.
+ * @param path Path of the primitive in the JSON, for error messages.
+ * @param range Range of splats of an uncompressed primitive to read; default all.
  */
 export async function readPrimitive(
   document: GltfDocument,
@@ -101,7 +106,7 @@ const LINEAR = 'lin_rec709_display';
 /** Whether the colors of a primitive of splats are linear. */
 export const hasLinearColors = (primitive: Json): boolean => splatsOf(primitive).colorSpace === LINEAR;
 
-/** Supported values; the first also replaces unsupported ones. */
+/** Supported values of the properties of the extension. The first value replaces unsupported ones. */
 const KNOWN = {
   kernel: ['ellipse'],
   colorSpace: ['srgb_rec709_display', LINEAR],
@@ -110,8 +115,8 @@ const KNOWN = {
 } as const;
 
 /**
- * Warns of values that other extensions define. A file that depends on such an extension requires it, and is rejected
- * then.
+ * Adds a warning for each property with an unsupported value, which another extension defines. Files that require such an
+ * extension have already been rejected.
  */
 function noteUnknown(cloud: DraftCloud, splats: Json): void {
   for (const [property, known] of Object.entries(KNOWN)) {
@@ -150,8 +155,7 @@ async function readAttributes(
   range: SplatRange | undefined,
 ): Promise<DraftCloud> {
   const attributes = isObject(primitive.attributes) ? primitive.attributes : {};
-  // Drafts used _SCALE and _ROTATION.
-  const own = (name: string): unknown => attributes[`${EXTENSION}:${name}`] ?? attributes[`_${name}`];
+  const own = (name: string): unknown => attributeIn(attributes, name);
   const { count: all } = splatsIn(document, primitive, path);
   const count = range ? range.end - range.first : all;
   const read = async (name: string, index: unknown, width: number): Promise<Float32Array> => {
@@ -164,7 +168,7 @@ async function readAttributes(
     }
     return data.values;
   };
-  // Positions are read first, so that a file without them fails before the allocation below.
+  // Positions are read first, so that a file that is too short for them fails before the cloud is allocated.
   const positions = await read('POSITION', attributes.POSITION, 3);
   const cloud = allocateCloud(count, degreeOf(own), document);
   cloud.positions.set(positions);
@@ -182,12 +186,12 @@ function degreeOf(own: (name: string) => unknown): ShDegree {
   return bands.findLast((degree) => own(`SH_DEGREE_${degree}_COEF_0`) !== undefined) ?? 0;
 }
 
-/** Drafts stored opacities only in the colors. */
+/** Sets opacities from the alpha of colors, [N, 4]: some drafts of the extension have no other opacities. */
 function setAlphas({ opacities }: DraftCloud, colors: Float32Array): void {
   for (let i = 0; i < opacities.length; i++) opacities[i] = colors[4 * i + 3];
 }
 
-/** glTF stores quaternions as (x, y, z, w). */
+/** Copies quaternions (x, y, z, w), as in glTF, to (w, x, y, z), as in clouds. */
 function toWFirst(source: Float32Array, out: Float32Array): void {
   for (let i = 0; i < out.length; i += 4) {
     out[i] = source[i + 3];

@@ -4,20 +4,22 @@ import { isObject } from '../json.js';
 import type { SplatRange } from '../scene-format.js';
 import { COMPONENTS, type GltfDocument } from './document.js';
 
-/** Destination of the numbers of a sparse accessor. */
+/** Destination of the values of a sparse accessor. */
 interface SparseTarget {
   readonly path: string;
   readonly componentType: unknown;
-  /** Number of elements of the accessor, and the range of them in `values`. */
+  /** Number of elements of the accessor. */
   readonly count: number;
+  /** Range of elements that `values` contains. */
   readonly range: SplatRange;
   readonly width: number;
   readonly values: Float32Array;
 }
 
 /**
- * Writes the numbers of a sparse accessor over others, as stored. Throws `decode/header`, `decode/corrupt` or
- * `decode/truncated`.
+ * Writes the sparse values of an accessor to `target.values`, not normalized.
+ * @param sparse Property `sparse` of the accessor.
+ * @throws GaussianSplatError `decode/header`, `decode/corrupt`, `decode/truncated`, `out-of-memory/budget`
  */
 export async function putSparse(document: GltfDocument, sparse: unknown, target: SparseTarget): Promise<void> {
   const path = `${target.path}.sparse`;
@@ -42,7 +44,7 @@ export async function putSparse(document: GltfDocument, sparse: unknown, target:
   }
 }
 
-/** Returns a getter for contiguous numbers in a view. */
+/** Returns a getter by index for contiguous numbers of one component type in a buffer view. */
 async function numbersIn(
   document: GltfDocument,
   place: unknown,

@@ -5,53 +5,56 @@ import { KSPLAT_HEADER_BYTES as HEADER_BYTES } from '../signatures.js';
 
 const SECTION_HEADER_BYTES = 1024;
 
-/** Storage of each compression level: bytes of one coordinate, scale or quaternion component, and of one coefficient. */
+/** Bytes of a coordinate, scale or quaternion component, and of a coefficient, by compression level. */
 const LEVELS = [
   { number: 4, coefficient: 4 },
   { number: 2, coefficient: 2 },
   { number: 2, coefficient: 1 },
 ] as const;
 
-/** Positions of levels 1 and 2 are 16-bit offsets with this range, unless the section declares another. */
+/** Default range of the 16-bit offsets of positions in levels 1 and 2. A section may declare another. */
 const DEFAULT_RANGE = 32_767;
 const COEFFICIENTS = [0, 9, 24, 45];
 
-/** One section: its positions are relative to the centers of buckets, which are cubes. */
+/** A section of a file. Its positions are relative to the centers of buckets, which are cubes. */
 export interface KsplatSection {
   readonly count: number;
   readonly degree: ShDegree;
   readonly bytesPerSplat: number;
-  /** Byte of the first splat. */
+  /** Byte offset in the file of the first splat. */
   readonly splatsAt: number;
-  /** Byte of the first bucket's center, three float32. */
+  /** Byte offset in the file of the first bucket's center, three float32. */
   readonly bucketsAt: number;
   readonly bucketStride: number;
   readonly bucketCount: number;
-  /** Splats of each full bucket; these come first. */
+  /** Number of splats of each full bucket. Full buckets precede the partial ones. */
   readonly bucketSize: number;
   readonly fullBuckets: number;
-  /** Byte of the number of splats, uint32, of each bucket that is not full. */
+  /** Byte offset in the file of the number of splats of each partial bucket, uint32. */
   readonly partialSizesAt: number;
   readonly partialBuckets: number;
-  /** World units of one step of a position, and the step of a bucket's center. */
+  /** Units of the scene for one step of a position. */
   readonly positionStep: number;
+  /** Stored coordinate of the center of a bucket, in steps. */
   readonly positionRange: number;
 }
 
 export interface KsplatHeader {
   readonly level: 0 | 1 | 2;
-  /** Total number of splats. */
+  /** Number of splats of all sections. */
   readonly count: number;
-  /** The highest degree of all sections. */
+  /** Highest degree of spherical harmonics of all sections. */
   readonly degree: ShDegree;
-  /** Values of the bytes 0 and 255 of the coefficients of level 2. */
+  /** Values of coefficients that the bytes 0 and 255 represent in level 2. */
   readonly coefficientRange: readonly [number, number];
   readonly sections: readonly KsplatSection[];
 }
 
 /**
- * Parses and validates all headers: every section lies within the file, or is shortened to its available part
- * (`isPrefix`).
+ * Parses and validates the header of a file and the headers of its sections.
+ * @param isPrefix Whether `bytes` is only the beginning of the file. Sections are then shortened to their complete
+ * splats.
+ * @throws GaussianSplatError `decode/truncated`, `decode/header`, `decode/unsupported`, `decode/empty`
  */
 export function parseKsplatHeader(bytes: Uint8Array, name: string, isPrefix = false): KsplatHeader {
   if (bytes.length < HEADER_BYTES) throw cut(bytes, name, HEADER_BYTES, 'a header');
@@ -74,7 +77,7 @@ export function parseKsplatHeader(bytes: Uint8Array, name: string, isPrefix = fa
 
 function parseSections(bytes: Uint8Array, name: string, level: 0 | 1 | 2): KsplatSection[] {
   const view = viewOf(bytes);
-  // The number of filled sections at byte 8 is unreliable: GaussianSplats3D ignores it, and some files contain 0.
+  // The number of used sections at byte 8 is unreliable: GaussianSplats3D ignores it, and some files contain 0.
   const maxSections = view.getUint32(4, true);
   const dataStart = HEADER_BYTES + SECTION_HEADER_BYTES * maxSections;
   if (dataStart > bytes.length) throw cut(bytes, name, dataStart, `${grouped(maxSections)} section headers`);

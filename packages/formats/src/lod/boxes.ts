@@ -4,51 +4,52 @@ import { damaged } from '../faults.js';
 import { partAddress } from '../fetch-scene.js';
 import { parseLodMeta, type LodRun } from './meta.js';
 
-/** Splats `first` to `first + count` of one SOG file of a streamed scene. */
+/** Range of splats in a SOG file of a streamed scene: `first` to `first + count`, excluding the latter. */
 export interface SogRun extends SogAddress {
-  /** Index of the file: see {@link LodScene.files}. */
+  /** Index of the file in {@link LodScene.files}. */
   readonly file: number;
   readonly first: number;
   readonly count: number;
 }
 
-/** A SOG file of a streamed scene. */
+/** Location of a SOG file of a streamed scene. */
 export interface SogAddress {
-  /** Absolute address of its `meta.json`, or of a bundle. */
+  /** Absolute URL of the `meta.json` of a SOG folder, or of a bundle. */
   readonly url: string;
-  /** Name in error messages. */
+  /** Name of the file in error messages. */
   readonly name: string;
 }
 
 /** A region of a streamed scene with its levels of detail. */
 export interface LodBox {
-  /** Corners, world units. */
+  /** Corner (x, y, z) with the smallest coordinates, in units of the scene. */
   readonly min: readonly number[];
+  /** Corner (x, y, z) with the largest coordinates. */
   readonly max: readonly number[];
-  /** At least one, coarsest first; each has at least one splat. */
+  /** One range of splats for each level of detail, coarsest first. There is at least one, and none is empty. */
   readonly runs: readonly SogRun[];
 }
 
-/** A streamed SOG scene, before any splat is read. */
+/** Index of a streamed SOG scene. */
 export interface LodScene {
   readonly boxes: readonly LodBox[];
-  /** Paths of all files, relative to the index. */
+  /** Paths of all SOG files, relative to the index. */
   readonly files: readonly string[];
-  /** Splats that are always shown, or undefined. */
+  /** File whose splats are shown at every level, or undefined. */
   readonly environment: SogAddress | undefined;
 }
 
 /** Maximum number of splats over all levels of an index. */
 const MAX_SPLATS = 2 ** 31;
-/** Charge for each file: its addresses, and the parsing of them. */
+/** Bytes that are charged for each file, for its URLs and their parsing, in addition to the length of the base URL. */
 const FILE_BYTES = 512;
-/** Memory of each splat before any is loaded: bounds and state of each 256. */
+/** Bytes of memory for each splat before it is loaded: bounds and state of each 256 splats. */
 const KEPT_BYTES = 32 / 256;
 
 /**
- * Reads the index of a streamed SOG scene, `lod-meta.json`, for fetching it box by box.
- * @param name Name in error messages.
- * @param url Absolute address of the index, the base of all others.
+ * Parses the index of a streamed SOG scene, `lod-meta.json`, whose boxes can then be loaded separately.
+ * @param name Name of the index in error messages.
+ * @param url Absolute URL of the index, the base of the paths of all files.
  * @throws GaussianSplatError `decode/header`, `decode/unsupported` for another version, `out-of-memory/budget`.
  */
 export function readLodScene(bytes: Uint8Array, name: string, url: string, limits?: LoadLimits): LodScene {
@@ -79,10 +80,10 @@ const placeOf = ({ file, offset, count }: LodRun): Pick<SogRun, 'file' | 'first'
 });
 
 /**
- * A file of a streamed scene.
- * @param path Relative to the index.
+ * Returns the location of a file of a streamed scene.
+ * @param path Path of the file, relative to the index.
  * @param name Name of the index in error messages.
- * @param url Absolute address of the index.
+ * @param url Absolute URL of the index.
  */
 export const sogAddress = (path: string, name: string, url: string): SogAddress => ({
   url: partAddress(url, path).href,

@@ -2,42 +2,43 @@ import { damaged } from '../faults.js';
 import { grouped } from '../bytes.js';
 import { isObject, parseJson, show, type JsonSource } from '../json.js';
 
-/** Splats `offset` to `offset + count` of one file. */
+/** Range of splats in a file: `offset` to `offset + count`, excluding the latter. */
 export interface LodRun {
-  /** Index into {@link LodMeta.files}. */
+  /** Index of the file in {@link LodMeta.files}. */
   readonly file: number;
   readonly offset: number;
   readonly count: number;
 }
 
-/** A box of space with its splats at one or more levels of detail. */
+/** A box of the scene with its splats at one or more levels of detail. `min` and `max` are corners (x, y, z). */
 export interface LodLeaf {
   readonly min: readonly number[];
   readonly max: readonly number[];
-  /** Sparse: a level may be missing. Index 0 is the finest. */
+  /** Range of splats of each level; undefined if the box lacks a level. Level 0 is the finest. */
   readonly levels: readonly (LodRun | undefined)[];
 }
 
-/** The index of a streamed scene. */
+/** Index of a streamed scene. */
 export interface LodMeta {
-  /** Number of levels. */
+  /** Number of levels of detail. */
   readonly levels: number;
-  /** Paths of the `meta.json` of each SOG, or of a bundle, relative to the index. */
+  /** Path of each SOG file, relative to the index: the `meta.json` of a folder, or a bundle. */
   readonly files: readonly string[];
-  /** Splats that every level shows, or undefined. */
+  /** Path of the SOG file whose splats are shown at every level, or undefined. */
   readonly environment: string | undefined;
   readonly leaves: readonly LodLeaf[];
 }
 
-/** An index takes about 100 bytes for each leaf and level. */
+/** Maximum size of an index in bytes. An index has about 100 bytes for each leaf and level. */
 export const MAX_INDEX_BYTES = 1 << 26;
 /** Maximum length of a path in characters, because servers reject longer addresses. */
-const MAX_PATH = 2048;
+export const MAX_PATH = 2048;
 const MAX_LEVELS = 64;
 
 /**
- * Reads `lod-meta.json` in both its dialects: version 1 (`version`, `asset`, `count`, `counts`) and the earlier one
- * without a version (whose `environment` may be null). Both have `lodLevels`, `filenames` and `tree`.
+ * Parses `lod-meta.json` of version 1, and of the earlier format without a version, whose `environment` may be null. Both
+ * formats have `lodLevels`, `filenames` and `tree`.
+ * @throws GaussianSplatError `decode/header`, `decode/unsupported` for other versions, or as `parseJson` does
  */
 export function parseLodMeta(source: JsonSource): LodMeta {
   const { name } = source;
@@ -75,8 +76,8 @@ function isCount(value: unknown): value is number {
 }
 
 /**
- * Walks the tree without recursion and without spreading children as arguments, because the file chooses its depth and
- * breadth.
+ * Returns the leaves of the tree in depth-first order. Neither recursion nor arguments depend on the size of the tree,
+ * because a file may have any depth and breadth.
  */
 function collectLeaves(root: unknown, levels: number, files: number, fail: Fail): LodLeaf[] {
   const leaves: LodLeaf[] = [];
@@ -84,7 +85,7 @@ function collectLeaves(root: unknown, levels: number, files: number, fail: Fail)
   while (open.length > 0) {
     const node = open.pop();
     if (!isObject(node)) return fail('tree', 'an object for each box', node);
-    // Children are pushed in reverse, so that the first is next.
+    // Children are pushed in reverse order, so that the first child is visited next.
     const children: unknown[] = Array.isArray(node.children) ? node.children : [];
     for (let k = children.length - 1; k >= 0; k--) open.push(children[k]);
     if (node.lods !== undefined) leaves.push(parseLeaf(node, levels, files, fail));
@@ -117,20 +118,23 @@ function parseRun(value: unknown, files: number, fail: Fail): LodRun {
   return { file: file as number, offset: offset as number, count: count as number };
 }
 
-/** A run with its node of the scene and its level. */
+/** A range of splats with the index of its leaf, `node`, and its level of detail. */
 export interface NodeRun extends LodRun {
   readonly node: number;
   readonly level: number;
 }
 
-/** All runs of all boxes, at every level. */
+/** Returns the ranges of all leaves at every level, without empty ones. */
 export function runsAtAllLevels({ leaves }: LodMeta): NodeRun[] {
   return leaves.flatMap(({ levels }, node) =>
     levels.flatMap((run, level) => (run === undefined || run.count === 0 ? [] : [{ ...run, node, level }])),
   );
 }
 
-/** Runs of the scene at a level: of each box that level, or the nearest available one, preferring finer. */
+/**
+ * Returns one range of each leaf, without empty ones, for a level of detail. If a leaf lacks the level, the next finer
+ * one applies, or else the next coarser one. The result has level 0.
+ */
 export function runsAtLevel({ leaves }: LodMeta, level: number): NodeRun[] {
   return leaves.flatMap(({ levels }, node) => {
     const finer = levels.slice(0, level + 1).findLast((run) => run !== undefined);

@@ -6,10 +6,12 @@ import type { LodScene, SogAddress, SogRun } from './boxes.js';
 import { cut, type FetchBytes, type SogFiles } from './sog-files.js';
 
 /**
- * Reads the coarsest run of each box of a streamed scene, and its environment: the nodes of `levelRuns` are the indices
- * of the boxes, followed by the environment. Unusable splats are dropped; a box may become empty. All files are charged
- * to one account.
- * @throws GaussianSplatError as `SogFiles.read`
+ * Reads the coarsest splats of each box of a streamed scene, and its environment. Each node of `levelRuns` is the index
+ * of a box; the environment has the index after the last box. Unusable splats are dropped, so that a box may become
+ * empty. `limits` apply to all files together.
+ * @param fetch Fetches files that `files` has not cached.
+ * @param name Name of the scene in error messages.
+ * @throws GaussianSplatError as {@link SogFiles.read} does; `decode/empty` if no splat of the scene is usable.
  */
 export async function readCoarsestLevel(
   { boxes, environment }: LodScene,
@@ -27,7 +29,7 @@ export async function readCoarsestLevel(
     if (others) others.push([node, run]);
     else byFile.set(run.url, [[node, run]]);
   });
-  // A missing file cancels the others.
+  // If reading one file fails, the downloads of the other files are aborted.
   const failed = new AbortController();
   const either = AbortSignal.any([failed.signal, ...(signal ? [signal] : [])]);
   const openFile = (file: SogAddress): Promise<GaussianCloud> => files.open(file, fetch, either, budget);

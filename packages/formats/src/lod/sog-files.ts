@@ -8,33 +8,33 @@ import { partAddress } from '../fetch-scene.js';
 import { readSogPart } from '../sog/read-sog.js';
 import type { SogAddress, SogRun } from './boxes.js';
 
-/** Fetches a file; aborted when no caller waits for it. */
+/** Fetches a file by its absolute URL. The signal aborts when no caller waits for the file. */
 export type FetchBytes = (url: string, signal: AbortSignal) => Promise<Uint8Array>;
 
-/** Maximum number of files in progress: one is fetched while the other is decoded. */
+/** Maximum number of files in progress, so that one is fetched while another is decoded. */
 const FILES_AT_A_TIME = 2;
 
 /**
- * Runs of splats from the SOG files of streamed scenes. A file holds many runs: concurrent requests share one read, and
- * recently used files are cached, up to a number of bytes.
+ * Reads ranges of splats from the SOG files of streamed scenes. Concurrent requests for the same file cause one read.
+ * Recently used files are cached, up to a number of bytes.
  */
 export class SogFiles {
   readonly #reads: SharedReads<GaussianCloud>;
   readonly #gate = new Gate(FILES_AT_A_TIME);
-  /** Downloaded bytes of each cloud. */
+  /** Number of downloaded bytes of each cloud. */
   readonly #arrived = new WeakMap<GaussianCloud, number>();
 
-  /** @param keptBytes Limit of the cache of decoded splats, default 128 MB; the last file is always kept. */
+  /** @param keptBytes Maximum bytes of decoded splats in the cache, default 128 MB. The last file is always cached. */
   constructor(keptBytes?: number) {
     this.#reads = new SharedReads(byteLengthOf, keptBytes);
   }
 
   /**
-   * Reads the splats of a run, without unusable ones.
-   * @param fetch Fetches uncached files.
-   * @param budget Account of the scene; without it each file has its own.
-   * @throws GaussianSplatError `decode/*`, `decode/corrupt` for a run beyond its file, `decode/empty` for one without
-   * usable splats, `out-of-memory/budget`; errors of `fetch`; the reason of `signal` as soon as that is aborted.
+   * Reads a range of splats of a file, without unusable splats.
+   * @param fetch Fetches files that are not cached.
+   * @param budget Account of the scene. Without it, each file has its own account.
+   * @throws GaussianSplatError `decode/...`, including `decode/corrupt` for a range beyond its file and `decode/empty` for
+   * one without usable splats; `out-of-memory/budget`; errors of `fetch`; the reason of `signal` as soon as it aborts.
    */
   async read(
     run: Omit<SogRun, 'file'>,
@@ -42,7 +42,7 @@ export class SogFiles {
     signal?: AbortSignal,
     budget?: LoadBudget,
   ): Promise<GaussianCloud> {
-    const cloud = keepUsable(cut(await this.open(run, fetch, signal, budget), run));
+    const cloud = keepUsable(cut(await this.#shared(run, fetch, signal, budget), run));
     if (cloud.count > 0) return cloud;
     throw new GaussianSplatError('decode/empty', {
       where: whereOf(run),
@@ -52,14 +52,18 @@ export class SogFiles {
     });
   }
 
-  /** All splats of a file, in its order; read-only. Throws as {@link read} does. */
+  /** Reads all splats of a file, in its order. Do not modify the cloud, which is cached. Throws as {@link read} does. */
   async open(file: SogAddress, fetch: FetchBytes, signal?: AbortSignal, budget?: LoadBudget): Promise<GaussianCloud> {
     const isKept = this.#reads.has(file.url);
-    // A read that another scene started is limited by the budget of that scene.
-    const cloud = await this.#reads.read(file.url, (ended) => this.#read(file, fetch, ended, budget), signal, budget);
-    // A cached file costs nothing more, but copies of its splats are charged.
+    const cloud = await this.#shared(file, fetch, signal, budget);
+    // A cached file raises the limit as a downloaded one, because the caller charges copies of its splats.
     if (isKept) budget?.arrive(this.#arrived.get(cloud) ?? 0);
     return cloud;
+  }
+
+  /** Returns all splats of a file. If another scene has started the read, the budget of that scene limits it. */
+  #shared(file: SogAddress, fetch: FetchBytes, signal?: AbortSignal, budget?: LoadBudget): Promise<GaussianCloud> {
+    return this.#reads.read(file.url, (ended) => this.#read(file, fetch, ended, budget), signal, budget);
   }
 
   async #read(
@@ -98,9 +102,9 @@ const byteLengthOf = ({ positions, scales, rotations, opacities, sh }: GaussianC
   [positions, scales, rotations, opacities, sh].reduce((sum, { byteLength }) => sum + byteLength, 0);
 
 /**
- * Copies some splats of a cloud to new arrays.
- * @param budget Is charged for them.
- * @throws GaussianSplatError `decode/corrupt` if the cloud has too few.
+ * Copies a range of splats of a cloud to new arrays.
+ * @param budget Account that is charged for the new arrays.
+ * @throws GaussianSplatError `decode/corrupt` if the range exceeds the cloud; `out-of-memory/budget`
  */
 export function cut(cloud: GaussianCloud, run: Omit<SogRun, 'file'>, budget?: LoadBudget): GaussianCloud {
   const { first, count, name } = run;
@@ -134,7 +138,7 @@ class Gate {
     this.#free = places;
   }
 
-  /** Waits for a permit. @returns A function that releases it. */
+  /** Waits for a permit. @returns A function that releases the permit. */
   async enter(): Promise<() => void> {
     if (this.#free > 0) this.#free--;
     else await new Promise<void>((resolve) => this.#queue.push(resolve));

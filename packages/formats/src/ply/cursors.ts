@@ -5,17 +5,17 @@ import { sizeOf, type ScalarType } from './header.js';
 
 /** Reads the values of a PLY body in sequence, for rows without a fixed size. */
 export interface ValueCursor {
-  /** Offset of the next byte. */
+  /** Byte offset in the file of the next value. */
   readonly position: number;
-  /** Whether a value beyond the end of the file was requested. */
+  /** Whether the last request exceeded the end of the file. */
   readonly ended: boolean;
-  /** The next value, or NaN at the end of the file. */
+  /** Reads the next value; returns NaN at the end of the file. */
   next(type: ScalarType): number;
   /** Skips `count` values of one type. */
   skip(type: ScalarType, count: number): void;
 }
 
-/** A function that reads one value of a type at a byte of a view. */
+/** Returns a function that reads one value of a type from a view, at a byte offset. */
 export function scalarGetter(type: ScalarType, littleEndian: boolean): (view: DataView, at: number) => number {
   switch (type) {
     case 'int8':
@@ -30,7 +30,7 @@ export function scalarGetter(type: ScalarType, littleEndian: boolean): (view: Da
       return (view, at) => view.getInt32(at, littleEndian);
     case 'uint32':
       return (view, at) => view.getUint32(at, littleEndian);
-    // Rounded beyond 2⁵³, as in float64.
+    // Integers beyond 2⁵³ are rounded to float64.
     case 'int64':
       return (view, at) => Number(view.getBigInt64(at, littleEndian));
     case 'uint64':
@@ -68,11 +68,11 @@ export class BinaryCursor implements ValueCursor {
 }
 
 const SPACE = 32;
-/** Spellings of non-finite numbers by C libraries; their splats are dropped later. */
+/** Matches the spellings of NaN that C libraries write. Splats with such values are dropped later. */
 const NOT_A_NUMBER = /^[+-]?(nan(\(.*\))?|1\.#(ind|qnan|snan)0*)$/i;
 const INFINITE = /^[+-]?(inf(inity)?|1\.#inf0*)$/i;
 const NUMBER = /^[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?$/i;
-/** Maximum length of a number in characters; float64 prints need 25. */
+/** Maximum length of a number in characters. A float64 needs 25. */
 const MAX_TOKEN = 256;
 
 export class AsciiCursor implements ValueCursor {
@@ -87,7 +87,7 @@ export class AsciiCursor implements ValueCursor {
 
   next(): number {
     const token = this.#token();
-    // Number() parses the plain spellings exactly; the patterns are only for the rest.
+    // `Number` also accepts other spellings, such as 0x10, which PLY does not have.
     const value = Number(token);
     if (token === '' || (value === value && NUMBER.test(token))) return token === '' ? NaN : value;
     if (NOT_A_NUMBER.test(token)) return NaN;
@@ -99,7 +99,10 @@ export class AsciiCursor implements ValueCursor {
     for (let i = 0; i < count && !this.ended; i++) this.#token();
   }
 
-  /** The next run of non-space characters; empty at the end of the file. */
+  /**
+   * Skips white space, and returns the characters up to the next white space; an empty string at the end of the file.
+   * Throws for more than {@link MAX_TOKEN} characters.
+   */
   #token(): string {
     const { bytes, isPrefix } = this.#source;
     let start = this.position;

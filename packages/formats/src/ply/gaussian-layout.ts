@@ -5,18 +5,22 @@ import type { PlyElement, PlyHeader, PlyProperty } from './header.js';
 import type * as meaning from './metadata.js';
 import type { ColumnTarget } from './rows.js';
 
-/** Layout of the splats in a PLY file, in the aspects that vary. */
+/** Properties of the splats in a PLY file that differ between files. */
 export interface GaussianLayout {
   readonly vertex: PlyElement;
   /** Degree of the file's spherical harmonics. */
   readonly degree: ShDegree | 4;
   readonly opacity: PlyProperty;
-  /** Properties of the constant color: SH coefficients, or plain colors to convert. */
+  /** Properties of the constant color: red, green and blue. */
   readonly color: readonly PlyProperty[];
+  /** Whether {@link color} has SH coefficients. If false, it has plain colors. */
   readonly colorIsSh: boolean;
-  /** False for 2D Gaussians (2DGS): discs without a third axis. */
+  /** Whether splats have three scales. If false, they are 2D Gaussians (2DGS), which are discs. */
   readonly hasThirdScale: boolean;
-  /** Mip-Splatting: sizes and opacities are those before its filter, whose width is stored for each splat. */
+  /**
+   * Whether the file has the width of the 3D filter of Mip-Splatting for each splat. Its scales and opacities are then
+   * those before filtering.
+   */
   readonly hasFilter: boolean;
 }
 
@@ -24,7 +28,11 @@ const REQUIRED = ['x', 'y', 'z', 'scale_0', 'scale_1', 'rot_0', 'rot_1', 'rot_2'
 const SH_COLOR = ['f_dc_0', 'f_dc_1', 'f_dc_2'];
 const PLAIN_COLOR = ['red', 'green', 'blue'];
 
-/** Finds the splats in a header. Throws `decode/not-splats` for meshes and point clouds, `decode/header` otherwise. */
+/**
+ * Returns the layout of the splats that a header describes.
+ * @throws GaussianSplatError `decode/not-splats` if properties of splats are missing, as in meshes and point clouds;
+ * `decode/header` for incomplete spherical harmonics.
+ */
 export function findGaussians(source: SceneSource, header: PlyHeader): GaussianLayout {
   const vertex = header.elements.find((element) => element.name === 'vertex');
   if (!vertex) throw notSplats(source, 'an element "vertex"', describeElements(header));
@@ -55,7 +63,7 @@ export function findGaussians(source: SceneSource, header: PlyHeader): GaussianL
   };
 }
 
-/** Returns a header with the standard names: CloudCompare writes `scalar_opacity` for `opacity`. */
+/** Returns a header without the prefix `scalar_` of property names, which CloudCompare adds, as in `scalar_opacity`. */
 export function withPlainNames(header: PlyHeader): PlyHeader {
   const plain = ({ properties, ...element }: PlyElement): PlyElement => {
     const names = new Set(properties.map(({ name }) => name));
@@ -69,8 +77,8 @@ export function withPlainNames(header: PlyHeader): PlyHeader {
 }
 
 /**
- * Degree of the spherical harmonics of an element with properties `f_rest_0`, `f_rest_1`, ...; their number is 3·((d +
- * 1)² - 1). Throws `decode/header` for any other number or a gap in the numbering.
+ * Returns the degree d of the spherical harmonics of an element, which has 3·((d + 1)² - 1) properties `f_rest_0`,
+ * `f_rest_1`, ... Throws `decode/header` for any other number of properties, or a gap in the numbering.
  */
 export function shDegreeOf(source: SceneSource, element: PlyElement): ShDegree | 4 {
   const rest = element.properties.filter((property) => /^f_rest_\d+$/.test(property.name));
@@ -87,8 +95,9 @@ export function shDegreeOf(source: SceneSource, element: PlyElement): ShDegree |
 }
 
 /**
- * Destinations of the properties `f_rest_*`. They hold the coefficients above the constant one channel by channel, red
- * first; a cloud interleaves the channels. `degree` is that of the file; bands above the cloud's degree are skipped.
+ * Returns the destinations of the properties `f_rest_*` in `cloud.sh`. The file has all coefficients of red, then of
+ * green, then of blue; a cloud interleaves the channels. Bands above the degree of the cloud are skipped.
+ * @param degree Degree of the file.
  */
 export function harmonicTargets(degree: number, cloud: DraftCloud): ColumnTarget[] {
   const kept = shCoefficientCount(cloud.shDegree);
@@ -103,21 +112,21 @@ export function harmonicTargets(degree: number, cloud: DraftCloud): ColumnTarget
   return targets;
 }
 
-/** Standard properties of splats up to degree 3, including packed ones; normals are ignored. */
+/** Matches the standard properties of splats up to degree 3, including packed ones and normals, which are ignored. */
 export const PLAIN = /^(n?[xyz]|f_dc_\d|f_rest_([1-3]?\d|4[0-4])|opacity|(scale|rot)_\d|red|green|blue|packed_.*)$/;
-/** Elements that change the meaning of the vertices, or that are drawn in addition. */
-const ODD = /^(face|tristrips|codebook_centers)$/;
-/** LAM stores offsets from a mesh instead of positions, and only the file name reveals it. */
+/** Matches elements of splats, plain and packed. Others may change their meaning, or other programs draw them, too. */
+const OF_SPLATS = /^(vertex|sh|chunk)$/;
+/** Matches the names of files in which LAM may store offsets from a mesh in place of positions. */
 export const OFFSETS = /offset\.ply$/i;
 
-/** Loads the metadata reader for a header with more than plain splats; undefined for all others. */
+/** Loads metadata.ts if a header has comments or more than plain splats. Resolves to undefined otherwise. */
 export async function loadMetadata(
   { comments, elements }: PlyHeader,
   fileName: string,
 ): Promise<typeof meaning | undefined> {
   const isOdd = elements.some(
     ({ name, properties }) =>
-      ODD.test(name) || (/^(vertex|sh)$/.test(name) && properties.some((own) => !PLAIN.test(own.name))),
+      !OF_SPLATS.test(name) || (name !== 'chunk' && properties.some((own) => !PLAIN.test(own.name))),
   );
   const isFlat = elements.some(
     ({ name, properties }) => name === 'vertex' && !properties.some((own) => own.name === 'scale_2'),
@@ -129,8 +138,8 @@ export async function loadMetadata(
 export const importMeaning = (): Promise<typeof meaning> =>
   loadModule('the code that reads what a PLY says of itself', () => import('./metadata.js'));
 
-/** Element and property of SHARP's color space. */
-export const COLOR_SPACE = 'color_space';
+/** Matches elements after the splats, and their only property: the color space of SHARP, and a safe orbit. */
+export const TRAILING = /^(color_space|safe_orbit_camera_.*)$/;
 
 function notSplats(source: SceneSource, expected: string, found: string): GaussianSplatError {
   return new GaussianSplatError('decode/not-splats', {

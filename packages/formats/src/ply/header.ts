@@ -13,13 +13,13 @@ export interface PlyProperty {
   readonly name: string;
   /** Type of the value, or of each value of a list. */
   readonly type: ScalarType;
-  /** Type of a list's length; absent for a scalar. */
+  /** Type of the length of a list. Absent for a scalar property. */
   readonly listCountType?: ScalarType;
 }
 
 export interface PlyElement {
   readonly name: string;
-  /** Number of rows. */
+  /** Number of rows of the element. */
   readonly count: number;
   readonly properties: readonly PlyProperty[];
 }
@@ -27,15 +27,15 @@ export interface PlyElement {
 export interface PlyHeader {
   readonly encoding: 'ascii' | 'little-endian' | 'big-endian';
   readonly elements: readonly PlyElement[];
-  /** Text after the word `comment` of every comment line. */
+  /** Text of each comment line, after the word `comment`. */
   readonly comments: readonly string[];
-  /** Offset of the first byte of the data. */
+  /** Byte offset in the file of the first row, after the header. */
   readonly dataStart: number;
 }
 
 /**
- * Both spellings of every type: that of the PLY specification and the one with sizes. 64-bit integers are not in the
- * specification, but occur in files.
+ * Types by their names in files: those of the PLY specification, and those with sizes in bits. 64-bit integers are not in
+ * the specification, but occur in files.
  */
 const TYPES: ReadonlyMap<string, ScalarType> = new Map([
   ...SCALARS.map((type): [string, ScalarType] => [type, type]),
@@ -62,18 +62,24 @@ export function sizeOf(type: ScalarType): number {
   return Number(/\d+/.exec(type)) / 8;
 }
 
-/** Whether float32 rounds numbers of this type: such coordinates need an origin, which depends on all splats. */
+/**
+ * Whether float32 cannot represent all numbers of a type. Coordinates of such a type need an origin, which depends on all
+ * splats.
+ */
 export function exceedsFloat32(type: ScalarType): boolean {
   return type !== 'float32' && sizeOf(type) >= 4;
 }
 
-/** Parses the header of a PLY file; line ends may be LF, CRLF or CR. Throws `decode/header` or `decode/truncated`. */
+/**
+ * Parses the header of a PLY file. Lines may end with LF, CRLF or CR.
+ * @throws GaussianSplatError `decode/header`, `decode/truncated`
+ */
 export function parsePlyHeader(source: SceneSource): PlyHeader {
   const { lines, dataStart } = splitHeader(source);
   const elements: { name: string; count: number; properties: PlyProperty[] }[] = [];
   /**
-   * Sets of the names of all elements, and of the properties of the last one, because a header may have a hundred
-   * thousand lines.
+   * Names of all elements, and names of the properties of the last element. Sets are fast enough for headers with a
+   * hundred thousand lines.
    */
   const [names, own] = [new Set<string>(), new Set<string>()];
   const comments: string[] = [];
@@ -124,12 +130,15 @@ function parseProperty(words: readonly string[], properties: Set<string>, fail: 
   return { name, type, listCountType };
 }
 
-/** Lines before `end_header`, and the offset after that line. */
+/**
+ * Returns the lines before `end_header`, and the byte offset after that line.
+ * @param length Number of bytes to search; if the header is longer, {@link MAX_HEADER_BYTES} are searched.
+ */
 function splitHeader(source: SceneSource, length = USUAL_HEADER_BYTES): { lines: string[]; dataStart: number } {
   const { bytes, name } = source;
   const text = asciiOf(bytes, 0, length);
-  // If line ends are lone CRs, a first data byte of 10 belongs to the data; otherwise LF ends every line and a CR
-  // before it is part of the line end.
+  // If lines end with CR, a byte 10 after `end_header` belongs to the data. Otherwise LF ends every line, with an
+  // optional CR before it.
   const usesLoneCr = /^[^\r\n]*\r(?!\n)/.test(text);
   const end = (usesLoneCr ? /\rend_header[ \t]*(\r|$)/ : /\nend_header[ \t]*\r?(\n|$)/).exec(text);
   const isWithin = end !== null && end.index + end[0].length < length;

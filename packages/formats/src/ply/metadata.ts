@@ -1,39 +1,44 @@
 /**
- * Metadata in the header of a PLY. Loaded only for files with comments, or with properties that change the meaning of
- * others.
+ * Reader of the metadata in the header of a PLY. This module is loaded only for files with comments, or with properties
+ * that change the meaning of others.
  */
-import { GaussianSplatError, normalize, type Vector3 } from '@gaussian-splat/core';
+import { GaussianSplatError, loadModule, normalize, type Vector3 } from '@gaussian-splat/core';
 import { grouped } from '../bytes.js';
 import type { DraftCloud } from '../cloud.js';
 import { DEGREE_4, FLAT, warn } from '../faults.js';
-import { OFFSETS, PLAIN } from './gaussian-layout.js';
+import { OFFSETS, PLAIN, TRAILING } from './gaussian-layout.js';
+import { safeOrbit } from '../safe-orbit.js';
 import type { PlyHeader } from './header.js';
 
-/** Filter variance in px² in the training of Mip-Splatting and of Brush's mip mode. */
+/** Filter variance in px² with which Mip-Splatting and the mip mode of Brush train. */
 export const MIP_VARIANCE = 0.1;
 
-/** Key of the comment with the sort order of training. */
+/** Matches a comment with the sort order of training, which is group 1. */
 const SORTING = /^sort(?:ing)?_?(?:method|mode)\s*[:=]?\s*(\S+)$/i;
-/** No trainer writes it yet: `pixel`, and the names of per-pixel sorting in StopThePop's settings. */
+/** Matches sort orders per pixel: `pixel`, and the names in the settings of StopThePop. No known trainer writes one. */
 const ORDERS_PIXELS = /^(per_?)?pixel|^(hierarchical|full_sort|k_?buffer)$/;
 
-/** Text of the comments after a key such as `Vertical Axis:`; the last one wins, as in the tools that write them. */
+/**
+ * Returns group 1 of the last comment that matches a key such as `Vertical Axis:`, in lower case; undefined if none
+ * matches. The last comment applies in the tools that write them, too. White space is reduced to single spaces, because
+ * the time of a match is quadratic in the length of white space.
+ */
 function valueOf(comments: readonly string[], key: RegExp): string | undefined {
   return comments
-    .map((text) => key.exec(text.trim()))
+    .map((text) => key.exec(text.replace(/\s+/g, ' ').trim()))
     .findLast((match) => match !== null)?.[1]
     .trim()
     .toLowerCase();
 }
 
-/** Sets the metadata of a header's comments: filter, order, up, and the tool that wrote the file. */
+/** Sets the metadata of a cloud from comments: filter, sort order, direction up, and the program that wrote the file. */
 export function readComments(cloud: DraftCloud, comments: readonly string[]): void {
   const mode = valueOf(comments, /^splatrendermode\s*:\s*(.*)$/i);
   if (mode !== undefined) cloud.antialiased = mode === 'mip';
   else if (valueOf(comments, /^antialiased\s*[:=]?\s*(\S*)$/i) === '1') cloud.antialiased = true;
   const variance = Number(valueOf(comments, /^filter_variance\s*[:=]?\s*(\S+)$/i) ?? NaN);
   if (variance >= 0 && variance <= 1) cloud.filterVariance = variance;
-  // gsplat's trainer compensates for 0.3.
+  // The trainer of gsplat uses a filter variance of 0.3 px², the default.
   else if (mode === 'mip' && !comments.some((text) => /gsplat/i.test(text))) cloud.filterVariance = MIP_VARIANCE;
   const generator = valueOf(comments, /^((?:generated|exported|created) .*)$/i);
   if (ORDERS_PIXELS.test(valueOf(comments, SORTING) ?? '')) cloud.hints = { ...cloud.hints, order: 'pixel' };
@@ -43,8 +48,8 @@ export function readComments(cloud: DraftCloud, comments: readonly string[]): vo
 }
 
 /**
- * nerfstudio writes `Vertical Axis: z` for +z; Brush writes the direction, or an axis, which it interprets as pointing
- * down.
+ * Returns the unit direction up from a comment; undefined if there is none. An axis without a sign, such as `Vertical
+ * Axis: z`, is +z in nerfstudio but -z in Brush. Brush also writes three numbers.
  */
 function upOf(comments: readonly string[]): Vector3 | undefined {
   const text = valueOf(comments, /^vertical\s+axis\s*:\s*(.*)$/i);
@@ -56,15 +61,15 @@ function upOf(comments: readonly string[]): Vector3 | undefined {
     return ['x', 'y', 'z'].map((name) => (name === axis[2] ? sign : 0)) as unknown as Vector3;
   }
   const numbers = text.split(/[\s,]+/).map(Number);
+  if (numbers.length !== 3) return undefined;
   const size = Math.hypot(...numbers);
-  return numbers.length === 3 && size > 0 && Number.isFinite(size)
-    ? normalize(numbers as unknown as Vector3)
-    : undefined;
+  return size > 0 && Number.isFinite(size) ? normalize(numbers as unknown as Vector3) : undefined;
 }
 
 /**
- * Applies the 3D smoothing filter of Mip-Splatting: it widens Gaussians and reduces their opacity accordingly (Yu et
- * al. 2024, section 4.1; same as `create_fused_ply` of its code). Training stores the filter separately.
+ * Applies the 3D smoothing filter of Mip-Splatting in place: widens Gaussians and reduces their opacity (Yu et al. 2024,
+ * section 4.1; `create_fused_ply` of its code).
+ * @param filter [N] standard deviation of the filter for each splat, in units of the scene.
  */
 export function fuseFilter(cloud: DraftCloud, filter: Float32Array): void {
   const { count, scales, opacities } = cloud;
@@ -81,11 +86,48 @@ export function fuseFilter(cloud: DraftCloud, filter: Float32Array): void {
   }
 }
 
-/** Supported properties, and others that do not affect drawing: labels and training statistics. */
+/** Elements of Niantic's library with a safe orbit: two elevations, and a radius. */
+const ELEVATIONS = 'safe_orbit_camera_elevation_min_max_radians';
+const RADIUS = 'safe_orbit_camera_radius_min';
+
+/**
+ * Reads the elements that follow the splats: a safe orbit, and the color space of SHARP, 0 for sRGB and 1 for linear
+ * RGB.
+ * @param valuesOf Returns the values of an element whose only property has the same name.
+ */
+export async function readTrailing(
+  cloud: DraftCloud,
+  { elements }: PlyHeader,
+  valuesOf: (name: string) => Float32Array,
+): Promise<void> {
+  const has = (wanted: string, rows: number): boolean =>
+    elements.some(({ name, count }) => name === wanted && count === rows);
+  if (has(ELEVATIONS, 2) && has(RADIUS, 1)) {
+    const orbit = safeOrbit([...valuesOf(ELEVATIONS), ...valuesOf(RADIUS)]);
+    if (orbit) cloud.hints = { ...cloud.hints, orbit };
+    else warn(cloud, 'The limits of the camera are left out, because they are no angles and radius of an orbit.');
+  }
+  if (!has('color_space', 1) || valuesOf('color_space')[0] !== 1) return;
+  const { encodeLinearColors } = await loadModule(
+    'the code that encodes linear colors',
+    () => import('../linear-colors.js'),
+  );
+  encodeLinearColors(cloud, 'color_space 1 of SHARP');
+}
+
+/** Matches supported properties, and properties that do not affect drawing: labels and training statistics. */
 const READ =
   /^(filter_3D|f_rest_\d+|alpha|(obj|sem|semantic|instance|label|class|object|segment|confidence|kl|id)(_.*)?)$/i;
 
-/** Warns of content that is not drawn, or may be misinterpreted. */
+/**
+ * Matches supported elements, elements with a warning of their own, and elements that do not affect drawing: the camera
+ * of the photograph in files of SHARP.
+ */
+const KNOWN = new RegExp(
+  `${TRAILING.source}|^(vertex|sh|chunk|face|tristrips|extrinsic|intrinsic|image_size|frame|disparity|version)$`,
+);
+
+/** Adds warnings about content that is not drawn, or that may be misinterpreted. */
 export function warnDropped(cloud: DraftCloud, { elements }: PlyHeader, fileName: string): void {
   const properties = (name: string): string[] =>
     elements
@@ -99,9 +141,11 @@ export function warnDropped(cloud: DraftCloud, { elements }: PlyHeader, fileName
     const listed = unread.slice(0, 6).join(', ') + (unread.length > 6 ? `, ... (${unread.length})` : '');
     warn(
       cloud,
-      `Properties of splats that are not known are left out: ${listed}. If they move or recolour the splats, what is drawn is not what was trained.`,
+      `Properties of splats that are not known are left out: ${listed}. If they move or recolor the splats, what is drawn is not what was trained.`,
     );
   }
+  const others = elements.filter(({ name, count }) => count > 0 && !KNOWN.test(name)).map(({ name }) => name);
+  if (others.length > 0) warn(cloud, `Elements that are not known are left out: ${others.slice(0, 6).join(', ')}.`);
   for (const { name, count } of elements) {
     if (/^(face|tristrips)$/.test(name) && count > 0)
       warn(cloud, `${grouped(count)} rows of "${name}" are left out: only splats are drawn, not meshes.`);
@@ -114,8 +158,9 @@ export function warnDropped(cloud: DraftCloud, { elements }: PlyHeader, fileName
 }
 
 /**
- * Warns of numbers that look activated: trained scenes have negative logits, and splats smaller than one unit.
- * @param hasLargeScales Whether also no logarithm of a scale is below 0.
+ * Adds a warning about numbers that may have been activated already. Trained scenes have negative logits, and splats
+ * smaller than one unit.
+ * @param hasLargeScales Whether no logarithm of a scale is below 0. All logits are in 0..1.
  */
 export function noteActivated(cloud: DraftCloud, hasLargeScales: boolean): void {
   warn(
@@ -126,11 +171,11 @@ export function noteActivated(cloud: DraftCloud, hasLargeScales: boolean): void 
   );
 }
 
-/** Other kinds of splats whose property names may be the same: recognized by a unique name. */
+/** Other kinds of splats with the same property names. `mark` matches a name that only this kind has. */
 const OTHER_SPLAT_TYPES: readonly { readonly mark: RegExp; readonly found: string; readonly remedy: string }[] = [
   {
     mark: /^(trbf_center|motion_\d+|omega_\d+)$/,
-    found: 'SpacetimeGaussians, which move and whose f_dc_* are plain colours',
+    found: 'SpacetimeGaussians, which move and whose f_dc_* are plain colors',
     remedy: 'export each moment as a PLY of its own and show them as a sequence',
   },
   {
@@ -146,11 +191,11 @@ const OTHER_SPLAT_TYPES: readonly { readonly mark: RegExp; readonly found: strin
   {
     mark: /^codebook_centers$/,
     found: 'splats as reduced-3dgs compresses them',
-    remedy: 'save the scene without quantisation, or unpack it with the tools of reduced-3dgs, and give that PLY',
+    remedy: 'save the scene without quantization, or unpack it with the tools of reduced-3dgs, and give that PLY',
   },
 ];
 
-/** Throws `decode/unsupported` if names show that the numbers have another meaning than in plain splats. */
+/** Throws `decode/unsupported` if names show that properties have another meaning than in plain splats. */
 export function refuseOtherMeanings(where: string, { elements }: PlyHeader): void {
   const names = elements.flatMap(({ name, properties }) => [name, ...properties.map((property) => property.name)]);
   for (const { mark, found, remedy } of OTHER_SPLAT_TYPES) {

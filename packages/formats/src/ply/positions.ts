@@ -1,17 +1,19 @@
 import type { Vector3 } from '@gaussian-splat/core';
 
-/** float64 [N, 3] positions split into a float64 origin and float32 positions relative to it. */
+/** Positions [N, 3] in float32, relative to an origin in float64. */
 export interface RelativePositions {
   readonly origin: Vector3;
   readonly positions: Float32Array;
 }
 
-/** Maximum number of coordinates that are sampled for the origin. */
+/** Maximum number of splats that are sampled for the origin. */
 const SAMPLE_LIMIT = 16_384;
 
 /**
- * Moves the origin to the center of a scene far from (0, 0, 0), such as a georeferenced one, so that float32 keeps the
- * detail of float64. The origin stays (0, 0, 0) if float32 represents every coordinate exactly.
+ * Splits positions into a float64 origin and float32 positions relative to it, so that float32 keeps the detail of
+ * scenes far from (0, 0, 0), such as georeferenced ones. The origin is (0, 0, 0) if float32 represents every coordinate
+ * exactly.
+ * @param world [N, 3] positions.
  */
 export function relativePositions(world: Float64Array): RelativePositions {
   const isExact = world.every((value) => Math.fround(value) === value || !Number.isFinite(value));
@@ -21,7 +23,7 @@ export function relativePositions(world: Float64Array): RelativePositions {
   return { origin, positions };
 }
 
-/** Median of one axis, which is robust to outliers, unlike a mean or a box. */
+/** Returns the median of one axis from a sample. Unlike a mean, it is robust to outliers. */
 function medianOf(world: Float64Array, axis: number): number {
   const step = 3 * Math.max(1, Math.ceil(world.length / 3 / SAMPLE_LIMIT));
   const sample: number[] = [];

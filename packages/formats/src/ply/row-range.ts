@@ -4,23 +4,25 @@ import { readPly } from '../readers/ply.js';
 import type { SceneSource, SplatRange } from '../scene-format.js';
 import { MAX_HEADER_BYTES } from '../signatures.js';
 import type { SplatRanges } from '../splat-ranges.js';
-import { COLOR_SPACE, findGaussians, withPlainNames } from './gaussian-layout.js';
+import { findGaussians, TRAILING, withPlainNames } from './gaussian-layout.js';
 import { exceedsFloat32, parsePlyHeader } from './header.js';
 import { openElement } from './rows.js';
 
-/** Returns the location of a PLY's splats, or undefined if its rows differ in size or depend on one another. */
+/**
+ * Returns the properties of a PLY whose rows can be read independently. Undefined if rows differ in size, coordinates
+ * need an origin, or a color space or safe orbit follows the rows.
+ */
 export function plyRanges(source: SceneSource): SplatRanges | undefined {
   const header = withPlainNames(parsePlyHeader(source));
   const { vertex, degree } = findGaussians(source, header);
-  // The color-space element follows all rows.
-  if (header.elements.some(({ name }) => name === COLOR_SPACE)) return undefined;
+  if (header.elements.some(({ name }) => TRAILING.test(name))) return undefined;
   const { start, rowBytes } = openElement({ ...source, isPrefix: true }, header, 'vertex');
   const isCoarse = vertex.properties.some(({ name, type }) => /^[xyz]$/.test(name) && exceedsFloat32(type));
   if (rowBytes === undefined || rowBytes === 0 || isCoarse || start > MAX_HEADER_BYTES) return undefined;
   return { count: vertex.count, shDegree: keptDegree(degree), rows: { start, byteLength: rowBytes } };
 }
 
-/** Reads some rows of a PLY, from a file with its header followed by only these rows. */
+/** Reads a range of the rows of a PLY: copies its header and these rows to a smaller file, which `readPly` reads. */
 export function readPlyRange(source: SceneSource & { readonly range: SplatRange }): Promise<GaussianCloud> {
   const { bytes, range } = source;
   const { start, rowBytes = 0 } = openElement(source, parsePlyHeader(source), 'vertex');

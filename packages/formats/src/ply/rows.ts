@@ -12,19 +12,20 @@ export interface ColumnTarget {
   readonly offset: number;
 }
 
-/** One element of a PLY file and the offset of its first row. */
+/** An element of a PLY file. `start` is the byte offset of its first row. */
 export interface ElementData {
   readonly source: SceneSource;
   readonly encoding: PlyHeader['encoding'];
   readonly element: PlyElement;
   readonly start: number;
-  /** Bytes of every row; undefined for text and for rows with lists, which have no fixed size. */
+  /** Size of each row in bytes. Undefined for text and for rows with lists, which have no fixed size. */
   readonly rowBytes: number | undefined;
 }
 
 /**
- * Finds an element of the header, skipping those before it, and checks that the file can hold its rows, so that a
- * caller may allocate for `element.count` rows. Throws `decode/truncated` otherwise.
+ * Finds an element of the header by its name, and skips the elements before. The file is long enough for its rows, so
+ * that a caller may allocate memory for `element.count` rows. If the file is a prefix, `element.count` is reduced.
+ * @throws GaussianSplatError `decode/truncated`
  */
 export function openElement(source: SceneSource, header: PlyHeader, name: string): ElementData {
   const { encoding } = header;
@@ -40,14 +41,14 @@ export function openElement(source: SceneSource, header: PlyHeader, name: string
   throw new Error(`no element ${name}: callers ask only for elements of the header`);
 }
 
-/** Returns the complete rows of a file that is still loading. */
+/** Returns an element with a count of only the rows that are complete, for a file that is still loading. */
 function wholeRows(data: ElementData, rowBytes: number): ElementData {
   const { element, source, start } = data;
   const rows = Math.max(0, Math.floor((source.bytes.length - start) / Math.max(1, rowBytes)));
   return { ...data, element: { ...element, count: Math.min(element.count, rows) } };
 }
 
-/** Copies properties of all rows to their targets. Throws `decode/truncated` or, for text, `decode/corrupt`. */
+/** Copies properties of all rows to their targets. Throws `decode/truncated`, or `decode/corrupt` for invalid text. */
 export function readColumns(data: ElementData, targets: readonly ColumnTarget[]): void {
   if (data.rowBytes === undefined) readSequentially(data, targets);
   else if (canViewAsFloats(data, targets)) readFloats(data, targets);
@@ -61,10 +62,10 @@ function fixedRowBytes(element: PlyElement, encoding: PlyHeader['encoding']): nu
   return properties.reduce((sum, property) => sum + sizeOf(property.type), 0);
 }
 
-/** Minimum size of a row, which bounds allocations before anything is read. */
+/** Returns the minimum size of a row in bytes, for checks before memory is allocated. */
 function minimumRowBytes({ element, encoding, rowBytes }: ElementData): number {
   if (rowBytes !== undefined) return rowBytes;
-  // A digit and a separator for each value of a text file.
+  // Each value of a text file has at least a digit and a separator.
   const sizes = element.properties.map(({ type, listCountType }) =>
     encoding === 'ascii' ? 2 : sizeOf(listCountType ?? type),
   );
@@ -91,7 +92,7 @@ function throwTruncated(data: ElementData, rows: number): never {
   });
 }
 
-/** Returns a cursor at the first row. */
+/** Returns a cursor at the first row of an element. */
 export function cursorAt({ source, encoding, start }: ElementData): ValueCursor {
   return encoding === 'ascii'
     ? new AsciiCursor(source, start)
@@ -103,7 +104,7 @@ function endOf(data: ElementData): number {
   return readSequentially(data, []);
 }
 
-/** Reads rows value by value; returns the offset after the last row. */
+/** Reads rows value by value, and copies properties to their targets. Returns the byte offset after the last row. */
 function readSequentially(data: ElementData, targets: readonly ColumnTarget[]): number {
   const { element } = data;
   const cursor = cursorAt(data);
@@ -122,7 +123,7 @@ function readSequentially(data: ElementData, targets: readonly ColumnTarget[]): 
   return cursor.position;
 }
 
-/** Skips a list. Throws `decode/corrupt` for an invalid length. */
+/** Moves the cursor past a list. Throws `decode/corrupt` for an invalid length. */
 export function skipList(
   data: ElementData,
   cursor: ValueCursor,
@@ -144,7 +145,7 @@ export function skipList(
   cursor.skip(type, length);
 }
 
-/** Offset of each target's property within a row, and its getter. */
+/** Returns, for each target that the element has, the byte offset of its property within a row, and a getter. */
 function locateColumns({ element, encoding }: ElementData, targets: readonly ColumnTarget[]) {
   let at = 0;
   const columns = [];
@@ -156,7 +157,7 @@ function locateColumns({ element, encoding }: ElementData, targets: readonly Col
   return columns;
 }
 
-/** Rows are processed in blocks of this size, so that a block stays in the cache while its columns are copied. */
+/** Number of rows that are processed together, so that they remain in the cache while their columns are copied. */
 const BLOCK_ROWS = 256;
 
 function readFixedRows(data: ElementData, targets: readonly ColumnTarget[]): void {
@@ -175,7 +176,7 @@ function readFixedRows(data: ElementData, targets: readonly ColumnTarget[]): voi
   }
 }
 
-/** The common case, float32 throughout in the host's byte order, is read without a DataView: three times as fast. */
+/** Whether all targets are aligned float32 in the byte order of the host. They are read without a DataView, 3 times as fast. */
 function canViewAsFloats(data: ElementData, targets: readonly ColumnTarget[]): boolean {
   return (
     hostIsLittleEndian &&
@@ -189,7 +190,7 @@ function readFloats(data: ElementData, targets: readonly ColumnTarget[]): void {
   const { source, element, start } = data;
   const rowBytes = data.rowBytes ?? 0;
   const parts = columnsByArray(data, targets);
-  // Rows of a file need not start at multiples of 4.
+  // Rows are copied to aligned memory, because their offsets in the file may not be multiples of 4.
   const block = new Uint8Array(BLOCK_ROWS * rowBytes);
   const floats = new Float32Array(block.buffer);
   for (let first = 0; first < element.count; first += BLOCK_ROWS) {
@@ -200,7 +201,7 @@ function readFloats(data: ElementData, targets: readonly ColumnTarget[]): void {
   }
 }
 
-/** Columns of float rows, and their destinations in the rows of an array. */
+/** Columns whose destination is the same array: indices of floats in a row of the file, and in a row of the array. */
 interface ArrayColumns {
   readonly array: ColumnTarget['array'];
   readonly stride: number;
@@ -208,7 +209,7 @@ interface ArrayColumns {
   readonly to: Int32Array;
 }
 
-/** Groups columns by destination array, so that writes of a row are close to one another. */
+/** Groups columns by their destination array, so that each row is written to adjacent memory. */
 function columnsByArray(data: ElementData, targets: readonly ColumnTarget[]): ArrayColumns[] {
   const columns = locateColumns(data, targets).sort((a, b) => a.target.offset - b.target.offset);
   return [...new Set(columns.map(({ target }) => target.array))].map((array) => {

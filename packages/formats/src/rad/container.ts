@@ -5,10 +5,10 @@ import type { SceneSource } from '../scene-format.js';
 import { noParts } from '../readers/sog.js';
 
 const MAX_JSON_BYTES = 1 << 24;
-/** Length of the signature and of the length of the description. */
+/** Bytes of the signature and of the length of the JSON description. */
 const START_BYTES = 8;
 
-/** One property of the splats of a chunk, as stored. */
+/** A property of the splats of a chunk, encoded. `min` and `max` are the bounds of quantized values. */
 export interface RadProperty {
   readonly name: string;
   readonly encoding: string;
@@ -18,21 +18,25 @@ export interface RadProperty {
   readonly max: number;
 }
 
-/** Consecutive splats. */
+/** A chunk of a scene: some of its splats, in the order of the file. */
 export interface RadChunk {
-  /** Name in error messages. */
+  /** Name of the chunk in error messages. */
   readonly where: string;
   readonly count: number;
   /** Degree of the spherical harmonics, 0 to 3. */
   readonly degree: number;
-  /** Whether splats are the nodes of a tree: those without children are the finest level. */
+  /** Whether splats are the nodes of a tree. Splats without children are then the finest level. */
   readonly isTree: boolean;
-  /** Number of entries in the file's palette of harmonics, if it declares one. */
+  /** Number of entries in the file's palette of spherical harmonics; undefined if the file declares none. */
   readonly paletteCount: number | undefined;
   readonly properties: readonly RadProperty[];
 }
 
-/** Iterates over the chunks of a RAD file in order, including those in separate files. A file may be a single chunk. */
+/**
+ * Iterates over the chunks of a RAD file in order, including those in separate files. A file may be a single chunk.
+ * @throws GaussianSplatError `decode/header`, `decode/truncated`, `decode/corrupt`, `decode/unsupported`,
+ * `out-of-memory/budget`; errors of opening another file
+ */
 export async function* chunksOf(source: SceneSource): AsyncGenerator<RadChunk> {
   const { bytes, name, budget } = source;
   if (startsWith(bytes, 'RADC')) {
@@ -57,7 +61,7 @@ export async function* chunksOf(source: SceneSource): AsyncGenerator<RadChunk> {
     const first = end + count(offset, `${where}.offset`);
     const last = first + count(length, `${where}.bytes`);
     if (last > bytes.length) throw damaged(where, `${grouped(last)} bytes`, grouped(bytes.length), 'decode/truncated');
-    // A list may refer to the same chunk repeatedly.
+    // Each chunk is charged, because a list may refer to the same chunk repeatedly.
     budget.take(length as number, where);
     yield chunkIn(source, bytes.subarray(first, last), where, entries);
   }
@@ -69,7 +73,7 @@ function chunkIn({ budget }: SceneSource, bytes: Uint8Array, where: string, pale
   if (version !== 1) throw damaged(`${where}, version`, 'version 1', show(version), 'decode/unsupported');
   if (![0, 1, 2, 3].includes(maxSh as number)) throw damaged(`${where}, maxSh`, '0 to 3', show(maxSh));
   if (!Array.isArray(properties)) throw damaged(`${where}, properties`, 'a list', show(properties), 'decode/header');
-  // The length of the properties follows the description.
+  // The 8 bytes after the description are the length of the properties.
   const payload = end + 8;
   return {
     where,
@@ -98,7 +102,7 @@ function propertyOf(property: unknown, bytes: Uint8Array, payload: number, where
   };
 }
 
-/** Reads a JSON description after a signature and its length; padded to a multiple of 8 bytes. */
+/** Reads the JSON description after a signature and a length. `end` is the byte after the padding to a multiple of 8. */
 function descriptionAt(
   { budget }: Pick<SceneSource, 'budget'>,
   bytes: Uint8Array,

@@ -1,24 +1,25 @@
 import { halfToNumber } from '@gaussian-splat/core';
-import { gunzipSync, inflateSync } from 'fflate';
-import { grouped, startsWith, viewOf } from '../bytes.js';
+import { grouped, viewOf } from '../bytes.js';
 import { damaged } from '../faults.js';
+import { inflateUpTo } from '../inflate.js';
 import type { SceneSource } from '../scene-format.js';
 import type { RadProperty } from './container.js';
 
-/** Bytes of each value. */
+/** Bytes of a value of each encoding. */
 const WIDTHS: Readonly<Record<string, number>> = {
   ...{ f32: 4, f16: 2, f32_lebytes: 4, f16_lebytes: 2, ln_f16: 2, u16: 2, u32: 4 },
   ...{ r8: 1, r8_delta: 1, s8: 1, s8_delta: 1, ln_0r8: 1, oct88r8: 1 },
 };
-/** The scale of code 0 is 0; other codes divide the logarithms between the bounds into this many steps. */
+/** Number of logarithmic steps between the bounds, for codes 1 to 255. Code 0 is the scale 0. */
 const LOGARITHM_STEPS = 254;
 
 type Value = (at: number) => number;
 
 /**
- * Returns the values of a property, splat by splat.
- * @param size Number of values for each splat; columns are contiguous in the file.
- * @param count Number of splats; undefined for all of them.
+ * Decodes the values of a property, [splats, size]. In the file, each of the `size` columns is contiguous.
+ * @param size Number of values for each splat.
+ * @param count Number of splats. If undefined, it follows from the length of the content.
+ * @throws GaussianSplatError `decode/unsupported`, `decode/truncated`, `decode/corrupt`, `out-of-memory/budget`
  */
 export function valuesOf(
   property: RadProperty,
@@ -47,7 +48,10 @@ export function valuesOf(
   return values;
 }
 
-/** Returns the bytes of a property: a copy if they are modified later. */
+/**
+ * Returns the inflated bytes of a property. They are a copy if decoding modifies them.
+ * @param expected Number of bytes, if known. Throws `decode/truncated` for fewer.
+ */
 export function contentOf(
   { bytes, isDeflated, encoding }: RadProperty,
   expected: number | undefined,
@@ -62,26 +66,25 @@ export function contentOf(
   return content;
 }
 
-/** Palettes do not declare their length. Limit of their inflation ratio, because float32 numbers hardly compress. */
+/** Maximum inflation ratio of palettes, which do not declare their length. Float32 values compress little. */
 const MAX_INFLATED = 16;
 
-/** Spark writes raw deflate streams; other writers interpret "gz" literally. */
+/** Inflates at most `max` bytes. The compression "gz" is raw deflate in files of Spark, gzip in files of other programs. */
 function inflated(bytes: Uint8Array, max: number, where: string): Uint8Array {
-  const out = new Uint8Array(max);
   try {
-    return startsWith(bytes, [0x1f, 0x8b]) ? gunzipSync(bytes, { out }) : inflateSync(bytes, { out });
+    return inflateUpTo(bytes, max);
   } catch (cause) {
-    // A stream that is too long ends in a RangeError.
+    if (cause instanceof RangeError) throw cause;
     const expected = `a deflate stream of ${grouped(max)} bytes`;
     throw damaged(where, expected, (cause as Error).message || 'damage', 'decode/corrupt', cause);
   }
 }
 
-/** Returns a getter by index, counted column by column, for `all` values. */
+/** Returns a getter of a decoded value by its index, which counts column by column. @param all Number of values. */
 function reader({ encoding, min, max }: RadProperty, bytes: Uint8Array, all: number): Value {
   const view = viewOf(bytes);
   const single = new DataView(new ArrayBuffer(4));
-  /** Joins the bytes of a value that are stored plane by plane: all lowest bytes first, then the next. */
+  /** Returns the bytes of a value, which are in separate planes: the lowest bytes of all values, then the next bytes. */
   const interleaved = (width: number, at: number): DataView => {
     for (let k = 0; k < width; k++) single.setUint8(k, bytes[k * all + at]);
     return single;

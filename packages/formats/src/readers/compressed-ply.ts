@@ -6,26 +6,26 @@ import { parsePlyHeader, type PlyElement, type PlyHeader } from '../ply/header.j
 import { openElement, readColumns } from '../ply/rows.js';
 import type { SceneSource } from '../scene-format.js';
 
-/** Number of splats with a common row of the element `chunk`. */
+/** Number of splats that a row of the element `chunk` describes. */
 const CHUNK_SPLATS = 256;
 const PACKED = ['packed_position', 'packed_rotation', 'packed_scale', 'packed_color'];
 const BOUNDS = ['min_', 'max_', 'min_scale_', 'max_scale_'].flatMap((bound) => ['x', 'y', 'z'].map((a) => bound + a));
 const COLOR_BOUNDS = ['min_', 'max_'].flatMap((bound) => ['r', 'g', 'b'].map((channel) => bound + channel));
 
-/** Bounds of one chunk, in the order of {@link BOUNDS} and then {@link COLOR_BOUNDS}. */
+/** Indices of bounds in the row of a chunk, which has {@link BOUNDS} and then {@link COLOR_BOUNDS}. */
 const [MIN_POSITION, MAX_POSITION, MIN_SCALE, MAX_SCALE, MIN_COLOR, MAX_COLOR] = [0, 3, 6, 9, 12, 15];
 const CHUNK_FLOATS = 18;
 
 /**
- * Reads the compressed PLY of PlayCanvas and SuperSplat: bounds for each 256 splats, four 32-bit words for each splat
- * relative to them, and optional 8-bit spherical harmonics. Follows the decompressor of splat-transform
- * (`src/lib/readers/decompress-ply.ts`), but keeps opacities instead of converting them to logits, so that 255 is
- * opacity 1 and not infinite. Files with 12 chunk properties (before 2024) store colors 0..1 without bounds.
+ * Reads the compressed PLY of PlayCanvas and SuperSplat. A file has bounds for each 256 splats, four 32-bit words for each
+ * splat relative to these bounds, and optional 8-bit spherical harmonics. The formulas are those of splat-transform
+ * (`src/lib/readers/decompress-ply.ts`), except that opacities are not converted to logits, so that 255 is opacity 1.
+ * Files with 12 chunk properties (before 2024) have colors 0..1 without bounds.
  */
 export async function readCompressedPly(source: SceneSource): Promise<GaussianCloud> {
   const header = parsePlyHeader(source);
   const { sh } = checkElements(source, header);
-  // Coefficients come after all splats, so they are skipped in a file that is still loading.
+  // Coefficients follow all splats. A file that is still loading is read without them.
   const degree = sh && !source.isPrefix ? shDegreeOf(source, sh) : 0;
   const chunkBounds = readChunkBounds(source, header);
   const vertexData = openElement(source, header, 'vertex');
@@ -79,7 +79,7 @@ function checkElements(source: SceneSource, header: PlyHeader): { sh: PlyElement
   return { sh };
 }
 
-/** [chunks, 18] bounds; colors without bounds span 0..1. */
+/** Returns bounds, [chunks, 18]. The bounds of colors are 0 and 1 if the file has none. */
 function readChunkBounds(source: SceneSource, header: PlyHeader): Float32Array {
   const data = openElement(source, header, 'chunk');
   const bounds = new Float32Array(CHUNK_FLOATS * data.element.count);
@@ -119,7 +119,11 @@ function mix(a: number, b: number, t: number): number {
   return a * (1 - t) + b * t;
 }
 
-/** Three fractions of 11, 10 and 11 bits, first axis highest, between the bounds of the chunk. */
+/**
+ * Decodes three values between bounds from a word of 11, 10 and 11 bits; the first axis has the highest bits.
+ * @param min Index in `bounds` of the three lower bounds.
+ * @param max Index in `bounds` of the three upper bounds.
+ */
 function unpack111011(
   word: number,
   bounds: Float32Array,
@@ -134,8 +138,8 @@ function unpack111011(
 }
 
 /**
- * Two bits select the largest component of (w, x, y, z), which is not stored, and 10 bits encode each of the others,
- * ±1/sqrt(2).
+ * Decodes a quaternion (w, x, y, z). The highest 2 bits of the word are the index of the largest component, which is not
+ * stored. Each other component has 10 bits, from -1/sqrt(2) to 1/sqrt(2).
  */
 function unpackRotation(word: number, out: Float32Array, at: number): void {
   const largest = word >>> 30;
@@ -150,7 +154,7 @@ function unpackRotation(word: number, out: Float32Array, at: number): void {
   out[at + largest] = Math.sqrt(Math.max(0, 1 - squares));
 }
 
-/** Coefficients -4..4 in 8 bits: bucket centers, except that 0 and 255 are the ends of the range. */
+/** Coefficient, -4..4, of each byte. A byte is the center of an interval, except that 0 and 255 are -4 and 4. */
 const HARMONIC_OF_BYTE = Float32Array.from({ length: 256 }, (_, byte) => {
   const fraction = byte === 0 ? 0 : byte === 255 ? 1 : (byte + 0.5) / 256;
   return (fraction - 0.5) * 8;

@@ -14,16 +14,16 @@ import { isFar, applyMotion } from '../transform/moved-cloud.js';
 import { isJsonWith } from '../signatures.js';
 import { noParts } from './sog.js';
 
-/** glTF's axes are left, up and forward of the subject; a cloud's are right, down and forward. */
+/** Transform from the axes of glTF (left, up, forward of the subject) to those of a cloud (right, down, forward). */
 const TO_CLOUD: Affine = [-1, 0, 0, 0, 0, -1, 0, 0, 0, 0, 1, 0];
 
-/** Charge for each instance of a primitive of splats, because a short file can repeat the same ones many times. */
+/** Bytes that are charged for each instance of a primitive, because a short file can repeat a primitive many times. */
 const PRIMITIVE_BYTES = 1024;
 
 /**
- * Reads glTF 2 and GLB with `KHR_gaussian_splatting`: all primitives with splats of the default scene, each transformed
- * by its nodes (including spherical harmonics), uncompressed or as SPZ. Degrees may differ. Meshes and points without
- * the extension, cameras, lights and animations are skipped; `hints.meshes` reports the presence of meshes.
+ * Reads glTF 2 and GLB with `KHR_gaussian_splatting`: the uncompressed or SPZ splats of all primitives in the default
+ * scene. Transforms of nodes apply to spherical harmonics, too. Primitives may have different degrees. Other primitives,
+ * cameras, lights and animations are skipped; `hints.meshes` is true if there are other primitives.
  */
 export async function readGltf(source: SceneSource): Promise<GaussianCloud> {
   if (isTileset(source.bytes)) {
@@ -33,7 +33,7 @@ export async function readGltf(source: SceneSource): Promise<GaussianCloud> {
   return readSplats(source);
 }
 
-/** The JSON of 3D Tiles has an asset, too. */
+/** Whether a file is a tileset of 3D Tiles, whose JSON has an `asset` as glTF does. */
 export const isTileset = isJsonWith(/"geometricError"\s*:/);
 
 async function readSplats(source: SceneSource): Promise<GaussianCloud> {
@@ -76,7 +76,7 @@ async function readSplats(source: SceneSource): Promise<GaussianCloud> {
   return whole;
 }
 
-/** Ranges are offered only for documents that match the specification: see {@link gltfSplats}. */
+/** Encoding of documents that are read in ranges: {@link gltfSplats} requires that they match the specification. */
 const PLAIN: Activation = { hasLogarithms: false, hasLogits: false, isInPlyFrame: false };
 
 const openCloudsOf = (found: readonly (PlacedSplats & { readonly cloud: GaussianCloud })[]): GaussianCloud[] =>
@@ -90,10 +90,13 @@ async function encodeColors(cloud: DraftCloud): Promise<void> {
   encodeLinearColors(cloud, 'lin_rec709_display');
 }
 
-/** Maximum number of extensions in a message. */
+/** Maximum number of extensions that a warning names. */
 const MAX_NAMED = 6;
 
-/** Warns of content that is not drawn. Other warnings of a file with meshes are left to the code that draws these. */
+/**
+ * Adds warnings about animations and unknown extensions. If the file has meshes, the code that draws them reports
+ * extensions.
+ */
 function warnDropped(cloud: DraftCloud, json: Json, hasMeshes: boolean): void {
   const unknown = hasMeshes ? [] : unknownExtensions(json);
   const named = unknown.slice(0, MAX_NAMED).map((extension) => extension.slice(0, 80));
@@ -104,9 +107,8 @@ function warnDropped(cloud: DraftCloud, json: Json, hasMeshes: boolean): void {
 }
 
 /**
- * Returns the number of splats in a glTF, and their degree; undefined if they cannot be read in ranges: because they
- * are compressed, in another file, encoded differently from the specification, or far enough away to need their own
- * origin.
+ * Returns the number of splats in a glTF, and their degree, if ranges of them can be read. Undefined if splats are
+ * compressed, in another file, encoded differently from the specification, or too far away for an origin of 0.
  */
 export async function gltfSplats(source: SceneSource): Promise<{ count: number; shDegree: ShDegree } | undefined> {
   const { document, placed } = open(source);
@@ -123,14 +125,14 @@ export async function gltfSplats(source: SceneSource): Promise<{ count: number; 
   return { count, shDegree };
 }
 
-/** Splats with their transform in the scene, and their location in the file. */
+/** An instance of a primitive of splats: its path in the JSON, and its transform to the coordinates of the scene. */
 interface PlacedSplats {
   readonly primitive: Json;
   readonly path: string;
   readonly toScene: Affine;
 }
 
-/** Returns the primitives with splats of the default scene in order, and the number of others. */
+/** Returns the instances of primitives with splats in the default scene, and the number of other instances. */
 function open({ bytes, name, openFile, budget }: SceneSource): {
   document: GltfDocument;
   placed: PlacedSplats[];
@@ -154,7 +156,7 @@ function open({ bytes, name, openFile, budget }: SceneSource): {
   return { document, placed, others };
 }
 
-/** Primitives of a mesh. */
+/** Primitives of a mesh with splats, and the number of its other primitives. */
 interface MeshParts {
   readonly splats: readonly Omit<PlacedSplats, 'toScene'>[];
   readonly others: number;
@@ -169,7 +171,10 @@ function partsOf(document: GltfDocument, mesh: number): MeshParts {
   return { splats, others: primitives.length - splats.length };
 }
 
-/** Intersects a range with `count` splats from index `at` on; the result is relative to `at`. */
+/**
+ * Returns the part of a range within the splats `at` to `at + count`, relative to `at`. If none is within, `end` is not
+ * above `first`.
+ */
 function within({ first, end }: SplatRange, at: number, count: number): SplatRange & { count: number } {
   return { first: Math.max(0, first - at), end: Math.min(count, end - at), count };
 }

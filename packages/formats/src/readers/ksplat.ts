@@ -5,15 +5,15 @@ import { parseKsplatHeader, type KsplatHeader, type KsplatSection } from '../ksp
 import type { SceneSource } from '../scene-format.js';
 
 /**
- * Number of coefficients in each band above the constant one; they are stored band by band, and red, green, blue within
- * each.
+ * Number of coefficients of a channel in each band above the constant one. In a file, each band has those of red, then
+ * green, then blue.
  */
 const BANDS = [3, 5, 7];
 
 /**
- * Reads mkkellogg's `.ksplat`, the SplatBuffer of GaussianSplats3D (`src/loaders/SplatBuffer.js`): sections of splats,
- * at level 0 in float32, at 1 and 2 with 16-bit positions within buckets and float16, at 2 with coefficients in bytes.
- * Sections of a lower degree than the highest are padded with zeros.
+ * Reads mkkellogg's `.ksplat`, the SplatBuffer of GaussianSplats3D (`src/loaders/SplatBuffer.js`). Values are float32 in
+ * level 0. Levels 1 and 2 have float16, with 16-bit positions within buckets; coefficients are bytes in level 2.
+ * Coefficients are padded with zeros if a section has a lower degree than others.
  */
 export function readKsplat(source: SceneSource): GaussianCloud {
   const { bytes, name, signal, isPrefix = false } = source;
@@ -30,7 +30,7 @@ export function readKsplat(source: SceneSource): GaussianCloud {
 
 type ReadNumber = (at: number) => number;
 
-/** Unpacks the splats of one section to the indices from `first` on. */
+/** Writes the splats of a section to a cloud, from index `first` on. */
 function unpackSection(
   bytes: Uint8Array,
   header: KsplatHeader,
@@ -67,7 +67,7 @@ function unpackColor(bytes: Uint8Array, at: number, { sh, shDegree, opacities }:
   opacities[to] = bytes[at + 3] / 255;
 }
 
-/** Center of the bucket of each splat, [count, 3]: full buckets first, then the others with their own sizes. */
+/** Returns the center of each splat's bucket, [count, 3]. Full buckets come first, then partial ones with stored sizes. */
 function centersOf(view: DataView, section: KsplatSection): Float32Array {
   const { count, bucketSize, fullBuckets, partialBuckets, bucketsAt, bucketStride, partialSizesAt } = section;
   const centers = new Float32Array(3 * count);

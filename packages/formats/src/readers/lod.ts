@@ -9,9 +9,8 @@ import { readSogPart } from '../sog/read-sog.js';
 import { noParts } from './sog.js';
 
 /**
- * Reads a streamed SOG scene from its `lod-meta.json` at one level of detail (`source.level`, 0 is the finest; levels
- * beyond the last give the coarsest) or at all of them (`all`), with its environment. The coarsest level is its
- * preview.
+ * Reads a streamed SOG scene with its environment, from its `lod-meta.json`, at the level of detail `source.level`: 0 is
+ * the finest, and levels beyond the last give the coarsest. `all` reads all levels. The preview is the coarsest level.
  */
 export async function readLod(source: SceneSource): Promise<GaussianCloud> {
   const { name, level = 0, maxSplats = Infinity } = source;
@@ -32,7 +31,7 @@ export async function readLod(source: SceneSource): Promise<GaussianCloud> {
   return level === 'all' ? { ...merged, levelRuns: levelRunsOf(parts) } : merged;
 }
 
-/** Reads some runs, file by file. */
+/** Reads ranges of splats. Each file is read once; the result is ordered by file. */
 async function readRuns(
   runs: readonly NodeRun[],
   { files }: LodMeta,
@@ -54,7 +53,7 @@ async function readRuns(
   return parts;
 }
 
-/** The environment is a separate node with one level, so that it is always drawn. */
+/** Reads the environment of a scene as a separate node with one level, so that it is always drawn. Empty without one. */
 async function readEnvironment(
   { environment, leaves }: LodMeta,
   open: OpenFile,
@@ -65,7 +64,7 @@ async function readEnvironment(
   return [{ cloud, first: 0, count: cloud.count, node: leaves.length, level: 0 }];
 }
 
-/** Reads one SOG of the scene; paths in its description are relative to it. */
+/** Reads a SOG of the scene. The paths of its images are relative to the SOG's own path. */
 async function readPart(path: string, open: OpenFile, source: SceneSource): Promise<GaussianCloud> {
   const folder = path.slice(0, path.lastIndexOf('/') + 1);
   const { budget, signal } = source;
@@ -74,7 +73,10 @@ async function readPart(path: string, open: OpenFile, source: SceneSource): Prom
   return readSogPart({ bytes, name, budget, signal }, (part) => open(folder + part));
 }
 
-/** The runs must lie within the file and not overlap, so that together they never hold more splats than the file. */
+/**
+ * Returns the parts of a file's cloud for ranges of splats, in the order of the file. Throws `decode/corrupt` if ranges
+ * overlap or exceed the file, so that all ranges together have no more splats than the file.
+ */
 function partsOf(cloud: GaussianCloud, runs: readonly NodeRun[], path: string, name: string): NodePart[] {
   let end = 0;
   return [...runs]

@@ -1,7 +1,6 @@
-import { loadModule, shCoefficientCount, type GaussianCloud } from '@gaussian-splat/core';
+import { shCoefficientCount, type GaussianCloud } from '@gaussian-splat/core';
 import { allocateCloud, expInPlace, keptDegree, SH_C0, sigmoidInPlace, type DraftCloud } from '../cloud.js';
 import {
-  COLOR_SPACE,
   findGaussians,
   harmonicTargets,
   importMeaning,
@@ -9,7 +8,7 @@ import {
   withPlainNames,
   type GaussianLayout,
 } from '../ply/gaussian-layout.js';
-import { exceedsFloat32, parsePlyHeader, type PlyHeader, type PlyProperty } from '../ply/header.js';
+import { exceedsFloat32, parsePlyHeader, type PlyProperty } from '../ply/header.js';
 import { relativePositions } from '../ply/positions.js';
 import { openElement, readColumns, type ColumnTarget, type ElementData } from '../ply/rows.js';
 import type { SceneSource } from '../scene-format.js';
@@ -43,13 +42,9 @@ export async function readPly(source: SceneSource): Promise<GaussianCloud> {
   else for (let i = 0; i < cloud.count; i++) cloud.opacities[i] /= white;
   if (layout.hasFilter) meaning?.fuseFilter(cloud, filter);
   if (!layout.colorIsSh) convertPlainColors(cloud, layout.color);
-  if (hasLinearColors(source, header)) {
-    const { encodeLinearColors } = await loadModule(
-      'the code that encodes linear colors',
-      () => import('../linear-colors.js'),
-    );
-    encodeLinearColors(cloud, 'color_space 1 of SHARP');
-  }
+  // The rest of the file follows the splats.
+  if (!source.isPrefix)
+    await meaning?.readTrailing(cloud, header, (name) => valuesOf(openElement(source, header, name)));
   return cloud;
 }
 
@@ -62,13 +57,11 @@ function isWithin(values: Float32Array, min: number, max: number): boolean {
   return true;
 }
 
-/** SHARP stores its color space as an element with one row: 0 for sRGB, 1 for linear RGB. */
-function hasLinearColors(source: SceneSource, header: PlyHeader): boolean {
-  const space = header.elements.find(({ name }) => name === COLOR_SPACE);
-  if (space?.count !== 1 || source.isPrefix) return false;
-  const value = new Uint8Array(1);
-  readColumns(openElement(source, header, COLOR_SPACE), interleaved([COLOR_SPACE], value, 1));
-  return value[0] === 1;
+/** Values of an element whose only property has the same name. */
+function valuesOf(data: ElementData): Float32Array {
+  const values = new Float32Array(data.element.count);
+  readColumns(data, interleaved([data.element.name], values, 1));
+  return values;
 }
 
 function readAttributes(data: ElementData, layout: GaussianLayout, cloud: DraftCloud, filter: Float32Array): void {

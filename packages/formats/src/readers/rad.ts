@@ -6,7 +6,7 @@ import { chunksOf, type RadChunk, type RadProperty } from '../rad/container.js';
 import { contentOf, valuesOf } from '../rad/properties.js';
 import type { SceneSource } from '../scene-format.js';
 
-/** Numbers of a splat's harmonics in each band above the constant one, and their offset among all. */
+/** Count of a splat's coefficients in each band above the constant one, and index of the band's first coefficient. */
 const BANDS = [
   { size: 9, first: 3 },
   { size: 15, first: 12 },
@@ -14,9 +14,9 @@ const BANDS = [
 ] as const;
 
 /**
- * Reads Spark's RAD (`rad.rs` of spark-lib, version 1): chunks of splats whose properties are columns, each with its
- * own encoding and deflated; harmonics for each splat or from a palette; chunks in the file or in separate files. Of a
- * tree of levels the leaves are read, which are the original splats.
+ * Reads Spark's RAD (`rad.rs` of spark-lib, version 1). Chunks of splats are in the file or in separate files. Properties
+ * are deflated columns with different encodings, and spherical harmonics may be in a palette. Only the leaves of a tree
+ * of levels are read, which are the original splats.
  */
 export async function readRad(source: SceneSource): Promise<GaussianCloud> {
   const chunks: { chunk: RadChunk; leaves: Uint32Array }[] = [];
@@ -44,10 +44,10 @@ export async function readRad(source: SceneSource): Promise<GaussianCloud> {
   return cloud;
 }
 
-/** Indices of the splats without children. */
+/** Returns the indices of a chunk's splats without children. */
 function leavesOf(chunk: RadChunk, { budget }: SceneSource): Uint32Array {
   const children = chunk.isTree ? find(chunk, 'child_count') : undefined;
-  // A chunk must contain at least as many deflated bytes of alpha as it declares splats.
+  // The count of a chunk is not checked against its bytes yet, so that it is charged to the budget.
   budget.take(8 * chunk.count, chunk.where);
   const counts = children && valuesOf(children, 1, chunk.count, { budget, name: chunk.where });
   const leaves = new Uint32Array(chunk.count);
@@ -59,10 +59,10 @@ function leavesOf(chunk: RadChunk, { budget }: SceneSource): Uint32Array {
 const find = ({ properties }: RadChunk, name: string): RadProperty | undefined =>
   properties.find((property) => property.name === name);
 
-/** Palette of harmonics, referenced by the labels of splats: the numbers of each band, entry by entry. */
+/** Palette of spherical harmonics: for each band, [entries, size]. Labels of splats are indices of entries. */
 type Palette = readonly (Float32Array | undefined)[];
 
-/** One of the chunks contains it, usually the first. */
+/** Returns the palette of a file, which one of its chunks contains, usually the first. Bands without one are undefined. */
 function paletteIn(chunks: readonly RadChunk[], degree: number, { budget, name }: SceneSource): Palette {
   return BANDS.slice(0, degree).map(({ size }, band) => {
     for (const chunk of chunks) {
@@ -72,7 +72,7 @@ function paletteIn(chunks: readonly RadChunk[], degree: number, { budget, name }
   });
 }
 
-/** Reads the leaves of a chunk into a cloud, from splat `at` on. */
+/** Writes the leaves of a chunk to a cloud, from splat `at` on. */
 function fill(
   cloud: DraftCloud,
   at: number,
@@ -87,7 +87,7 @@ function fill(
     if (!property) throw damaged(where, `the property ${name}`, 'none', 'decode/header');
     return valuesOf(property, size, chunk.count, { budget, name: where });
   };
-  /** Copies columns of the leaves to rows of `stride` numbers from `offset` on. */
+  /** Copies the leaves of `from`, [splats, size], to rows of `stride` numbers, from the column `offset` on. */
   const copy = (from: Float32Array, size: number, to: Float32Array, stride: number, offset = 0): void => {
     for (let k = 0; k < leaves.length; k++)
       for (let n = 0; n < size; n++) to[stride * (at + k) + offset + n] = from[size * leaves[k] + n];
@@ -116,7 +116,7 @@ function fill(
   });
 }
 
-/** Quaternions (w, x, y, z), decoded from an octahedral axis and half an angle in 8 bits each, or from x, y and z. */
+/** Decodes quaternions (w, x, y, z), [N, 4], from an octahedral axis and an angle in bytes, or from (x, y, z). */
 function quaternionsOf(chunk: RadChunk, budget: SceneSource['budget']): Float32Array {
   const { where, count } = chunk;
   const property = find(chunk, 'orientation');
@@ -136,7 +136,7 @@ function quaternionsOf(chunk: RadChunk, budget: SceneSource['budget']): Float32A
   return quaternions;
 }
 
-/** Decodes an octahedral direction (Meyer et al. 2010), and an angle in 255ths of a half turn. */
+/** Decodes a quaternion from an octahedral axis of 2 bytes (Meyer et al. 2010), and an angle in 255ths of π radians. */
 function unfold(codes: Uint8Array, from: number, quaternions: Float32Array, to: number): void {
   const [u, v] = [(2 * codes[from]) / 255 - 1, (2 * codes[from + 1]) / 255 - 1];
   const z = 1 - Math.abs(u) - Math.abs(v);

@@ -3,12 +3,12 @@ import type { SceneSource } from '../scene-format.js';
 import { parseSogMeta } from '../sog/meta.js';
 import { readSogImages } from '../sog/read-sog.js';
 
-/** Matches `meta.json` and similar names; a query of the server stays. */
+/** Matches the file name at the end of a path or URL. */
 const LAST_PART = /[^/]*$/;
 
 /**
- * Reads a SOG scene (PlayCanvas), versions 1 and 2, from its `meta.json`: attributes quantized into the pixels of
- * lossless WebP images, coefficients above the constant one in a palette. Bundles (`.sog`) are ZIP files, which
+ * Reads a SOG scene of PlayCanvas, version 1 or 2, from its `meta.json`. Its attributes are quantized to pixels of
+ * lossless WebP images, and coefficients above the constant one are in a palette. Bundles (`.sog`) are ZIP files, which
  * `readers/zip.ts` opens.
  */
 export async function readSog(source: SceneSource): Promise<GaussianCloud> {
@@ -17,8 +17,9 @@ export async function readSog(source: SceneSource): Promise<GaussianCloud> {
 }
 
 /**
- * Error for a description without its files.
- * @param packed Name of a file format that could hold the whole scene.
+ * Returns a substitute for `openFile` that rejects with `decode/unsupported`, for a scene whose other files cannot be
+ * opened.
+ * @param packed Name of a file that could contain the whole scene, for the remedy.
  */
 export function noParts(name: string, packed = 'scene.sog'): (path: string) => Promise<never> {
   return (path) =>

@@ -5,15 +5,15 @@ import { looksLikeSplats, SPLAT_BYTES } from '../splat/plausible.js';
 import type { SceneSource } from '../scene-format.js';
 
 /**
- * Reads antimatter15's `.splat`: 32 bytes for each splat, namely float32 position and standard deviations, RGBA in
- * bytes, and the quaternion (w, x, y, z) in bytes as 128 + 128·q. There is no header and no view-dependent color.
+ * Reads antimatter15's `.splat`, which has no header and no view-dependent color. A splat has 32 bytes: position and
+ * standard deviations in float32, RGBA in bytes, and the quaternion (w, x, y, z) in bytes as 128 + 128·q.
  */
 export function readSplat(source: SceneSource): GaussianCloud {
   const { name } = source;
   const count = Math.floor(source.bytes.length / SPLAT_BYTES);
   const rest = source.bytes.length % SPLAT_BYTES;
   const bytes = source.bytes.subarray(0, SPLAT_BYTES * count);
-  // A line end after the last splat is harmless.
+  // A line end after the last splat is accepted.
   const isLineEnd = source.bytes.subarray(bytes.length).every((byte) => byte === 10 || byte === 13);
   if (!source.isPrefix && !isLineEnd) {
     throw new GaussianSplatError('decode/truncated', {

@@ -1,6 +1,6 @@
 import { GaussianSplatError, loadModule, type GaussianCloud } from '@gaussian-splat/core';
 import { startsWith } from '../bytes.js';
-import { loadDetection, loadReader } from '../load-parts.js';
+import { loadDetection, loadReader } from '../load-files.js';
 import { PREVIEW_STEP, sparse } from '../preview.js';
 import { previewWanted, type SceneSource } from '../scene-format.js';
 import { Gunzip } from '../spz/gunzip.js';
@@ -20,9 +20,9 @@ import type { PackedScene } from '../spz/streams.js';
 import { unpackSplats } from '../spz/unpack.js';
 
 /**
- * Reads Niantic's SPZ: versions 1 to 3, which are gzip files (or their inflated content), and version 4, whose
- * attributes are zstd streams. Degree 4 of the spherical harmonics is dropped. Extensions are skipped, except the one
- * that names the coordinate system; without it the writer's characteristics decide: `assumedAxes`.
+ * Reads Niantic's SPZ: versions 1 to 3, which are gzip files or their inflated content, and version 4, whose attributes
+ * are zstd streams. Degree 4 of the spherical harmonics is dropped. Extensions are skipped, except the one for the
+ * coordinate system; without it, `assumedAxes` infers the axes from the program that wrote the file.
  */
 export async function readSpz(source: SceneSource): Promise<GaussianCloud> {
   if (source.isPrefix) return readWithoutHarmonics(source);
@@ -34,7 +34,7 @@ export async function readSpz(source: SceneSource): Promise<GaussianCloud> {
   return unpackFrame(header, scene, source);
 }
 
-/** Unpacks all attributes into the coordinates of a cloud. Few files have a vertical third axis. */
+/** Unpacks all attributes into the coordinates of a cloud. Few files have a vertical third axis and need a rotation. */
 async function unpackFrame(header: SpzHeader, scene: PackedScene, source: SceneSource): Promise<GaussianCloud> {
   const cloud = unpackSplats(header, scene, source);
   if (scene.turn === undefined) return cloud;
@@ -46,13 +46,13 @@ async function unpackFrame(header: SpzHeader, scene: PackedScene, source: SceneS
   return cloud;
 }
 
-/** The header, and the coordinate system that the enclosing file declares: glTF uses right-up-back. */
+/** Parses the header, and adds whether the axes are those of the specification (right, up, back), as within glTF. */
 const headerOf = ({ name, isWithinGltf }: SceneSource, start: Uint8Array): SpzHeader => ({
   ...parseSpzHeader(start, name),
   followsSpecification: isWithinGltf,
 });
 
-/** Every n-th splat, without coefficients above the constant one. */
+/** Unpacks every {@link PREVIEW_STEP}-th splat, enlarged, without coefficients above the constant one. */
 async function previewOf(
   header: SpzHeader,
   { attributes, axes, turn }: PackedScene,
@@ -74,7 +74,10 @@ function everyNth(values: Uint8Array, size: number, count: number): Uint8Array {
   return taken;
 }
 
-/** The harmonics come last and are at least half of a file, so all splats are available long before its end. */
+/**
+ * Reads all splats of an incomplete file without view-dependent color. Its coefficients are at the end, and are at least
+ * half of a file, so that all splats are available early.
+ */
 async function readWithoutHarmonics(source: SceneSource): Promise<GaussianCloud> {
   const { bytes, name } = source;
   if (startsWith(bytes, 'NGSP')) {
@@ -90,7 +93,7 @@ async function readWithoutHarmonics(source: SceneSource): Promise<GaussianCloud>
   try {
     const header = headerOf(source, await gunzip.upTo(SPZ_HEADER_BYTES));
     const plain = { ...header, degree: 0 } as const;
-    // A count that the received bytes cannot hold is not available yet, or invalid.
+    // The received bytes must be enough for all splats, unless the count is invalid.
     requirePlausibleCount(plain, bytes.length, name);
     const length = SPZ_HEADER_BYTES + bodyBytes(plain, header.version);
     return unpackLegacy(source, await gunzip.upTo(length), header);
@@ -100,7 +103,8 @@ async function readWithoutHarmonics(source: SceneSource): Promise<GaussianCloud>
 }
 
 function unpackLegacy(source: SceneSource, file: Uint8Array, header: SpzHeader): Promise<GaussianCloud> {
-  const plain = { ...header, degree: 0, hasExtensions: false } as const;
+  const plain = { ...header, degree: 0 } as const;
+  // The extension records follow the coefficients, so that the axes are assumed.
   const body = file.subarray(0, SPZ_HEADER_BYTES + bodyBytes(plain, header.version));
   return unpackFrame(plain, readLegacyBody(body, plain, source.name), source);
 }
@@ -110,7 +114,7 @@ interface SpzParts {
   readonly scene: PackedScene;
 }
 
-/** The zstd decoder, which only version 4 needs, is half of the code that reads SPZ. */
+/** Loads the reader of version 4 with its zstd decoder, which is half of the code that reads SPZ. */
 const loadStreams = (): Promise<typeof streams> =>
   loadModule('the code that reads SPZ version 4', () => import('../spz/streams.js'));
 
@@ -123,7 +127,7 @@ async function readPlain(source: SceneSource): Promise<SpzParts> {
   return { header, scene };
 }
 
-/** The sections of an SPZ, or the splats of another scene inside the gzip file. */
+/** Reads the sections of an SPZ in a gzip file, or the splats of another scene in it. */
 async function readGzip(source: SceneSource): Promise<SpzParts | GaussianCloud> {
   const { bytes, name } = source;
   const gunzip = new Gunzip(source);
@@ -143,12 +147,12 @@ async function readGzip(source: SceneSource): Promise<SpzParts | GaussianCloud> 
   }
 }
 
-/** Reads a scene that was compressed as a whole, such as `scene.ply.gz`. */
+/** Reads a scene of another format in a gzip file, such as `scene.ply.gz`. @param start First inflated bytes. */
 async function readInflated(source: SceneSource, start: Uint8Array, gunzip: Gunzip): Promise<GaussianCloud> {
   const { findFormat } = await loadDetection();
   const name = source.name.replace(/\.gz$/i, '');
   const isOther = (bytes: Uint8Array): boolean => (findFormat(bytes, name, '')?.name ?? 'spz') !== 'spz';
-  // A file that does not start like a scene is not inflated further.
+  // Inflation ends here if the content does not begin as a scene.
   if (!isOther(start)) throw await otherGzip(start, source.name);
   let bytes = start;
   for (let length = 0; bytes.length > length;) {

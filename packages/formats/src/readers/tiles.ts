@@ -1,8 +1,9 @@
 import { GaussianSplatError, type GaussianCloud, type Vector3 } from '@gaussian-splat/core';
 import { checkedPart } from '../foreign-signatures.js';
-import { grouped } from '../bytes.js';
+import { asciiOf, grouped } from '../bytes.js';
 import { damaged, warn } from '../faults.js';
 import { multiply, type Affine } from '../gltf/nodes.js';
+import { MAX_PATH } from '../lod/meta.js';
 import { mergeClouds } from '../merge-clouds.js';
 import type { SceneSource } from '../scene-format.js';
 import { contentsAt, type TileContent } from '../tileset.js';
@@ -11,19 +12,19 @@ import { isTileset, readGltf } from './gltf.js';
 import { noParts } from './sog.js';
 
 /**
- * Converts between the coordinates of a cloud (x right, y down, z forward) and of tiles (z up), via those of glTF (y
- * up).
+ * Transform from the coordinates of tiles (z up) to those of a cloud (x right, y down, z forward). It is its own inverse,
+ * and includes the rotation between glTF (y up) and tiles.
  */
 const TO_CLOUD: Affine = [-1, 0, 0, 0, 0, 0, -1, 0, 0, -1, 0, 0];
 /** Maximum nesting of tilesets. */
 const MAX_NESTED = 16;
-/** A tileset farther than this from the Earth's center, in meters, is georeferenced. */
+/** Minimum distance from the Earth's center, in meters, of a georeferenced tileset. */
 const ON_EARTH = 1e6;
 
 /**
- * Reads a tileset of 3D Tiles whose tiles are glTF with splats, at one level of detail (`source.level`, 0 is the
- * finest). Georeferenced tilesets get the direction away from the Earth's center as `hints.up`. Tiles of other kinds
- * are skipped with a warning.
+ * Reads a tileset of 3D Tiles whose tiles are glTF with splats, at the level of detail `source.level`; 0 is the finest.
+ * In a georeferenced tileset, `hints.up` is the direction away from the Earth's center. Tiles without splats are skipped
+ * with a warning.
  */
 export async function readTiles(source: SceneSource): Promise<GaussianCloud> {
   const level = source.level === 'all' ? 0 : (source.level ?? 0);
@@ -33,13 +34,17 @@ export async function readTiles(source: SceneSource): Promise<GaussianCloud> {
     source.signal?.throwIfAborted();
     const { budget, signal } = source;
     const name = `${source.name}, ${uri}`;
-    const folder = folderOf(uri);
+    if (isOtherTile(bytes)) {
+      others++;
+      continue;
+    }
+    const folder = decoded(folderOf(uri));
     const openFile = (path: string, query?: string): Promise<Uint8Array> => opened(source, folder + path, query);
     const cloud = await readGltf({ bytes, name, budget, signal, openFile }).catch((error: unknown) => {
       if (error instanceof GaussianSplatError && error.code === 'decode/not-splats') return undefined;
       throw error;
     });
-    // Both rotations are their own inverse.
+    // TO_CLOUD is its own inverse, so that the same transform leads from the cloud to the tile.
     if (cloud) clouds.push(applyMotion(cloud, multiply(TO_CLOUD, multiply(toTileset, TO_CLOUD))));
     else others++;
   }
@@ -62,15 +67,18 @@ export async function readTiles(source: SceneSource): Promise<GaussianCloud> {
 
 type TileFile = TileContent & { readonly bytes: Uint8Array };
 
-/** Iterates over the glTF files of a tileset and of nested tilesets. */
+/** Iterates over the glTF files of a tileset and of nested tilesets, at a level of detail. */
 async function* filesOf(source: SceneSource, level: number): AsyncGenerator<TileFile> {
   const { name, budget } = source;
   const left: (TileContent & { readonly depth: number })[] = [];
-  /** Remaining references to each file, and the files that have some. */
+  /** Number of remaining references to each file. */
   const uses = new Map<string, number>();
   const kept = new Map<string, Uint8Array>();
   const list = (contents: readonly TileContent[], depth: number): void => {
     for (const content of [...contents].reverse()) {
+      // The folder of a nested tileset is part of the address of each of its contents.
+      if (content.uri.length > MAX_PATH)
+        throw damaged(name, `addresses of at most ${grouped(MAX_PATH)} characters`, 'longer ones', 'decode/header');
       left.push({ ...content, depth });
       uses.set(content.uri, (uses.get(content.uri) ?? 0) + 1);
     }
@@ -81,7 +89,7 @@ async function* filesOf(source: SceneSource, level: number): AsyncGenerator<Tile
     const { uri, toTileset, depth } = content;
     const [path, query = ''] = uri.split(/(?=\?)/, 2);
     const where = `${name}, ${uri}`;
-    // A repeated file is fetched once, and charged each time.
+    // A file with several references is fetched once, and charged for each further reference.
     const again = kept.get(uri);
     budget.take(again?.length ?? 0, where);
     const bytes = again ?? (await checkedPart(await opened(source, decoded(path), query), where));
@@ -95,8 +103,9 @@ async function* filesOf(source: SceneSource, level: number): AsyncGenerator<Tile
     if (depth >= MAX_NESTED)
       throw damaged(where, `tilesets at most ${MAX_NESTED} deep`, 'deeper ones', 'decode/header');
     const inner = contentsAt({ bytes, name: where, budget }, level, load, toTileset);
+    const folder = folderOf(path);
     list(
-      inner.map((one) => ({ ...one, uri: folderOf(path) + one.uri })),
+      inner.map((one) => ({ ...one, uri: folder + one.uri })),
       depth + 1,
     );
   }
@@ -105,7 +114,13 @@ async function* filesOf(source: SceneSource, level: number): AsyncGenerator<Tile
 const opened = ({ openFile, name }: SceneSource, path: string, query?: string): Promise<Uint8Array> =>
   (openFile ?? noParts(name, 'scene.zip'))(path, query);
 
-const folderOf = (uri: string): string => uri.replace(/\?.*$/, '').replace(/[^/]*$/, '');
+/** Whether a tile is of a kind of 3D Tiles 1.0, which cannot have splats. */
+const isOtherTile = (bytes: Uint8Array): boolean => /^(b3dm|i3dm|pnts|cmpt)$/.test(asciiOf(bytes, 0, 4));
+
+function folderOf(uri: string): string {
+  const [path] = uri.split('?', 1);
+  return path.slice(0, path.lastIndexOf('/') + 1);
+}
 
 function decoded(path: string): string {
   try {
@@ -115,7 +130,7 @@ function decoded(path: string): string {
   }
 }
 
-/** Direction away from the Earth's center, for a cloud at its surface. */
+/** Returns the unit direction away from the Earth's center for a georeferenced origin; otherwise undefined. */
 function upAt(origin: Vector3): Vector3 | undefined {
   const radius = Math.hypot(...origin);
   return radius < ON_EARTH ? undefined : (origin.map((x) => x / radius) as unknown as Vector3);

@@ -1,7 +1,7 @@
 import { GaussianSplatError, type GaussianCloud } from '@gaussian-splat/core';
 import { asciiOf, viewOf } from '../bytes.js';
 import { findFormat } from '../detect.js';
-import { loadDiagnosis, loadReader } from '../load-parts.js';
+import { loadDiagnosis, loadReader } from '../load-files.js';
 import { MAX_INDEX_BYTES } from '../lod/meta.js';
 import type { SceneSource } from '../scene-format.js';
 import { MAX_META_BYTES } from '../sog/meta.js';
@@ -9,26 +9,26 @@ import { Archive } from '../zip/archive.js';
 import { listed, namedLike, relevant, shallowest } from '../zip/paths.js';
 
 /**
- * Main files of scenes with several files, in search order, because an index refers to descriptions; and their maximum
- * lengths.
+ * Main files of scenes with several files, with their maximum sizes in bytes. Files that refer to others come first,
+ * because the first one that is found is used.
  */
 const DESCRIPTIONS = [
   ['lod-meta.json', MAX_INDEX_BYTES],
   ['meta.json', MAX_META_BYTES],
   ['tileset.json', MAX_INDEX_BYTES],
 ] as const;
-/** Maximum number of files with these names that are opened to find a scene. */
+/** Maximum number of files with the same name of {@link DESCRIPTIONS} that are opened to find a scene. */
 const MAX_DESCRIPTIONS = 16;
-const SCENE_FILE = /\.(gltf|glb|ply|spz|splat|ksplat|sog)$/i;
-/** Names of the initial points of training in 3DGS, COLMAP and nerfstudio, and of cameras; */
+const SCENE_FILE = /\.(gltf|glb|ply|spz|splat|ksplat|sog|rad)$/i;
+/** Matches PLY files that are not the result of training: initial points in 3DGS, COLMAP and nerfstudio, and cameras. */
 const FIRST_POINTS = /(^|\/)(input|sparse(_pc)?|points?(3d)?|cameras?)\.ply$/i;
-/** names of the splats after a number of iterations in 3DGS. */
+/** Matches the splats after a number of iterations in the output of 3DGS. Group 1 is the folder, group 2 the number. */
 const ITERATION = /^(.*\/)?iteration_(\d+)\/point_cloud\.ply$/i;
 
 /**
- * Reads a ZIP file with one scene in it: a SOG bundle (`.sog`), a streamed SOG scene, glTF with its buffers, or one
- * file of any other format. The least nested scene is used; for the output of a training, the one with the most
- * iterations. Nested archives are bundles and are read one level deep.
+ * Reads a ZIP file that contains one scene: a SOG bundle (`.sog`), a streamed SOG scene, a glTF with its buffers, or one
+ * file of any other format. The scene in the least nested folder is read, and the one after the most iterations of
+ * training. A scene may be an archive, too, such as a bundle, but not an archive in an archive.
  */
 export async function readZip(source: SceneSource): Promise<GaussianCloud> {
   const { name } = source;
@@ -47,14 +47,14 @@ export async function readZip(source: SceneSource): Promise<GaussianCloud> {
   return read({ ...source, bytes: inner, name: `${name}, ${path}`, openFile });
 }
 
-/** Marks a nested archive. */
+/** Value of `openFile` that marks a nested archive for {@link readZip}. */
 const WITHIN = async (): Promise<Uint8Array> => new Uint8Array(0);
 
-/** Undefined if there is none. */
+/** Returns the path of the scene in an archive; undefined if there is none. Throws if several scenes are equally likely. */
 async function mainFile(archive: Archive, name: string): Promise<string | undefined> {
   const paths = relevant(archive.paths);
   for (const [description, max] of DESCRIPTIONS) {
-    // Other programs have a meta.json, too.
+    // Files named meta.json may be of another program.
     const named = namedLike(description, paths)
       .filter((path) => archive.lengthOf(path) <= max)
       .slice(0, MAX_DESCRIPTIONS);
@@ -68,14 +68,14 @@ async function mainFile(archive: Archive, name: string): Promise<string | undefi
   if (scenes.length === 1) return scenes[0];
   const last = lastIteration(scenes);
   if (last !== undefined) return last;
-  // glTF names its other files, which may be scenes themselves.
+  // The other scenes may be files that a glTF refers to.
   const gltf = scenes.filter((path) => /\.gltf$/i.test(path));
   if (gltf.length === 1) return gltf[0];
   if (scenes.length > 0) throw (await namedArchive(archive, name)) ?? severalScenes(name, scenes);
   return undefined;
 }
 
-/** Excludes GLB files with only meshes; keeps all scenes if nothing else is left. */
+/** Returns the paths without GLB files that contain no splats; all paths if no other is left. */
 function withoutMeshes(scenes: readonly string[], archive: Archive): readonly string[] {
   if (scenes.length < 2) return scenes;
   const hasSplats = (path: string): boolean => {
@@ -86,7 +86,7 @@ function withoutMeshes(scenes: readonly string[], archive: Archive): readonly st
   return left.length > 0 ? left : scenes;
 }
 
-/** The error for an archive that is recognized by a path in it. */
+/** Returns the error for an archive of a known but unsupported kind; undefined for others. */
 async function namedArchive({ paths }: Archive, name: string): Promise<GaussianSplatError | undefined> {
   const { diagnoseArchive } = await loadDiagnosis();
   return diagnoseArchive(paths, name);
@@ -97,7 +97,7 @@ async function noSceneIn(archive: Archive, name: string): Promise<GaussianSplatE
   return (await namedArchive(archive, name)) ?? noScene(name, undefined, found);
 }
 
-/** For the same scene after several numbers of iterations, the one with the most; undefined for others. */
+/** Returns the path with the most iterations if all paths are the same scene during training; otherwise undefined. */
 function lastIteration(paths: readonly string[]): string | undefined {
   const found = paths.map((path) => ITERATION.exec(path));
   const [first] = found;
@@ -120,6 +120,6 @@ function severalScenes(name: string, scenes: readonly string[]): GaussianSplatEr
     where: name,
     expected: 'one scene in the archive',
     found: `${scenes.length} scenes: ${listed(scenes)}`,
-    remedy: 'pack each scene by itself; for scenes that follow one another in time, serve the files and a manifest',
+    remedy: 'pack each scene separately; for scenes that follow one another in time, serve the files and a manifest',
   });
 }

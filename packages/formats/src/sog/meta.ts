@@ -3,35 +3,38 @@ import { grouped } from '../bytes.js';
 import { damaged } from '../faults.js';
 import { isObject, parseJson, show, type Json, type JsonSource } from '../json.js';
 
-/** A value for each byte 0..255, for each channel of a plane. */
+/** For each channel of an image, an array with the value of each byte 0..255. */
 export type ByteTable = readonly Float32Array[];
 
-/** The description of a SOG scene in either version. */
+/** Content of the `meta.json` of a SOG scene, version 1 or 2. */
 export interface SogMeta {
   readonly version: 1 | 2;
   readonly count: number;
   readonly antialiased: boolean;
   /**
-   * Variance of the filter if the file declares it; splat-transform 3 writes `model: antialiased` for `SplatRenderMode:
-   * mip` of PLY.
+   * Filter variance in px²: 0.1 for `model: antialiased`, which splat-transform 3 writes for PLY with `SplatRenderMode:
+   * mip`; otherwise undefined.
    */
   readonly filterVariance: number | undefined;
-  /** Written by our own exporter for scenes in per-pixel order: `sortingMethod: pixel`. */
+  /** Sort order of `sortingMethod: pixel`, which the exporter of this project writes; otherwise undefined. */
   readonly order: 'pixel' | undefined;
-  /** 2D Gaussians (2DGS): `model: 2dgs` of splat-transform. */
+  /** Whether splats are 2D Gaussians (2DGS): `model: 2dgs` of splat-transform. */
   readonly isFlat: boolean;
   readonly means: {
     readonly mins: readonly number[];
     readonly maxs: readonly number[];
     readonly files: readonly string[];
   };
-  /** Logarithms of the scales. */
+  /** Natural logarithms of scales, for each byte of three channels. */
   readonly scales: { readonly values: ByteTable; readonly files: readonly string[] };
   readonly quats: { readonly files: readonly string[] };
-  /** Constant coefficients; version 1 has opacities as logits in a fourth table, version 2 has opacities in bytes. */
+  /**
+   * Constant coefficients for each byte of three channels. In version 1, a fourth table has the logits of opacities. In
+   * version 2, opacities are bytes.
+   */
   readonly sh0: { readonly values: ByteTable; readonly files: readonly string[] };
   readonly shN?: {
-    /** Undefined if only the width of the centroids determines it (version 1). */
+    /** Degree of spherical harmonics. Undefined if only the width of the palette's image determines it. */
     readonly degree: ShDegree | undefined;
     readonly paletteSize: number;
     readonly values: Float32Array;
@@ -39,12 +42,15 @@ export interface SogMeta {
   };
 }
 
-/** A description has a few codebooks of 256 numbers; a larger file is invalid. */
+/** Maximum size in bytes of a `meta.json`, which has a few codebooks of 256 numbers. */
 export const MAX_META_BYTES = 1 << 20;
-/** Labels have 16 bits. */
+/** Maximum number of entries of a palette, because labels have 16 bits. */
 const MAX_PALETTE = 65_536;
 
-/** Parses and validates the `meta.json` of a SOG scene of version 1 (which does not declare it) or 2. */
+/**
+ * Parses and validates the `meta.json` of a SOG scene. Version 1 does not declare its version.
+ * @throws GaussianSplatError `decode/header`, `decode/unsupported`, `decode/empty`, or as `parseJson` does
+ */
 export function parseSogMeta(source: JsonSource): SogMeta {
   const { name } = source;
   const json = parseJson(source, MAX_META_BYTES);
@@ -118,8 +124,8 @@ export function parseSogMeta(source: JsonSource): SogMeta {
 }
 
 /**
- * A codebook of early tools whose first entry is null: that entry is taken to be one mean step below the second, as
- * PlayCanvas does. Undefined for all others.
+ * Returns a codebook of early tools, whose first entry is null, with a first entry one mean step below the second, as
+ * PlayCanvas does. Undefined for all other codebooks.
  */
 function withFirst(codebook: unknown): number[] | undefined {
   if (!Array.isArray(codebook) || codebook.length < 2 || codebook[0] !== null) return undefined;
@@ -128,7 +134,7 @@ function withFirst(codebook: unknown): number[] | undefined {
   return [rest[0] - (rest[rest.length - 1] - rest[0]) / 255, ...rest];
 }
 
-/** Codebooks are padded to 256 entries with their last. */
+/** Returns a table of 256 entries from a codebook, padded with its last entry. */
 function tableOf(values: readonly number[]): Float32Array {
   return Float32Array.from({ length: 256 }, (_, byte) => values[Math.min(byte, values.length - 1)]);
 }
@@ -141,7 +147,7 @@ function repeated(table: Float32Array, channels: number): Float32Array[] {
   return Array.from({ length: channels }, () => table);
 }
 
-/** The folder of gsplat's PNG compression, the predecessor of SOG: its description names no files. */
+/** Returns the error for a folder of gsplat's PNG compression, the predecessor of SOG, whose JSON names no files. */
 function gsplatPngs(name: string): GaussianSplatError {
   return new GaussianSplatError('decode/unsupported', {
     where: name,

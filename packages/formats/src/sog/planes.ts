@@ -7,15 +7,15 @@ import { WebpError } from '../webp/bits.js';
 import { decodeWebp, webpSize, type WebpImage } from '../webp/decode.js';
 import { decodeNatively } from '../webp/native.js';
 
-/** Maximum number of pixels of a plane beyond one for each splat: rows and columns of padding. */
+/** Number of pixels that a plane may have in addition to two for each splat, for rows and columns of padding. */
 const EXTRA_PIXELS = 65_536;
 
-/** Opens the images of a SOG scene and decodes them, with limits on their size. */
+/** Opens and decodes the images of a SOG scene, with limits on their size. */
 export class Planes {
   readonly #open: OpenFile;
   readonly #source: SceneSource;
   readonly #loaded = new Map<string, Promise<Uint8Array>>();
-  /** The last decoded image, because names may repeat. */
+  /** Last decoded image, which several attributes may have in common. */
   #last: { readonly file: string; readonly image: WebpImage } | undefined;
 
   constructor(open: OpenFile, source: SceneSource) {
@@ -23,7 +23,7 @@ export class Planes {
     this.#source = source;
   }
 
-  /** Downloads an image: only once for repeated names. */
+  /** Returns the bytes of an image file. Each file is downloaded once. */
   load(file: string): Promise<Uint8Array> {
     const loading = this.#loaded.get(file) ?? this.#load(file);
     this.#loaded.set(file, loading);
@@ -35,7 +35,9 @@ export class Planes {
     return checkedPart(await this.#open(file), `${this.#source.name}, ${file}`);
   }
 
-  /** A plane with one pixel for each splat: at least `count` pixels, and not many more. */
+  /**
+   * Decodes an image with one pixel for each of `count` splats. Throws `decode/corrupt` for fewer pixels, or many more.
+   */
   async decodePlane(bytes: Uint8Array, file: string, count: number): Promise<Uint32Array> {
     const { pixels } = await this.decode(bytes, file, 2 * count + EXTRA_PIXELS);
     if (pixels.length < count) {
@@ -48,7 +50,11 @@ export class Planes {
     return pixels;
   }
 
-  /** Any image of at most `maxPixels`; its header is checked before anything is allocated. */
+  /**
+   * Decodes an image of at most `maxPixels` pixels. The size in its header is checked before memory is allocated.
+   * @param file Path of the image, for the cache and for error messages.
+   * @throws GaussianSplatError `decode/corrupt`, `decode/truncated`, `decode/unsupported`, `out-of-memory/budget`
+   */
   async decode(bytes: Uint8Array, file: string, maxPixels: number): Promise<WebpImage> {
     const { signal, name, budget } = this.#source;
     signal?.throwIfAborted();
@@ -60,7 +66,7 @@ export class Planes {
       if (width * height > maxPixels) {
         throw damaged(where, `at most ${grouped(maxPixels)} pixels`, `${width} x ${height}`);
       }
-      // Pixels, and those before a transform with its own size is inverted.
+      // Decoding needs two arrays of pixels: before and after a transform that changes the width.
       take(8 * width * height);
       const image = (await decodeNatively(bytes, { width, height })) ?? decodeWebp(bytes, take);
       this.#last = { file, image };

@@ -19,12 +19,12 @@ import {
 } from './unpack.js';
 
 /**
- * Maximum number of splats for each byte of the images. Images of a single color have almost no bytes, so that a file
- * of 200 bytes could declare a thousand million splats; real scenes need at least 3 bytes for each.
+ * Maximum number of splats for each byte of the images. Without this limit, a file of 200 bytes could declare a thousand
+ * million splats, because images of a single color are tiny. Real scenes need 3 bytes or more for each splat.
  */
 const MAX_SPLATS_PER_BYTE = 16;
 const FREE_SPLATS = 65_536;
-/** Pixels of the largest palette: 1024 rows of 64 entries of 15 coefficients. */
+/** Number of pixels of the largest palette: 1024 rows of 64 entries of 15 coefficients. */
 const MAX_PALETTE_PIXELS = 1024 * PALETTE_ROW * 15;
 
 interface GeometryPlanes {
@@ -35,14 +35,17 @@ interface GeometryPlanes {
   readonly sh0: Uint32Array;
 }
 
-/** Reads the images that a `meta.json` names. */
+/**
+ * Reads the images that a `meta.json` names, and returns the splats.
+ * @param open Opens images by their paths relative to the `meta.json`.
+ */
 export async function readSogImages(meta: SogMeta, open: OpenFile, source: SceneSource): Promise<GaussianCloud> {
   const { name } = source;
   const images = new Planes(open, source);
   const { count } = meta;
-  // Download starts early, but they are decoded only after the images of a preview.
+  // The download of coefficients starts at once, but they are decoded after the images of a preview.
   const harmonics = meta.shN?.files.slice(0, 2).map((file) => images.load(file));
-  // The other images are awaited first, and may fail first.
+  // Prevents an unhandled rejection if another image fails before these promises are awaited.
   harmonics?.forEach((file) => file.catch(() => undefined));
   const planes = await decodeGeometry(images, meta, name);
   if (previewWanted(source, count))
@@ -57,8 +60,8 @@ export async function readSogImages(meta: SogMeta, open: OpenFile, source: Scene
 }
 
 /**
- * Reads one SOG of a streamed scene: its `meta.json`, or a bundle of all of its files. @param open Opens files relative
- * to it.
+ * Reads a SOG of a streamed scene, from its `meta.json` or from a bundle of all of its files.
+ * @param open Opens files by their paths relative to the `meta.json`.
  */
 export async function readSogPart(source: SceneSource, open: OpenFile): Promise<GaussianCloud> {
   if (startsWith(source.bytes, 'PK\x03\x04')) {
@@ -69,7 +72,7 @@ export async function readSogPart(source: SceneSource, open: OpenFile): Promise<
   return readSogImages(parseSogMeta(source), open, source);
 }
 
-/** The images required for a preview, all downloaded before the first is decoded. */
+/** Downloads and decodes the images that a preview needs: all images except the coefficients above the constant one. */
 async function decodeGeometry(images: Planes, meta: SogMeta, name: string): Promise<GeometryPlanes> {
   const files = [...meta.means.files.slice(0, 2), meta.scales.files[0], meta.quats.files[0], meta.sh0.files[0]];
   const loaded = await Promise.all(files.map((file) => images.load(file)));
@@ -89,7 +92,10 @@ async function decodeGeometry(images: Planes, meta: SogMeta, name: string): Prom
   return { low, high, scales, quats, sh0 };
 }
 
-/** Every `step`-th splat, without coefficients above the constant one. */
+/**
+ * Returns a cloud of every `step`-th splat. Coefficients above the constant one are 0.
+ * @param degree Degree of the cloud.
+ */
 function unpackGeometry(
   planes: GeometryPlanes,
   meta: SogMeta,
@@ -110,7 +116,7 @@ function unpackGeometry(
   return cloud;
 }
 
-/** The degree, which version 1 defines by the palette's width only. */
+/** Returns the degree of spherical harmonics, from the width of the palette's image. Throws if `meta.json` differs. */
 function checkDegree({ shN }: SogMeta, width: number, name: string): ShDegree {
   const found = DEGREE_OF_REST_COUNT.get(width / PALETTE_ROW);
   const expected = shN?.degree ?? found;

@@ -2,7 +2,7 @@ import { shCoefficientCount } from '@gaussian-splat/core';
 import { expInPlace, type DraftCloud } from '../cloud.js';
 import type { SogMeta } from './meta.js';
 
-/** Selection of splats to unpack: every `step`-th, `count` of them. */
+/** Selection of splats to unpack: `count` splats, with indices that are multiples of `step`. */
 export interface Selection {
   readonly count: number;
   readonly step: number;
@@ -13,7 +13,10 @@ const green = (pixel: number): number => (pixel >>> 8) & 255;
 const blue = (pixel: number): number => pixel & 255;
 const alpha = (pixel: number): number => pixel >>> 24;
 
-/** 16-bit coordinates of sign(x)·ln(1 + |x|) between bounds, their low and high bytes in two planes. */
+/**
+ * Writes positions, [count, 3]. Their 16-bit codes, with low and high bytes in two planes, are sign(x)·ln(1 + |x|)
+ * between bounds.
+ */
 export function unpackMeans(
   low: Uint32Array,
   high: Uint32Array,
@@ -31,12 +34,15 @@ export function unpackMeans(
   }
 }
 
-/** Alpha 252 to 255 selects the largest of (w, x, y, z), which is not stored; the others are bytes in ±1/sqrt(2). */
+/**
+ * Writes quaternions (w, x, y, z), [count, 4]. Alpha less 252 is the index of the largest component, which is not stored.
+ * The other components are bytes, from -1/sqrt(2) to 1/sqrt(2).
+ */
 export function unpackQuats(plane: Uint32Array, { count, step }: Selection, out: Float32Array): void {
   for (let i = 0; i < count; i++) {
     const pixel = plane[i * step];
     const largest = alpha(pixel) - 252;
-    // Leaves zeros: an undefined rotation makes the splat unusable.
+    // The rotation of an invalid code remains 0, so that the splat is dropped.
     if (largest < 0) continue;
     let squares = 0;
     for (let component = 0, shift = 16; component < 4; component++) {
@@ -65,7 +71,7 @@ export function unpackScales(
   expInPlace(out);
 }
 
-/** Constant coefficients and opacities. */
+/** Writes constant coefficients and opacities of a cloud. */
 export function unpackColors(
   plane: Uint32Array,
   { values }: SogMeta['sh0'],
@@ -83,17 +89,20 @@ export function unpackColors(
   }
 }
 
-/** The palette of coefficients above the constant one: 64 entries in a row of the image, a pixel for each coefficient. */
+/**
+ * Palette of coefficients above the constant one. A row of its image has 64 entries, with a pixel for each coefficient.
+ * `size` is the number of entries, and `values` has the coefficient of each byte.
+ */
 export interface Palette {
   readonly pixels: Uint32Array;
   readonly size: number;
   readonly values: Float32Array;
 }
 
-/** Entries of the palette in one row of its image. */
+/** Number of entries of the palette in a row of its image. */
 export const PALETTE_ROW = 64;
 
-/** Copies each splat's palette entry. Labels beyond the palette leave zeros. */
+/** Writes the coefficients of each splat's palette entry. Splats with a label beyond the palette keep zeros. */
 export function unpackHarmonics(labels: Uint32Array, palette: Palette, cloud: DraftCloud): void {
   const coefficients = shCoefficientCount(cloud.shDegree) - 1;
   const entry = 3 * coefficients;

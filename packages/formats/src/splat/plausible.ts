@@ -1,16 +1,16 @@
 import { viewOf } from '../bytes.js';
 
-/** Bytes of one splat of a `.splat` file. */
+/** Size in bytes of a splat in a `.splat` file. */
 export const SPLAT_BYTES = 32;
 
-/** Number of sampled records, evenly spaced over the file. */
+/** Maximum number of splats that are sampled, evenly spaced over the file. */
 const SAMPLES = 64;
 
 /**
- * Whether bytes look like a `.splat` file, which has no signature: positions are finite and no farther than 1e6,
- * standard deviations are from 0 to 1e4 and not all zero, and quaternions have a length near 1. `all` requires this of
- * every sampled record, if nothing else indicates the format; `at least half` only rejects implausible files, and
- * ignores quaternions.
+ * Whether bytes resemble a `.splat` file, which has no signature. Coordinates of plausible splats are within ±1e6.
+ * Standard deviations are from 0 to 1e4, not all 0. Quaternions have a length near 1.
+ * @param share Fraction of the sampled splats that must be plausible. `all` is the test if nothing else indicates the
+ * format. `at least half` only rejects implausible files, and ignores quaternions.
  */
 export function looksLikeSplats(bytes: Uint8Array, share: 'all' | 'at least half'): boolean {
   const count = Math.floor(bytes.length / SPLAT_BYTES);
@@ -28,7 +28,7 @@ function hasPlausibleFloats(view: DataView, at: number): boolean {
   const floats = [0, 1, 2, 3, 4, 5].map((k) => view.getFloat32(at + 4 * k, true));
   const positions = floats.slice(0, 3);
   const scales = floats.slice(3);
-  // Comparisons are negated so that NaN fails.
+  // These comparisons are false for NaN.
   return (
     positions.every((p) => Math.abs(p) <= 1e6) && scales.every((s) => s >= 0 && s <= 1e4) && scales.some((s) => s > 0)
   );

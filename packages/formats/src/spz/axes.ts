@@ -1,5 +1,6 @@
 import { GaussianSplatError } from '@gaussian-splat/core';
 import { viewOf } from '../bytes.js';
+import { safeOrbit, type OrbitLimits } from '../safe-orbit.js';
 import type { SpzHeader } from './header.js';
 
 /** Sign of each axis in the conversion to the coordinates of a cloud (x right, y down, z forward). */
@@ -12,8 +13,9 @@ export const RIGHT_DOWN_FORWARD: AxisSigns = [1, 1, 1];
 
 /** Adobe's record of the coordinate system of a file, one of 16 in the numbering of SPZ's `CoordinateSystem`. */
 const COORDINATE_SYSTEM = 0xadbe0003;
-/** Padding; and Adobe's limits of an orbiting camera, which do not affect splats. */
-const MEANINGLESS = new Set([0, 0xadbe0002]);
+/** Adobe's limits of an orbiting camera: smallest and largest elevation, smallest radius. */
+const SAFE_ORBIT = 0xadbe0002;
+const PADDING = 0;
 /** Our own record of the order of splats: 1 for per-pixel. */
 const ORDER = 0x47530001;
 const MAX_SKIPPED = 8;
@@ -30,49 +32,68 @@ export interface SpzFrame {
   /** Whether the file declares no coordinate system. */
   readonly isAssumed?: boolean | undefined;
   readonly order?: 'pixel' | undefined;
+  readonly orbit?: OrbitLimits | undefined;
 }
 
 /**
  * Axes of a file without a declared coordinate system, inferred from its writer. Version 1, and version 2 with
- * antialiasing, come from Niantic's own apps; other numbers of fractional bits than 12 come from tools that follow the
- * specification. All of these use right-up-back. Current converters keep the coordinates of PLY:
- * docs/decisions/0022-the-frame-of-spz.md.
+ * antialiasing, come from Niantic's own apps; files without extension records and with other numbers of fractional bits
+ * than 12 come from tools that follow the specification. All of these use right-up-back. Current converters keep the
+ * coordinates of PLY: docs/decisions/0022-the-frame-of-spz.md.
  */
 export function assumedAxes(header: SpzHeader): AxisSigns {
-  const { version, antialiased, fractionalBits, followsSpecification } = header;
+  const { version, antialiased, fractionalBits, hasExtensions, followsSpecification } = header;
   const isRightUpBack =
-    followsSpecification || version === 1 || (version === 2 && antialiased) || fractionalBits !== USUAL_FRACTIONAL_BITS;
+    followsSpecification ||
+    version === 1 ||
+    (version === 2 && antialiased) ||
+    (fractionalBits !== USUAL_FRACTIONAL_BITS && !hasExtensions);
   return isRightUpBack ? RIGHT_UP_BACK : RIGHT_DOWN_FORWARD;
 }
 
 /**
  * Finds the coordinate system in the extension records: `[uint32 type][uint32 length][payload]`, in sequence; without
- * one, {@link assumedAxes}. Records of other types are skipped, and listed.
+ * one, {@link assumedAxes}. Records that are not known, or not used, are skipped, and listed: among them limits of an
+ * orbit within a glTF, whose nodes may scale the splats.
  */
 export function readExtensions(
   records: Uint8Array,
   header: SpzHeader,
   name: string,
 ): SpzFrame & { skipped: readonly number[] } {
-  const view = viewOf(records);
   const skipped = new Set<number>();
   let frame: SpzFrame | undefined;
   let order: 'pixel' | undefined;
-  for (let at = 0; at + 8 <= records.length;) {
-    const type = view.getUint32(at, true);
-    const length = view.getUint32(at + 4, true);
-    if (at + 8 + length > records.length) break;
-    if (type === COORDINATE_SYSTEM && length >= 4) frame ??= frameOfSystem(view.getUint32(at + 8, true), name);
-    else if (type === ORDER && length >= 4) order = view.getUint32(at + 8, true) === 1 ? 'pixel' : undefined;
-    else if (!MEANINGLESS.has(type) && skipped.size < MAX_SKIPPED) skipped.add(type);
-    at += 8 + length;
+  let orbit: OrbitLimits | undefined;
+  for (const { type, payload } of recordsIn(records)) {
+    const length = payload.byteLength;
+    const limits = type === SAFE_ORBIT && length >= 12 && !header.followsSpecification ? limitsIn(payload) : undefined;
+    if (limits) orbit = limits;
+    else if (type === COORDINATE_SYSTEM && length >= 4) frame ??= frameOfSystem(payload.getUint32(0, true), name);
+    else if (type === ORDER && length >= 4) order = payload.getUint32(0, true) === 1 ? 'pixel' : undefined;
+    else if (type !== PADDING && skipped.size < MAX_SKIPPED) skipped.add(type);
   }
   return {
     ...(frame ?? { axes: assumedAxes(header), isAssumed: !header.followsSpecification }),
     order,
+    orbit,
     skipped: [...skipped],
   };
 }
+
+/** All extension records; one that exceeds the bytes has an empty payload. */
+function* recordsIn(records: Uint8Array): Generator<{ type: number; payload: DataView }> {
+  const view = viewOf(records);
+  for (let at = 0; at + 8 <= records.length;) {
+    const length = view.getUint32(at + 4, true);
+    const end = at + 8 + length;
+    yield { type: view.getUint32(at, true), payload: viewOf(records.subarray(at + 8, end > records.length ? 0 : end)) };
+    at = end;
+  }
+}
+
+const limitsIn = (payload: DataView): OrbitLimits | undefined =>
+  safeOrbit([0, 4, 8].map((at) => payload.getFloat32(at, true)));
 
 /**
  * In systems 1 to 8, bit 0 of (system - 1) means right, bit 1 up and bit 2 forward. Systems 9 to 16 list the depth axis

@@ -1,45 +1,40 @@
-import { GaussianSplatError } from '@gaussian-splat/core';
+import { GaussianSplatError, loadModule } from '@gaussian-splat/core';
 import { GrowingBytes, grouped } from '../bytes.js';
+import { decompressing } from '../decompression.js';
 import type { SceneSource } from '../scene-format.js';
 
-/** Compressed bytes fed in one step: they may inflate to 17 MB before the stream can be stopped. */
-const FEED_BYTES = 16_384;
-
 /**
- * Whether the error is about bytes after the end of the stream, such as padding, which other readers of SPZ ignore. The
- * complete stream has been received then. Browsers report it only in the message, each differently.
+ * Whether an error reports bytes after the end of the first member, such as padding or another member. Only the message
+ * identifies the error, and it differs between browsers.
  */
 const isBehind = (cause: unknown): boolean => /junk|extra bytes|after the end/i.test(String((cause as Error).message));
 
-/** Inflates a gzip file in steps, so that a header can be checked before its body is inflated. */
+/** Inflates a gzip file in steps, so that a header can be checked before the rest is inflated. */
 export class Gunzip {
   readonly #source: SceneSource;
-  readonly #reader: ReadableStreamDefaultReader<Uint8Array>;
+  #reader: ReadableStreamDefaultReader<Uint8Array>;
   readonly #output = new GrowingBytes(65_536);
   #isEnded = false;
 
   constructor(source: SceneSource) {
     this.#source = source;
-    const { readable, writable } = new DecompressionStream('gzip');
-    this.#reader = readable.getReader();
-    // Errors of the stream are reported by the reader.
-    this.#feed(writable.getWriter()).catch(() => {});
+    this.#reader = decompressing(source.bytes, 'gzip');
   }
 
   /**
-   * Inflates until there are `length` bytes or the stream ends; returns all inflated bytes, possibly more. Throws
-   * `out-of-memory/budget` if the load may not allocate as many.
+   * Inflates until there are `length` bytes in total, or the stream ends.
+   * @returns All inflated bytes from the beginning of the file: `length`, more, or fewer if the stream has ended.
+   * @throws GaussianSplatError `decode/truncated`, `decode/corrupt`, `out-of-memory/budget`; the reason of `signal`
    */
   async upTo(length: number): Promise<Uint8Array> {
     const { budget, name } = this.#source;
-    // A growing buffer exists twice while it is copied.
+    // A growing buffer needs its size twice while its content is copied to a larger one.
     budget.take(2 * length, name);
     while (this.#output.length < length && !this.#isEnded) {
       this.#source.signal?.throwIfAborted();
-      const { value } = await this.#reader.read().catch((cause: unknown) => {
-        if (!isBehind(cause)) return this.#fail(cause);
-        return { value: undefined };
-      });
+      const { value } = await this.#reader
+        .read()
+        .catch((cause: unknown) => (isBehind(cause) ? this.#readMembers() : this.#fail(cause)));
       if (value) this.#output.append(value);
       else this.#isEnded = true;
     }
@@ -51,17 +46,16 @@ export class Gunzip {
     this.#reader.cancel().catch(() => {});
   }
 
-  async #feed(writer: WritableStreamDefaultWriter<BufferSource>): Promise<void> {
-    const { bytes } = this.#source;
-    for (let at = 0; at < bytes.length; at += FEED_BYTES) {
-      await writer.write(bytes.slice(at, at + FEED_BYTES));
-    }
-    await writer.close();
+  /** Continues with a decoder of several members. That of a browser ends at the first, and drops content that is not read. */
+  async #readMembers(): Promise<ReadableStreamReadResult<Uint8Array>> {
+    const { readMembers } = await loadModule('the code that inflates gzip members', () => import('./gzip-members.js'));
+    this.#reader = readMembers(this.#source.bytes, this.#output.length);
+    return this.#reader.read();
   }
 
   #fail(cause: unknown): never {
     const { name, bytes } = this.#source;
-    // Browsers distinguish the two cases only in the message.
+    // Browsers distinguish truncated from damaged streams only by their messages.
     const isCut = /unexpected end|truncated|incomplete|ended/i.test(String((cause as Error).message));
     throw new GaussianSplatError(isCut ? 'decode/truncated' : 'decode/corrupt', {
       where: `${name}, ${isCut ? `byte ${grouped(bytes.length)} (end of the file)` : 'gzip stream'}`,

@@ -1,36 +1,38 @@
 import { GaussianSplatError, type ShDegree } from '@gaussian-splat/core';
 import { grouped, startsWith, viewOf } from '../bytes.js';
 
-/** Common header fields of all versions of SPZ. */
+/** Header fields that all versions of SPZ have. */
 export interface SpzHeader {
   readonly version: 1 | 2 | 3 | 4;
-  /** Number of splats. */
   readonly count: number;
   readonly degree: ShDegree | 4;
   /** Number of fractional bits of the 24-bit coordinates. */
   readonly fractionalBits: number;
   readonly antialiased: boolean;
   readonly hasExtensions: boolean;
-  /** Whether the file uses the coordinates of the specification unless it declares others. */
+  /** Whether a file that declares no coordinate system has that of the specification. */
   readonly followsSpecification?: boolean | undefined;
 }
 
-/** The attributes in the order of the file. */
+/** Attributes in the order of the file. */
 export const SPZ_ATTRIBUTES = ['positions', 'opacities', 'colors', 'scales', 'rotations', 'harmonics'] as const;
 export type SpzAttribute = (typeof SPZ_ATTRIBUTES)[number];
 
-/** Length of the header of versions 1 to 3, and of the part that version 4 shares with them. */
+/** Size in bytes of the header of versions 1 to 3. The header of version 4 begins with the same fields. */
 export const SPZ_HEADER_BYTES = 16;
 
 const FLAG_ANTIALIASED = 1;
 const FLAG_EXTENSIONS = 2;
-/** Spark's flag for a tree of levels of detail: the splats of all levels follow, and drawing all would be wrong. */
+/** Flag of Spark for a tree of levels of detail. The file then has the splats of all levels, which is not supported. */
 const FLAG_LEVEL_OF_DETAIL = 0x80;
 
-/** Maximum ratio of deflate, which real scenes in zstd streams do not exceed either. */
+/** Maximum compression ratio of deflate. Real scenes in zstd streams do not exceed it, either. */
 const MAX_COMPRESSION_RATIO = 1032;
 
-/** Reads and checks the first 16 bytes of an SPZ file (after decompression, for gzip files). */
+/**
+ * Parses and validates the first 16 bytes of an SPZ file, inflated if the file is gzip.
+ * @throws GaussianSplatError `decode/header`, `decode/unsupported`, `decode/truncated`
+ */
 export function parseSpzHeader(bytes: Uint8Array, name: string): SpzHeader {
   const fail = (code: 'decode/header' | 'decode/unsupported', byte: number, expected: string, found: string): never => {
     throw new GaussianSplatError(code, {
@@ -62,7 +64,7 @@ export function parseSpzHeader(bytes: Uint8Array, name: string): SpzHeader {
   };
 }
 
-/** Bytes of each attribute of one splat in the given version. */
+/** Returns the size in bytes of each attribute of a splat, in the given version and degree. */
 export function bytesPerSplat(version: number, degree: number): Readonly<Record<SpzAttribute, number>> {
   return {
     positions: version === 1 ? 6 : 9,
@@ -74,12 +76,16 @@ export function bytesPerSplat(version: number, degree: number): Readonly<Record<
   };
 }
 
-/** Bytes of all attributes of all splats, uncompressed. */
+/** Returns the uncompressed size in bytes of all attributes of all splats. */
 export function bodyBytes({ count, degree }: SpzHeader, version: number): number {
   return count * Object.values(bytesPerSplat(version, degree)).reduce((sum, size) => sum + size, 0);
 }
 
-/** Rejects headers that declare more splats than a file of this size can hold, before anything is allocated. */
+/**
+ * Throws `decode/empty` for a header that declares no splats, and `decode/truncated` for one that declares more than the
+ * file can contain. Call it before memory is allocated.
+ * @param fileBytes Compressed size of the file.
+ */
 export function requirePlausibleCount(header: SpzHeader, fileBytes: number, name: string): void {
   if (header.count === 0) {
     throw new GaussianSplatError('decode/empty', {

@@ -11,25 +11,25 @@ import {
 } from './header.js';
 import type { PackedScene } from './streams.js';
 
-/** Limit for extension records, which have 12 to 20 bytes each, and padding after the splats. */
+/** Maximum bytes after the splats: extension records, which have 12 to 20 bytes each, and padding. */
 const MAX_TRAILING_BYTES = 65_536;
 
 const VERSIONS = [1, 2, 3];
 
 /**
- * Maximum length of a body under this header in any version, including trailing bytes and one byte too many: this much
- * must be inflated to distinguish a wrong version from a wrong length.
+ * Returns the number of bytes of the body that must be inflated to distinguish a wrong version from a wrong length: the
+ * largest body of all versions 1 to 3, trailing bytes, and one byte more.
  */
 export function longestBody(header: SpzHeader): number {
   return Math.max(...VERSIONS.map((version) => bodyBytes(header, version))) + MAX_TRAILING_BYTES + 1;
 }
 
 /**
- * Reads the body of versions 1 to 3: the attributes of all splats in sequence, then extension records. Other trailing
- * bytes are ignored unless they may belong to a body of another version than the header declares, which would decode to
- * garbage.
+ * Splits the body of versions 1 to 3 into the attributes of all splats, which are followed by extension records. Other
+ * trailing bytes are ignored, unless the length may be that of another version than the header declares.
  *
- * @param file The inflated file, or as much as {@link longestBody} requires.
+ * @param file The inflated file with its header, or its beginning with a body of {@link longestBody} bytes.
+ * @throws GaussianSplatError `decode/truncated`, `decode/corrupt`, `decode/unsupported` for other coordinate systems
  */
 export function readLegacyBody(file: Uint8Array, header: SpzHeader, name: string): PackedScene {
   const expected = bodyBytes(header, header.version);
@@ -47,7 +47,7 @@ export function readLegacyBody(file: Uint8Array, header: SpzHeader, name: string
   return { attributes, ...readExtensions(header.hasExtensions ? file.subarray(at) : new Uint8Array(0), header, name) };
 }
 
-/** Whether bytes are valid after a body: zeros, or fewer than another version would have there. */
+/** Whether the bytes after a body are valid: fewer than a body of another version would have there, or only zeros. */
 function isTrailing(rest: Uint8Array, header: SpzHeader): boolean {
   const own = bodyBytes(header, header.version);
   const others = VERSIONS.map((version) => bodyBytes(header, version) - own).filter((bytes) => bytes > 0);

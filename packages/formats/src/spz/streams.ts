@@ -6,10 +6,10 @@ import { decompressZstd } from '../zstd/decompress.js';
 import { readExtensions, type SpzFrame } from './axes.js';
 import { bytesPerSplat, SPZ_ATTRIBUTES, truncatedHeader, type SpzAttribute, type SpzHeader } from './header.js';
 
-/** The packed attributes of all splats, and their coordinate system. */
+/** Packed attributes of all splats, uncompressed, and their coordinate system. */
 export interface PackedScene extends SpzFrame {
   readonly attributes: Readonly<Record<SpzAttribute, Uint8Array>>;
-  /** Types of unknown extensions. */
+  /** Types of unknown extension records. */
   readonly skipped?: readonly number[];
 }
 
@@ -17,8 +17,10 @@ const HEADER_BYTES = 32;
 const ENTRY_BYTES = 16;
 
 /**
- * Reads the body of version 4: extension records in plain text, a table of the compressed and uncompressed sizes of
- * the streams, then one zstd stream for each attribute that has bytes.
+ * Reads the body of version 4: uncompressed extension records, a table of the compressed and uncompressed sizes of the
+ * streams, and one zstd stream for each attribute that has bytes. If the file is a prefix, coefficients are skipped.
+ * @throws GaussianSplatError `decode/header`, `decode/truncated`, `decode/corrupt`, `decode/unsupported`,
+ * `out-of-memory/budget`
  */
 export function readStreams(source: SceneSource, header: SpzHeader): PackedScene {
   const { bytes, name } = source;

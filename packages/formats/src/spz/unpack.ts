@@ -7,20 +7,21 @@ import { bytesPerSplat, type SpzHeader } from './header.js';
 import type { SceneSource } from '../scene-format.js';
 import type { PackedScene } from './streams.js';
 
-/** Colors are stored as 0.5 + 0.15·f_dc, which allows constant terms outside 0..1. */
+/** Factor of constant coefficients in stored colors, 0.5 + 0.15·f_dc, so that colors may be outside 0..1. */
 const COLOR_SCALE = 0.15;
 
-/** Unpacks all attributes into a cloud (defined by `unpackGaussians` in SPZ's `src/cc/load-spz.cc`). */
+/** Returns the cloud of packed attributes, as `unpackGaussians` in SPZ's `src/cc/load-spz.cc` defines them. */
 export function unpackSplats(
   header: SpzHeader,
-  { attributes, axes, isAssumed, order, skipped = [] }: PackedScene,
+  { attributes, axes, isAssumed, order, orbit, skipped = [] }: PackedScene,
   source: Pick<SceneSource, 'budget' | 'name'>,
 ): GaussianCloud {
   const cloud = allocateCloud(header.count, keptDegree(header.degree), source);
   cloud.antialiased = header.antialiased;
-  if (isAssumed || order) cloud.hints = { ...(isAssumed && { isUpAssumed: true }), ...(order && { order }) };
+  if (isAssumed || order || orbit)
+    cloud.hints = { ...(isAssumed && { isUpAssumed: true }), ...(order && { order }), ...(orbit && { orbit }) };
   if (header.degree === 4) warn(cloud, DEGREE_4);
-  for (const type of skipped) warn(cloud, `The SPZ extension 0x${type.toString(16)} is not known and is left out.`);
+  for (const type of skipped) warn(cloud, `The SPZ extension 0x${type.toString(16)} is left out.`);
   if (header.version === 1) unpackHalfPositions(attributes.positions, axes, cloud.positions);
   else unpackFixedPositions(attributes.positions, header.fractionalBits, axes, cloud.positions);
   for (let i = 0; i < cloud.scales.length; i++) cloud.scales[i] = attributes.scales[i] / 16 - 10;
@@ -36,7 +37,7 @@ export function unpackSplats(
   return cloud;
 }
 
-/** 24-bit signed fixed-point coordinates. */
+/** Writes positions, [N, 3], from 24-bit signed fixed-point coordinates. */
 function unpackFixedPositions(packed: Uint8Array, fractionalBits: number, axes: AxisSigns, out: Float32Array): void {
   const unit = 2 ** -fractionalBits;
   for (let i = 0; i < out.length; i++) {
@@ -50,7 +51,10 @@ function unpackHalfPositions(packed: Uint8Array, axes: AxisSigns, out: Float32Ar
   for (let i = 0; i < out.length; i++) out[i] = axes[i % 3] * halfToNumber(view.getUint16(2 * i, true));
 }
 
-/** Versions 1 and 2: x, y and z in bytes, -1..1; w is not negative and follows from the unit length. */
+/**
+ * Writes quaternions (w, x, y, z), [N, 4], of versions 1 and 2: x, y and z are bytes, -1..1. The component w is not
+ * negative, and follows from the unit length.
+ */
 function unpackFirstThree(packed: Uint8Array, axes: AxisSigns, out: Float32Array): void {
   const signs = quaternionSigns(axes);
   for (let i = 0; 4 * i < out.length; i++) {
@@ -65,8 +69,9 @@ function unpackFirstThree(packed: Uint8Array, axes: AxisSigns, out: Float32Array
 }
 
 /**
- * Versions 3 and 4: two bits for the largest component of (x, y, z, w), which is not stored, then a sign bit and 9 bits
- * of magnitude up to 1/sqrt(2) for each of the others.
+ * Writes quaternions (w, x, y, z), [N, 4], of versions 3 and 4. The highest two bits are the index of the largest
+ * component of (x, y, z, w), which is not stored. Each other component has a sign bit, and 9 bits of magnitude up to
+ * 1/sqrt(2).
  */
 function unpackSmallestThree(packed: Uint8Array, axes: AxisSigns, out: Float32Array): void {
   const signs = [...quaternionSigns(axes), 1];
@@ -87,7 +92,7 @@ function unpackSmallestThree(packed: Uint8Array, axes: AxisSigns, out: Float32Ar
   }
 }
 
-/** Coefficients -1..1 in bytes, channels interleaved as in a cloud. */
+/** Writes coefficients above the constant one from bytes, -1..1, whose channels are interleaved as in a cloud. */
 function unpackHarmonics(
   packed: Uint8Array,
   { version, degree, count }: SpzHeader,

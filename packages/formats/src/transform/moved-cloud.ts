@@ -1,19 +1,21 @@
 import type { GaussianCloud } from '@gaussian-splat/core';
 import { transformCloud } from './transform-cloud.js';
 
-/** Number of splats sampled for the center of a cloud. */
+/** Maximum number of splats that are sampled for the center of a cloud. */
 const SAMPLES = 4096;
 
 /**
- * Whether float32 would round positions by more than a few hundredths of a millimeter after the translation of a map,
- * as in georeferenced scenes.
+ * Whether a transform translates by 1,000 units or more along an axis, as in georeferenced scenes. Float32 would then
+ * round positions by more than a few hundredths of a millimeter.
+ * @param map Row-major, [3, 4].
  */
 export const isFar = (map: readonly number[]): boolean => [3, 7, 11].some((k) => Math.abs(map[k]) >= 1_000);
 
 /**
- * Applies an affine map to a cloud, in place. Far from (0, 0, 0) the center of its splats becomes the origin, so that
- * they keep their precision.
- * @param map [3, 4], row-major: linear part and translation.
+ * Applies an affine transform to a cloud. The arrays of the cloud are modified. If the cloud has an origin or moves far,
+ * the center of its splats becomes the origin of the result, so that positions keep their precision.
+ * @param map Row-major, [3, 4]: linear part and translation.
+ * @returns The same cloud, or a new object with the same arrays and another origin.
  */
 export function applyMotion(cloud: GaussianCloud, map: readonly number[]): GaussianCloud {
   const { origin } = cloud;
@@ -26,7 +28,7 @@ export function applyMotion(cloud: GaussianCloud, map: readonly number[]): Gauss
     map[row] * from[0] + map[row + 1] * from[1] + map[row + 2] * from[2] + map[row + 3];
   const world = local.map((x, axis) => x + origin[axis]);
   const moved = [place(world, 0), place(world, 4), place(world, 8)] as const;
-  // The center moves to (0, 0, 0).
+  // Relative to the new origin, the center of the splats is (0, 0, 0).
   const shift = [0, 4, 8].map((row) => map[row + 3] - place(local, row));
   transformCloud(
     cloud,
@@ -35,7 +37,7 @@ export function applyMotion(cloud: GaussianCloud, map: readonly number[]): Gauss
   return { ...cloud, origin: moved };
 }
 
-/** Median of sampled coordinates along an axis, because unusable ones may have any value. */
+/** Returns the median of sampled coordinates along an axis. Unlike a mean, it is robust to unusable splats. */
 function middleOf({ positions, count }: GaussianCloud, axis: number): number {
   const step = 3 * Math.ceil(count / SAMPLES);
   const sample: number[] = [];

@@ -1,6 +1,9 @@
 import type { Matrix3 } from '@gaussian-splat/core';
 
-/** Real spherical harmonics of one band in the order and with the signs of 3D Gaussian Splatting. */
+/**
+ * Real spherical harmonics of bands 1 to 3 at a unit direction, without their common factor, in the order and with the
+ * signs of 3D Gaussian Splatting.
+ */
 const BANDS: readonly ((x: number, y: number, z: number) => number[])[] = [
   (x, y, z) => [-y, z, -x],
   (x, y, z) => {
@@ -23,8 +26,8 @@ const BANDS: readonly ((x: number, y: number, z: number) => number[])[] = [
 ];
 
 /**
- * The harmonics are compared at these directions: a spiral over the sphere, with more points than there are
- * coefficients.
+ * Unit directions on a spiral over the sphere for fitting rotated harmonics. There are more directions than
+ * coefficients in a band.
  */
 const DIRECTIONS = Array.from({ length: 24 }, (_, k) => {
   const z = 1 - (2 * k + 1) / 24;
@@ -34,9 +37,9 @@ const DIRECTIONS = Array.from({ length: 24 }, (_, k) => {
 });
 
 /**
- * Matrix that transforms the coefficients of a band under an orthogonal matrix, including reflections: [2b + 1, 2b +
- * 1], row-major. It solves for the rotated function to equal, in every direction d, the original one in the direction
- * that rotates to d.
+ * Returns the matrix, row-major [2·band + 1, 2·band + 1], that rotates the coefficients of a band by an orthogonal
+ * matrix, which may be a reflection. The rotated function in direction d equals the original function in the direction
+ * that `turn` rotates to d.
  *
  * @param band 1, 2 or 3.
  */
@@ -60,7 +63,7 @@ export function shRotation(band: 1 | 2 | 3, turn: Matrix3): Float64Array {
   return solve(matrix(after), matrix(before));
 }
 
-/** The solution X of A·X = B for a positive definite A, by elimination. */
+/** Solves A·X = B for a positive definite A by elimination, and returns X, row-major. Modifies `a` and `b`. */
 function solve(a: number[][], b: number[][]): Float64Array {
   const size = a.length;
   for (let pivot = 0; pivot < size; pivot++) {

@@ -12,18 +12,18 @@ import {
 } from '@gaussian-splat/core';
 import { shRotation } from './sh-rotation.js';
 
-/** Relative tolerance within which a matrix counts as a rotation with uniform scale. */
+/** Relative tolerance within which a matrix is considered a rotation with uniform scale. */
 const SIMILARITY = 1e-6;
 
-/** Entries of a rotation of harmonics below this vanish in float32. */
+/** Entries of a rotation of harmonics with a smaller magnitude are considered 0. */
 const NEGLIGIBLE = 1e-12;
 
 /**
- * Applies an affine map to a cloud, in place: centers, covariances, and the directions of the spherical harmonics,
- * which rotate with the map. Maps that flatten splats give discs; those that leave only a line or a point give splats
- * without extent, which readers drop.
+ * Applies an affine transform to a cloud, in place: to centers, covariances, and the directions of spherical harmonics.
+ * A singular transform of rank 2 makes splats discs. One of lower rank sets their scales to 0, so that readers drop them.
+ * The origin of the cloud is not transformed.
  *
- * @param map [3, 4], row-major: linear part and translation.
+ * @param map Row-major, [3, 4]: linear part and translation.
  */
 export function transformCloud(cloud: GaussianCloud, map: readonly number[]): void {
   const linear = [map[0], map[1], map[2], map[4], map[5], map[6], map[8], map[9], map[10]];
@@ -42,9 +42,8 @@ export function transformCloud(cloud: GaussianCloud, map: readonly number[]): vo
 }
 
 /**
- * Returns the map, or for a singular one of rank 2 a regular one with the same rotation: its cofactors are the outer
- * product of the lost axis and the normal of the image plane, scaled by the product of the two remaining scales.
- * Undefined for lower ranks.
+ * Returns a regular matrix with the same rotation as `m`: `m` itself, unless it is singular. For rank 2, adds the outer
+ * product of the normal of the image and the lost axis, which is proportional to the cofactors. Undefined for lower ranks.
  */
 function filled(m: Matrix3): Matrix3 | undefined {
   const volume = determinant(m);
@@ -71,7 +70,8 @@ function movePositions(positions: Float32Array, m: Matrix3, [tx, ty, tz]: readon
 }
 
 /**
- * A mirrored ellipsoid equals a rotated one: -1 times a reflection is a rotation, and an ellipsoid is point-symmetric.
+ * Rotates and scales the ellipsoids of splats. `turn` may be a reflection: because an ellipsoid is point-symmetric, the
+ * rotation -1 · `turn` gives the same ellipsoid.
  */
 function turnShapes({ count, scales, rotations }: GaussianCloud, turn: Matrix3, scale: number): void {
   const sign = Math.sign(determinant(turn));
@@ -89,7 +89,7 @@ function turnShapes({ count, scales, rotations }: GaussianCloud, turn: Matrix3, 
   if (scale !== 1) for (let k = 0; k < scales.length; k++) scales[k] *= scale;
 }
 
-/** Covariances M·Σ·Mᵀ, decomposed into rotation and scales again. */
+/** Transforms covariances to M·Σ·Mᵀ, and decomposes them into rotations and scales. */
 function deformShapes({ count, scales, rotations }: GaussianCloud, m: Matrix3): void {
   for (let i = 0; i < count; i++) {
     const q = rotations.subarray(4 * i, 4 * i + 4);
@@ -112,7 +112,10 @@ function turnHarmonics(cloud: GaussianCloud, turn: Matrix3): void {
   bands.forEach((band, k) => turnBand(cloud, band, rotations[k]));
 }
 
-/** Diagonal of a rotation of harmonics that only changes signs, as for half turns. */
+/**
+ * Returns the diagonal of a rotation of harmonics that only changes signs, as for half turns. Undefined for other
+ * rotations.
+ */
 function signsOf(matrix: Float64Array, size: number): number[] | undefined {
   const diagonal = Array.from({ length: size }, (_, k) => Math.sign(matrix[k * size + k]));
   const isDiagonal = matrix.every((value, at) => {
@@ -133,7 +136,7 @@ function turnBand({ count, sh, shDegree }: GaussianCloud, band: number, matrix: 
   const stride = 3 * shCoefficientCount(shDegree);
   const old = new Float64Array(21);
   const size = 2 * band + 1;
-  // Quarter turns between axis conventions leave one or two entries in each row.
+  // Zeros are skipped: quarter turns between axis conventions have only one or two other entries in each row.
   const terms = Array.from({ length: size }, (_, row) =>
     Array.from({ length: size }, (_, k) => ({ k, factor: matrix[row * size + k] })).filter(
       ({ factor }) => Math.abs(factor) > NEGLIGIBLE,

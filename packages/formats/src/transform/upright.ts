@@ -1,13 +1,13 @@
-/** Rotates clouds so that up matches the convention of formats without such metadata. */
+/** Rotation of clouds so that their direction up becomes (0, -1, 0), as in formats without a declared direction. */
 import { type GaussianCloud, type Matrix3, type Vector3 } from '@gaussian-splat/core';
 import { transformCloud } from './transform-cloud.js';
 
-/** Cosine of the angle to straight down beyond which any half-turn axis is valid. */
+/** Cosine of the angle from (0, -1, 0) to the direction up, below which they are considered opposite. */
 const OPPOSITE = -1 + 1e-9;
 
 /**
- * Returns the rotation, row-major, of the up direction of a cloud's hints to (0, -1, 0); undefined if it is already
- * there, or unknown.
+ * Returns the row-major rotation from the direction up in a cloud's hints to (0, -1, 0). Undefined if the directions are
+ * the same, or the hints have none.
  */
 export function uprightRotation({ hints }: Pick<GaussianCloud, 'hints'>): Matrix3 | undefined {
   const up = hints?.up;

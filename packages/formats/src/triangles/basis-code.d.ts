@@ -1,6 +1,6 @@
 import type { DecoderScript } from './wasm-decoder.js';
 
-/** A KTX2 file of the transcoder. */
+/** A KTX2 file that the transcoder has opened. */
 interface Ktx2 {
   isValid(): boolean;
   isHDR(): boolean;
@@ -20,12 +20,12 @@ interface Ktx2 {
   close(): void;
   delete(): void;
 }
-/** The used part of Basis Universal's transcoder. */
+/** Part of the interface of Basis Universal's transcoder that this package uses. */
 export interface Basis {
   initializeBasis(): void;
   readonly KTX2File: new (bytes: Uint8Array) => Ktx2;
 }
 
-/** `npm run build` writes this module: scripts/decoders.mjs. */
+/** Creates the transcoder. `npm run build` writes this module by scripts/decoders.mjs. */
 export const create: DecoderScript<Basis>['create'];
 export const wasm: string;

@@ -1,6 +1,6 @@
 import type { DecoderScript } from './wasm-decoder.js';
 
-/** An object of the decoder's WebAssembly. */
+/** An object in the memory of the decoder's WebAssembly. */
 interface Owned {
   readonly ptr: number;
 }
@@ -24,7 +24,7 @@ interface Decoder extends Owned {
   ): boolean;
   GetTrianglesUInt32Array(mesh: DracoMesh, bytes: number, pointer: number): boolean;
 }
-/** The used part of Draco's decoder. */
+/** Part of the interface of Draco's decoder that this package uses. */
 export interface Draco {
   readonly Decoder: new () => Decoder;
   readonly Mesh: new () => DracoMesh;
@@ -35,13 +35,13 @@ export interface Draco {
   readonly DT_UINT16: number;
   readonly DT_UINT32: number;
   readonly DT_FLOAT32: number;
-  /** The memory, as bytes; another array after it has grown. */
+  /** Memory of the decoder. It is another array after the memory has grown. */
   readonly HEAPU8: Uint8Array<ArrayBuffer>;
   _malloc(bytes: number): number;
   _free(pointer: number): void;
   destroy(object: Owned): void;
 }
 
-/** `npm run build` writes this module: scripts/decoders.mjs. */
+/** Creates the decoder. `npm run build` writes this module by scripts/decoders.mjs. */
 export const create: DecoderScript<Draco>['create'];
 export const wasm: string;

@@ -22,21 +22,21 @@ const TYPES = {
   5126: [Float32Array, 'DT_FLOAT32'],
 } as const;
 
-/** A compressed primitive. */
+/** A primitive that Draco has compressed. */
 interface Compressed {
-  /** Its place in the file. */
+  /** Path of the primitive in the JSON, for error messages. */
   readonly path: string;
-  /** Buffer view of the compressed bytes. */
+  /** Index of the buffer view of the compressed bytes. */
   readonly view: number;
-  /** Accessors by the identifiers of their attributes in the compressed mesh. */
+  /** Index of the accessor of each attribute, by the id of the attribute in the compressed mesh. */
   readonly attributes: ReadonlyMap<number, number>;
   readonly indices: number | undefined;
 }
 
 /**
- * Decodes the primitives that Draco has compressed, and gives their accessors buffer views. A primitive whose accessors
- * have views already is left as it is: these are its uncompressed fallback.
- * @param survey Has charged the accessors to the budget, with the counts that they declare.
+ * Decodes the primitives that Draco has compressed, and adds buffer views for their accessors. A primitive whose
+ * accessors have buffer views has an uncompressed fallback, and is not decoded.
+ * @param survey Used parts of the document. Their accessors are already charged to the budget.
  * @throws GaussianSplatError `decode/*`, `out-of-memory/budget`
  */
 export async function decodeDraco(document: GltfDocument, survey: Survey): Promise<void> {
@@ -46,7 +46,7 @@ export async function decodeDraco(document: GltfDocument, survey: Survey): Promi
     }),
   );
   const decoder = new WasmDecoder('Draco', document.budget, () => import('./draco-code.js'));
-  /** The primitive that has provided each accessor. */
+  /** Index of the compressed buffer view that has provided each accessor. */
   const done = new Map<number, number>();
   for (const primitive of found) {
     const { path, view } = primitive;
@@ -63,7 +63,7 @@ export async function decodeDraco(document: GltfDocument, survey: Survey): Promi
   }
 }
 
-/** Validates the extension of a primitive; undefined if it has none, or a fallback. */
+/** Validates the extension of a primitive. Returns undefined without the extension, or with an uncompressed fallback. */
 function compressedIn(document: GltfDocument, primitive: Json, path: string): Compressed | undefined {
   const { extensions, attributes, indices, mode = TRIANGLES } = primitive;
   if (!isObject(extensions) || extensions[DRACO] === undefined) return undefined;
@@ -90,7 +90,7 @@ function compressedIn(document: GltfDocument, primitive: Json, path: string): Co
   return { path, view: own.bufferView, attributes: ids, indices: indices as number | undefined };
 }
 
-/** Decodes a mesh, and adds the data of its accessors to the document. */
+/** Decodes a mesh, and adds the content of its accessors to the document. */
 function decode(
   draco: Draco,
   bytes: Uint8Array,
@@ -118,7 +118,10 @@ function decode(
   }
 }
 
-/** @returns The elements of an accessor, and the bytes from one to the next, a multiple of 4. */
+/**
+ * Decodes an attribute of a mesh.
+ * @returns The elements of its accessor, and the distance of elements in bytes, a multiple of 4.
+ */
 function attributeOf(
   draco: Draco,
   decoder: InstanceType<Draco['Decoder']>,
@@ -161,7 +164,7 @@ function indicesOf(
   return new Uint8Array(Integers.from(new Uint32Array(packed.buffer)).buffer);
 }
 
-/** Returns a copy of the bytes that a function writes to the memory of the decoder. */
+/** Returns a copy of the `byteLength` bytes that `write` writes to the memory of the decoder, at a pointer. */
 function copied(
   draco: Draco,
   byteLength: number,

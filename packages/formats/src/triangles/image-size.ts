@@ -1,13 +1,13 @@
 import { asciiOf, startsWith, viewOf } from '../bytes.js';
 
-/** The header of an image file: its media type and its size in pixels. */
+/** Media type of an image file, and its size in pixels. */
 export interface ImageHeader {
   readonly type: 'image/png' | 'image/jpeg' | 'image/webp' | 'image/ktx2';
   readonly width: number;
   readonly height: number;
 }
 
-/** Reads the header of a PNG, JPEG, WebP or KTX2 image; undefined for other files and for headers without a size. */
+/** Reads the header of a PNG, JPEG, WebP or KTX2 image. Undefined for other files, and for headers without a size. */
 export function imageHeader(bytes: Uint8Array): ImageHeader | undefined {
   const found = pngHeader(bytes) ?? jpegHeader(bytes) ?? webpHeader(bytes) ?? ktx2Header(bytes);
   return found && found.width > 0 && found.height > 0 ? found : undefined;
@@ -26,12 +26,15 @@ function pngHeader(bytes: Uint8Array): ImageHeader | undefined {
   return { type: 'image/png', width: view.getUint32(16), height: view.getUint32(20) };
 }
 
-/** Start-of-frame markers: C0 to CF except the tables (C4), the reserved one (C8) and arithmetic conditioning (CC). */
+/** Whether a JPEG marker starts a frame: C0 to CF, except tables (C4), reserved (C8) and arithmetic conditioning (CC). */
 const isFrame = (marker: number): boolean => marker >= 0xc0 && marker <= 0xcf && ![0xc4, 0xc8, 0xcc].includes(marker);
 
 const KTX2 = [0xab, 0x4b, 0x54, 0x58, 0x20, 0x32, 0x30, 0xbb, 0x0d, 0x0a, 0x1a, 0x0a];
 
-/** Only for one image of Basis Universal (`VK_FORMAT_UNDEFINED`), as KHR_texture_basisu requires. */
+/**
+ * Reads the header of a KTX2 file with one 2D image of Basis Universal (`VK_FORMAT_UNDEFINED`). Undefined for other KTX2
+ * files, which KHR_texture_basisu does not allow.
+ */
 function ktx2Header(bytes: Uint8Array): ImageHeader | undefined {
   if (!startsWith(bytes, KTX2) || bytes.length < 80) return undefined;
   const view = viewOf(bytes);
@@ -48,7 +51,7 @@ function jpegHeader(bytes: Uint8Array): ImageHeader | undefined {
     if (bytes[at] !== 0xff) return undefined;
     const marker = bytes[at + 1];
     if (isFrame(marker)) return { type: 'image/jpeg', width: view.getUint16(at + 7), height: view.getUint16(at + 5) };
-    // Fill bytes and markers without a segment.
+    // Fill bytes and some markers have no segment.
     if (marker === 0xff) at++;
     else if (marker === 0x01 || (marker >= 0xd0 && marker <= 0xd8)) at += 2;
     else at += 2 + Math.max(2, view.getUint16(at + 2));

@@ -7,24 +7,24 @@ import { TEXEL_BYTES } from './costs.js';
 import { imageHeader, type ImageHeader } from './image-size.js';
 import type { Survey } from './survey.js';
 
-/** Texture size that every WebGPU device supports. */
+/** Maximum width and height of textures that every WebGPU device supports, in pixels. */
 const MAX_SIDE = 8192;
 const IMAGES = 'a PNG, JPEG or WebP image, or a KTX2 image of Basis Universal';
 
-/** An encoded image. */
+/** An encoded image file with its media type and its size. */
 export interface ImageFile extends ImageHeader {
   readonly bytes: Uint8Array<ArrayBuffer>;
 }
 
-/** The images in the textures of used materials. */
+/** Images in the textures of the materials that a scene uses. */
 export class Images {
-  /** GPU memory of all textures in bytes, known once the images are read. */
+  /** GPU memory of all textures in bytes. It is complete after {@link read}. */
   byteLength = 0;
   readonly #document: GltfDocument;
-  /** GPU textures that contain each image. */
+  /** For each image, a key of each GPU texture that contains it. */
   readonly #uses = new Map<number, Set<string>>();
 
-  /** Throws `decode/*`. */
+  /** Finds the images of all textures. Throws `decode/*`. */
   constructor(document: GltfDocument, { materials }: Survey) {
     this.#document = document;
     for (const material of materials) {
@@ -32,13 +32,16 @@ export class Images {
         const image = sourceOf(document, reference.index);
         const uses = this.#uses.get(image) ?? new Set();
         this.#uses.set(image, uses);
-        // Another transform or set of coordinates requires a separate texture.
-        uses.add(JSON.stringify([reference.index, reference.texCoord, reference.extensions]));
+        uses.add(isOwn(reference) ? `reference ${uses.size}` : `texture ${String(reference.index)}`);
       }
     }
   }
 
-  /** Throws `decode/*`, `out-of-memory/budget`, and the errors of the download. */
+  /**
+   * Reads the used images.
+   * @returns One entry for each image of the file; undefined for unused ones.
+   * @throws GaussianSplatError `decode/*`, `out-of-memory/budget`; errors of the download
+   */
   async read(): Promise<(ImageFile | undefined)[]> {
     const { images } = this.#document.json;
     const files: (ImageFile | undefined)[] = new Array(Array.isArray(images) ? images.length : 0).fill(undefined);
@@ -58,7 +61,7 @@ export class Images {
       throw damaged(`${document.name}, ${path}`, expected, `${width} x ${height}`, 'decode/unsupported');
     }
     const texture = Math.ceil(width * height * TEXEL_BYTES);
-    // Charges the file, the bitmap, and each texture.
+    // The charge includes the file, the decoded bitmap, and each GPU texture.
     document.take(bytes.length + 4 * width * height + uses * texture);
     this.byteLength += uses * texture;
     return { ...header, bytes: bytes.slice() as Uint8Array<ArrayBuffer> };
@@ -72,8 +75,8 @@ export class Images {
 }
 
 /**
- * The image of a texture: WebP if available, because others are fallbacks for viewers without WebP. KTX2 comes last,
- * because its fallback needs no decoder.
+ * Returns the index of the image of a texture. A WebP image is preferred, because other images are fallbacks for viewers
+ * without WebP. A KTX2 image is used only without a fallback, which needs no decoder.
  */
 export function sourceOf(document: GltfDocument, index: unknown): number {
   const texture = document.item('textures', index);
@@ -90,10 +93,18 @@ export function sourceOf(document: GltfDocument, index: unknown): number {
   );
 }
 
-/** All texture references in a material and in its extensions. */
+/** Whether three.js copies the texture for a reference, because it has a transform or other texture coordinates. */
+const isOwn = ({ texCoord, extensions }: Json): boolean =>
+  Boolean(texCoord) || (isObject(extensions) && extensions.KHR_texture_transform !== undefined);
+
+/**
+ * Returns all texture references in a material and in its extensions. That of metalness and roughness occurs twice,
+ * because three.js reads it for each of them.
+ */
 function texturesIn(value: Json, depth = 0): Json[] {
   return Object.entries(value).flatMap(([key, child]) => {
     if (!isObject(child) || depth > 3) return [];
-    return /Texture$/.test(key) && child.index !== undefined ? [child] : texturesIn(child, depth + 1);
+    if (!/Texture$/.test(key) || child.index === undefined) return texturesIn(child, depth + 1);
+    return key === 'metallicRoughnessTexture' ? [child, child] : [child];
   });
 }

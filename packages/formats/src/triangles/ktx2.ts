@@ -3,15 +3,15 @@ import { damaged } from '../faults.js';
 import type { ImageFile } from './images.js';
 import { WasmDecoder } from './wasm-decoder.js';
 
-/** `cTFRGBA32` of the transcoder: four bytes a pixel. */
+/** Output format of the transcoder, `cTFRGBA32`: four bytes for each pixel. */
 const RGBA32 = 13;
 
-/** Decodes KTX2 images with Basis Universal. */
+/** Decoder of KTX2 images by Basis Universal. */
 export class Ktx2Decoder {
   readonly #budget: LoadBudget;
   readonly #decoder;
 
-  /** @param budget Memory of the transcoder is charged to it; images are charged when their headers are read. */
+  /** @param budget Account that is charged for the memory of the transcoder, and for decoded images. */
   constructor(budget: LoadBudget) {
     this.#budget = budget;
     this.#decoder = new WasmDecoder('KTX2', budget, () => import('./basis-code.js'));
@@ -20,7 +20,7 @@ export class Ktx2Decoder {
   /**
    * Decodes the largest level of an image.
    * @param where Name of the image in error messages.
-   * @returns [height, width, 4] bytes: red, green, blue and alpha, as stored, the first row first.
+   * @returns [height, width, 4] bytes: red, green, blue and alpha, in the row order of the file.
    * @throws GaussianSplatError `decode/corrupt`, `decode/unsupported`, `out-of-memory/budget`
    */
   decode({ bytes, width, height }: ImageFile, where: string): Promise<Uint8ClampedArray<ArrayBuffer>> {

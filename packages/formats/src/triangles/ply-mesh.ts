@@ -8,7 +8,7 @@ import type { SceneSource } from '../scene-format.js';
 import { DRAW_BYTES, TRIANGLE_BYTES } from './costs.js';
 import type { TriangleFile, TriangleSource } from './read-triangles.js';
 
-/** Property names: each column of an attribute has one name of its list. */
+/** Names of the properties of an attribute. Each column of the attribute has a list of alternative names. */
 const POSITION = [['x'], ['y'], ['z']];
 const NORMAL = [['nx'], ['ny'], ['nz']];
 const COLOR = [
@@ -24,14 +24,14 @@ const UV = [
 const CORNERS = ['vertex_indices', 'vertex_index'];
 const [FLOAT, UNSIGNED_SHORT, UNSIGNED_INT] = [5126, 5123, 5125];
 
-/** One attribute, or the indices, as a glTF accessor. */
+/** An attribute or the indices of the mesh: the bytes and the JSON of a glTF accessor. */
 interface Accessor {
   readonly bytes: Uint8Array<ArrayBuffer>;
   readonly json: Readonly<Record<string, unknown>>;
 }
 
 /**
- * Reads a PLY file with faces: positions, normals, colors, and the triangle fans of its polygons. Vertices and
+ * Converts a PLY file with faces to glTF: positions, normals, colors, and polygons as triangle fans. Vertices and
  * triangles are charged to the budget before they are allocated.
  * @throws GaussianSplatError `decode/*`, `out-of-memory/budget`
  */
@@ -66,7 +66,7 @@ export function readPlyMesh({ bytes, name, budget }: TriangleSource): TriangleFi
 
 const NO_TEXTURE = 'The texture of a PLY mesh is not shown; export the mesh as GLB to have it.';
 
-/** Names of columns in an element; undefined if one is missing. */
+/** Returns the name of each column in an element; undefined if a column is missing. */
 function namesIn({ properties }: PlyElement, columns: readonly (readonly string[])[]): string[] | undefined {
   const found = columns.map(
     (names) => properties.find((each) => names.includes(each.name) && !each.listCountType)?.name,
@@ -74,7 +74,7 @@ function namesIn({ properties }: PlyElement, columns: readonly (readonly string[
   return found.includes(undefined) ? undefined : (found as string[]);
 }
 
-/** Columns of all vertices, row by row; undefined if the file lacks them. */
+/** Reads columns of all vertices, [vertices, columns]; undefined if a column is missing. */
 function columnsOf(
   data: ElementData,
   columns: readonly (readonly string[])[],
@@ -83,7 +83,7 @@ function columnsOf(
   const names = namesIn(data.element, columns);
   if (!names) return undefined;
   const stride = names.length;
-  // Charged for the CPU and for the GPU.
+  // The charge includes the memory of the CPU and of the GPU.
   source.budget?.take(8 * stride * data.element.count, source.name);
   const array = new Float32Array(stride * data.element.count);
   readColumns(
@@ -93,7 +93,7 @@ function columnsOf(
   return array;
 }
 
-/** Vertex indices of the triangle fans of polygons. Triangles with an invalid vertex position are dropped. */
+/** Returns the vertex indices of the triangle fans of all faces, [triangles, 3]. Triangles without finite positions are dropped. */
 function trianglesOf(
   data: ElementData,
   list: PlyProperty,
@@ -151,7 +151,7 @@ function positionsOf(positions: Float32Array<ArrayBuffer>): Accessor {
   const min = [Infinity, Infinity, Infinity];
   const max = [-Infinity, -Infinity, -Infinity];
   for (let at = 0; at < positions.length; at++) {
-    // No triangle uses it.
+    // No triangle uses a vertex with a coordinate that is not finite.
     if (!Number.isFinite(positions[at])) positions[at] = 0;
     min[at % 3] = Math.min(min[at % 3], positions[at]);
     max[at % 3] = Math.max(max[at % 3], positions[at]);
@@ -165,7 +165,7 @@ const floats = (array: Float32Array<ArrayBuffer>, type: 'VEC3'): Accessor => ({
   json: { componentType: FLOAT, count: array.length / 3, type },
 });
 
-/** Converts the sRGB colors of PLY files to linear colors of glTF. */
+/** Converts sRGB colors, [vertices, 3], to an accessor of linear colors with alpha, as glTF specifies. */
 function colorsOf(colors: Float32Array, alpha: Float32Array | undefined, { properties }: PlyElement): Accessor {
   const type = properties.find(({ name }) => COLOR[0].includes(name))!.type;
   const max = { uint8: 255, uint16: 65_535, int32: 255, uint32: 255 }[type as string] ?? 1;
@@ -182,7 +182,7 @@ const unit = (value: number): number => Math.min(1, Math.max(0, value || 0));
 const linearOf = (value: number): number => (value <= 0.04045 ? value / 12.92 : ((value + 0.055) / 1.055) ** 2.4);
 const bytesOf = ({ buffer }: { readonly buffer: ArrayBuffer }): Uint8Array<ArrayBuffer> => new Uint8Array(buffer);
 
-/** Returns a glTF of one mesh whose views are the accessors, indices last. */
+/** Returns the JSON of a glTF with one mesh. Accessor k has buffer view k; the last accessor has the indices. */
 function documentOf(names: readonly string[], accessors: readonly Accessor[], hasAlpha: boolean): TriangleFile['json'] {
   const attributes = Object.fromEntries(names.map((name, index) => [name, index]));
   return {

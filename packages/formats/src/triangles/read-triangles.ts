@@ -10,45 +10,45 @@ import { Survey } from './survey.js';
 import { trimmed } from './trim.js';
 import { Views, type MeshoptView } from './views.js';
 
-/** A file in memory, and access to the files that it names. */
+/** Input of {@link readTriangles}: a file in memory, and access to the files that it refers to. */
 export interface TriangleSource {
   readonly bytes: Uint8Array;
-  /** Name in error messages. */
+  /** Name of the file in error messages. */
   readonly name: string;
   readonly budget: LoadBudget;
   /**
-   * Fetches a file that the glTF names.
-   * @param uri As in the glTF, relative or absolute; never `data:`.
+   * Fetches a file that the glTF refers to.
+   * @param uri URI as in the glTF, relative or absolute, but not `data:`.
    */
   readonly openUri: OpenUri;
 }
 
-/** The triangles, points and lines of a file: self-contained JSON, and its binary data. */
+/** Triangles, points and lines of a file: a glTF whose JSON refers to no other file, and its binary content. */
 export interface TriangleFile {
   /**
-   * glTF 2.0 with one scene, without splats, cameras, names and extras. Its buffer views have neither buffers nor
-   * offsets: their bytes are in `views`. Its images have neither addresses nor views: they are in `images`.
+   * JSON of glTF 2.0 with one scene, without splats, cameras and extras. Buffer views have neither buffers nor offsets,
+   * because their bytes are in `views`. Images have neither URIs nor buffer views, because they are in `images`.
    */
   readonly json: Json;
-  /** Bytes of each used buffer view, each in its own buffer. */
+  /** Content of each buffer view: bytes in a buffer of its own, or a compressed {@link MeshoptView}. Undefined if unused. */
   readonly views: readonly (Uint8Array<ArrayBuffer> | MeshoptView | undefined)[];
-  /** Each used image, encoded. */
+  /** Encoded file of each image; undefined for unused ones. */
   readonly images: readonly (ImageFile | undefined)[];
-  /** GPU memory of geometry and textures, bytes. */
+  /** GPU memory of geometry and textures in bytes. */
   readonly byteLength: number;
-  /** Triangles that a frame draws. */
+  /** Number of triangles that a frame draws, including instances. */
   readonly triangles: number;
-  /** Messages about the parts of the file that are not shown. */
+  /** Messages about parts of the file that are not shown. */
   readonly warnings: readonly string[];
 }
 
-/** Extensions that a file may require. */
+/** Matches the extensions that a file may require. */
 const KNOWN =
   /^(KHR_mesh_quantization|(EXT|KHR)_meshopt_compression|KHR_draco_mesh_compression|EXT_mesh_gpu_instancing|KHR_lights_punctual|KHR_texture_(transform|basisu)|EXT_texture_webp|KHR_materials_\w+|EXT_materials_\w+|KHR_gaussian_splatting\w*|\w+_xmp\w*)$/;
 
 /**
- * Reads the triangles of a glTF 2.0, GLB or PLY file. Every number that determines an allocation is validated, and
- * everything that the file declares or repeats is charged to the budget, before anything is decoded.
+ * Reads the triangles of a glTF 2.0, GLB or PLY file. Before content is decoded, all numbers that determine the size of
+ * an allocation are validated, and all content is charged to the budget.
  *
  * @throws GaussianSplatError `decode/*`, `out-of-memory/budget`, and the errors of `openUri`.
  */

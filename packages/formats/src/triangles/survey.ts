@@ -4,36 +4,44 @@ import { walkNodes } from '../gltf/nodes.js';
 import { isSplats } from '../gltf/primitive.js';
 import { isObject } from '../json.js';
 import {
-  CHANNEL_BYTES,
   DRAW_BYTES,
   JOINT_BYTES,
   layoutOf,
+  MIXED_BYTES,
+  scalarsIn,
   STEP_BYTES,
+  TRACK_BYTES,
   TRIANGLE_BYTES,
   triangleCount,
   trianglesOf,
+  VERTEX_BYTES,
 } from './costs.js';
 
 const LIGHTS = 'KHR_lights_punctual';
 const INSTANCES = 'EXT_mesh_gpu_instancing';
 /** Maximum number of lights, because each pixel evaluates all of them. */
 const MAX_LIGHTS = 16;
+/** Number of joints that may move a vertex. */
+const JOINTS_PER_VERTEX = 4;
+/** Modes of primitives that three.js converts to triangles: strips and fans. */
+const CONVERTED_MODES: readonly unknown[] = [5, 6];
 
-/** The parts of a file that its scene uses, except splats. All of them are charged to the budget. */
+/** Indices of the objects that the scene of a file uses, except splats. The constructor charges them to the budget. */
 export class Survey {
   readonly nodes = new Set<number>();
   readonly meshes = new Set<number>();
   readonly materials = new Set<number>();
   readonly skins = new Set<number>();
   readonly accessors = new Set<number>();
-  /** Nodes whose light is used. */
+  /** Indices of the nodes whose light is drawn, at most {@link MAX_LIGHTS}. */
   readonly lit = new Set<number>();
-  /** Number of lights that are not used. */
+  /** Number of lights that exceed {@link MAX_LIGHTS} and are not drawn. */
   darkLights = 0;
-  /** Primitives drawn in a frame, and their triangles. */
+  /** Number of primitives that a frame draws. */
   draws = 0;
+  /** Number of triangles that a frame draws, including instances. */
   triangles = 0;
-  /** Bytes of accessor copies: morph targets, instances, joints. */
+  /** Bytes of the copies of accessors that three.js makes: morph targets, instances, joints and animations. */
   copies = 0;
   readonly #document: GltfDocument;
   readonly #primitives = new Map<number, Json[]>();
@@ -47,7 +55,7 @@ export class Survey {
     for (const accessor of this.accessors) this.#addAccessor(accessor);
   }
 
-  /** Channels of an animation that affect nodes of the scene. */
+  /** Returns the channels of an animation that affect nodes of the scene. */
   channelsOf(animation: Json): Json[] {
     const channels: unknown[] = Array.isArray(animation.channels) ? animation.channels : [];
     const moves = (channel: unknown): channel is Json =>
@@ -55,11 +63,16 @@ export class Survey {
     return channels.filter(moves);
   }
 
-  /** Primitives of a mesh other than splats. */
+  /** Returns the primitives of a mesh other than splats, by the index of the mesh. */
   primitivesOf(mesh: number): Json[] {
     const known = this.#primitives.get(mesh) ?? trianglesOf(this.#document, mesh, isSplats);
     this.#primitives.set(mesh, known);
     return known;
+  }
+
+  /** Returns the largest number of morph targets of the primitives of a mesh. */
+  targetsOf(mesh: number): number {
+    return this.primitivesOf(mesh).reduce((max, { targets }) => Math.max(max, listOf(targets).length), 0);
   }
 
   #addNode(node: Json, index: number): void {
@@ -73,8 +86,8 @@ export class Survey {
     }
     if (mesh === undefined) return;
     if (!document.isIndex(mesh)) return document.fail(`nodes[${index}].mesh`, 'a whole number', mesh);
-    const instances = isObject(extensions) ? this.#instancesOf(extensions[INSTANCES], index) : 1;
     const primitives = this.primitivesOf(mesh);
+    const instances = isObject(extensions) ? this.#instancesOf(extensions[INSTANCES], index, primitives.length) : 1;
     const isNew = !this.meshes.has(mesh);
     this.meshes.add(mesh);
     this.draws += primitives.length;
@@ -84,8 +97,11 @@ export class Survey {
       if (isNew) this.#addPrimitive(primitive, path);
       const triangles = instances * triangleCount(document, primitive);
       this.triangles += triangles;
-      document.take(TRIANGLE_BYTES * triangles);
-      this.#copy(16 * listOf(primitive.targets).length);
+      const targets = listOf(primitive.targets).length;
+      const steps = 1 + targets + (skin === undefined ? 0 : JOINTS_PER_VERTEX);
+      const vertices = document.accessorCount((primitive.attributes as Json).POSITION);
+      document.take(TRIANGLE_BYTES * triangles + VERTEX_BYTES * vertices * steps);
+      this.#copy(16 * targets);
     }
     if (skin !== undefined && primitives.length > 0) this.#addSkin(skin);
   }
@@ -94,7 +110,7 @@ export class Survey {
     const document = this.#document;
     if (!isObject(primitive) || !isObject(primitive.attributes))
       return document.fail(path, 'a primitive with attributes', primitive);
-    const { attributes, indices, material, targets, extensions } = primitive;
+    const { attributes, indices, material, targets, extensions, mode } = primitive;
     if (
       isObject(extensions) &&
       extensions.KHR_draco_mesh_compression !== undefined &&
@@ -103,6 +119,8 @@ export class Survey {
       document.fail(path, 'attributes', 'none');
     for (const accessor of Object.values(attributes)) this.#use(accessor);
     const { count } = layoutOf(document, attributes.POSITION);
+    // Three indices for each vertex, in a list of numbers and in an array.
+    if (CONVERTED_MODES.includes(mode)) this.#copy(3 * (8 + 4) * triangleCount(document, primitive));
     if (indices !== undefined) this.#use(indices);
     if (material !== undefined) {
       if (!this.materials.has(material as number)) document.take(DRAW_BYTES);
@@ -121,8 +139,8 @@ export class Survey {
     this.#copy(2 * 16 * count * names.size * listOf(targets).length);
   }
 
-  /** Instances of a node's mesh. */
-  #instancesOf(extension: unknown, node: number): number {
+  /** Returns the number of instances of a node's mesh, 1 or more, and charges them for each of its `draws`. */
+  #instancesOf(extension: unknown, node: number, draws: number): number {
     if (!isObject(extension)) return 1;
     const { attributes } = extension;
     if (!isObject(attributes))
@@ -132,8 +150,8 @@ export class Survey {
       return this.#document.accessorCount(accessor);
     });
     const count = Math.max(1, ...counts);
-    // A matrix each, in CPU and in GPU memory.
-    this.#copy(2 * 64 * count);
+    // Each instance of a draw has a matrix of 64 bytes in CPU and in GPU memory.
+    this.#copy(2 * 64 * count * draws);
     return count;
   }
 
@@ -149,17 +167,26 @@ export class Survey {
     const animation = document.item('animations', index);
     const samplers = listOf(animation.samplers);
     for (const channel of this.channelsOf(animation)) {
-      document.take(CHANNEL_BYTES + STEP_BYTES * this.nodes.size);
       const sampler = samplers[channel.sampler as number];
       if (!isObject(sampler)) return document.fail(`animations[${index}]`, 'a sampler for each channel', channel);
-      this.#use(sampler.input);
-      this.#use(sampler.output);
-      const { byteLength } = layoutOf(document, sampler.output);
-      // Weights are copied for each primitive of the mesh.
-      const { mesh } = document.item('nodes', (channel.target as Json).node);
-      const copies = mesh === undefined ? 1 : Math.max(1, this.primitivesOf(mesh as number).length);
-      this.#copy(4 * byteLength * copies);
+      const [times, values] = [sampler.input, sampler.output].map((accessor) => {
+        this.#use(accessor);
+        return layoutOf(document, accessor);
+      });
+      const tracks = this.#tracksOf(channel.target as Json);
+      document.take(tracks * (TRACK_BYTES + STEP_BYTES * this.nodes.size));
+      // Each track may convert times and values to float32, after values are converted once for the channel.
+      const scalars = scalarsIn(values);
+      this.#copy(4 * scalars + tracks * 4 * (scalarsIn(times) + scalars));
+      this.#copy((tracks * MIXED_BYTES * scalars) / Math.max(1, times.count));
     }
+  }
+
+  /** Returns the maximum number of tracks of a channel: one for each morphed object at the node and directly below. */
+  #tracksOf({ node, path }: Json): number {
+    if (path !== 'weights') return 1;
+    const { mesh, children } = this.#document.item('nodes', node);
+    return 1 + (mesh === undefined ? 0 : this.primitivesOf(mesh as number).length) + listOf(children).length;
   }
 
   #use(accessor: unknown): void {
@@ -167,7 +194,7 @@ export class Survey {
     this.accessors.add(accessor as number);
   }
 
-  /** Charged for the CPU and for the GPU. */
+  /** Charges an accessor for the memory of the CPU and of the GPU. */
   #addAccessor(index: number): void {
     this.#document.take(2 * layoutOf(this.#document, index).byteLength);
   }

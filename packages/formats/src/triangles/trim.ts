@@ -5,15 +5,15 @@ import { rootNodes } from '../gltf/nodes.js';
 import { sourceOf } from './images.js';
 import type { Survey } from './survey.js';
 
-/** Extensions that the loader of three.js supports here. */
+/** Matches the extensions that remain in the JSON, because the glTF loader of three.js supports them. */
 const READ =
   /^(KHR_materials_\w+|EXT_materials_\w+|KHR_lights_punctual|KHR_texture_transform|KHR_mesh_quantization|EXT_mesh_gpu_instancing)$/;
 
-/** Maximum length of a name, because it is copied for each channel of an animation. */
+/** Maximum length of a name in characters, because three.js copies it for each channel of an animation. */
 const NAME_LENGTH = 64;
 
 /**
- * Returns the JSON of a glTF reduced to the content that its scene uses. Names are kept only for meshes and materials,
+ * Returns the JSON of a glTF without content that its scene does not use. Only meshes and materials keep their names,
  * which picking reports.
  */
 export function trimmed(document: GltfDocument, survey: Survey): Json {
@@ -31,7 +31,11 @@ export function trimmed(document: GltfDocument, survey: Survey): Json {
     meshes: list('meshes').map((mesh, index) => {
       if (!meshes.has(index)) return { primitives: [] };
       const { name, weights } = mesh as Json;
-      return { name: nameOf(name), primitives: survey.primitivesOf(index).map(primitiveOf), weights };
+      return {
+        name: nameOf(name),
+        primitives: survey.primitivesOf(index).map(primitiveOf),
+        weights: weightsOf(weights, index, survey),
+      };
     }),
     materials: only('materials', materials, (material) => ({ ...unnamed(material), name: nameOf(material.name) })),
     textures: list('textures').map((texture, index) =>
@@ -60,17 +64,23 @@ const hasSource = ({ source, extensions }: Json): boolean =>
   (isObject(extensions) && (isObject(extensions.EXT_texture_webp) || isObject(extensions.KHR_texture_basisu)));
 
 /**
- * Transform of a node, and its visible content. Skins may refer to nodes outside the scene: only their transform is
- * kept.
+ * Returns a node with its transform and its visible content. Nodes outside the scene keep only their transform, because
+ * skins may refer to them.
  */
-function nodeOf(node: Json, index: number, { nodes, lit }: Survey): Json {
+function nodeOf(node: Json, index: number, survey: Survey): Json {
+  const { nodes, lit } = survey;
   const { matrix, translation, rotation, scale } = node;
   const place = { matrix, translation, rotation, scale };
   if (!nodes.has(index)) return place;
   const { mesh, skin, children, weights, extensions } = node;
   const names = ['EXT_mesh_gpu_instancing', ...(lit.has(index) ? ['KHR_lights_punctual'] : [])];
-  return { ...place, mesh, skin, children, weights, extensions: extensionsIn(extensions, names) };
+  const own = weightsOf(weights, mesh, survey);
+  return { ...place, mesh, skin, children, weights: own, extensions: extensionsIn(extensions, names) };
 }
+
+/** Returns the weights of a mesh, one for each morph target, because three.js copies the list for each object. */
+const weightsOf = (weights: unknown, mesh: unknown, survey: Survey): unknown[] | undefined =>
+  Array.isArray(weights) && mesh !== undefined ? weights.slice(0, survey.targetsOf(mesh as number)) : undefined;
 
 function primitiveOf({ attributes, indices, material, mode, targets }: Json): Json {
   return { attributes, indices, material, mode, targets };

@@ -6,11 +6,11 @@ import type { GltfDocument } from '../gltf/document.js';
 import { layoutOf } from './costs.js';
 import type { Survey } from './survey.js';
 
-/** A buffer view that meshoptimizer has compressed: see EXT_meshopt_compression. */
+/** A buffer view that meshoptimizer has compressed, with the properties of EXT_meshopt_compression. */
 export interface MeshoptView {
   readonly source: Uint8Array<ArrayBuffer>;
   readonly count: number;
-  /** Bytes of an element. */
+  /** Size of an uncompressed element in bytes. */
   readonly stride: number;
   readonly mode: string;
   readonly filter: string | undefined;
@@ -19,14 +19,14 @@ export interface MeshoptView {
 const MODES = ['ATTRIBUTES', 'TRIANGLES', 'INDICES'];
 const FILTERS = ['NONE', 'OCTAHEDRAL', 'QUATERNION', 'EXPONENTIAL', 'COLOR'];
 
-/** The buffer views that accessors use, with every range validated. */
+/** Buffer views of the accessors that a scene uses. The constructor validates the ranges of these accessors. */
 export class Views {
-  /** Bytes of the accessors on the GPU. */
+  /** GPU memory of the accessors in bytes. */
   readonly byteLength: number;
   readonly #document: GltfDocument;
   readonly #used = new Set<number>();
 
-  /** Throws `decode/*`. */
+  /** Validates the ranges of all used accessors. Throws `decode/*`. */
   constructor(document: GltfDocument, { accessors }: Survey) {
     this.#document = document;
     let bytes = 0;
@@ -34,7 +34,11 @@ export class Views {
     this.byteLength = bytes;
   }
 
-  /** Copies the views from their buffers. Throws `decode/*`, `out-of-memory/budget`, and errors of fetching buffers. */
+  /**
+   * Copies the used buffer views from their buffers.
+   * @returns One entry for each buffer view of the file; undefined for unused ones.
+   * @throws GaussianSplatError `decode/*`, `out-of-memory/budget`; errors of fetching buffers
+   */
   async read(): Promise<(Uint8Array<ArrayBuffer> | MeshoptView | undefined)[]> {
     const { bufferViews } = this.#document.json;
     const views: (Uint8Array<ArrayBuffer> | MeshoptView | undefined)[] = new Array(
@@ -71,7 +75,8 @@ export class Views {
   }
 
   /**
-   * Checks that an accessor lies within its views. @returns Its bytes on the GPU, including gaps between its elements.
+   * Checks that an accessor is within its buffer views.
+   * @returns GPU memory of the accessor in bytes, including gaps between elements.
    */
   #check(index: number): number {
     const document = this.#document;

@@ -2,12 +2,12 @@ import { GaussianSplatError, loadModule } from '@gaussian-splat/core';
 import type { LoadBudget } from '../budget.js';
 import { damaged } from '../faults.js';
 
-/** Hooks of a script that Emscripten has made. */
+/** Options of the function that creates a library compiled by Emscripten. */
 interface EmscriptenHooks {
   instantiateWasm(imports: WebAssembly.Imports, onInstance: (instance: WebAssembly.Instance) => void): object;
 }
 
-/** A decoder of a library: its script, and its WebAssembly, deflated, in base64. */
+/** Module of a decoder. `wasm` is its deflated WebAssembly in base64; empty if a bundle does not contain it. */
 export interface DecoderScript<T> {
   readonly create: (hooks: EmscriptenHooks) => Promise<T>;
   readonly wasm: string;
@@ -16,20 +16,20 @@ export interface DecoderScript<T> {
 const PAGE_BYTES = 65_536;
 
 /**
- * A decoder in WebAssembly, loaded at its first use. Its memory is charged to the budget as it grows, so that a file
- * takes no more of it than the load may.
+ * A decoder in WebAssembly, which is loaded at its first use. The growth of its memory is charged to the budget of the
+ * load.
  */
 export class WasmDecoder<T> {
   readonly #name: string;
   readonly #load: () => Promise<DecoderScript<T>>;
   readonly #budget: LoadBudget;
   #starting: Promise<{ readonly library: T }> | undefined;
-  /** The error of the budget: Emscripten catches it, and fails with another. */
+  /** Error of the budget when memory grew. Emscripten catches it and throws another error. */
   #refused: unknown;
 
   /**
-   * @param name Name of the format, in error messages.
-   * @param load Imports the script.
+   * @param name Name of the format in error messages.
+   * @param load Imports the module of the decoder.
    */
   constructor(name: string, budget: LoadBudget, load: () => Promise<DecoderScript<T>>) {
     this.#name = name;
@@ -38,8 +38,9 @@ export class WasmDecoder<T> {
   }
 
   /**
-   * Calls back with the library.
+   * Calls a function with the library, and returns its result.
    * @param where Part of the file in error messages.
+   * @param decode Function that uses the library; it must not be asynchronous.
    * @throws GaussianSplatError `decode/corrupt` for other errors of the callback; `decode/unsupported` without
    *   WebAssembly; `out-of-memory/budget`; `network/unreachable` if the decoder cannot be loaded.
    */
@@ -75,12 +76,12 @@ export class WasmDecoder<T> {
           instantiate(imports).then(onInstance).catch(reject);
           return {};
         },
-        // An object around it, because a promise may not resolve to an object that might have a method `then`.
+        // The library is wrapped in an object, because a promise cannot resolve to an object with a method `then`.
       }).then((library) => resolve({ library }), reject);
     });
   }
 
-  /** Charges the memory of an instance, now and whenever it grows. */
+  /** Charges the memory of an instance, at once and whenever it grows. */
   #charge({ exports }: WebAssembly.Instance, where: string): void {
     const memory = Object.values(exports).find((value) => value instanceof WebAssembly.Memory)!;
     this.#budget.take(memory.buffer.byteLength, where);

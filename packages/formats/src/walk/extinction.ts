@@ -1,47 +1,50 @@
 import { GaussianSplatError, type GaussianCloud, type Vector3 } from '@gaussian-splat/core';
 
-/** Rows of the rotation from the coordinates of the cloud to those with y up. */
+/** Rows of the rotation from the coordinates of a cloud to those with y up. */
 export type UpFrame = readonly [Vector3, Vector3, Vector3];
 
-/** Cubic voxels: a frame with y up, lengths in meters. */
+/** Grid of cubic voxels in coordinates with y up, in meters. */
 export interface VoxelGrid {
-  /** Corner of the first voxel, meters. */
+  /** Corner of the first voxel with the smallest coordinates, in meters. */
   readonly corner: Vector3;
   /** Number of voxels along x, y and z. */
   readonly size: readonly [nx: number, ny: number, nz: number];
-  /** Edge of a voxel, meters. */
+  /** Edge of a voxel in meters. */
   readonly voxel: number;
 }
 
-/** Optical depth of a scene in voxels. */
+/** Grid with the optical depth of a scene in each voxel. */
 export interface ExtinctionGrid extends VoxelGrid {
-  /** [nz, ny, nx] sums of `-ln(1 - alpha)`, x innermost. */
+  /** Optical depths, [nz, ny, nx]: sums of `-ln(1 - alpha)` over all splats. */
   readonly values: Float32Array;
 }
 
 export interface GridOptions {
-  /** Meters in one unit of the scene; default 1. */
+  /** Meters in a unit of the scene; default 1. */
   readonly metersPerUnit?: number;
   readonly frame: UpFrame;
-  /** Edge of a voxel, meters; default 0.05. Scenes that would need more than {@link MAX_VOXELS} get larger voxels. */
+  /** Edge of a voxel in meters; default 0.05. It is larger if the scene would need more than {@link MAX_VOXELS}. */
   readonly voxel?: number;
 }
 
-/** Largest grid: 64 MB of float32. */
+/** Maximum number of voxels of a grid, 64 MB of float32. */
 export const MAX_VOXELS = 2 ** 24;
-/** Maximum number of splats for the grid; larger scenes are sampled evenly, and each sample represents its neighbors. */
+/** Maximum number of splats that are added to a grid. Of more splats, an evenly spaced sample represents all. */
 const MAX_SPLATS = 500_000;
-/** Fraction of the splats that may lie outside the grid on each side, so that distant outliers do not enlarge it. */
+/** Maximum number of voxels that all splats together cover, about a minute of work. */
+const MAX_COVERED = 2 ** 33;
+/** Fraction of the splats that may be outside the grid on each side, so that distant outliers do not enlarge it. */
 const OUTLIERS = 0.003;
-/** Empty voxels around the scene. */
+/** Number of voxels around the scene on each side of the grid. */
 const MARGIN = 4;
 const MIN_ALPHA = 1 / 255;
 const MAX_ALPHA = 0.999;
 
 /**
- * Adds the optical depth `-ln(1 - alpha)` of every splat to the voxels in its reach. The covariance is widened by the variance of a voxel, edge² / 12, so
- * that thin walls do not fall between voxel centers.
- * @throws GaussianSplatError `argument/value` for lengths that are not positive and finite.
+ * Returns the optical depth of a scene: the sum of `-ln(1 - alpha)` of all splats at the center of each voxel. Covariances
+ * are widened by the variance of a voxel, edge² / 12, so that thin walls do not fall between voxel centers.
+ * @throws GaussianSplatError `argument/value` for lengths that are not positive and finite; `out-of-memory/budget` if
+ * splats cover too many voxels.
  */
 export function extinctionOf(cloud: GaussianCloud, options: GridOptions): ExtinctionGrid {
   const { metersPerUnit = 1, frame } = options;
@@ -56,12 +59,19 @@ export function extinctionOf(cloud: GaussianCloud, options: GridOptions): Extinc
   const step = Math.max(1, Math.ceil(cloud.count / MAX_SPLATS));
   const centers = centersOf(cloud, frame, metersPerUnit, step);
   const grid = emptyGrid(centers, options.voxel ?? 0.05);
-  for (let k = 0, i = 0; i < cloud.count; k++, i += step)
-    addSplat(grid, cloud, i, k, centers, frame, metersPerUnit, step);
-  return grid;
+  let left = MAX_COVERED;
+  for (let k = 0, i = 0; i < cloud.count && left >= 0; k++, i += step)
+    left -= addSplat(grid, cloud, i, k, centers, frame, metersPerUnit, step);
+  if (left >= 0) return grid;
+  throw new GaussianSplatError('out-of-memory/budget', {
+    where: 'floor of the scene',
+    expected: `splats that cover at most ${MAX_COVERED} voxels`,
+    found: 'larger ones',
+    remedy: 'remove the splats around the scene, or make a file of its floor and name it in walk-map',
+  });
 }
 
-/** [N, 3] centers of every `step`th splat, meters, y up. */
+/** Returns the centers of every `step`th splat, [N, 3], in meters with y up. */
 function centersOf(cloud: GaussianCloud, frame: UpFrame, metersPerUnit: number, step: number): Float32Array {
   const { count, positions, origin } = cloud;
   const centers = new Float32Array(3 * Math.ceil(count / step));
@@ -89,7 +99,12 @@ function emptyGrid(centers: Float32Array, wanted: number): ExtinctionGrid {
   return { values: new Float32Array(nx * ny * nz), corner: [x, y, z], size: [nx, ny, nz], voxel };
 }
 
-/** Adds splat `i`, whose center is entry `k`; `share` is the number of splats that it represents. */
+/**
+ * Adds the optical depth of splat `i` to the grid.
+ * @param k Index of the splat's center in `centers`.
+ * @param share Number of splats that the splat represents.
+ * @returns The number of voxels that the splat covers.
+ */
 function addSplat(
   { values, corner, size, voxel }: ExtinctionGrid,
   cloud: GaussianCloud,
@@ -99,13 +114,13 @@ function addSplat(
   frame: UpFrame,
   metersPerUnit: number,
   share: number,
-): void {
+): number {
   const alpha = Math.min(MAX_ALPHA, cloud.opacities[i]);
-  if (!(alpha >= MIN_ALPHA)) return;
+  if (!(alpha >= MIN_ALPHA)) return 0;
   const [xx, xy, xz, yy, yz, zz] = covarianceOf(cloud, i, frame, metersPerUnit, (voxel * voxel) / 12);
   const [a, d, f] = [yy * zz - yz * yz, xz * yz - xy * zz, xy * yz - xz * yy];
   const determinant = xx * a + xy * d + xz * f;
-  if (!(determinant > 0)) return;
+  if (!(determinant > 0)) return 0;
   const inverse = [a, d, f, xx * zz - xz * xz, xy * xz - xx * yz, xx * yy - xy * xy].map((v) => v / determinant);
   const reach = Math.sqrt(2 * Math.log(alpha / MIN_ALPHA));
   const center = [centers[3 * k], centers[3 * k + 1], centers[3 * k + 2]];
@@ -130,9 +145,10 @@ function addSplat(
       }
     }
   }
+  return Math.max(0, x1 - x0 + 1) * Math.max(0, y1 - y0 + 1) * Math.max(0, z1 - z0 + 1);
 }
 
-/** Covariance of splat `i`, meters², y up, with `widened` added to its diagonal: xx, xy, xz, yy, yz, zz. */
+/** Returns the covariance of splat `i` in m² with y up, plus `widened` on its diagonal: xx, xy, xz, yy, yz, zz. */
 function covarianceOf(
   { rotations, scales }: GaussianCloud,
   i: number,

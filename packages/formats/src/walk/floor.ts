@@ -4,25 +4,27 @@ import { solidsOf } from './solids.js';
 import type { WalkMap } from './walk-map.js';
 
 export interface FloorOptions extends GridOptions {
-  /** Free height that a body needs above the floor, meters; default 1.6. */
+  /** Free height in meters that a body needs above the floor; default 1.6. */
   readonly height?: number;
-  /** Radius of a body, meters; default 0.2. */
+  /** Radius of a body in meters; default 0.2. */
   readonly radius?: number;
-  /** Largest step up or down, meters; default 0.3. */
+  /** Maximum height of a step up or down in meters; default 0.3. */
   readonly step?: number;
-  /** Point, meters and y up, near the start of the walk. Default: above the center of the scene. */
+  /** Point near the start of the walk, in meters with y up. Default: infinitely high above the center of the scene. */
   readonly near?: Vector3;
 }
 
-/** Maximum width of gaps in the floor that are bridged, meters. */
+/** Maximum width in meters of gaps in the floor that are bridged. */
 const BRIDGE = 0.3;
-/** Maximum distance of a floor from the start, meters. */
+/** Maximum number of cells along the radius of a body. With smaller voxels, only some cells under it are examined. */
+const MAX_RADIUS = 8;
+/** Maximum horizontal distance in meters of the floor from the point `near`. */
 const REACH = 3;
 
 /**
- * Finds the walkable floor of a scene from its splats alone: solid voxels with free height above them, joined by a
- * flood fill of positions that fit a body. Uses the largest floor below the point `near` that comes within 3 m of it;
- * if there is none, the lowest of the large floors.
+ * Finds the walkable floor of a scene from its splats. Surfaces are solid voxels with free height above, which a flood
+ * fill joins if a body fits between them. The result is the largest floor below `near` within 3 m of it, or else the
+ * lowest of the large floors.
  * @throws GaussianSplatError `argument/value` for lengths that are not positive and finite.
  */
 export function makeWalkMap(cloud: GaussianCloud, options: FloorOptions): WalkMap {
@@ -30,12 +32,13 @@ export function makeWalkMap(cloud: GaussianCloud, options: FloorOptions): WalkMa
   return floorOf(grid, solidsOf(grid), options);
 }
 
-/** A grid, optionally with the optical depth of its voxels. */
+/** A grid with or without the optical depth of its voxels. */
 type FloorGrid = VoxelGrid & Partial<ExtinctionGrid>;
 
 /**
- * The same from a grid of solid voxels, [nz, ny, nx], 1 for solid. Without values the surface is in the center of its
- * voxel.
+ * Finds the walkable floor as {@link makeWalkMap} does, but from solid voxels. If `grid` has no optical depths, a surface
+ * is at the center of its voxel.
+ * @param solid Voxels, [nz, ny, nx]: 1 for solid, 0 for empty.
  */
 export function floorOf(grid: FloorGrid, solid: Uint8Array, options: Omit<FloorOptions, 'frame'> = {}): WalkMap {
   const body: Body = { height: 1.6, radius: 0.2, step: 0.3, ...options };
@@ -51,19 +54,20 @@ interface Body {
   readonly step: number;
 }
 
-/** One connected floor. */
+/** A connected floor: cells, as indices x + nx · z, and the height in meters of each. */
 interface Region {
   readonly cells: readonly number[];
   readonly heights: readonly number[];
-  /** Index of the cell nearest to the start, and its distance in meters. */
+  /** Index in `cells` of the cell nearest to the point `near`. */
   readonly nearest: number;
+  /** Horizontal distance in meters of the nearest cell from the point `near`. */
   readonly distance: number;
-  /** Height of the first cell of the flood fill, meters. */
+  /** Height in meters of the first cell of the flood fill. */
   readonly bottom: number;
 }
 
 const NOWHERE: Region = { cells: [], heights: [], nearest: 0, distance: 0, bottom: 0 };
-/** Minimum area of a lower floor relative to the largest one to be preferred. */
+/** Minimum area of a large floor, relative to the largest floor. */
 const COMPARABLE = 0.5;
 
 const largestOf = (regions: readonly Region[]): Region | undefined =>
@@ -72,7 +76,7 @@ const largestOf = (regions: readonly Region[]): Region | undefined =>
     undefined,
   );
 
-/** The lowest of the large floors, because a roof may be as large as the floor under it. */
+/** Returns the lowest of the large floors, because a roof may be as large as the floor under it. */
 function lowestOf(regions: readonly Region[]): Region {
   const max = largestOf(regions)?.cells.length ?? 0;
   const large = regions.filter(({ cells }) => cells.length >= COMPARABLE * max);
@@ -83,9 +87,9 @@ class FloorFinder {
   readonly #grid: FloorGrid;
   readonly #solid: Uint8Array;
   readonly #body: Body;
-  /** Heights of all surfaces with free height above, by column. */
+  /** For each column, heights in meters of all surfaces with free height above, from the top down. */
   readonly #floors: readonly (readonly number[])[];
-  /** Heights that belong to a region, by column. */
+  /** For each column, heights in meters that already belong to a region. */
   readonly #seen: number[][];
   readonly #disc: readonly (readonly [x: number, z: number])[];
 
@@ -113,8 +117,8 @@ class FloorFinder {
   }
 
   /**
-   * Heights of the floors of a column, from the top down. The surface is at the peak of the optical depth, interpolated
-   * by a parabola through three voxels.
+   * Returns the heights in meters of the floors of a column, from the top down. A surface is at the peak of the optical
+   * depth, which a parabola through three voxels interpolates.
    */
   #floorsOf(x: number, z: number): number[] {
     const { values, size, corner, voxel } = this.#grid;
@@ -151,7 +155,7 @@ class FloorFinder {
     return this.#seen[c].some((seen) => Math.abs(seen - height) <= this.#body.step / 2);
   }
 
-  /** Height between floors on two opposite sides of a gap; undefined if there are none. */
+  /** Returns the mean height of floors on two opposite sides of a gap; undefined if there are none. */
   #bridged(x: number, z: number, y: number): number | undefined {
     const gap = Math.ceil(BRIDGE / this.#grid.voxel);
     for (const [dx, dz] of DIRECTIONS) {
@@ -173,7 +177,7 @@ class FloorFinder {
     return undefined;
   }
 
-  /** Whether a solid voxel obstructs a body between the height of a step and its own. */
+  /** Whether a solid voxel obstructs a body at height `y`, between the height of a step and that of the body. */
   #isBlocked(x: number, z: number, y: number): boolean {
     const { size, corner, voxel } = this.#grid;
     const [nx, ny, nz] = size;
@@ -187,7 +191,7 @@ class FloorFinder {
     return false;
   }
 
-  /** Flood fill of all cells that can be reached from a height of a column. */
+  /** Returns the region of all cells that a body can reach from a height of a column, by a flood fill. */
   #fill(start: number, height: number, near: Vector3): Region {
     const { size, corner, voxel } = this.#grid;
     const [nx, , nz] = size;
@@ -217,7 +221,7 @@ class FloorFinder {
     return { cells, heights, nearest, distance: shortest * voxel, bottom: height };
   }
 
-  /** Extracts the region, cropped to its own rectangle. */
+  /** Converts a region to a map, cropped to the rectangle of its cells. */
   #mapOf({ cells, heights, nearest }: Region): WalkMap {
     const { size, corner, voxel } = this.#grid;
     const [nx] = size;
@@ -261,8 +265,11 @@ const DIRECTIONS = [
   [1, -1],
 ] as const;
 
+/** Returns the cells under a body, relative to its center. @param radius Radius in cells. */
 function discOf(radius: number): (readonly [number, number])[] {
-  const side = Array.from({ length: 2 * radius + 1 }, (_, i) => i - radius);
+  const step = Math.max(1, Math.ceil(radius / MAX_RADIUS));
+  const count = Math.floor(radius / step);
+  const side = Array.from({ length: 2 * count + 1 }, (_, i) => step * (i - count));
   return side.flatMap((z) =>
     side.flatMap((x): [number, number][] => (x * x + z * z <= radius * radius ? [[x, z]] : [])),
   );

@@ -1,4 +1,4 @@
-/** The walkable floor of a scene: derived from its splats, stored in `.floor` files, used for walking. */
+/** Walkable floor of a scene: finds it from splats or voxels, stores it in `.floor` files, and walks on it. */
 export { extinctionOf, type ExtinctionGrid, type GridOptions, type UpFrame, type VoxelGrid } from './extinction.js';
 export { floorOf, makeWalkMap, type FloorOptions } from './floor.js';
 export { solidsOf } from './solids.js';

@@ -1,16 +1,16 @@
 import type { ExtinctionGrid } from './extinction.js';
 
 /**
- * Minimum opacity of a solid voxel. Lower values close doors, higher ones leave holes in walls: measured on rooms with
- * known floors.
+ * Minimum opacity of a solid voxel, 0..1, measured on indoor scenes with known floors. Lower values close doors, and
+ * higher ones leave holes in walls.
  */
 const SOLID_OPACITY = 0.4;
-/** Minimum size of a connected component in voxels (26-neighborhood); smaller ones are floaters. */
+/** Minimum number of voxels of a connected component, in a neighborhood of 26. Smaller components are floaters. */
 const MIN_PIECE = 64;
 
 /**
- * Returns the voxels of a grid that block a body: [nz, ny, nx], 1 for solid. Components of fewer than 64 connected
- * voxels are floaters and count as empty.
+ * Returns which voxels of a grid block a body, [nz, ny, nx]: 1 for solid, 0 for empty. Components of fewer than 64
+ * connected voxels are considered empty.
  */
 export function solidsOf({ values, size: [nx, ny, nz] }: ExtinctionGrid): Uint8Array {
   const limit = -Math.log(1 - SOLID_OPACITY);

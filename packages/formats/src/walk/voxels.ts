@@ -1,6 +1,6 @@
 /**
- * Voxels of a scene from splat-transform (`.voxel.json` and `.voxel.bin`, versions 1.0 and 1.1), as solids for finding
- * a floor.
+ * Reader of the solid voxels that splat-transform writes (`.voxel.json` and `.voxel.bin`, versions 1.0 and 1.1), for
+ * finding a floor.
  */
 import type { Vector3 } from '@gaussian-splat/core';
 import { LoadBudget, type LoadLimits } from '../budget.js';
@@ -9,38 +9,41 @@ import { damaged } from '../faults.js';
 import { isObject, parseJson, show } from '../json.js';
 import { MAX_VOXELS, type UpFrame, type VoxelGrid } from './extinction.js';
 
-/** Voxels along the edge of a block. */
+/** Number of voxels along the edge of a block, which is a leaf of the octree. */
 const BLOCK = 4;
 const SOLID = 0xff000000;
 const MAX_HEAD_BYTES = 1 << 20;
-/** Links have 24 bits. */
+/** Maximum number of voxels of the upright grid, which is larger than the rotated grid that it encloses. */
+const MAX_UPRIGHT = 4 * MAX_VOXELS;
+/** Maximum number of nodes, because links have 24 bits. */
 const MAX_ENTRIES = 1 << 24;
 const SUFFIX = /\.voxel\.json$/i;
 
 export interface VoxelFiles {
-  /** The `.voxel.json`. */
+  /** Bytes of the `.voxel.json`. */
   readonly head: Uint8Array;
-  /** The `.voxel.bin`. */
+  /** Bytes of the `.voxel.bin`. */
   readonly tree: Uint8Array;
   readonly name: string;
   readonly limits?: LoadLimits | undefined;
 }
 
-/** Solid voxels, [nz, ny, nx], 1 for solid, in a frame with y up, lengths in meters. */
+/** Voxels, [nz, ny, nx], 1 for solid, 0 for empty, on a grid with y up and lengths in meters. */
 export interface SolidGrid {
   readonly grid: VoxelGrid;
   readonly solid: Uint8Array;
 }
 
-/** Whether a path is that of a voxel header. */
+/** Whether a path ends with `.voxel.json`. */
 export const isVoxelPath = (path: string): boolean => SUFFIX.test(path);
 
-/** Path of the octree that belongs to a header. */
+/** Returns the path of the octree, `.voxel.bin`, for the path of a `.voxel.json`. */
 export const voxelTreePath = (path: string): string => path.replace(SUFFIX, '.voxel.bin');
 
 /**
- * Reads voxels and rotates them so that y points up.
- * @param frame Rows of the rotation from the coordinates of the splats' file.
+ * Reads solid voxels, and rotates them so that y is up.
+ * @param frame Rows of the rotation from the coordinates of the splats' file to those with y up.
+ * @param metersPerUnit Meters in a unit of the splats' file.
  * @throws GaussianSplatError `decode/*`, `out-of-memory/budget`
  */
 export function readVoxels(files: VoxelFiles, frame: UpFrame, metersPerUnit: number): SolidGrid {
@@ -54,7 +57,7 @@ export function readVoxels(files: VoxelFiles, frame: UpFrame, metersPerUnit: num
   const octree = { nodes: numbers.subarray(0, nodeCount), masks: numbers.subarray(nodeCount) };
   const size = blocks.map((count) => BLOCK * count) as unknown as VoxelGrid['size'];
   const solid = new Octree(octree, head.depth, size, name).solids();
-  return upright({ corner: head.corner, size, voxel: head.voxel }, solid, head.isTurned, frame, metersPerUnit);
+  return upright({ corner: head.corner, size, voxel: head.voxel }, solid, head.isTurned, frame, metersPerUnit, name);
 }
 
 interface VoxelHead {
@@ -64,7 +67,7 @@ interface VoxelHead {
   readonly depth: number;
   readonly nodes: number;
   readonly words: number;
-  /** From version 1.1 on, coordinates are those of the file rotated by half a turn about z. */
+  /** Whether coordinates are those of the splats' file rotated by half a turn about z, as from version 1.1 on. */
   readonly isTurned: boolean;
 }
 
@@ -108,7 +111,7 @@ function readHead({ head, name, limits }: VoxelFiles): VoxelHead {
   };
 }
 
-/** Traverses the nodes from the root. Children are stored after their parents, so there are no cycles. */
+/** Decoder of an octree. Children are stored after their parents, so that there are no cycles. */
 class Octree {
   readonly #nodes: Uint32Array;
   readonly #masks: Uint32Array;
@@ -136,11 +139,15 @@ class Octree {
     return this.#solid;
   }
 
-  /** @param level Remaining subdivisions down to blocks. @param x First voxel of the node, as `y` and `z`. */
+  /**
+   * Marks the solid voxels of a node and its children.
+   * @param at Index of the node.
+   * @param level Number of subdivisions from the node to blocks.
+   * @param x Coordinate of the node's first voxel, in voxels, as `y` and `z`.
+   */
   #visit(at: number, level: number, x: number, y: number, z: number): void {
     const [nx, ny, nz] = this.#size;
-    // Outside the grid the tree is empty. Nodes that claim otherwise are skipped, so that each visit covers distinct
-    // voxels.
+    // Nodes outside the grid are skipped, so that each visit covers other voxels of the grid.
     if (x >= nx || y >= ny || z >= nz) return;
     const word = this.#nodes[at];
     const edge = BLOCK * 2 ** level;
@@ -179,8 +186,15 @@ class Octree {
   }
 }
 
-/** Resamples the voxels along the axes of other coordinates: each takes the value at its center. */
-function upright(grid: VoxelGrid, solid: Uint8Array, isTurned: boolean, frame: UpFrame, unit: number): SolidGrid {
+/** Resamples voxels on a rotated grid with y up. Each new voxel has the value of the old voxel at its center. */
+function upright(
+  grid: VoxelGrid,
+  solid: Uint8Array,
+  isTurned: boolean,
+  frame: UpFrame,
+  unit: number,
+  name: string,
+): SolidGrid {
   const sign = isTurned ? [-1, -1, 1] : [1, 1, 1];
   const rows = frame.map((row) => row.map((value, k) => value * sign[k]));
   const ends = grid.corner.map((low, k) => [low, low + grid.size[k] * grid.voxel]);
@@ -191,8 +205,11 @@ function upright(grid: VoxelGrid, solid: Uint8Array, isTurned: boolean, frame: U
     Math.max(1, Math.round((high - low) / grid.voxel)),
   ) as unknown as VoxelGrid['size'];
   const corner = ranges.map(([low]) => low) as unknown as Vector3;
-  const turned = new Uint8Array(size[0] * size[1] * size[2]);
-  // The inverse of a rotation has its columns as rows.
+  const voxels = size[0] * size[1] * size[2];
+  if (voxels > MAX_UPRIGHT)
+    throw damaged(name, `at most ${grouped(MAX_UPRIGHT)} voxels with y up`, grouped(voxels), 'decode/unsupported');
+  const turned = new Uint8Array(voxels);
+  // The transpose of `rows` is its inverse.
   const from = (axis: number, p: readonly number[]): number =>
     Math.floor((sum(rows.map((row, k) => row[axis] * p[k])) - grid.corner[axis]) / grid.voxel);
   for (let z = 0, at = 0; z < size[2]; z++)

@@ -1,47 +1,66 @@
 import { GaussianSplatError } from '@gaussian-splat/core';
-import { gunzipSync, gzipSync } from 'fflate';
+import { gzipSync } from 'fflate';
+import { inflateUpTo } from '../inflate.js';
 
 /**
- * The walkable floor: for each cell of a horizontal grid the heights that fit a body. Coordinates with y up, lengths in
- * meters. A cell has several heights if floors overlap, as on stairs and galleries.
+ * Walkable floor of a scene: heights of the floor that fit a body, for each cell of a horizontal grid. Coordinates have y up,
+ * in meters. A cell has several heights if floors overlap, as on stairs and galleries.
  */
 export interface WalkMap {
-  /** Edge of a cell, meters. */
+  /** Edge of a cell in meters. */
   readonly cell: number;
-  /** Corner of the first cell, meters. */
+  /** Corner of the first cell with the smallest coordinates, in meters. */
   readonly corner: readonly [x: number, z: number];
+  /** Number of cells along x. */
   readonly width: number;
+  /** Number of cells along z. */
   readonly depth: number;
-  /** Layers of [depth, width] heights in meters, x innermost; NaN without a floor. */
+  /** Layers of heights in meters, [depth, width] each; NaN for cells without another floor. */
   readonly layers: readonly Float32Array[];
-  /** Maximum step height between neighboring cells, meters. */
+  /** Maximum difference in height of a step between neighboring cells, in meters. */
   readonly step: number;
-  /** Start of the walk: the position on the floor nearest to the requested point. */
+  /** Start of the walk in meters: the position on the floor that is nearest to the requested point. */
   readonly start: readonly [x: number, y: number, z: number];
-  /** Area of the floor, m². */
+  /** Area of the floor in m². */
   readonly area: number;
 }
 
 /**
- * Returns the height of the floor at a point, within one step of the height `near`; undefined if a body cannot stand
- * there.
+ * Returns the height of the floor at a point that is nearest to the height `near`, in meters. Undefined if there is no
+ * floor within `map.step` of `near`.
  */
 export function floorAt(map: WalkMap, x: number, z: number, near: number): number | undefined {
-  const i = Math.floor((x - map.corner[0]) / map.cell);
-  const j = Math.floor((z - map.corner[1]) / map.cell);
-  if (!(i >= 0 && j >= 0 && i < map.width && j < map.depth)) return undefined;
-  let best: number | undefined;
-  for (const layer of map.layers) {
-    const height = layer[i + map.width * j];
-    const isCloser = best === undefined || Math.abs(height - near) < Math.abs(best - near);
-    if (Math.abs(height - near) <= map.step && isCloser) best = height;
+  const place = placeAt(map, columnOf(map, x), rowOf(map, z), near);
+  return place < 0 ? undefined : heightOf(map, place);
+}
+
+const columnOf = ({ corner, cell }: WalkMap, x: number): number => Math.floor((x - corner[0]) / cell);
+const rowOf = ({ corner, cell }: WalkMap, z: number): number => Math.floor((z - corner[1]) / cell);
+
+/**
+ * Returns the place in a cell whose height is nearest to `near`: its layer, times the number of cells, plus the index of
+ * the cell. Returns -1 if there is no floor within `map.step` of `near`.
+ */
+function placeAt({ width, depth, layers, step }: WalkMap, column: number, row: number, near: number): number {
+  if (!(column >= 0 && row >= 0 && column < width && row < depth)) return -1;
+  const index = column + width * row;
+  let best = -1;
+  let distance = step;
+  for (let layer = 0; layer < layers.length; layer++) {
+    const off = Math.abs(layers[layer][index] - near);
+    if (!(off < distance || (off === distance && best < 0))) continue;
+    distance = off;
+    best = index + width * depth * layer;
   }
   return best;
 }
 
+const heightOf = ({ width, depth, layers }: WalkMap, place: number): number =>
+  layers[Math.floor(place / (width * depth))][place % (width * depth)];
+
 /**
- * Moves one step on the floor. A body that meets a wall slides along it.
- * @param from x, height of the floor, z: meters.
+ * Moves a body on the floor by (dx, dz) meters. A body that meets a wall slides along the wall.
+ * @param from Position (x, height of the floor, z) in meters.
  * @returns The new position; the same array if the body is blocked.
  */
 export function stepOn(
@@ -63,7 +82,7 @@ export function stepOn(
   return from;
 }
 
-/** Follows the floor from cell to cell; undefined if it ends on the way. */
+/** Returns the height of the floor at the end of a straight movement; undefined if the floor ends before. */
 function walkTo(map: WalkMap, x: number, y: number, z: number, toX: number, toZ: number): number | undefined {
   const pieces = Math.max(1, Math.ceil(Math.max(Math.abs(toX - x), Math.abs(toZ - z)) / map.cell));
   let height: number | undefined = y;
@@ -73,45 +92,39 @@ function walkTo(map: WalkMap, x: number, y: number, z: number, toX: number, toZ:
 }
 
 /**
- * Finds the shortest path over the floor between two positions, by breadth-first search over cells, eight neighbors
- * each.
- * @returns Positions from cell to cell, the last at the end of the path; empty if there is none.
+ * Finds the path over the floor with the fewest cells between two positions, by breadth-first search over cells with
+ * eight neighbors.
+ * @param from Position (x, height of the floor, z) in meters, as `to`.
+ * @returns Positions from cell to cell without `from`; the last is `to`. Empty if there is no path.
  */
 export function wayTo(
   map: WalkMap,
   from: readonly [number, number, number],
   to: readonly [number, number, number],
 ): readonly (readonly [number, number, number])[] {
-  const { cell, corner, width } = map;
-  const cellOf = (x: number, z: number): number =>
-    Math.floor((x - corner[0]) / cell) + width * Math.floor((z - corner[1]) / cell);
-  const middle = (index: number): [number, number] => [
-    corner[0] + ((index % width) + 0.5) * cell,
-    corner[1] + (Math.floor(index / width) + 0.5) * cell,
-  ];
-  const goal = cellOf(to[0], to[2]);
-  const visited = new Map<string, { readonly place: readonly [number, number, number]; readonly before?: string }>();
-  const keyOf = (index: number, y: number): string => `${index} ${Math.round(y / map.step)}`;
-  const first = keyOf(cellOf(from[0], from[2]), from[1]);
-  visited.set(first, { place: from });
-  const queue = [first];
-  for (let head = 0; head < queue.length; head++) {
-    const key = queue[head];
-    const [x, y, z] = visited.get(key)!.place;
-    const index = cellOf(x, z);
-    if (index === goal && Math.abs(y - to[1]) <= map.step) return back(visited, key, to);
+  const start = placeAt(map, columnOf(map, from[0]), rowOf(map, from[2]), from[1]);
+  const goal = placeAt(map, columnOf(map, to[0]), rowOf(map, to[2]), to[1]);
+  if (start < 0 || goal < 0) return [];
+  const { width, depth, layers } = map;
+  // For each visited place, the place before it. Typed arrays, because a floor may have 100,000 cells.
+  const before = new Int32Array(layers.length * width * depth).fill(-1);
+  const queue = new Int32Array(before.length);
+  [before[start], queue[0]] = [start, start];
+  for (let head = 0, tail = 1; head < tail; head++) {
+    const place = queue[head];
+    if (place === goal) return back(map, before, goal, to);
+    const height = heightOf(map, place);
+    const column = place % width;
+    const row = Math.floor(place / width) % depth;
     for (const [i, j] of NEIGHBORS) {
-      const next = index + i + width * j;
-      const [toX, toZ] = middle(next);
-      const height = floorAt(map, toX, toZ, y);
+      const next = placeAt(map, column + i, row + j, height);
+      if (next < 0 || before[next] >= 0) continue;
+      // A diagonal step requires a floor in both cells beside it, because a body does not cut corners.
       const isCorner = i !== 0 && j !== 0;
-      if (height === undefined) continue;
-      // A diagonal step needs both adjacent cells, because a body does not cut corners.
-      if (isCorner && (!isFree(map, middle(index + i), y) || !isFree(map, middle(index + width * j), y))) continue;
-      const nextKey = keyOf(next, height);
-      if (visited.has(nextKey)) continue;
-      visited.set(nextKey, { place: [toX, height, toZ], before: key });
-      queue.push(nextKey);
+      if (isCorner && (placeAt(map, column + i, row, height) < 0 || placeAt(map, column, row + j, height) < 0))
+        continue;
+      before[next] = place;
+      queue[tail++] = next;
     }
   }
   return [];
@@ -128,33 +141,34 @@ const NEIGHBORS = [
   [-1, -1],
 ] as const;
 
-const isFree = (map: WalkMap, [x, z]: readonly [number, number], near: number): boolean =>
-  floorAt(map, x, z, near) !== undefined;
-
+/** Returns the positions on the way to a place, without the first; the last is `to`. */
 function back(
-  visited: ReadonlyMap<string, { readonly place: readonly [number, number, number]; readonly before?: string }>,
-  last: string,
+  map: WalkMap,
+  before: Int32Array,
+  goal: number,
   to: readonly [number, number, number],
 ): readonly (readonly [number, number, number])[] {
-  const way: (readonly [number, number, number])[] = [to];
-  for (let key = visited.get(last)!.before; key !== undefined; key = visited.get(key)!.before)
-    way.push(visited.get(key)!.place);
-  way.pop();
+  const { cell, corner, width, depth } = map;
+  const way = [to];
+  for (let place = before[goal]; place !== before[place]; place = before[place]) {
+    const [column, row] = [place % width, Math.floor(place / width) % depth];
+    way.push([corner[0] + (column + 0.5) * cell, heightOf(map, place), corner[1] + (row + 0.5) * cell]);
+  }
   return way.reverse();
 }
 
 const FORMAT = 'gaussian-splat-walk-map';
 const VERSION = 1;
-/** The int16 that marks a missing floor. */
+/** Value of int16 for cells without a floor. */
 const NO_FLOOR = -0x8000;
-/** Smallest unit of stored heights, meters. */
+/** Minimum unit of stored heights in meters. */
 const HEIGHT_UNIT = 0.01;
-/** Maximum unpacked size of a file: 64 MB. */
+/** Maximum uncompressed size of a file in bytes. */
 const MAX_BYTES = 2 ** 26;
 
 /**
- * Encodes a `.floor` file: gzip of one line of JSON and, layer by layer, int16 differences along rows, in units of
- * `heightUnit` meters.
+ * Returns the bytes of a `.floor` file: gzip of one line of JSON, followed by the heights of all layers. Heights are int16
+ * differences from the previous height, in units of `heightUnit` meters.
  */
 export function encodeWalkMap(map: WalkMap): Uint8Array {
   const { layers, ...rest } = map;
@@ -180,9 +194,16 @@ export function encodeWalkMap(map: WalkMap): Uint8Array {
   return gzipSync(bytes, { level: 9, mtime: 0 });
 }
 
+/** Maximum number of layers of a file. Layers of few cells would take much more memory than their bytes. */
+const MAX_LAYERS = 1024;
+
+/** Returns a list of `count` values; NaN instead of any other value. */
+const numbersOf = (value: unknown, count: number): readonly unknown[] =>
+  Array.isArray(value) && value.length === count ? (value as unknown[]) : [NaN];
+
 /**
  * Reads a `.floor` file.
- * @param name Name of the file in errors.
+ * @param name Name of the file in error messages.
  * @throws GaussianSplatError `decode/corrupt`
  */
 export function decodeWalkMap(file: Uint8Array, name = 'walk map'): WalkMap {
@@ -198,7 +219,7 @@ export function decodeWalkMap(file: Uint8Array, name = 'walk map'): WalkMap {
   try {
     const length = new DataView(file.buffer, file.byteOffset + file.length - 4, 4).getUint32(0, true);
     if (length > MAX_BYTES) fail(`at most ${MAX_BYTES} bytes`, String(length));
-    bytes = gunzipSync(file, { out: new Uint8Array(length) });
+    bytes = inflateUpTo(file, length);
   } catch (error) {
     if (error instanceof GaussianSplatError) throw error;
     fail('a gzip file', (error as Error).message);
@@ -218,19 +239,24 @@ export function decodeWalkMap(file: Uint8Array, name = 'walk map'): WalkMap {
   const { format, version, cell, corner, width, depth, layers, step, start, area, heightUnit } = head ?? {};
   if (format !== FORMAT || version !== VERSION)
     fail(`format ${FORMAT}, version ${VERSION}`, `format ${format}, version ${version}`);
-  const numbers = [cell, step, area, heightUnit, ...(corner ?? []), ...(start ?? [])];
+  const numbers = [cell, step, area, heightUnit, ...numbersOf(corner, 2), ...numbersOf(start, 3)];
   const counts = [width, depth, layers];
   const isWhole =
-    numbers.length === 9 &&
     numbers.every((value) => Number.isFinite(value)) &&
     cell! > 0 &&
     step! > 0 &&
-    counts.every((value) => Number.isSafeInteger(value) && value! >= 0);
+    counts.every((value) => Number.isSafeInteger(value) && value! >= 0) &&
+    layers! <= MAX_LAYERS;
   if (!isWhole)
-    fail('finite numbers for cell, corner, width, depth, layers, step, start and area', JSON.stringify(head));
+    fail(
+      'finite numbers for cell, corner, width, depth, layers, step, start and area',
+      JSON.stringify(head).slice(0, 200),
+    );
   const cells = width! * depth!;
   const expected = 2 * layers! * cells;
-  if (bytes.length - end - 1 !== expected) fail(`${expected} bytes of heights`, String(bytes.length - end - 1));
+  // Layers without cells take no bytes, so that their number would be unlimited.
+  if (bytes.length - end - 1 !== expected || layers! > expected)
+    fail(`${expected} bytes of heights`, String(bytes.length - end - 1));
   const view = new DataView(bytes.buffer, bytes.byteOffset + end + 1);
   const read = (layer: number): Float32Array => {
     let before = 0;

@@ -1,8 +1,8 @@
-/** A fault in a WebP file; the caller adds the file's name and converts it to an error for users. */
+/** Error of a WebP decoder. The caller converts it to a GaussianSplatError with the name of the file. */
 export class WebpError extends Error {
-  /** Whether the file may only be truncated. */
+  /** Whether the file is truncated. */
   readonly isCut: boolean;
-  /** Whether the file is valid but of an unsupported kind. */
+  /** Whether the file may be valid, but is of an unsupported kind. */
   readonly isForeign: boolean;
 
   constructor(found: string, kind: 'damaged' | 'cut' | 'foreign' = 'damaged') {
@@ -12,18 +12,18 @@ export class WebpError extends Error {
   }
 }
 
-/** Zeros after the stream, so that a 32-bit read at its end stays within the array. */
+/** Number of zero bytes after the stream, so that a 32-bit read at its end is within the array. */
 const PADDING = 8;
 
-/** Reads bits, least significant first. */
+/** Reader of a bit stream, least significant bit first. */
 export class BitReader {
   readonly bytes: Uint8Array;
-  /** Number of bits read. The decoder's inner loop keeps a local copy and writes it back. */
+  /** Number of bits that have been read. The inner loop of the decoder reads without {@link read} and sets it. */
   position = 0;
-  /** Bits of the stream. */
+  /** Number of bits of the stream. */
   readonly length: number;
 
-  /** Charges bytes before they are allocated. */
+  /** Charges bytes before they are allocated; may throw. */
   readonly take: (bytes: number) => void;
 
   constructor(stream: Uint8Array, take: (bytes: number) => void) {
@@ -33,7 +33,7 @@ export class BitReader {
     this.length = 8 * stream.length;
   }
 
-  /** The next `count` bits, 0 to 24, as a number. */
+  /** Reads the next `count` bits, 0 to 24, as an unsigned integer. Throws {@link WebpError} at the end of the stream. */
   read(count: number): number {
     const value = window32(this.bytes, this.position) & ((1 << count) - 1);
     this.position += count;
@@ -42,7 +42,7 @@ export class BitReader {
   }
 }
 
-/** At least 25 bits from a bit position on, padded with zeros beyond the end. */
+/** Returns at least 25 bits from a bit position on, the first bit lowest. Bits after the end of the stream are 0. */
 export function window32(bytes: Uint8Array, position: number): number {
   const at = position >>> 3;
   return (bytes[at] | (bytes[at + 1] << 8) | (bytes[at + 2] << 16) | (bytes[at + 3] << 24)) >>> (position & 7);

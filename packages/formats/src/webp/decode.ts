@@ -3,27 +3,26 @@ import { BitReader, cut, WebpError } from './bits.js';
 import { readPixels } from './pixels.js';
 import { readTransform, type Transform } from './transforms.js';
 
-/** A decoded image. */
+/** A decoded image; its size is in pixels. */
 export interface WebpImage {
   readonly width: number;
   readonly height: number;
-  /** [height, width] pixels from the top, bytes alpha, red, green, blue from the highest on, not premultiplied. */
+  /** [height, width] pixels, top row first. Bytes from the highest: alpha, red, green, blue; not premultiplied. */
   readonly pixels: Uint32Array;
 }
 
 const SIGNATURE = 0x2f;
 
-/** Size of a lossless image from its first bytes; decodes and allocates nothing. */
+/** Returns the size of a lossless image in pixels from its header. Throws {@link WebpError}. */
 export function webpSize(file: Uint8Array): { width: number; height: number } {
   const bits = new BitReader(losslessStream(file).subarray(0, 5), () => undefined);
   return readHeader(bits);
 }
 
 /**
- * Decodes a lossless WebP image (RFC 9649) to the exact encoded bytes, including alpha and the colors of transparent
- * pixels, which browsers' canvases do not guarantee. Memory is bounded by the image's size: check {@link webpSize}
- * first.
- * @param take Is called before each allocation other than the pixels, and may throw.
+ * Decodes a lossless WebP image (RFC 9649) exactly, including the colors of transparent pixels, which a canvas does not
+ * guarantee. The caller limits memory by {@link webpSize}.
+ * @param take Called with a number of bytes before each allocation other than the pixels; may throw.
  * @throws WebpError
  */
 export function decodeWebp(file: Uint8Array, take: (bytes: number) => void = () => undefined): WebpImage {
@@ -51,7 +50,7 @@ function readHeader(bits: BitReader): { width: number; height: number } {
   return { width, height };
 }
 
-/** The chunk `VP8L` of the container. */
+/** Returns the content of the chunk `VP8L` of a file. */
 function losslessStream(file: Uint8Array): Uint8Array {
   if (file.length < 12) throw cut();
   if (!startsWith(file, 'RIFF') || !startsWith(file, 'WEBP', 8)) throw new WebpError('no WebP image', 'foreign');

@@ -1,27 +1,28 @@
 import { decodeWebp, type WebpImage } from './decode.js';
 
 /**
- * 6 x 6 pixels of many colors, with alpha 0 to 255, and without alpha: a decoder that premultiplies or converts colors
- * would change them.
+ * Lossless images of 6 x 6 pixels in base64, with alpha 0 to 255 and without alpha. A decoder that premultiplies or
+ * converts colors changes some of their pixels.
  */
 const PROBES = [
   'UklGRq4AAABXRUJQVlA4TKEAAAAvBUABEE2UIaL/sYiI/gfYtLbdhoALCG+Ng2lYnixdBB49BkzAJFumKHtHUIEwimQrzhEkIAEHIAEJLQEdCMlt0xABkRAXuwJGtW2DamAkhQrmOlhmguihwY4ggiWBCCL89UcG0rZJle3Krj3y3Ip/qD/TxF6uTv3nMWrx0wAoxwDCb0oPfeKKABhh8wX0kYEVF7q6GSSAG2zV0pYC8AMEAAA=',
   'UklGRqAAAABXRUJQVlA4TJMAAAAvBUABAE2UIaL/sYiI/gfYtLbdhoALCG+Ng2lYnixdBB49BkzAJFumKHtHUIEwimQrzhEkIAEHIAEJLQEdCMlt0xABkRAXuwJGtW2DamAkhQrmOlhmguihwY4ggiWBCCL89UcReW7xD/2ZxF7q1OcxWvwaQDkDhH9Kjz65IsCIzRf0kWHloqvbkIAbtrq0VYAfCAAA',
 ];
 /**
- * Type, at byte 12, of the only chunk of a file that contains just pixels: other chunks may specify colors or rotations
- * that a browser applies.
+ * `VP8L`, the type at byte 12 of the first chunk of a file with only pixels. Other chunks may specify color spaces or
+ * rotations that a browser applies.
  */
 const PLAIN = [0x56, 0x50, 0x38, 0x4c];
-/** Minimum file size in bytes for the browser's decoder; ours is faster for smaller files. */
+/** Minimum file size in bytes for the decoder of the browser. For smaller files, {@link decodeWebp} is faster. */
 const MIN_BYTES = 4096;
 
 let isExact: Promise<boolean> | undefined;
 
 /**
- * Decodes a lossless WebP image with the browser's own decoder, asynchronously, if it is available and exact, which is
- * tested once.
- * @returns Undefined to fall back to {@link decodeWebp}, which also reports faults of a file.
+ * Decodes a lossless WebP image by the `ImageDecoder` of the browser, if one exists and is exact. The first call tests
+ * exactness.
+ * @param size Expected size of the image in pixels.
+ * @returns Undefined if the caller must use {@link decodeWebp}, which also reports faults of a file.
  */
 export async function decodeNatively(
   file: Uint8Array,
@@ -68,7 +69,7 @@ async function decode(file: Uint8Array): Promise<WebpImage> {
 
 async function pixelsOf(image: VideoFrame): Promise<WebpImage> {
   const { codedWidth: width, codedHeight: height, format } = image;
-  // Shifts of the first and the third byte.
+  // Shifts in bits of the first and the third byte of a pixel in ARGB.
   const [first, third] = format?.startsWith('RGB') ? [16, 0] : [0, 16];
   if (!/^(RGB|BGR)[AX]$/.test(format ?? '')) throw new Error(`pixels of format ${format}`);
   const pixels = new Uint32Array(width * height);

@@ -5,20 +5,20 @@ const LITERALS = 256;
 const LENGTH_SYMBOLS = 24;
 const DISTANCE_SYMBOLS = 40;
 const CACHE_HASH = 0x1e35a7bd;
-/** Bytes of the five codes of a group besides their tables, as the minimum cost of reading them. */
+/** Bytes charged for each group in addition to the tables of its five codes. */
 const GROUP_BYTES = 1024;
 
-/** The codes of one group: green with lengths and color cache, red, blue, alpha, distance. */
+/** Codes of a group. The symbols of `green` are also lengths of copies, and entries of the color cache. */
 type Group = readonly [green: PrefixCode, red: PrefixCode, blue: PrefixCode, alpha: PrefixCode, distance: PrefixCode];
 
-/** Maps pixels to groups: pixel (x, y) uses the group at (x >> bits, y >> bits) of a small image. */
+/** Map of pixels to groups. The group of pixel (x, y) is at (x >> bits, y >> bits) of an image `width` pixels wide. */
 interface GroupMap {
   readonly bits: number;
   readonly width: number;
   readonly groups: Uint32Array;
 }
 
-/** Neighbors of the 120 shortest distance codes, as [columns to the left, rows up], in the order of RFC 9649. */
+/** Distances of the 120 smallest distance codes in the order of RFC 9649: pairs of columns to the left and rows up. */
 const NEIGHBORS: readonly number[] = [
   ...[0, 1, 1, 0, 1, 1, -1, 1, 0, 2, 2, 0, 1, 2, -1, 2, 2, 1, -2, 1, 2, 2, -2, 2, 0, 3, 3, 0, 1, 3, -1, 3, 3, 1, -3, 1],
   ...[2, 3, -2, 3, 3, 2, -3, 2, 0, 4, 4, 0, 1, 4, -1, 4, 4, 1, -4, 1, 3, 3, -3, 3, 2, 4, -2, 4, 4, 2, -4, 2, 0, 5],
@@ -30,12 +30,12 @@ const NEIGHBORS: readonly number[] = [
 ];
 
 /**
- * Reads entropy-coded pixels, ARGB from the highest byte on. `isMain` images may use several groups of codes; the small images
- * that belong to transforms may not.
+ * Decodes entropy-coded pixels, [height, width]: bytes ARGB from the highest.
+ * @param isMain Whether the image may use several groups of codes. Images of transforms may not.
  */
 export function readPixels(bits: BitReader, width: number, height: number, isMain: boolean): Uint32Array {
   const cacheBits = bits.read(1) === 1 ? bits.read(4) : 0;
-  if (cacheBits > 11) throw new WebpError('a colour cache of more than 11 bits');
+  if (cacheBits > 11) throw new WebpError('a color cache of more than 11 bits');
   const map = isMain && bits.read(1) === 1 ? readGroupMap(bits, width, height) : undefined;
   const groupCount = map ? map.groups.reduce((max, group) => Math.max(max, group), 0) + 1 : 1;
   const groups = readGroups(bits, groupCount, cacheBits);
@@ -65,7 +65,7 @@ function readGroups(bits: BitReader, count: number, cacheBits: number): Group[] 
   });
 }
 
-/** The innermost loop of the reader, so the bit position is kept in a local variable. */
+/** Decodes all pixels into `pixels`. This is the inner loop of the decoder, so the bit position is a local variable. */
 function decode(
   bits: BitReader,
   pixels: Uint32Array,
@@ -145,7 +145,7 @@ function decode(
   bits.position = position;
 }
 
-/** Number of pixels back for a distance code: the first 120 represent neighbors. */
+/** Returns the distance of a code in pixels, 1 or more. The codes 1 to 120 are neighbors in two dimensions. */
 function distanceOf(code: number, width: number): number {
   if (code > NEIGHBORS.length / 2) return code - NEIGHBORS.length / 2;
   const k = 2 * (code - 1);

@@ -2,7 +2,7 @@ type Predictor = (left: number, top: number, topRight: number, topLeft: number) 
 
 const BLACK = 0xff000000;
 
-/** The 14 predictors of a pixel from its neighbors (RFC 9649, 4.1); the two remaining codes mean black. */
+/** The 14 predictors of a pixel from its neighbors (RFC 9649, 4.1). The codes 14 and 15 are black. */
 const PREDICTORS: readonly Predictor[] = [
   () => BLACK,
   (left) => left,
@@ -25,7 +25,11 @@ const PREDICTORS: readonly Predictor[] = [
   () => BLACK,
 ];
 
-/** Inverts prediction in place: every pixel holds the difference from its block's predictor. */
+/**
+ * Inverts prediction in place, and returns `pixels`, which contains differences from predicted pixels.
+ * @param blocks Pixels whose green is the predictor of each block of 2^blockBits by 2^blockBits pixels.
+ * @param blocksAcross Number of blocks in a row.
+ */
 export function predict(
   pixels: Uint32Array,
   width: number,
@@ -45,7 +49,7 @@ export function predict(
       for (; x < end; x++) {
         const at = row + x;
         const above = at - width;
-        // To the right of the last column is the start of the next row, as the format specifies.
+        // For the last column, the pixel at the top right is the first pixel of the current row, as RFC 9649 specifies.
         const foretold = predictor(pixels[at - 1], pixels[above], pixels[above + 1], pixels[above - 1]);
         pixels[at] = addPixels(pixels[at], foretold);
       }
@@ -54,7 +58,7 @@ export function predict(
   return pixels;
 }
 
-/** Sum of each of the four bytes, modulo 256. */
+/** Adds each of the four bytes of two pixels, modulo 256. */
 export function addPixels(a: number, b: number): number {
   return (
     ((((a & 0xff00ff00) >>> 0) + ((b & 0xff00ff00) >>> 0)) & 0xff00ff00) |
@@ -62,12 +66,12 @@ export function addPixels(a: number, b: number): number {
   );
 }
 
-/** Mean of each byte, rounded down. */
+/** Returns the mean of each byte of two pixels, rounded down. */
 function average(a: number, b: number): number {
   return (((a ^ b) & 0xfefefefe) >>> 1) + (a & b);
 }
 
-/** Left or top, whichever is nearer to left + top - topLeft. */
+/** Returns `left` or `top`: the one whose bytes are nearer to left + top - topLeft. */
 function select(left: number, top: number, topLeft: number): number {
   let toLeft = 0;
   let toTop = 0;

@@ -1,26 +1,26 @@
 import { type BitReader, WebpError } from './bits.js';
 
-/** Bits of the root table's index; codes are up to 15 bits long. */
+/** Maximum number of bits that index the root table of a code. Codes have up to 15 bits. */
 export const ROOT_BITS = 9;
 const MAX_LENGTH = 15;
 
 /**
- * A prefix code as tables. Entry: symbol or start of a second table in the upper bits, in the lower 8 the number of
- * bits to consume, and {@link LINK} if a second table follows.
+ * Decoding tables of a prefix code. The upper 24 bits of an entry are a symbol, and the lower 8 bits the length of its
+ * code. With {@link LINK}, the upper bits are the start of a second table, which the next bits index.
  */
 export interface PrefixCode {
   readonly table: Uint32Array;
-  /** Bits that index the first table. */
+  /** Number of bits that index the root table. */
   readonly rootBits: number;
 }
 
-/** Set if the entry refers to a second table; the other low bits are then the bits of its index. */
+/** Flag of an entry that refers to a second table. The lowest 4 bits are then the number of bits of its index. */
 export const LINK = 0x80;
 
-/** Storage order of the code lengths of the length code. */
+/** Symbols of the code for code lengths, in the order of their stored lengths. */
 const LENGTH_ORDER = [17, 18, 0, 1, 2, 3, 4, 5, 16, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15];
 
-/** Reads one prefix code over `alphabet` symbols. */
+/** Reads a prefix code of the symbols 0 to `alphabet` - 1. Throws {@link WebpError}. */
 export function readPrefixCode(bits: BitReader, alphabet: number): PrefixCode {
   if (bits.read(1) === 1) return readSimple(bits, alphabet);
   const lengths = new Uint8Array(alphabet);
@@ -28,7 +28,7 @@ export function readPrefixCode(bits: BitReader, alphabet: number): PrefixCode {
   return buildTables(lengths);
 }
 
-/** One or two explicit symbols: their code needs no lengths, which would cost hundreds of steps for 4 bits. */
+/** Reads a code of one or two symbols, whose tables do not depend on code lengths. */
 function readSimple(bits: BitReader, alphabet: number): PrefixCode {
   const count = bits.read(1) + 1;
   const first = bits.read(bits.read(1) === 1 ? 8 : 1);
@@ -64,7 +64,7 @@ function readLengths(bits: BitReader, lengths: Uint8Array): void {
   }
 }
 
-/** Reads the next symbol, without optimization, for headers. */
+/** Reads the next symbol of a code. This function is for headers; pixels have a faster loop. */
 export function readSymbol(bits: BitReader, { table, rootBits }: PrefixCode): number {
   let ahead = 0;
   const start = bits.position;
@@ -85,7 +85,7 @@ export function readSymbol(bits: BitReader, { table, rootBits }: PrefixCode): nu
   return entry >>> 8;
 }
 
-/** Canonical codes of the given lengths, 0 for unused symbols. A single symbol takes no bits. */
+/** Builds the canonical code of the given code lengths, 0 for unused symbols. A single symbol has a code of 0 bits. */
 function buildTables(lengths: Uint8Array): PrefixCode {
   const counts = new Uint16Array(MAX_LENGTH + 1);
   let used = 0;
@@ -108,7 +108,7 @@ function buildTables(lengths: Uint8Array): PrefixCode {
   return { table: fillTables(lengths, codes, rootBits), rootBits };
 }
 
-/** The first code of each length; a code must be complete, because otherwise some bits would be undefined. */
+/** Returns the first code of each length. Throws if the code is not complete, because some bits would be undefined. */
 function firstCodes(counts: Uint16Array): Uint16Array {
   const first = new Uint16Array(MAX_LENGTH + 2);
   let room = 1;
@@ -129,7 +129,7 @@ function reversed(code: number, length: number): number {
 
 function fillTables(lengths: Uint8Array, codes: Uint16Array, rootBits: number): Uint32Array {
   const rootSize = 1 << rootBits;
-  /** Bits beyond the root table of the longest code with each root prefix. */
+  /** For each index of the root table, number of bits of the second table; 0 without one. */
   const beyond = new Uint8Array(rootSize);
   lengths.forEach((length, symbol) => {
     const root = codes[symbol] & (rootSize - 1);

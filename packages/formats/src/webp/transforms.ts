@@ -2,7 +2,10 @@ import { type BitReader, WebpError } from './bits.js';
 import { readPixels } from './pixels.js';
 import { addPixels, predict } from './predictors.js';
 
-/** A transform that the encoder applied to the pixels: its inverse, and the width of the image before the inversion. */
+/**
+ * A transform that the encoder has applied to pixels. `undo` inverts it, and may modify its argument. `storedWidth` is the
+ * width in pixels before the inversion.
+ */
 export interface Transform {
   readonly type: number;
   readonly storedWidth: number;
@@ -11,7 +14,7 @@ export interface Transform {
 
 const [PREDICTOR, CROSS_COLOR, SUBTRACT_GREEN] = [0, 1, 2];
 
-/** Reads one transform of an image that is `width` pixels wide after the inversion. */
+/** Reads a transform. @param width Width of the image in pixels after the inversion. */
 export function readTransform(bits: BitReader, width: number, height: number): Transform {
   const type = bits.read(2);
   if (type === SUBTRACT_GREEN) return { type, storedWidth: width, undo: addGreen };
@@ -34,7 +37,10 @@ function addGreen(pixels: Uint32Array): Uint32Array {
   return pixels;
 }
 
-/** Multipliers in 1/32 of green for red, of green for blue and of red for blue: bytes 0, 1 and 2 of a block. */
+/**
+ * Inverts the color transform in place. Bytes 0, 1 and 2 of a block are the factors, in 1/32, of green for red, of green
+ * for blue, and of red for blue.
+ */
 function addCrossColor(
   pixels: Uint32Array,
   width: number,
@@ -60,7 +66,7 @@ function addCrossColor(
   return pixels;
 }
 
-/** Up to 256 colors; with 16 or fewer, several indices share the green byte of one stored pixel. */
+/** Reads a palette of up to 256 colors. With 16 colors or fewer, the green byte of a stored pixel has several indices. */
 function readPalette(bits: BitReader, type: number, width: number, height: number): Transform {
   const size = bits.read(8) + 1;
   const differences = readPixels(bits, size, 1, false);

@@ -1,26 +1,26 @@
 import { GaussianSplatError } from '@gaussian-splat/core';
-import { inflateSync } from 'fflate';
 import type { LoadBudget } from '../budget.js';
 import { grouped, quote, viewOf } from '../bytes.js';
 import { damaged } from '../faults.js';
+import { inflateUpTo } from '../inflate.js';
 import type { SceneSource } from '../scene-format.js';
 import { crc32 } from './crc32.js';
 import { readDirectory, type ZipEntry } from './directory.js';
 
-/** Maximum ratio of deflate. */
+/** Maximum compression ratio of deflate. */
 const MAX_COMPRESSION_RATIO = 1032;
 const HEADER = 0x04034b50;
 const HEADER_BYTES = 30;
 const [STORED, DEFLATED] = [0, 8];
 
-/** A ZIP file whose entries are inflated on demand. */
+/** A ZIP file whose files are inflated on demand. */
 export class Archive {
   readonly #file: Uint8Array;
   readonly #name: string;
   readonly #budget: LoadBudget;
   readonly #entries = new Map<string, ZipEntry>();
 
-  /** Reads the directory. Throws `decode/corrupt`, `decode/truncated` or `decode/unsupported`. */
+  /** Reads the directory of the archive. Throws `decode/corrupt`, `decode/truncated` or `decode/unsupported`. */
   constructor({ bytes, name, budget }: Pick<SceneSource, 'bytes' | 'name' | 'budget'>) {
     this.#file = bytes;
     this.#name = name;
@@ -36,15 +36,15 @@ export class Archive {
     return [...this.#entries.keys()];
   }
 
-  /** Inflated size of a file in bytes, as the directory declares. */
+  /** Returns the inflated size of a file in bytes, as the directory declares; 0 if the file is missing. */
   lengthOf(path: string): number {
     return this.#entries.get(normalized(path))?.bytes ?? 0;
   }
 
   /**
-   * Returns the content of a file; read-only, because it may be the archive's own memory. Throws `decode/corrupt`,
-   * `decode/truncated`, `decode/unsupported` or `out-of-memory/budget`.
-   * @param path May contain `.` and `..`.
+   * Returns the content of a file. Do not modify it, because it may be memory of the archive.
+   * @param path Path of the file in the archive. It may contain `.` and `..`.
+   * @throws GaussianSplatError `decode/corrupt`, also for missing files; `decode/unsupported`, `out-of-memory/budget`
    */
   open(path: string): Uint8Array {
     const entry = this.#entries.get(normalized(path));
@@ -55,17 +55,17 @@ export class Archive {
       const found = `compression method ${entry.method}`;
       throw damaged(where, 'a file that is stored or deflated', found, 'decode/unsupported');
     }
-    // A directory may declare any size, but the file limits it.
+    // The declared size is checked, because a directory may declare any size.
     const there = Math.min(entry.compressedBytes, this.#file.length);
     if (entry.bytes > MAX_COMPRESSION_RATIO * there + 64) {
       const found = `${grouped(entry.bytes)} bytes out of ${grouped(there)}`;
       throw damaged(where, 'a size that deflate can reach', found);
     }
-    // The checksum reads all of it, inflated or not.
+    // Stored content is charged, too, because the checksum reads all bytes.
     this.#budget.take(entry.bytes, where);
     const content = this.#contentOf(entry, where);
     if (content.length !== entry.bytes) throw damaged(where, `${grouped(entry.bytes)} bytes`, grouped(content.length));
-    // Programs that do not know the checksum before they write the content leave 0.
+    // Some programs write 0, because they do not know the checksum before they write the content.
     if (entry.crc === 0) return content;
     const crc = crc32(content);
     if (crc === entry.crc) return content;
@@ -80,7 +80,7 @@ export class Archive {
     const stored = this.#file.subarray(start, start + compressedBytes);
     if (method === STORED) return stored;
     try {
-      return inflateSync(stored, { out: new Uint8Array(bytes) });
+      return inflateUpTo(stored, bytes);
     } catch (cause) {
       if (cause instanceof RangeError) throw cause;
       throw damaged(where, 'an intact deflate stream', (cause as Error).message || 'damage', 'decode/corrupt', cause);
@@ -101,7 +101,7 @@ const hex = (value: number): string => value.toString(16).padStart(8, '0');
 
 const isFolder = (path: string): boolean => /[\\/]$/.test(path);
 
-/** Resolves `.` and `..` of a path within the archive. */
+/** Resolves `.`, `..` and backslashes of a path. The result has `/` between folders, and is within the archive. */
 function normalized(path: string): string {
   const parts: string[] = [];
   for (const part of path.replaceAll('\\', '/').split('/')) {

@@ -4,8 +4,8 @@ import { Archive } from './archive.js';
 import { listed, namedLike, relevant } from './paths.js';
 
 /**
- * Returns the description in a SOG bundle, and an opener for its images.
- * @throws GaussianSplatError `decode/unknown-format` if there is none; also faults of the archive.
+ * Returns the bytes of the `meta.json` in a SOG bundle, and a function that opens its images.
+ * @throws GaussianSplatError `decode/unknown-format` if the bundle has no `meta.json`; errors of {@link Archive}
  */
 export function openBundle(source: Pick<SceneSource, 'bytes' | 'name' | 'budget'>): {
   bytes: Uint8Array;

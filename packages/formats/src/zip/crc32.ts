@@ -1,11 +1,11 @@
-/** The polynomial of ISO 3309 in ZIP, gzip and PNG: lowest bit first. */
+/** Polynomial of ISO 3309 for ZIP, gzip and PNG, with the lowest bit first. */
 const POLYNOMIAL = 0xedb88320;
-/** Bytes in each step, with one table each. */
+/** Number of bytes that each step processes, and number of tables. */
 const SLICES = 4;
 
 let tables: readonly Int32Array[] | undefined;
 
-/** Remainder of each byte followed by none to three bytes of zeros. */
+/** Returns the tables: entry b of table k is the remainder of byte b followed by k bytes of zeros. */
 function makeTables(): readonly Int32Array[] {
   const first = Int32Array.from({ length: 256 }, (_, byte) => {
     for (let bit = 0; bit < 8; bit++) byte = (byte >>> 1) ^ (byte & 1 ? POLYNOMIAL : 0);
@@ -16,7 +16,7 @@ function makeTables(): readonly Int32Array[] {
   return made;
 }
 
-/** CRC-32 of bytes, an unsigned number; four bytes in each step ("slicing", Kounavis and Berry 2005). */
+/** Returns the CRC-32 of bytes as an unsigned integer. Processes four bytes in each step (Kounavis and Berry 2005). */
 export function crc32(bytes: Uint8Array): number {
   const [t0, t1, t2, t3] = (tables ??= makeTables());
   let rest = -1;

@@ -1,18 +1,18 @@
 import { grouped, viewOf } from '../bytes.js';
 import { damaged } from '../faults.js';
 
-/** A file within an archive, as the directory describes it. */
+/** A file of an archive, as the directory describes it. `bytes` is its inflated size. */
 export interface ZipEntry {
-  /** Path as in the archive. */
+  /** Path of the file, not normalized. */
   readonly path: string;
   /** Compression method: 0 stored, 8 deflate. */
   readonly method: number;
   readonly isEncrypted: boolean;
   readonly compressedBytes: number;
   readonly bytes: number;
-  /** CRC-32 of the content; 0 if unknown. */
+  /** CRC-32 of the inflated content; 0 if the writer did not know it. */
   readonly crc: number;
-  /** Offset of the file's own header, which its content follows. */
+  /** Byte offset in the archive of the file's header, which precedes its content. */
   readonly headerAt: number;
 }
 
@@ -23,9 +23,9 @@ const LOCATOR_64 = 0x07064b50;
 const LOCATOR_64_BYTES = 20;
 const ENTRY = 0x02014b50;
 const ENTRY_BYTES = 46;
-/** Maximum number of entries; a streamed scene of 50 million splats has some thousands. */
+/** Maximum number of entries. A streamed scene of 50 million splats has a few thousand. */
 const MAX_ENTRIES = 100_000;
-/** Value of a 32-bit field whose number is in the 64-bit field instead. */
+/** Value of a 32-bit field that is replaced by a field of 64 bits. */
 const ELSEWHERE = 0xffffffff;
 const FLAG_ENCRYPTED = 1;
 const FLAG_UTF8 = 0x800;
@@ -33,7 +33,7 @@ const FLAG_UTF8 = 0x800;
 const utf8 = new TextDecoder('utf-8', { fatal: true });
 const latin1 = new TextDecoder('latin1');
 
-/** Reads the directory at the end of a ZIP file. Throws `decode/corrupt`, `decode/truncated` or `decode/unsupported`. */
+/** Reads all entries of a ZIP file's directory. Throws `decode/corrupt`, `decode/truncated` or `decode/unsupported`. */
 export function readDirectory(file: Uint8Array, name: string): ZipEntry[] {
   const view = viewOf(file);
   const { count, start } = findDirectory(view, name);
@@ -53,14 +53,17 @@ export function readDirectory(file: Uint8Array, name: string): ZipEntry[] {
   return entries;
 }
 
-/** The directory is at the end, before a comment: without it the file is truncated. */
+/**
+ * Returns the number of entries in the directory, and its byte offset. The record with these numbers is at the end of the
+ * file, before a comment. Throws `decode/truncated` if it is missing.
+ */
 function findDirectory(view: DataView, name: string): { count: number; start: number } {
   const last = view.byteLength - DIRECTORY_END_BYTES;
   const ends: number[] = [];
   for (let at = last; at >= Math.max(0, last - 65_535); at--) {
     if (view.getUint32(at, true) === DIRECTORY_END) ends.push(at);
   }
-  // Comments may contain anything; the record whose comment ends with the file is the right one.
+  // A comment may contain the same signature. The comment of the actual record ends at the end of the file.
   const end =
     ends.find((at) => at + DIRECTORY_END_BYTES + view.getUint16(at + 20, true) === view.byteLength) ?? ends[0];
   if (end === undefined) {
@@ -81,7 +84,7 @@ function readEntry(file: Uint8Array, view: DataView, at: number, nameEnd: number
   const flags = view.getUint16(at + 8, true);
   const [compressedBytes, bytes, headerAt] = [20, 24, 42].map((field) => view.getUint32(at + field, true));
   const long = longNumbers(view, nameEnd, Math.min(file.length, nameEnd + extraBytes));
-  // In this order, and only those that are needed.
+  // The 64-bit fields are in this order, without those that a 32-bit field can represent.
   const [bytes64, compressed64, header64] = [bytes, compressedBytes, headerAt].map((value) =>
     value === ELSEWHERE ? (long.shift() ?? value) : value,
   );
@@ -96,7 +99,7 @@ function readEntry(file: Uint8Array, view: DataView, at: number, nameEnd: number
   };
 }
 
-/** The numbers of the extra field 1 (ZIP64). */
+/** Returns the 64-bit integers of the extra field 1 (ZIP64); an empty array without it. */
 function longNumbers(view: DataView, start: number, end: number): number[] {
   for (let at = start; at + 4 <= end; at += 4 + view.getUint16(at + 2, true)) {
     if (view.getUint16(at, true) !== 1) continue;
@@ -106,7 +109,7 @@ function longNumbers(view: DataView, start: number, end: number): number[] {
   return [];
 }
 
-/** Names are UTF-8 if a flag declares it, and on macOS even without it. */
+/** Decodes a path as UTF-8, which macOS writes even without the flag. Without the flag, invalid UTF-8 is Latin-1. */
 function pathOf(bytes: Uint8Array, isUtf8: boolean): string {
   try {
     return utf8.decode(bytes);

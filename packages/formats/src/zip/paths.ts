@@ -1,16 +1,16 @@
 import { quote } from '../bytes.js';
 
-/** Metadata files that macOS adds, with the names of others. */
+/** Matches the paths of metadata files that macOS adds for other files. */
 const NO_CONTENT = /(^|\/)(__MACOSX\/|\._)/;
 
-/** Paths of files without such metadata. */
+/** Returns the paths without metadata files of macOS. */
 export const relevant = (paths: readonly string[]): string[] => paths.filter((path) => !NO_CONTENT.test(path));
 
-/** Files of this name, least nested first. */
+/** Returns the paths of files with a name, least nested first. */
 export const namedLike = (name: string, paths: readonly string[]): string[] =>
   paths.filter((path) => path.split('/').pop() === name).sort((a, b) => depthOf(a) - depthOf(b));
 
-/** The least nested paths. */
+/** Returns the least nested paths. */
 export function shallowest(paths: readonly string[]): string[] {
   const depth = paths.reduce((min, path) => Math.min(min, depthOf(path)), Infinity);
   return paths.filter((path) => depthOf(path) === depth);
@@ -18,7 +18,7 @@ export function shallowest(paths: readonly string[]): string[] {
 
 const depthOf = (path: string): number => path.split('/').length;
 
-/** The first paths, for error messages. */
+/** Formats the first 4 paths for error messages, and the number of further ones. */
 export function listed(paths: readonly string[]): string {
   const shown = paths.slice(0, 4).map((path) => quote(path, 40));
   return paths.length === 0 ? 'no files' : shown.join(', ') + (paths.length > 4 ? ` and ${paths.length - 4} more` : '');

@@ -1,8 +1,8 @@
-/** A damaged or unreadable Zstandard stream; `byte` counts from the start of the stream. */
+/** Error of the Zstandard decoder. `byte` is the offset of the fault from the start of the stream. */
 export class ZstdError extends Error {
   override readonly name = 'ZstdError';
   readonly byte: number;
-  /** Whether the stream ends too early; false if its content is invalid. */
+  /** Whether the stream ends too early. If false, its content is invalid. */
   readonly isCut: boolean;
 
   constructor(message: string, byte: number, isCut = false) {
@@ -12,22 +12,22 @@ export class ZstdError extends Error {
   }
 }
 
-/** Position of the highest set bit of a positive integer below 2^32; 0 for 1. */
+/** Returns the position of the highest set bit of an integer, 1 to 2^32 - 1. The lowest bit has position 0. */
 export function highestBit(value: number): number {
   return 31 - Math.clz32(value);
 }
 
 /**
- * Reads a bit stream from its end to its beginning, as in entropy-coded parts of Zstandard (RFC 8878, 4.1). Bits before
- * the beginning read as zeros and make {@link left} negative; callers check it if that is an error.
+ * Reader of a bit stream from its end to its beginning, as in entropy-coded parts of Zstandard (RFC 8878, 4.1). Bits
+ * before the beginning are 0 and make {@link left} negative, which callers check.
  */
 export class BackwardBits {
   readonly #bytes: Uint8Array;
   readonly #start: number;
-  /** Number of unread bits. */
+  /** Number of unread bits. Negative if more bits than the stream has were read. */
   left: number;
 
-  /** The stream is the bytes `start` to `end`; the highest set bit of the last one marks its end. */
+  /** @param end Byte offset after the stream. The highest set bit of its last byte marks the end of the bits. */
   constructor(bytes: Uint8Array, start: number, end: number) {
     const last = end > start ? bytes[end - 1] : 0;
     if (last === 0) throw new ZstdError('a bit stream without an end mark', end);
@@ -36,7 +36,7 @@ export class BackwardBits {
     this.left = 8 * (end - start - 1) + highestBit(last);
   }
 
-  /** Reads the next `count` bits, 0 to 31, first bit highest. */
+  /** Reads the next `count` bits, 0 to 31, as an unsigned integer; the first bit is the highest. */
   read(count: number): number {
     if (count > 16) return this.read(count - 16) * 65_536 + this.read(16);
     const bits = this.peek(count);

@@ -7,9 +7,8 @@ import { executeSequences, type Output, type SequenceTables } from './sequences.
 const FRAME_MAGIC = [0x28, 0xb5, 0x2f, 0xfd];
 
 /**
- * Decompresses Zstandard data (RFC 8878): one or more frames, together exactly `length` bytes. It never writes more
- * than that and stops at the first contradiction, so that the time and memory of a hostile stream are bounded by its
- * own size and `length`. A checksum is skipped.
+ * Decompresses a Zstandard stream (RFC 8878) of one or more frames, with a content of exactly `length` bytes. It ends at
+ * the first fault, so that the size of the stream and `length` bound time and memory. Checksums are not verified.
  *
  * @throws ZstdError with the byte of the stream at the fault.
  */
@@ -26,7 +25,7 @@ export function decompressZstd(bytes: Uint8Array, length: number): Uint8Array {
   return output.bytes;
 }
 
-/** Decompresses the frame at byte `start`; returns the offset after it. */
+/** Decompresses the frame at byte `start`. Returns the byte offset after the frame. */
 function decompressFrame(bytes: Uint8Array, start: number, output: Output): number {
   const { blocksStart, hasChecksum } = readFrameHeader(bytes, start, output.bytes.length - output.position);
   output.frameStart = output.position;

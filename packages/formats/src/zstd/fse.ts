@@ -1,23 +1,25 @@
 import { highestBit, ZstdError } from './bits.js';
 
-/** Decoding table of a finite-state entropy code (RFC 8878, 4.1): state to symbol and to the next state. */
+/** Decoding table of a finite-state entropy code (RFC 8878, 4.1). Each array is indexed by the state. */
 export interface FseTable {
-  /** log2 of the number of states. */
+  /** Binary logarithm of the number of states. */
   readonly accuracyLog: number;
+  /** Symbol of each state. */
   readonly symbols: Uint8Array;
-  /** Number of bits to read for the next state, and the base value to add to them. */
+  /** Number of bits to read for the next state. */
   readonly bits: Uint8Array;
+  /** Value that is added to the read bits to get the next state. */
   readonly baselines: Uint16Array;
 }
 
-/** Table of a code with a single symbol, which takes no bits. */
+/** Returns the table of a code with a single symbol, which consumes no bits. */
 export function singleSymbolTable(symbol: number): FseTable {
   return { accuracyLog: 0, symbols: Uint8Array.of(symbol), bits: new Uint8Array(1), baselines: new Uint16Array(1) };
 }
 
 /**
- * Builds the table of a distribution over 2^accuracyLog states; probability -1 means "less than 1", which takes one
- * state. The probabilities must add up to the number of states.
+ * Builds the table of a distribution over 2^accuracyLog states. Probabilities are numbers of states, whose sum must be
+ * 2^accuracyLog. Probability -1 means "less than 1", and counts as one state.
  */
 export function buildFseTable(probabilities: readonly number[], accuracyLog: number): FseTable {
   const size = 1 << accuracyLog;
@@ -46,7 +48,10 @@ export function buildFseTable(probabilities: readonly number[], accuracyLog: num
   return { accuracyLog, symbols, bits, baselines };
 }
 
-/** Reads a table description at byte `start` of a block that ends at `end`; `next` is the byte after it. */
+/**
+ * Reads the description of a table at byte `start` of a block that ends before byte `end`.
+ * @returns The table; `next` is the byte offset after the description.
+ */
 export function readFseTable(
   bytes: Uint8Array,
   start: number,
@@ -64,7 +69,7 @@ export function readFseTable(
   };
   let remaining = 1 << accuracyLog;
   while (remaining > 0 && probabilities.length <= limits.maxSymbol) {
-    // Impossible values make some codes one bit shorter.
+    // Values that exceed the remaining probability do not occur, so that some codes are one bit shorter.
     const count = highestBit(remaining + 1) + 1;
     const short = peek(count - 1);
     const shortValues = (1 << count) - 2 - remaining;

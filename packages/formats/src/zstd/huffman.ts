@@ -1,7 +1,7 @@
 import { BackwardBits, highestBit, ZstdError } from './bits.js';
 import { readFseTable } from './fse.js';
 
-/** Decoding table of a prefix code (RFC 8878, 4.2): the next `maxBits` bits to a symbol and the length of its code. */
+/** Decoding table of a prefix code (RFC 8878, 4.2). The next `maxBits` bits are the index of a symbol and its length. */
 export interface HuffmanTable {
   readonly maxBits: number;
   readonly symbols: Uint8Array;
@@ -11,7 +11,7 @@ export interface HuffmanTable {
 const MAX_BITS = 11;
 const MAX_WEIGHTS = 255;
 
-/** Reads a description of a prefix code at byte `start`; `next` is the byte after it. */
+/** Reads the description of a prefix code at byte `start`. In the result, `next` is the byte offset after it. */
 export function readHuffmanTable(bytes: Uint8Array, start: number, end: number): { table: HuffmanTable; next: number } {
   const header = start < end ? bytes[start] : 0;
   const count = header - 127;
@@ -24,7 +24,7 @@ export function readHuffmanTable(bytes: Uint8Array, start: number, end: number):
   return { table: buildHuffmanTable(weights, start), next };
 }
 
-/** Weights in a finite-state code, with two alternating states until the bits run out. */
+/** Reads weights in a finite-state code up to the end of its bits, with two alternating states. */
 function readCodedWeights(bytes: Uint8Array, start: number, end: number): number[] {
   const { table, next } = readFseTable(bytes, start, end, { maxAccuracyLog: 6, maxSymbol: 255 });
   const bits = new BackwardBits(bytes, next, end);
@@ -42,7 +42,10 @@ function readCodedWeights(bytes: Uint8Array, start: number, end: number): number
   throw new ZstdError('a prefix code of too many symbols', start);
 }
 
-/** A symbol of weight w > 0 has a code of maxBits + 1 - w bits. The weight of the last symbol follows from the rest. */
+/**
+ * Builds the table of a prefix code from weights. A symbol of weight w > 0 has a code of maxBits + 1 - w bits. The weight
+ * of the last symbol is not in `weights`, because it follows from the others.
+ */
 function buildHuffmanTable(weights: readonly number[], at: number): HuffmanTable {
   const share = (weight: number): number => (weight > 0 ? 1 << (weight - 1) : 0);
   const sum = weights.reduce((total, weight) => total + share(weight), 0);
@@ -66,7 +69,7 @@ function buildHuffmanTable(weights: readonly number[], at: number): HuffmanTable
   return { maxBits, symbols, lengths };
 }
 
-/** Decodes one stream, the bytes `start` to `end`, into all of `out`. */
+/** Decodes the stream of the bytes `start` to `end` into all of `out`. Throws {@link ZstdError}. */
 export function decodeHuffmanStream(
   table: HuffmanTable,
   bytes: Uint8Array,

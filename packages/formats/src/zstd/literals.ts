@@ -1,18 +1,18 @@
 import { decodeHuffmanStream, readHuffmanTable, type HuffmanTable } from './huffman.js';
 import { ZstdError } from './bits.js';
 
-/** Maximum content of a block, which also limits literals. */
+/** Maximum content of a block in bytes, and of its literals. */
 export const MAX_BLOCK = 131_072;
 
 export interface Literals {
   readonly content: Uint8Array;
-  /** Offset after the literals section. */
+  /** Byte offset after the literals section. */
   readonly next: number;
-  /** The prefix code that a later block may reuse. */
+  /** Prefix code that a later block may reuse; undefined if no block has described one. */
   readonly table: HuffmanTable | undefined;
 }
 
-/** Reads the literals section of a compressed block (RFC 8878, 3.1.1.3.1). */
+/** Reads the literals section of a compressed block (RFC 8878, 3.1.1.3.1). @param previous Code of earlier blocks. */
 export function readLiterals(
   bytes: Uint8Array,
   start: number,
@@ -69,7 +69,7 @@ function readCodedLiterals(
   return { content, next, table };
 }
 
-/** Four streams of a quarter of the literals each, after a table of the sizes of the first three. */
+/** Decodes four streams with a quarter of the literals each. The sizes of the first three precede the streams. */
 function decodeFourStreams(table: HuffmanTable, bytes: Uint8Array, start: number, end: number, out: Uint8Array): void {
   const quarter = (out.length + 3) >> 2;
   let at = start + 6;
@@ -83,7 +83,7 @@ function decodeFourStreams(table: HuffmanTable, bytes: Uint8Array, start: number
   }
 }
 
-/** An unsigned integer of up to 6 bytes; bytes after the end of the array count as 0. */
+/** Returns a little-endian unsigned integer of `count` bytes, up to 6. Bytes after the end of the array are 0. */
 export function littleEndian(bytes: Uint8Array, at: number, count: number): number {
   let value = 0;
   for (let i = count - 1; i >= 0; i--) value = value * 256 + (bytes[at + i] ?? 0);

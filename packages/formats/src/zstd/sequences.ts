@@ -1,14 +1,15 @@
 import { BackwardBits, ZstdError } from './bits.js';
 import { buildFseTable, readFseTable, singleSymbolTable, type FseTable } from './fse.js';
 
-/** Tables of literal lengths, offsets and match lengths, in the order of a block's description. */
+/** Tables of literal lengths, offsets and match lengths, in the order of the description in a block. */
 export type SequenceTables = readonly [FseTable, FseTable, FseTable];
 
 const range = (length: number, value: (k: number) => number): number[] => Array.from({ length }, (_, k) => value(k));
 
-/** Additional bits of each code, and the base value of each (RFC 8878, 3.1.1.3.2.1). */
+/** Number of additional bits of each code of literal lengths and match lengths (RFC 8878, 3.1.1.3.2.1). */
 const LITERAL_BITS = [...range(16, () => 0), 1, 1, 1, 1, 2, 2, 3, 3, 4, ...range(11, (k) => k + 6)];
 const MATCH_BITS = [...range(32, () => 0), 1, 1, 1, 1, 2, 2, 3, 3, 4, 4, 5, ...range(10, (k) => k + 7)];
+/** Base value of each code; its additional bits are added. */
 const LITERAL_BASE = baseValues(LITERAL_BITS, 0);
 const MATCH_BASE = baseValues(MATCH_BITS, 3);
 
@@ -21,7 +22,7 @@ function baseValues(bits: readonly number[], first: number): number[] {
   });
 }
 
-/** Limits of the three codes, and their predefined distributions. */
+/** Limits and predefined tables of the codes, in the order of {@link SequenceTables}. */
 const CODES = [
   {
     limits: { maxAccuracyLog: 9, maxSymbol: 35 },
@@ -43,16 +44,20 @@ const CODES = [
   },
 ] as const;
 
-/** Destination of decoded content, and the repeatable offsets of sequences. */
+/** Destination of decoded content. `position` is the offset of the next byte. */
 export interface Output {
   readonly bytes: Uint8Array;
-  /** Offset of the frame's start: matches cannot refer to earlier bytes. */
+  /** Offset in `bytes` of the start of the frame. Matches cannot refer to earlier bytes. */
   frameStart: number;
   position: number;
   readonly repeatedOffsets: [number, number, number];
 }
 
-/** Reads and executes the sequences section of a block; returns the tables that a later block may reuse. */
+/**
+ * Executes the sequences section of a block: copies literals and matches to the output.
+ * @param previous Tables of earlier blocks.
+ * @returns Tables that a later block may reuse.
+ */
 export function executeSequences(
   bytes: Uint8Array,
   start: number,
@@ -109,7 +114,7 @@ function readTables(
   return { tables: [tables[0], tables[1], tables[2]], next: at };
 }
 
-/** Copies literals and matches alternately; returns the number of literals used. */
+/** Copies literals and matches alternately. Returns the number of literals that were copied. */
 function runSequences(
   bits: BackwardBits,
   count: number,
@@ -143,7 +148,7 @@ function runSequences(
   return used;
 }
 
-/** The offset of a value: a new one, or one of the last three (RFC 8878, 3.1.1.5), which it updates. */
+/** Returns the offset of a match, which may be one of the last three (RFC 8878, 3.1.1.5), and updates `recent`. */
 function nextOffset(recent: Output['repeatedOffsets'], value: number, literalLength: number): number {
   const index = value > 3 ? 3 : value - (literalLength === 0 ? 0 : 1);
   const offset = value > 3 ? value - 3 : index === 3 ? recent[0] - 1 : recent[index];
@@ -165,7 +170,7 @@ function copyLiterals(literals: Uint8Array, from: number, to: number, output: Ou
   }
 }
 
-/** Repeats `length` bytes from `offset` bytes ago; the two ranges may overlap. */
+/** Copies `length` bytes that begin `offset` bytes before the position. The ranges may overlap. */
 function copyMatch(output: Output, offset: number, length: number, at: number): void {
   const { bytes, position, frameStart } = output;
   if (offset < 1 || offset > position - frameStart) throw new ZstdError('a match that begins before the content', at);

@@ -6,8 +6,8 @@ import { groupInstances, inputsOfInstances, stackInputs } from './stack-inputs.j
 import { StepSessions } from './step-sessions.js';
 
 /**
- * Resolves at the end of the current task. All callbacks of one animation frame are one task, so by then the elements
- * of a page have made all requests of the frame. A message is used because browsers throttle timers.
+ * Fulfills at the end of the current task. All callbacks of one animation frame are one task, so the elements of a page
+ * have made all requests of the frame by then. Uses a message, because browsers throttle timers.
  */
 export function endOfTask(): Promise<void> {
   return new Promise((resolve) => {
@@ -20,28 +20,30 @@ export function endOfTask(): Promise<void> {
   });
 }
 
-/** Latest request of an instance. */
+/** A request of an instance. */
 interface RunRequest {
   readonly inputs: Inputs;
 }
 
 /** One instance of a batch. */
 export interface BatchMember<W extends RunRequest> {
-  /** Whether a request requires a run. */
+  /** Whether a request requires a run. False, for example, if its inputs equal those of the last run. */
   readonly isDue: (request: W) => boolean;
   /**
-   * Consumes the output of a run; `instance` is the index of this instance in it. It must submit its work before it
-   * returns.
+   * Consumes the output of a run. `instance` is the index of this instance in the output. The function must submit its
+   * GPU work before it returns.
    */
   readonly take: (request: W, outputs: RunOutputs, instance: number) => void;
-  /** Called when the run is submitted; `start` is its start time by `performance.now()`. */
+  /**
+   * Called when the work of the run is submitted. `start` is the start of the run, milliseconds by `performance.now()`.
+   */
   readonly onTaken: (request: W, start: number) => void;
   readonly onError: (error: unknown) => void;
 }
 
 const batches = new WeakMap<GeneratorSession, Batch>();
 
-/** The batch of all instances of a session. @param session Its model declares instances. */
+/** Returns the batch of all instances of a session. @param session A session whose model declares instances. */
 export function batchOf(session: GeneratorSession): Batch {
   let batch = batches.get(session);
   if (batch === undefined) batches.set(session, (batch = new Batch(session)));
@@ -49,9 +51,8 @@ export function batchOf(session: GeneratorSession): Batch {
 }
 
 /**
- * All instances of one generator on one device: requests within a task run together, each instance with its own inputs,
- * and each gets its slice of the output. The latest request of each instance wins, and a single loop keeps them
- * together.
+ * All instances of one generator on one device. Requests within one task run together. Each instance has its own
+ * inputs, and receives its part of the output. Only the latest request of each instance runs.
  */
 export class Batch {
   readonly #session: GeneratorSession;
@@ -73,12 +74,12 @@ export class Batch {
     });
   }
 
-  /** Session kind; undefined before the first run. */
+  /** Kind of the session; undefined before the first run. */
   get kind(): SessionKind | undefined {
     return this.#steps.kind;
   }
 
-  /** Adds an instance. */
+  /** Adds an instance, and returns its slot. */
   join<W extends RunRequest>(member: BatchMember<W>): BatchSlot<W> {
     const seat = new BatchSlot(this, member, {
       ask: () => this.#loop.request(true),
@@ -92,7 +93,7 @@ export class Batch {
     this.#seats.delete(seat);
     if (this.#seats.size > 0) return;
     this.#loop.close();
-    // The next instance starts a new batch.
+    // The next instance of this session starts a new batch.
     if (batches.get(this.#session) === this) batches.delete(this.#session);
     void this.#loop.idle.then(() => this.#steps.release());
   }
@@ -154,7 +155,7 @@ export class BatchSlot<W extends RunRequest> {
   #taken: W | undefined;
   #isRunning = false;
   #isClosed = false;
-  /** Resolvers to call when no run is in progress. */
+  /** Functions that fulfill the promises of {@link idle} when no run is in progress. */
   #waiting: (() => void)[] = [];
 
   constructor(batch: Batch, member: BatchMember<W>, calls: { readonly ask: () => void; readonly leave: () => void }) {
@@ -167,34 +168,37 @@ export class BatchSlot<W extends RunRequest> {
     return this.#isClosed;
   }
 
-  /** Session kind of the batch; undefined before its first run. */
+  /** Kind of the batch's session; undefined before its first run. */
   get kind(): SessionKind | undefined {
     return this.#batch.kind;
   }
 
-  /** Resolves, and never rejects, when no run for this instance is in progress; runs of other instances may continue. */
+  /** Fulfills when no run for this instance is in progress. Never rejects. Runs of other instances may continue. */
   get idle(): Promise<void> {
     return this.#isBusy ? new Promise((resolve) => this.#waiting.push(resolve)) : Promise.resolve();
   }
 
-  /** Whether there is a request that requires a run. */
+  /** Whether the latest request requires a run. */
   get isDue(): boolean {
     return this.#request !== undefined && this.member.isDue(this.#request);
   }
 
-  /** Inputs of the last request taken. */
+  /** Inputs of the last request that was taken; empty before the first. */
   get inputs(): Inputs {
     return this.#taken?.inputs ?? {};
   }
 
-  /** Returns at once; a request that has not started yet is replaced. */
+  /** Requests a run and returns at once. Replaces a request that has not started yet. */
   request(request: W): void {
     if (this.#isClosed) return;
     this.#request = request;
     this.#calls.ask();
   }
 
-  /** Takes the request; its run is in progress until {@link settle}. */
+  /**
+   * Takes the latest request, and returns it; undefined if there is none. Its run counts as in progress until {@link
+   * settle}.
+   */
   takeRequest(): W | undefined {
     this.#taken = this.#request;
     this.#request = undefined;
@@ -202,7 +206,7 @@ export class BatchSlot<W extends RunRequest> {
     return this.#taken;
   }
 
-  /** Marks the end of the run of the taken request. */
+  /** Marks the run of the taken request as ended. */
   settle(): void {
     this.#isRunning = false;
     if (this.#isBusy) return;

@@ -2,17 +2,20 @@ import { hasInstances, type Contract } from '@gaussian-splat/core/contract';
 import type { OnnxHeader } from '@gaussian-splat/core/onnx';
 import { isOnGpu, sameInputs, type InputNumbers, type Inputs, type InputValue } from '../input-value.js';
 
-/** Names of the inputs that have a row for each instance. */
+/** Returns the names of the inputs with a row for each instance. */
 export function inputsOfInstances({ inputs }: OnnxHeader, contract: Contract): ReadonlySet<string> {
   return new Set(inputs.filter((input) => hasInstances(input, contract)).map(({ name }) => name));
 }
 
-/** The inputs that all instances of a run share. */
+/** Returns the inputs that all instances of a run share: those that are not in `varying`. */
 export function sharedInputs(inputs: Inputs, varying: ReadonlySet<string>): Inputs {
   return Object.fromEntries(Object.entries(inputs).filter(([name]) => !varying.has(name)));
 }
 
-/** Groups instances that may run together: those with equal shared inputs, at most `most` of them, in order. */
+/**
+ * Groups instances that may run together: those with equal shared inputs, at most `max` per group, in the given order.
+ * @param varying Names of the inputs with a row for each instance.
+ */
 export function groupInstances<T extends { readonly inputs: Inputs }>(
   instances: readonly T[],
   varying: ReadonlySet<string>,
@@ -29,10 +32,10 @@ export function groupInstances<T extends { readonly inputs: Inputs }>(
 }
 
 /**
- * Stacks the inputs of several instances for one run.
- * @param instances Values from `bindInputs`, at least one set of them, with the same shared inputs.
- * @param varying Names of the inputs that get a row for each instance; all others are taken from the first.
- * @param count Number of rows: if it exceeds the instances, the last one is repeated, and its output is ignored.
+ * Returns the inputs of one run of several instances.
+ * @param instances Values from `bindInputs` for each instance, at least one, with equal shared inputs.
+ * @param varying Names of the inputs that get a row for each instance; all others are those of the first instance.
+ * @param count Number of rows. Beyond the instances, the last one is repeated, and its output is ignored.
  */
 export function stackInputs(
   instances: readonly Inputs[],

@@ -1,7 +1,7 @@
 import type { GeneratorSession } from '../runtime/generator-session.js';
 import type { SessionKind } from '../runtime/ort-session.js';
 
-/** Number of runs after which an unused session for a number of instances is released. */
+/** Number of runs without use after which a session is released. */
 const RUNS_UNTIL_RELEASE = 300;
 
 interface Step {
@@ -10,8 +10,8 @@ interface Step {
 }
 
 /**
- * Number of instances that a session computes: 1, 2, 4, 6, 8, 12, 16, 24, 32 ... The excess, at most a third, is
- * wasted.
+ * Returns the number of instances that a session computes for the requested number: the next of 1, 2, 4, 6, 8, 12, 16,
+ * 24, 32 ... At most a third of them is unused.
  */
 export function stepOf(instances: number): number {
   const whole = 2 ** Math.ceil(Math.log2(instances));
@@ -20,11 +20,11 @@ export function stepOf(instances: number): number {
 }
 
 /**
- * Sessions of one model, one for each {@link stepOf} the instances. Graph capture needs fixed shapes, so each step has
- * its own session; adding or removing an instance mostly stays within a step.
+ * Sessions of one model, one for each {@link stepOf} that occurs. Each number of instances needs its own session,
+ * because graph capture needs fixed shapes. Adding or removing an instance seldom changes the session.
  */
 export class StepSessions {
-  /** Maximum number of instances in one run: limited by the contract and the device's buffers. */
+  /** Maximum number of instances in one run, which the contract and the device's buffers limit. */
   readonly max: number;
   readonly #session: GeneratorSession;
   readonly #steps = new Map<number, Step>();
@@ -39,12 +39,15 @@ export class StepSessions {
     this.max = Math.max(1, Math.min(contract.instances!.most, room));
   }
 
-  /** Session kind of the last run; undefined before. */
+  /** Kind of the session of the last run; undefined before the first run. */
   get kind(): SessionKind | undefined {
     return [...this.#steps.values()].sort((a, b) => b.lastUse - a.lastUse)[0]?.session.kind ?? this.#kind;
   }
 
-  /** Returns the session for at least this many instances, and the number that it computes. */
+  /**
+   * Returns a session for at least this many instances, at most {@link max}, and the number of instances that it
+   * computes.
+   */
   sessionFor(instances: number): { readonly session: GeneratorSession; readonly count: number } {
     const count = Math.min(this.max, stepOf(instances));
     let step = this.#steps.get(count);

@@ -11,14 +11,14 @@ import { connect } from './connect.js';
 import { HandOver } from './hand-over.js';
 import { StateOf } from './state-of.js';
 
-/** One model, or several in a chain whose outputs feed the next model. */
+/** One model, or several models that run in sequence: the outputs of each are inputs of the next. */
 export class Chain {
   readonly device: GPUDevice;
   readonly #leases: readonly SessionLease[];
   readonly #handOvers: readonly HandOver[];
-  /** State of each model between runs; undefined for a model without state. */
+  /** State tensors of each model between runs; undefined for a model without state. */
   readonly #states: readonly (StateOf | undefined)[];
-  /** Page inputs of each model's last run; undefined if its last output is invalid. */
+  /** Inputs from the page in each model's last run. A missing element means that the model must run again. */
   readonly #ran: (Inputs | undefined)[] = [];
   readonly #endProgress: () => void;
 
@@ -29,13 +29,14 @@ export class Chain {
     const models = leases.map(({ session }) => session.model);
     requireNoneBefore(models[0]);
     if (models.length > 1) requireNoInstances(models);
-    this.#states = models.map((model) => StateOf.of(model, device));
     this.#handOvers = models.slice(1).map((after, i) => new HandOver(device, models[i], connect(models[i], after)));
+    this.#states = models.map((model) => StateOf.of(model, device));
   }
 
   /**
-   * Fetches all models and checks them, individually and as a chain; the runtime is not fetched yet.
-   * @throws ContractError, GaussianSplatError: see `openModel`; ContractError `contract/chain` if they do not match.
+   * Fetches all models and checks them, individually and as a chain. The runtime is not fetched yet.
+   * @throws ContractError, GaussianSplatError: see `openModel`; ContractError `contract/chain` if the models do not
+   * match.
    */
   static async open(
     sources: ModelSource | readonly ModelSource[],
@@ -47,7 +48,7 @@ export class Chain {
     const endProgress = watchRuntimeBytes(reports[list.length]);
     const opening = list.map(async (source, i) => {
       const lease = await acquireSession(source, device, { ...options, onProgress: reports[i] });
-      // Another generator may have fetched it, or be fetching it.
+      // Reports the whole size, because another generator may have fetched the model, or may be fetching it.
       const { bytes, externalData } = lease.session.model;
       const size = externalData.reduce((sum, { data }) => sum + data.length, bytes.length);
       reports[i](size, size);
@@ -62,7 +63,10 @@ export class Chain {
     }
   }
 
-  /** Session of a single model that computes several instances in one run; undefined for all others. */
+  /**
+   * Session of a single model that computes several instances in one run; undefined for a chain and for all other
+   * models.
+   */
   get ofInstances(): GeneratorSession | undefined {
     const [{ session }] = this.#leases;
     return session.model.contract.instances && session;
@@ -73,25 +77,26 @@ export class Chain {
     return this.#leases.map(({ session }) => session.model);
   }
 
-  /** Session kind of the slowest model; undefined before the first run. */
+  /** Slowest session kind of all models; undefined before the first run. */
   get kind(): SessionKind | undefined {
     const kinds = this.#leases.map(({ session }) => session.kind);
     return SLOWEST_FIRST.find((kind) => kinds.includes(kind));
   }
 
-  /** Values of the inputs of every model for a state of the page. @throws GaussianSplatError `argument/value` */
+  /** Returns the inputs of every model for a state of the page. @throws GaussianSplatError `argument/value` */
   bind(state: GeneratorState): readonly Inputs[] {
     return this.#leases.map(({ session }, i) => session.bind(state, this.#handOvers[i - 1]?.inputs));
   }
 
-  /** Resets the state of all models. */
+  /** Resets the state tensors of all models to their defaults. */
   restart(): void {
     for (const state of this.#states) state?.reset();
   }
 
   /**
-   * Runs the models that a change of inputs affects: leading models with the inputs of their last run are skipped.
-   * @throws as `GeneratorSession.run`.
+   * Runs the first model whose inputs differ from those of its last run, and all models after it; without a difference,
+   * all models. Calls `use` with the outputs of the last model, or with empty outputs if an earlier model has no rows.
+   * @throws the errors of `GeneratorSession.run`
    */
   async run(inputs: readonly Inputs[], use: (outputs: RunOutputs) => void): Promise<void> {
     const changed = inputs.findIndex((values, i) => !this.#ran[i] || !sameInputs(values, this.#ran[i]));
@@ -110,14 +115,14 @@ export class Chain {
     }
   }
 
-  /** Invalidates the outputs of its models: the next run executes all of them. */
+  /** Invalidates the outputs of all models, so that the next run executes all of them. */
   forget(): void {
     this.#ran.length = 0;
   }
 
   /**
-   * Releases its models. @param idle Resolves when the last run has ended, which may read the intermediate tensors
-   * until then.
+   * Releases all models.
+   * @param idle Promise that fulfills when the last run has ended, which may read the intermediate tensors until then.
    */
   release(idle: Promise<void> = Promise.resolve()): void {
     this.#endProgress();
@@ -132,7 +137,10 @@ export class Chain {
 
 const SLOWEST_FIRST: readonly SessionKind[] = ['wasm', 'webgpu', 'captured'];
 
-/** The first model of a chain must not depend on another model. */
+/**
+ * Requires that the first model of a chain has no inputs for another model's Gaussians.
+ * @throws ContractError `contract/chain`
+ */
 function requireNoneBefore({ header, contract }: GeneratorModel): void {
   const faults = header.inputs
     .filter(({ name }) => contract.inputs[name].role === 'gaussians')
@@ -149,7 +157,10 @@ function requireNoneBefore({ header, contract }: GeneratorModel): void {
   if (faults.length > 0) throw new ContractError(faults);
 }
 
-/** Intermediate tensors of a chain are those of one instance. */
+/**
+ * Requires that no model of a chain declares instances, because intermediate tensors are those of one instance.
+ * @throws ContractError `contract/chain`
+ */
 function requireNoInstances(models: readonly GeneratorModel[]): void {
   const faults = models
     .filter(({ contract }) => contract.instances !== undefined)

@@ -7,15 +7,19 @@ import {
 import { describeTensor, type OnnxTensor } from '@gaussian-splat/core/onnx';
 import type { GeneratorModel } from '../runtime/open-model.js';
 
-/** An output of one model that feeds an input of the next; without an output the input receives the number of rows. */
+/**
+ * An output of one model that is an input of the next. With an undefined output, the input receives the number of rows.
+ */
 export interface Connection {
   readonly output: string | undefined;
   readonly input: string;
+  /** Dimensions of an input that receives the number of rows: each is 1, and a scalar has none. */
+  readonly dims?: readonly number[];
 }
 
 /**
- * Matches the outputs of a model with the inputs of the next. Tensors are passed unchanged: layout, activations, orders
- * and element type must be the same.
+ * Matches the outputs of a model with the inputs of the next. Tensors are passed unchanged, so layout, activations,
+ * orders and element type must be equal.
  * @throws ContractError `contract/chain`, with every fault.
  */
 export function connect(before: GeneratorModel, after: GeneratorModel): Connection[] {
@@ -28,7 +32,10 @@ export function connect(before: GeneratorModel, after: GeneratorModel): Connecti
     const found = binding.role === 'gaussians' ? gaussiansFor(before, binding) : { output: before.outputs[0].name };
     const misfit = 'misfit' in found ? found.misfit : shapeMisfit(before, found.output, input);
     if (misfit !== undefined) faults.push(cannotConnect(before, after, input, misfit));
-    else if ('output' in found) connections.push({ output: found.output, input: input.name });
+    else if ('output' in found) {
+      const dims = input.dims as readonly number[];
+      connections.push({ output: found.output, input: input.name, ...(found.output === undefined ? { dims } : {}) });
+    }
   }
   if (connections.length + faults.length === 0) faults.push(takesNothing(before, after, wanted));
   if (before.layout?.count !== undefined && faults.length === 0) faults.push(...lostCount(before, after, connections));
@@ -38,7 +45,7 @@ export function connect(before: GeneratorModel, after: GeneratorModel): Connecti
 
 type Found = { readonly output: string | undefined } | { readonly misfit: string };
 
-/** The tensor of Gaussians for an input. */
+/** Returns the output for an input with Gaussians, or a description of the output that does not fit. */
 function gaussiansFor({ layout, contract }: GeneratorModel, wanted: GaussiansInput): Found {
   const { outputs } = contract;
   if (wanted.attribute === 'count') return { output: layout?.count };
@@ -73,7 +80,10 @@ function activationMisfit(slice: AttributeSlice, wanted: GaussiansInput): string
   return `${attribute} as ${written[attribute]}, not ${asked[attribute]}`;
 }
 
-/** Fixed sizes on both sides must agree; a fixed input cannot receive a variable size. */
+/**
+ * Returns a description of the output if its shape or element type does not fit the input; undefined if it does. A
+ * fixed size must be equal on both sides; an open size accepts any.
+ */
 function shapeMisfit({ header }: GeneratorModel, output: string | undefined, input: OnnxTensor): string | undefined {
   const tensor = header.outputs.find(({ name }) => name === output);
   if (tensor === undefined) return undefined;
@@ -104,7 +114,7 @@ const takesNothing = (before: GeneratorModel, after: GeneratorModel, role: strin
   remedy: 'put models into a chain in the order in which they feed one another',
 });
 
-/** Rows after the live count are undefined, so the next model needs the count. */
+/** Returns a fault if the next model does not receive the live count: rows after it are undefined. */
 function lostCount(
   before: GeneratorModel,
   after: GeneratorModel,

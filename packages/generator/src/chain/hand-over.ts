@@ -7,8 +7,8 @@ import type { GeneratorModel } from '../runtime/open-model.js';
 import type { Connection } from './connect.js';
 
 /**
- * Tensors between two models of a chain, or two runs of one model: the first one's outputs, kept on the GPU until the
- * second has run.
+ * Tensors between two models of a chain, or between two runs of one model: outputs of the first, kept on the GPU until
+ * the second has run.
  */
 export class HandOver {
   readonly #device: GPUDevice;
@@ -19,31 +19,31 @@ export class HandOver {
   #rows = 0;
   #version = 0;
 
-  /** @param model The first of the two. */
+  /** Creates an empty hand-over. @param model The model that writes the tensors. */
   constructor(device: GPUDevice, model: GeneratorModel, connections: readonly Connection[]) {
     this.#device = device;
     this.#model = model;
     this.#connections = connections;
   }
 
-  /** Inputs of the second model that are not set by the page. */
+  /** Names of the second model's inputs that the first model writes. */
   get inputs(): ReadonlySet<string> {
     return new Set(this.#connections.map(({ input }) => input));
   }
 
-  /** Last outputs of the first model. */
+  /** Last outputs of the first model, by input name of the second. */
   get tensors(): Inputs {
     return this.#tensors;
   }
 
-  /** Rows of Gaussians in it; without any, the second model need not run. */
+  /** Number of rows of Gaussians. With 0 rows, the second model need not run. */
   get rows(): number {
     return this.#rows;
   }
 
   /**
-   * Copies the output of the first model, because the runtime reuses its buffers.
-   * @throws ContractError `contract/rows` if it exceeds the declared size. The previous content remains.
+   * Copies the outputs of the first model, because the runtime reuses its buffers.
+   * @throws ContractError `contract/rows` if the rows exceed the declared maximum. The previous content then remains.
    */
   take({ tensors, dims, rows }: RunOutputs): void {
     const { layout, header } = this.#model;
@@ -53,8 +53,8 @@ export class HandOver {
     this.#rows = rows;
     const encoder = this.#device.createCommandEncoder({ label: 'gs.generator.hand-over' });
     const taken: Record<string, GpuTensor> = {};
-    for (const { output, input } of this.#connections) {
-      taken[input] = output === undefined ? this.#countRows(input) : this.#shaped(input, output, dims[output]);
+    for (const { output, input, dims: ones = [1] } of this.#connections) {
+      taken[input] = output === undefined ? this.#countRows(input, ones) : this.#shaped(input, output, dims[output]);
       const { buffer } = taken[input];
       if (output !== undefined && buffer.size > 0) {
         encoder.copyBufferToBuffer(tensors[output], 0, buffer, 0, usedBytes(taken[input]));
@@ -64,7 +64,7 @@ export class HandOver {
     this.#tensors = taken;
   }
 
-  /** Before the first run, a tensor is filled with one number. */
+  /** Fills the tensor of an input with one number, for the time before the first run. */
   fill(input: string, { dtype, dims }: Pick<GpuTensor, 'dtype' | 'dims'>, value: number): void {
     const length = elementsOf(dims);
     const buffer = this.#bufferOf(input, bufferBytes(dtype, length));
@@ -80,16 +80,16 @@ export class HandOver {
 
   #shaped(input: string, output: string, dims: readonly number[]): GpuTensor {
     const { dtype: written, max } = this.#model.outputs.find(({ name }) => name === output)!;
-    // A 64-bit count feeds no input: `connect` requires the same type on both sides.
+    // A 64-bit count is no input of another model, because `connect` requires equal types on both sides.
     const dtype = written as GpuTensor['dtype'];
     const buffer = this.#bufferOf(input, bufferBytes(dtype, max ?? elementsOf(dims)));
     return { buffer, dtype, dims, version: this.#version };
   }
 
-  #countRows(input: string): GpuTensor {
+  #countRows(input: string, dims: readonly number[]): GpuTensor {
     const buffer = this.#bufferOf(input, bufferBytes('int32', 1));
     this.#device.queue.writeBuffer(buffer, 0, Int32Array.of(this.#rows));
-    return { buffer, dtype: 'int32', dims: [1], version: this.#version };
+    return { buffer, dtype: 'int32', dims, version: this.#version };
   }
 
   #bufferOf(input: string, size: number): GPUBuffer {
@@ -102,7 +102,7 @@ export class HandOver {
   }
 }
 
-/** Replicates a number over a word. */
+/** Returns a 32-bit word with the bits of a number: once, or twice for float16. */
 function wordOf(dtype: GpuTensor['dtype'], value: number): number {
   if (dtype === 'float16') return numberToHalf(value) * 0x1_0001;
   const Numbers = dtype === 'int32' ? Int32Array : Float32Array;

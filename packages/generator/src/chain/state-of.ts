@@ -4,7 +4,7 @@ import type { RunOutputs } from '../runtime/ort-session.js';
 import type { GeneratorModel } from '../runtime/open-model.js';
 import { HandOver } from './hand-over.js';
 
-/** State of one model between runs: outputs that feed its next run. */
+/** State of one model: outputs of a run that are inputs of the next run. */
 export class StateOf {
   readonly #model: GeneratorModel;
   readonly #kept: HandOver;
@@ -16,17 +16,17 @@ export class StateOf {
     this.reset();
   }
 
-  /** Undefined for a model without state. */
+  /** Returns the state of a model; undefined for a model without state. */
   static of(model: GeneratorModel, device: GPUDevice): StateOf | undefined {
     return statesOf(model).length > 0 ? new StateOf(model, device) : undefined;
   }
 
-  /** Outputs of the last run. */
+  /** Outputs of the last run, by the names of the inputs that they become. */
   get tensors(): Inputs {
     return this.#kept.tensors;
   }
 
-  /** Resets to the initial state. */
+  /** Fills each state tensor with the default that the contract declares, or 0. */
   reset(): void {
     const { header } = this.#model;
     for (const [name, { default: value = 0 }] of statesOf(this.#model)) {
@@ -35,7 +35,7 @@ export class StateOf {
     }
   }
 
-  /** Copies the outputs of a run for the next one. */
+  /** Copies the state outputs of a run for the next run. */
   take(outputs: RunOutputs): void {
     this.#kept.take(outputs);
   }

@@ -1,23 +1,25 @@
 import { GaussianSplatError } from '@gaussian-splat/core';
 import { bytesOf, chunksOf, fetchPatiently } from '@gaussian-splat/core/fetch';
 
-/** Called with the received bytes, and the total; undefined if that is unknown. */
+/** Called with the received and the total bytes. The total is undefined while unknown. */
 export type ProgressListener = (loaded: number, total: number | undefined) => void;
 
 /** Options of downloads. */
 export interface FetchOptions {
-  /** Cookies policy; default `same-origin`. */
+  /** Policy for cookies. Default: `same-origin`. */
   readonly credentials?: RequestCredentials;
   readonly signal?: AbortSignal;
-  /** Called with the received bytes, and the total if the server declares it, or it is expected. */
+  /** Called with the received bytes, and the total if the server declares it or `expected` is set. */
   readonly onProgress?: ProgressListener;
-  /** Expected length of the file in bytes, because servers with compression do not declare it. */
+  /** Expected length of the file in bytes. Servers that compress a file do not declare its length. */
   readonly expected?: number;
+  /** Maximum length of a file that is fetched without `onProgress`. A longer one has a RangeError as its cause. */
+  readonly maxBytes?: number;
 }
 
 /**
- * Fetches a whole file, with the same retries as scenes; undefined if the server reports that it is missing and
- * `mayBeMissing` allows it.
+ * Fetches a whole file, with the same retries as scenes. Returns undefined if `mayBeMissing` is true and the server
+ * reports that the file is missing.
  * @throws GaussianSplatError `network/unreachable`, `network/status`, `network/interrupted`; the reason of the signal.
  */
 export async function fetchBytes(
@@ -47,12 +49,15 @@ export async function fetchBytes(
   }
 }
 
-/** Initial allocation for a file of unknown length, and the maximum for a declared length, bytes. */
+/** Bytes of the initial allocation for a file of unknown length. */
 const FIRST_BYTES = 65_536;
 const MAX_AT_ONCE = 2 ** 28;
 
-async function readBody(response: Response, { onProgress, expected }: FetchOptions): Promise<Uint8Array<ArrayBuffer>> {
-  if (onProgress === undefined) return bytesOf(response);
+async function readBody(
+  response: Response,
+  { onProgress, expected, maxBytes }: FetchOptions,
+): Promise<Uint8Array<ArrayBuffer>> {
+  if (onProgress === undefined) return bytesOf(response, undefined, maxBytes);
   const length = Number(response.headers.get('Content-Length')) || undefined;
   const total = (response.headers.get('Content-Encoding') ? undefined : length) ?? expected;
   let bytes = new Uint8Array(Math.min(total ?? FIRST_BYTES, MAX_AT_ONCE));
@@ -62,7 +67,7 @@ async function readBody(response: Response, { onProgress, expected }: FetchOptio
     if (end > bytes.length) bytes = grown(bytes, Math.max(end, 2 * bytes.length));
     bytes.set(chunk, loaded);
     loaded = end;
-    // The total of a file that is longer than declared grows with the received bytes.
+    // If the file is longer than declared, the total grows with the received bytes.
     onProgress(loaded, total && Math.max(loaded, total));
   }
   return loaded === bytes.length ? bytes : bytes.slice(0, loaded);
@@ -74,7 +79,10 @@ function grown(bytes: Uint8Array, length: number): Uint8Array<ArrayBuffer> {
   return larger;
 }
 
-/** Returns listeners for several downloads that report their sum to one. The total is known once that of each is. */
+/**
+ * Returns listeners for several downloads that report the sum to one listener. The total is undefined until the total
+ * of each download is known.
+ */
 export function sumProgress(count: number, onProgress: ProgressListener): readonly ProgressListener[] {
   const downloads: { loaded: number; total: number | undefined }[] = Array.from({ length: count }, () => ({
     loaded: 0,

@@ -1,20 +1,20 @@
 import { elementsOf, isOnGpu, type GpuTensor, type Inputs } from '../input-value.js';
-import type { Evidence } from '../proof/prove.js';
+import type { Evidence } from '../cpu-check/prove.js';
 import type { FixedOutput, RunOutputs } from './ort-session.js';
 import type { GeneratorModel } from './open-model.js';
 import { ELEMENT_BYTES, readTensors, TENSOR_USAGE } from './tensor-buffers.js';
 
-/** Size of the compared ranges of an output, and their maximum number, spread over the output. */
+/** Bytes of a compared range of an output. Several ranges are spread over a large output. */
 const PIECE_BYTES = 65_536;
 const MAX_PIECES = 8;
 
-/** Ranges of a run's output. */
+/** Dimensions of a run's outputs, and ranges of their content. */
 export interface WrittenRun {
   readonly dims: Readonly<Record<string, readonly number[]>>;
   readonly parts: Evidence['parts'];
 }
 
-/** Reads ranges of a run's output; data after its rows is undefined. */
+/** Reads ranges of a run's output back from the GPU. Data after the rows of a run is undefined and not read. */
 export async function readRun(
   device: GPUDevice,
   { outputs }: GeneratorModel,
@@ -22,12 +22,12 @@ export async function readRun(
 ): Promise<WrittenRun> {
   const parts = outputs.flatMap(({ name: tensor, dtype }) => {
     const bytes = elementsOf(dims[tensor]) * ELEMENT_BYTES[dtype];
-    // More rows than declared do not exist in the buffer, and are rejected later.
+    // The buffer does not contain more rows than declared; such a run is rejected later.
     const size = Math.min(bytes - (bytes % 4), tensors[tensor].size);
     const pieces = Math.min(MAX_PIECES, Math.ceil(size / PIECE_BYTES));
     return Array.from({ length: Math.max(1, pieces) }, (_, i) => {
       const offset = pieces > 1 ? Math.floor(((size - PIECE_BYTES) * i) / (pieces - 1) / 4) * 4 : 0;
-      // A 64-bit count is compared as two 32-bit numbers.
+      // A 64-bit count is compared as two 32-bit integers.
       const compared = dtype === 'int64' ? ('int32' as const) : dtype;
       return { tensor, dtype: compared, offset, size: Math.min(PIECE_BYTES, size), buffer: tensors[tensor] };
     });
@@ -44,7 +44,7 @@ export const isEqual = ({ parts: a }: WrittenRun, { parts: b }: WrittenRun): boo
   a.length === b.length &&
   a.every(({ bytes }, i) => bytes.length === b[i].bytes.length && bytes.every((byte, k) => byte === b[i].bytes[k]));
 
-/** A run and its inputs for a comparison in a worker: inputs on the GPU are read back. */
+/** Returns a run with its inputs, for a comparison in a worker. Reads inputs on the GPU back. */
 export async function evidenceOf(device: GPUDevice, inputs: Inputs, { dims, parts }: WrittenRun): Promise<Evidence> {
   const feeds = await Promise.all(
     Object.entries(inputs).map(async ([name, value]) => {
@@ -55,7 +55,7 @@ export async function evidenceOf(device: GPUDevice, inputs: Inputs, { dims, part
   return { feeds: Object.fromEntries(feeds), dims, parts };
 }
 
-/** Numbers of a tensor on the GPU, read in whole words. */
+/** Reads the numbers of a tensor back from the GPU. Numbers of float16 are returned as their bits. */
 export async function numbersOf(device: GPUDevice, input: GpuTensor): Promise<Float32Array | Int32Array | Uint16Array> {
   const { buffer, dtype, dims } = input;
   const length = elementsOf(dims);
@@ -65,7 +65,7 @@ export async function numbersOf(device: GPUDevice, input: GpuTensor): Promise<Fl
   return dtype === 'int32' ? new Int32Array(memory, 0, length) : new Float32Array(memory, 0, length);
 }
 
-/** A copy of an output that never changes. */
+/** Returns a copy of an output that is the same in every run. */
 export function copyOf(device: GPUDevice, name: string, { tensors, dims }: RunOutputs): FixedOutput {
   const { size } = tensors[name];
   const buffer = device.createBuffer({ label: `gs.generator.${name}`, size, usage: TENSOR_USAGE });

@@ -9,29 +9,29 @@ import { WeightRelease } from './cadence.js';
 import type { OrtSession, RunOutputs, SessionKind } from './ort-session.js';
 import { RuntimeGone } from './load-runtime.js';
 import type { GeneratorModel } from './open-model.js';
-import { earlierVerdict, prove, type Evidence } from '../proof/prove.js';
-import type { StartWorker } from '../proof/run-on-cpu.js';
-import type { CpuCheckResult } from '../proof/record.js';
+import { earlierVerdict, prove, type Evidence } from '../cpu-check/prove.js';
+import type { StartWorker } from '../cpu-check/run-on-cpu.js';
+import type { CpuCheckResult } from '../cpu-check/record.js';
 import { ELEMENT_BYTES } from './tensor-buffers.js';
 import { runFault, startSession } from './start-session.js';
 
-/** Consecutive failures after which a model is abandoned or, if it has run before, paused. */
+/** Number of consecutive failures after which a model is abandoned or, if it has run before, paused. */
 const MAX_FAILURES = 2;
-/** Initial and maximum pause, ms; it doubles. */
+/** Initial pause after failures, milliseconds. Each further failure doubles it up to {@link LONGEST_REST_MS}. */
 const FIRST_REST_MS = 250;
 const LONGEST_REST_MS = 2_000;
-/** Maximum number of copies of the runtime that other models may break while one run is tried. */
+/** Maximum number of copies of the runtime that one run is tried with, because other models may break a copy. */
 const MAX_COPIES = 5;
 
 /**
- * A generator on one device: one session of the runtime, shared by all its users. A failed run ends the runtime's
- * session; the next run starts another.
+ * A generator on one device, with one session of the runtime that all users share. After a failed run, the next run
+ * starts another session of the runtime.
  */
 export class GeneratorSession {
   readonly model: GeneratorModel;
   readonly device: GPUDevice;
   readonly #onFallback: (reason: string) => void;
-  readonly #compare: boolean | StartWorker;
+  readonly #gpuCheck: boolean | StartWorker;
   readonly #end = new AbortController();
   readonly #oneInstance: OnnxHeader;
   readonly #weights: WeightRelease;
@@ -44,26 +44,27 @@ export class GeneratorSession {
   #hasBroken = false;
   #isLost = false;
   #isReleased = false;
-  /** Reason that the GPU is not used any more. */
+  /** Reason that the model does not run on the GPU anymore; undefined if it may. */
   #refusal: string | undefined;
   #verdict: CpuCheckResult | undefined;
 
   /**
-   * @param onFallback Called once if the model has to run on the CPU.
-   * @param compare Whether the output of the first run on the GPU is compared with that on the CPU; a function starts
-   * the worker for it.
+   * Creates a session without starting the runtime.
+   * @param onFallback Called once if the model has to run on the CPU, with the reason.
+   * @param gpuCheck Whether the output of the first run on the GPU is compared with that on the CPU. A function starts
+   * the worker for the comparison.
    * @throws GaussianSplatError `out-of-memory/buffer-limit` if an output is larger than the device's buffers.
    */
   constructor(
     model: GeneratorModel,
     device: GPUDevice,
     onFallback: (reason: string) => void = () => undefined,
-    compare: boolean | StartWorker = true,
+    gpuCheck: boolean | StartWorker = true,
   ) {
     this.model = model;
     this.device = device;
     this.#onFallback = onFallback;
-    this.#compare = compare;
+    this.#gpuCheck = gpuCheck;
     this.#oneInstance = oneInstance(model.header, model.contract);
     this.#weights = new WeightRelease(model, () => void this.#releaseDynamic());
     requireRoom(model, device);
@@ -73,19 +74,19 @@ export class GeneratorSession {
     });
   }
 
-  /** Session kind; undefined before the first run. */
+  /** Kind of the session; undefined before the first run. */
   get kind(): SessionKind | undefined {
     return this.#kind;
   }
 
-  /** Result of the comparison with the CPU; undefined until some seconds after the first run. */
+  /** Result of the comparison with the CPU; undefined before it, usually for some seconds after the first run. */
   get verdict(): CpuCheckResult | undefined {
     return this.#verdict;
   }
 
   /**
-   * Values of the inputs for a state of the page, of one instance.
-   * @param given Inputs that another model writes, which are excluded.
+   * Returns the inputs of one instance for a state of the page.
+   * @param given Names of inputs that another model writes, which are excluded.
    * @throws GaussianSplatError `argument/value`
    */
   bind(state: GeneratorState, given: ReadonlySet<string> = new Set()): Inputs {
@@ -95,8 +96,8 @@ export class GeneratorSession {
   }
 
   /**
-   * Another session of the same model, for exactly this number of instances.
-   * @throws GaussianSplatError `out-of-memory/buffer-limit`, as the constructor.
+   * Returns another session of the same model, for exactly this number of instances.
+   * @throws GaussianSplatError `out-of-memory/buffer-limit` if an output is larger than the device's buffers.
    */
   forInstances(count: number): GeneratorSession {
     const { header, contract, outputs, ...rest } = this.model;
@@ -107,12 +108,12 @@ export class GeneratorSession {
       outputs: outputs.map((output) => ({ ...output, max: output.max && output.max * count })),
       instances: count,
     };
-    return new GeneratorSession(model, this.device, this.#onFallback, this.#compare);
+    return new GeneratorSession(model, this.device, this.#onFallback, this.#gpuCheck);
   }
 
   /**
-   * Runs the model. The first run also starts the session, and `use` is called with its outputs before graph capture
-   * begins. `use` must submit its work before it returns.
+   * Runs the model, and calls `use` with its outputs. `use` must submit its GPU work before it returns. The first run
+   * also starts the session, and `use` is called before graph capture begins.
    * @throws ContractError `contract/run` if the runtime fails; GaussianSplatError `device-lost/unrecoverable` if the
    * device is lost, `network/*` if the runtime cannot be fetched; errors of `use`.
    */
@@ -121,13 +122,13 @@ export class GeneratorSession {
       try {
         return await this.#runOnce(inputs, use);
       } catch (error) {
-        // Another model has broken this session's copy of the runtime: it starts again in the next copy.
+        // Another model has broken this session's copy of the runtime, so the session starts again in the next copy.
         if (!(error instanceof RuntimeGone) || copies === MAX_COPIES) throw error;
       }
     }
   }
 
-  /** Whether the model will not be tried again: it has never run, or it breaks the runtime whenever it does. */
+  /** Whether the model is abandoned: repeated failures before it has ever run, or failures that break the runtime. */
   get hasGivenUp(): boolean {
     return this.#failures >= MAX_FAILURES && (!this.#hasRun || this.#hasBroken);
   }
@@ -136,14 +137,14 @@ export class GeneratorSession {
     this.#weights.runBegins();
     await this.#rest();
     const first = new FirstUse((outputs) => {
-      // A lost device writes nothing, and the runtime does not detect it.
+      // A lost device writes nothing, which the runtime does not detect.
       this.#requireLife();
       use(outputs);
     });
     const starting = (this.#live ??= this.#start(inputs, first.take));
     const live = await this.#started(starting);
     try {
-      // The run that started the session has already served this request.
+      // If this request has started the session, the first run of the session has served it.
       if (first.isTaken) first.requireSuccess();
       else await live.run(inputs, first.use);
       this.#failures = 0;
@@ -155,12 +156,12 @@ export class GeneratorSession {
     }
   }
 
-  /** Pauses after failed runs. @throws the last error if the model is abandoned; errors of {@link #requireLife} */
+  /** Waits after failed runs. @throws the last error if the model is abandoned; errors of {@link #requireLife} */
   async #rest(): Promise<void> {
     this.#requireLife();
     if (this.#failures < MAX_FAILURES) return;
     if (this.hasGivenUp) throw this.#lastFailure;
-    // Invalid values may be followed by valid ones, but restarting takes time.
+    // Valid inputs may follow invalid ones, but restarting takes time.
     const ms = Math.min(LONGEST_REST_MS, FIRST_REST_MS * 2 ** (this.#failures - MAX_FAILURES));
     await new Promise((resolve) => setTimeout(resolve, ms));
     this.#requireLife();
@@ -182,7 +183,7 @@ export class GeneratorSession {
     }
   }
 
-  /** Releases the runtime's session. */
+  /** Releases the session permanently. Further runs are rejected. */
   async release(): Promise<void> {
     this.#isReleased = true;
     this.#weights.runBegins();
@@ -190,7 +191,7 @@ export class GeneratorSession {
     await this.#releaseDynamic();
   }
 
-  /** Releases the runtime's session and its weights; a later run starts another. */
+  /** Releases the runtime's session with its weights. A later run starts another session. */
   async #releaseDynamic(): Promise<void> {
     const live = this.#live;
     this.#live = undefined;
@@ -204,7 +205,7 @@ export class GeneratorSession {
     const { model, device } = this;
     const requireLife = (): void => this.#requireLife();
     const onFallback = this.#kind === 'wasm' ? () => undefined : this.#onFallback;
-    if (this.#compare) this.#verdict ??= await earlierVerdict(model, device);
+    if (this.#gpuCheck) this.#verdict ??= await earlierVerdict(model, device);
     if (this.#verdict?.result === 'different') this.#refusal ??= this.#verdict.reason;
     const { session, evidence } = await startSession({
       model,
@@ -214,7 +215,7 @@ export class GeneratorSession {
       onBreakage: () => (this.#hasBroken = true),
       onFallback,
       refusal: this.#refusal,
-      keepsEvidence: this.#compare !== false && this.#verdict === undefined,
+      keepsEvidence: this.#gpuCheck !== false && this.#verdict === undefined,
       onFirstRun,
     });
     this.#kind = session.kind;
@@ -222,9 +223,12 @@ export class GeneratorSession {
     return session;
   }
 
-  /** If the GPU output is wrong, the model runs on the CPU from the next run on. */
+  /**
+   * Compares the output of the GPU with that of the CPU. If it is wrong, the model runs on the CPU from the next run
+   * on.
+   */
   async #prove(evidence: Evidence): Promise<void> {
-    const startWorker = typeof this.#compare === 'function' ? this.#compare : undefined;
+    const startWorker = typeof this.#gpuCheck === 'function' ? this.#gpuCheck : undefined;
     const verdict = await prove(this.model, this.device, evidence, this.#end.signal, startWorker);
     if (this.#end.signal.aborted) return;
     this.#verdict = verdict;
@@ -260,7 +264,9 @@ export class GeneratorSession {
   }
 }
 
-/** Consumes the outputs of the run that starts a session. Its errors must not count as faults of that run. */
+/**
+ * Passes the outputs of the run that starts a session to `use`. Errors of `use` must not count as faults of that run.
+ */
 class FirstUse {
   readonly use: (outputs: RunOutputs) => void;
   #taken: { readonly error?: unknown } | undefined;
@@ -282,13 +288,16 @@ class FirstUse {
     }
   };
 
-  /** @throws errors of `use` */
+  /** Throws the error that `use` has thrown, if any. */
   requireSuccess(): void {
     if (this.#taken && 'error' in this.#taken) throw this.#taken.error;
   }
 }
 
-/** The runtime keeps each output in one buffer. */
+/**
+ * Requires that each output fits into one buffer, which the runtime allocates.
+ * @throws GaussianSplatError `out-of-memory/buffer-limit`
+ */
 function requireRoom({ header, outputs }: GeneratorModel, { limits }: GPUDevice): void {
   for (const { name, dtype, max = 0 } of outputs) {
     const bytes = max * ELEMENT_BYTES[dtype];

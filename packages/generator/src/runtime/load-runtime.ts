@@ -2,43 +2,46 @@ import { GaussianSplatError } from '@gaussian-splat/core';
 import { fetchBytes } from './fetch-bytes.js';
 import { noteRuntimeBytes, WASM_BYTES, wasmBuild } from './runtime-progress.js';
 
-// Pages without generators need neither onnxruntime-web nor its types: then this is any.
+// The type is `any` in pages without generators, which need neither onnxruntime-web nor its types.
 // eslint-disable-next-line @typescript-eslint/ban-ts-comment
 /** @ts-ignore */
 // eslint-disable-next-line @typescript-eslint/consistent-type-imports
 export type Ort = typeof import('onnxruntime-web/webgpu');
 
-/** Time limit of one call of the runtime, ms. */
+/** Time limit of one call of the runtime, milliseconds. */
 let callLimit = 120_000;
 
 /**
- * Sets the time limit of one call of the runtime, in milliseconds; default 120,000. A call that exceeds it is
- * abandoned, together with that copy of the runtime: the next call loads another. A model on the CPU blocks the main
- * thread and cannot be abandoned.
+ * Sets the time limit of one call of the runtime, in milliseconds; default 120,000. A call that exceeds the limit is
+ * abandoned together with its copy of the runtime, and the next call loads another copy. A model on the CPU blocks the
+ * main thread and cannot be abandoned.
  */
 export function setRunLimit(milliseconds: number): void {
   callLimit = milliseconds;
 }
 
-/** Messages of WebAssembly after which the module's memory is invalid. */
+/** Pattern of WebAssembly error messages after which the memory of the module is invalid. */
 const FATAL = /\bAborted\(|unreachable|out of bounds|table index/;
 
-/** A call that never started because an earlier one has broken this copy of the runtime: another copy could run it. */
+/**
+ * Error of a call that never started, because an earlier call has broken this copy of the runtime. Another copy could
+ * run it.
+ */
 export class RuntimeGone extends Error {}
 
 export interface RuntimeSource {
-  /** Absolute address of the script. */
+  /** Absolute URL of the script. */
   readonly script: string;
   readonly wasm: ArrayBuffer;
 }
 
 /**
- * One loaded copy of ONNX Runtime. Its calls must never overlap: two concurrent runs never settle, two concurrent
- * creations block each other permanently. So there is one queue for all calls.
+ * One loaded copy of ONNX Runtime. All calls go through one queue, because concurrent calls are not supported: two runs
+ * never settle, and two creations block each other permanently.
  */
 export class Runtime {
   readonly ort: Ort;
-  /** Source files, for another copy in a worker. */
+  /** Source files of the runtime, for another copy in a worker. */
   readonly source: RuntimeSource;
   #tail: Promise<unknown> = Promise.resolve();
   #breakage: unknown;
@@ -48,14 +51,14 @@ export class Runtime {
     this.source = source;
   }
 
-  /** Whether this copy is unusable; {@link loadRuntime} then loads another. */
+  /** Whether this copy is unusable. {@link loadRuntime} then loads another. */
   get isBroken(): boolean {
     return this.#breakage !== undefined;
   }
 
   /**
-   * Runs a task after all earlier ones have ended, even by failures.
-   * @throws RuntimeGone if one of them has broken this copy; errors of the task.
+   * Runs a task after all earlier ones have ended or failed.
+   * @throws RuntimeGone if an earlier task has broken this copy; errors of the task.
    */
   exclusive<T>(task: () => Promise<T>): Promise<T> {
     const result = this.#tail.then(() => this.#guard(task));
@@ -86,10 +89,10 @@ let loading: Promise<Runtime> | undefined;
 let copies = 0;
 
 /**
- * Sets the location of four files of onnxruntime-web 1.30.0: `ort.jspi.bundle.min.mjs`, `ort.webgpu.bundle.min.mjs`,
+ * Sets the folder of four files of onnxruntime-web 1.30.0: `ort.jspi.bundle.min.mjs`, `ort.webgpu.bundle.min.mjs`,
  * `ort-wasm-simd-threaded.jspi.wasm` and `ort-wasm-simd-threaded.asyncify.wasm`. Default: the folder `onnxruntime/`
- * beside this module, as in the CDN build.
- * @param folder Absolute, or relative to the page.
+ * next to this module, as in the CDN build.
+ * @param folder Absolute URL, or a URL relative to the page.
  */
 export function setRuntimeLocation(folder: string | URL): void {
   const url = new URL(folder, globalThis.location?.href);
@@ -102,8 +105,8 @@ export function setRuntimeLocation(folder: string | URL): void {
 export const isRuntimeRequested = (): boolean => loading !== undefined;
 
 /**
- * Returns the page's copy of ONNX Runtime, fetched at the first call: the build with JSPI if the browser supports it,
- * else the larger one. Both have kernels for WebGPU and for the CPU.
+ * Returns the page's copy of ONNX Runtime, which the first call fetches: the build with JSPI if the browser supports
+ * it, else the larger one. Both have kernels for WebGPU and for the CPU.
  * @throws GaussianSplatError `network/*` if a file is unavailable; another call fetches it again.
  */
 export async function loadRuntime(): Promise<Runtime> {
@@ -130,7 +133,7 @@ async function load(): Promise<Runtime> {
     },
   );
   noteRuntimeBytes(null);
-  // Log messages are part of the errors, which are passed on.
+  // Log messages are redundant, because the errors contain them.
   ort.env.logLevel = 'fatal';
   ort.env.wasm.numThreads = 1;
   ort.env.wasm.wasmBinary = wasmBinary.buffer;
@@ -138,10 +141,10 @@ async function load(): Promise<Runtime> {
 }
 
 /**
- * Returns the folder `onnxruntime/` beside a module. `new URL(…, import.meta.url)` is avoided, because bundlers would
- * treat it as a file to copy.
- * @throws GaussianSplatError `network/unreachable` if the module address is unusable: bundlers remove it, or leave that
- * of a file on the build machine.
+ * Returns the URL of the folder `onnxruntime/` next to a module. Does not use `new URL(…, import.meta.url)`, which
+ * bundlers treat as a file to copy.
+ * @throws GaussianSplatError `network/unreachable` if the URL of the module is unusable: bundlers remove it, or leave
+ * that of a file on the build machine.
  */
 export function folderBeside(module: string | undefined): string {
   const isHidden = !module || (module.startsWith('file:') && globalThis.location?.protocol.startsWith('http'));
@@ -161,10 +164,13 @@ const REMEDY =
   `put these files of node_modules/onnxruntime-web/dist there (npm install onnxruntime-web@1.30.0): ${FILES}; ` +
   'or name their folder with GaussianSplatElement.runtimeLocation (without the element: setRuntimeLocation)';
 
-/** Time limit of loading a script, ms, because its progress is not observable. */
+/** Time limit for loading a script, milliseconds, because its progress is not observable. */
 const SCRIPT_LIMIT_MS = 120_000;
 
-/** A module is evaluated once for each address, so another copy needs another address. */
+/**
+ * Imports a copy of the script. Each copy needs its own URL, because a module is evaluated once per URL.
+ * @throws GaussianSplatError `network/unreachable`
+ */
 async function importScript(script: string): Promise<Ort> {
   const address = copies++ === 0 ? script : `${script}?copy=${copies}`;
   let timer: ReturnType<typeof setTimeout> | undefined;
@@ -177,7 +183,7 @@ async function importScript(script: string): Promise<Ort> {
     throw new GaussianSplatError('network/unreachable', {
       where: script.slice(0, 200),
       expected: 'the script of onnxruntime-web 1.30.0',
-      // The same message for every copy, so that it is reported only once.
+      // Every copy has the same message, so that it is reported only once.
       found: ((cause as Error)?.message ?? 'nothing').replace(address, script),
       remedy: REMEDY,
       cause,
@@ -187,7 +193,11 @@ async function importScript(script: string): Promise<Ort> {
   }
 }
 
-/** Fetched here, because a copy of the runtime that did not find its WebAssembly never works again. */
+/**
+ * Fetches the WebAssembly module of a build. The runtime does not fetch it itself, because a copy that fails to fetch
+ * it never works again.
+ * @throws GaussianSplatError `network/*`
+ */
 async function fetchWasm(folder: string, build: keyof typeof WASM_BYTES): Promise<Uint8Array<ArrayBuffer>> {
   const expected = WASM_BYTES[build];
   const url = `${folder}ort-wasm-simd-threaded.${build}.wasm`;

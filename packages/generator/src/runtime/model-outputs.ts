@@ -2,18 +2,21 @@ import type { Contract, GaussianLayout } from '@gaussian-splat/core/contract';
 import type { OnnxHeader } from '@gaussian-splat/core/onnx';
 import { elementsOf } from '../input-value.js';
 
-/** A requested output. */
+/** An output that each run requests, unless it is constant. */
 export interface ModelOutput {
   readonly name: string;
   readonly kind: 'gaussians' | 'count' | 'image' | 'state';
   readonly dtype: 'float32' | 'float16' | 'int32' | 'int64';
-  /** Elements in each row of Gaussians. */
+  /** Number of elements in each row of Gaussians; undefined for other outputs. */
   readonly rowElements?: number;
   /** Maximum number of elements in a run; undefined for an image whose size only a run determines. */
   readonly max: number | undefined;
 }
 
-/** The outputs that a contract names. @param layout Of the Gaussians, if the model writes any. */
+/**
+ * Returns the outputs that a contract names, each once.
+ * @param layout Layout of the Gaussians; undefined for a model that writes an image.
+ */
 export function modelOutputs(
   header: OnnxHeader,
   contract: Contract,

@@ -1,5 +1,4 @@
 import { GaussianSplatError } from '@gaussian-splat/core';
-import { partUrl } from '@gaussian-splat/core/fetch';
 import {
   carriesContract,
   checkContract,
@@ -12,44 +11,44 @@ import {
   type GaussianLayout,
   type ResolvedContract,
 } from '@gaussian-splat/core/contract';
-import { openHeader, type ModelPlace, type OnnxHeader, type OpenedModel } from '@gaussian-splat/core/onnx';
+import { externalUrl, openHeader, type ModelPlace, type OnnxHeader, type OpenedModel } from '@gaussian-splat/core/onnx';
 import { fetchBytes, sumProgress, type FetchOptions, type ProgressListener } from './fetch-bytes.js';
 import { modelOutputs, type ModelOutput } from './model-outputs.js';
 
-/** Location of a generator. */
+/** Source of a generator. */
 export interface ModelSource {
-  /** Address of the ONNX file, absolute or relative to the page. */
+  /** URL of the ONNX file, absolute or relative to the page. */
   readonly url: string;
-  /** The contract, as JSON text or as the object; default: that in the model's metadata, else a sidecar file. */
+  /** Contract, as JSON text or as an object. Default: the contract in the model's metadata, or in a sidecar file. */
   readonly contract?: unknown;
   readonly credentials?: 'omit' | 'same-origin' | 'include';
   /**
-   * Reads the header on another thread. It may transfer the bytes, and returns them as `whole`. Default: core's
-   * `openHeader`.
+   * Reads the header on another thread. The function may transfer the bytes, and then returns them as `whole`. Default:
+   * core's `openHeader`.
    */
   readonly openHeader?: ((place: ModelPlace, signal?: AbortSignal) => Promise<OpenedModel>) | undefined;
 }
 
-/** A validated model with all of its bytes, but without any runtime. */
+/** A validated model with all of its bytes. No runtime is needed yet. */
 export interface GeneratorModel {
   readonly url: string;
   readonly header: OnnxHeader;
   readonly contract: Contract;
-  /** Undefined for a post-processor, which writes an image. */
+  /** Layout of the Gaussians; undefined for a post-processor, which writes an image. */
   readonly layout: GaussianLayout | undefined;
-  /** All outputs that the contract names, each once. */
+  /** Outputs that the contract names, each once. */
   readonly outputs: readonly ModelOutput[];
-  /** Number of instances in a run; undefined if the model has no axis for them, or it is still symbolic. */
+  /** Number of instances in a run; undefined if the model has no axis for instances, or its size is still symbolic. */
   readonly instances?: number;
-  /** Inferences for a missing contract, for a warning; sentences without a full stop. */
+  /** Assumptions made for a missing contract, for a warning; sentences without a full stop. */
   readonly notes: readonly string[];
   readonly bytes: Uint8Array;
-  /** External files, by the locations in the model. */
+  /** External files with weights. `path` is the location that the model declares. */
   readonly externalData: readonly { readonly path: string; readonly data: Uint8Array }[];
 }
 
 /**
- * Fetches a model and checks it against its contract: first the header, and the weights only if that is valid.
+ * Fetches a model and checks it against its contract. The weights are fetched only if the header is valid.
  * @throws ContractError with every fault; GaussianSplatError `decode/*` for a file that is not an ONNX model,
  * `network/*`; the reason of the signal.
  */
@@ -59,10 +58,8 @@ export async function openModel(
 ): Promise<GeneratorModel> {
   const { credentials = 'same-origin', openHeader: open = openHeader } = source;
   const request = { credentials, signal: options.signal };
-  // A worker's own address differs from the page's.
-  const base = globalThis.location?.href;
-  const address = URL.canParse(source.url, base) ? new URL(source.url, base).href : source.url;
-  const { header, size, whole } = await open({ url: address, credentials }, options.signal);
+  // The URL is resolved here, because a worker has another base URL than the page.
+  const { header, size, whole } = await open({ url: addressOf(source.url), credentials }, options.signal);
   const { contract, notes } = await contractOf(source, header, request);
   const faults = checkContract(header, contract);
   if (faults.length > 0) throw new ContractError(faults);
@@ -76,7 +73,7 @@ export async function openModel(
   const onProgress = reports[externalFiles.length];
   if (whole) onProgress(whole.length, whole.length);
   const fetched = whole ?? (await fetchBytes(source.url, { ...request, onProgress, expected: size }));
-  // A file that was fetched in ranges may have been replaced meanwhile.
+  // Reads the header again, because a file that was fetched in ranges may have been replaced meanwhile.
   const bytes = whole ?? (await open({ bytes: fetched, name: header.name }, options.signal)).whole ?? fetched;
   return {
     url: source.url,
@@ -90,14 +87,20 @@ export async function openModel(
   };
 }
 
-/** Maximum size of a contract, which has some kilobytes including a rest pose. */
+/** Returns the absolute URL of a model; text that is no URL is returned as it is, for the error of the download. */
+export function addressOf(url: string): string {
+  const base = globalThis.location?.href;
+  return URL.canParse(url, base) ? new URL(url, base).href : url;
+}
+
+/** Maximum size of a contract, bytes. Typical contracts have some kilobytes, including a rest pose. */
 const MAX_CONTRACT_BYTES = 1 << 20;
 
-const longContract = (where: string, found: number): GaussianSplatError =>
+const longContract = (where: string): GaussianSplatError =>
   new GaussianSplatError('out-of-memory/budget', {
     where: `${where}, the contract beside it`,
     expected: `at most ${MAX_CONTRACT_BYTES} bytes`,
-    found: String(found),
+    found: 'more',
     remedy: 'write the contract without what no reader needs',
   });
 
@@ -106,15 +109,28 @@ async function contractOf(source: ModelSource, header: OnnxHeader, request: Fetc
   if (explicit !== undefined && explicit !== null) return resolveContract({ header, explicit });
   if (carriesContract(header)) return resolveContract({ header });
   if (/^(data|blob):/.test(source.url)) return resolveContract({ header });
-  const bytes = await fetchBytes(sidecarName(source.url), { ...request, mayBeMissing: true });
-  if (bytes && bytes.length > MAX_CONTRACT_BYTES) throw longContract(source.url, bytes.length);
+  let hidden: unknown;
+  const asked = { ...request, mayBeMissing: true, maxBytes: MAX_CONTRACT_BYTES } as const;
+  const bytes = await fetchBytes(sidecarName(source.url), asked).catch((error: unknown) => {
+    if ((error as Error | undefined)?.cause instanceof RangeError) throw longContract(source.url);
+    // Many servers permit other origins to read their files, but not their responses to unknown paths.
+    const isOtherServer = new URL(addressOf(source.url)).origin !== globalThis.location?.origin;
+    if (!isOtherServer || (error as { code?: string }).code !== 'network/unreachable') throw error;
+    hidden = error;
+    return undefined;
+  });
   const text = bytes && new TextDecoder().decode(bytes);
-  // Servers of single-page applications respond with their page for missing files.
+  // Servers of single-page applications respond with their HTML page for missing files.
   const sidecar = text === undefined || /^\s*</.test(text) ? undefined : text;
-  return resolveContract({ header, sidecar });
+  try {
+    return resolveContract({ header, sidecar });
+  } catch (error) {
+    // A contract that cannot be read may be there.
+    throw hidden ?? error;
+  }
 }
 
-/** Maximum number of weight files: exporters write one, or one for each large tensor on request. */
+/** Maximum number of files with weights. Exporters write one, or on request one for each large tensor. */
 const MAX_FILES = 256;
 /** Maximum number of concurrent downloads, so that other requests of the page can proceed. */
 const FILES_AT_ONCE = 4;
@@ -141,9 +157,9 @@ async function fetchExternal(
   const fetchSome = async (): Promise<void> => {
     for (let i = next++; i < header.externalFiles.length; i = next++) {
       const { location: path, byteLength: expected } = header.externalFiles[i];
-      const address = partUrl(path, new URL(source.url, globalThis.location?.href)).href;
+      const address = externalUrl(path, addressOf(source.url));
       const options = { ...request, expected, onProgress: reports[i], mayBeMissing: true } as const;
-      files[i] = { path, data: await fetchBytes(address, options) };
+      files[i] = { path, data: address && (await fetchBytes(address.href, options)) };
     }
   };
   await Promise.all(Array.from({ length: FILES_AT_ONCE }, fetchSome));

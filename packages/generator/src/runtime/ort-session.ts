@@ -16,19 +16,19 @@ import { numbersOf } from './first-run.js';
 import { SessionBuffers } from './session-buffers.js';
 import { bufferBytes } from './tensor-buffers.js';
 
-/** Kind of a session: captured GPU commands, GPU commands encoded for each run, or the CPU. */
+/** Kind of a session: captured GPU commands, GPU commands that are encoded for each run, or the CPU. */
 export type SessionKind = 'captured' | 'webgpu' | 'wasm';
 
-/** Output of one run: storage buffers by the names of the outputs, valid until the next run. */
+/** Output of one run: storage buffers by output name, valid until the next run. */
 export interface RunOutputs {
   readonly tensors: Readonly<Record<string, GPUBuffer>>;
-  /** Shapes of this run, by the same names. */
+  /** Dimensions of each output in this run, by output name. */
   readonly dims: Readonly<Record<string, readonly number[]>>;
-  /** Rows of Gaussians of one instance in this run; 1 for an image. */
+  /** Number of rows of Gaussians of one instance in this run; 1 for an image. */
   readonly rows: number;
 }
 
-/** An output that is the same in every run: it is kept, and not requested again. */
+/** An output that is the same in every run, so that it is kept and not requested again. */
 export interface FixedOutput {
   readonly buffer: GPUBuffer;
   readonly dims: readonly number[];
@@ -37,10 +37,10 @@ export interface FixedOutput {
 /** Fixed outputs by name. */
 export type FixedOutputs = Record<string, FixedOutput>;
 
-/** Log messages of the runtime are part of its errors, too. */
+/** Suppresses log messages, because the runtime's errors contain them, too. */
 const QUIET = { logSeverityLevel: 4 } as const;
 
-/** A session of ONNX Runtime with its inputs and outputs on the GPU. After a failed run it must not be used again. */
+/** A session of ONNX Runtime with inputs and outputs on the GPU. It must not be used again after a failed run. */
 export class OrtSession {
   readonly kind: SessionKind;
   readonly #runtime: Runtime;
@@ -54,7 +54,7 @@ export class OrtSession {
   readonly #feeds: Record<string, Tensor> = {};
   #hasFailed = false;
   #isReleased = false;
-  /** Output buffers of a captured session. */
+  /** Output buffers of a captured session, which its commands write in every run. */
   #written: readonly GPUBuffer[] = [];
 
   private constructor(
@@ -71,14 +71,15 @@ export class OrtSession {
     this.#device = device;
     this.#outputs = outputs;
     this.#instances = instances ?? 1;
-    // A run without requested outputs would compute nothing.
+    // At least one output is requested, because a run without outputs would compute nothing.
     this.#fixed = outputs.every(({ name }) => name in fixed) ? {} : fixed;
     this.#names = outputs.map(({ name }) => name).filter((name) => !(name in this.#fixed));
     this.#buffers = new SessionBuffers(device);
   }
 
   /**
-   * @param fixed Outputs that are never requested; a session that is created with them owns and destroys them.
+   * Creates a session of the runtime.
+   * @param fixed Outputs that are never requested. The session owns and destroys them if it is created.
    * @throws errors of the runtime.
    */
   static async create(
@@ -98,7 +99,7 @@ export class OrtSession {
       preferredOutputLocation: 'gpu-buffer',
       enableGraphCapture: kind === 'captured',
     };
-    // On the CPU, and if the runtime's fusions are known to be wrong, the graph runs without fusions.
+    // The graph runs without fusions on the CPU, and if fusions of the runtime are known to be wrong for it.
     const isFused = kind !== 'wasm' && misfusedProducts(model.header).length === 0;
     const session = await runtime.exclusive(() =>
       runtime.ort.InferenceSession.create(model.bytes, {
@@ -115,16 +116,16 @@ export class OrtSession {
     return this.#hasFailed;
   }
 
-  /** Whether its copy of the runtime is unusable. */
+  /** Whether the session's copy of the runtime is unusable. */
   get hasBrokenRuntime(): boolean {
     return this.#runtime.isBroken;
   }
 
   /**
-   * Runs the model, and calls `use` with its output, which must submit all its work before it returns. No other call of
-   * the runtime runs in between.
-   * @throws errors of the runtime, with {@link hasFailed} set; RuntimeGone if it never started, because the runtime or
-   * the session is gone; or errors of `use`.
+   * Runs the model, and calls `use` with its output. `use` must submit its GPU work before it returns, and no other
+   * call of the runtime runs meanwhile.
+   * @throws errors of the runtime, after setting {@link hasFailed}; RuntimeGone if the run never started, because the
+   * runtime or the session is gone; or errors of `use`.
    */
   async run(inputs: Inputs, use: (outputs: RunOutputs) => void): Promise<void> {
     try {
@@ -138,7 +139,7 @@ export class OrtSession {
     }
   }
 
-  /** Releases everything. Never rejects: even releasing a failed session may fail. */
+  /** Releases the session and all buffers. Never rejects, although the release of a failed session may fail. */
   async release(): Promise<void> {
     if (this.#isReleased) return;
     this.#isReleased = true;
@@ -158,7 +159,7 @@ export class OrtSession {
       );
       use({ tensors: this.#buffersOf(results), dims, rows: rowsOf(dims, this.#outputs, this.#instances) });
     } finally {
-      // Freed for later submissions; a captured session keeps its buffers.
+      // Frees the outputs after their submissions. A captured session keeps its buffers.
       if (this.kind === 'webgpu') for (const name of this.#names) disposeGpu(results[name]);
     }
   }
@@ -174,8 +175,8 @@ export class OrtSession {
   }
 
   /**
-   * Inputs are kept in our own buffers: the runtime would create new ones for every run, and captured commands always
-   * read the same ones.
+   * Sets an input of the next run. Inputs are in buffers of this session, because the runtime would create new ones for
+   * every run, and captured commands always read the same buffers.
    */
   async #feed(name: string, input: InputValue): Promise<void> {
     const isRead = this.kind === 'wasm' || input.dtype === 'int64';
@@ -187,10 +188,10 @@ export class OrtSession {
     }
     const buffer = this.#tensorOn(name, input);
     if (isOnGpu(input)) this.#buffers.copy(input.buffer, buffer, bytesOf(input));
-    else this.#device.queue.writeBuffer(buffer, 0, input.data as Float32Array<ArrayBuffer>);
+    else this.#buffers.write(buffer, input.data as Float32Array<ArrayBuffer>);
   }
 
-  /** The buffer of an input, and its tensor of the runtime. */
+  /** Returns the GPU buffer of an input. Replaces its tensor in the feeds if the buffer or the shape has changed. */
   #tensorOn(name: string, { dtype, dims }: InputValue): GPUBuffer {
     const buffer = this.#buffers.of(`input.${name}`, bufferBytes(dtype, elementsOf(dims)));
     const feed = this.#feeds[name] as Tensor | undefined;
@@ -216,16 +217,19 @@ export class OrtSession {
     return tensors;
   }
 
-  /** Outputs on the CPU; empty ones are on the CPU for any kind of session. */
+  /** Uploads an output in CPU memory to a GPU buffer. Empty outputs are in CPU memory for any kind of session. */
   #upload({ name, max }: ModelOutput, { type, data, size }: Tensor): GPUBuffer {
     const buffer = this.#buffers.of(`output.${name}`, bufferBytes(type, max ?? size));
-    // The consumer rejects more than the contract allows.
+    // A size above the maximum is not uploaded; the consumer rejects it.
     if (size > 0 && size <= (max ?? size)) this.#buffers.write(buffer, data as Float32Array<ArrayBuffer>);
     return buffer;
   }
 }
 
-/** The axis of instances is symbolic in the file, but graph capture needs fixed sizes. */
+/**
+ * Returns the size of the axis of instances by its name, because graph capture needs fixed sizes and the file has a
+ * symbolic one.
+ */
 function fixedDimensions({ contract, instances }: GeneratorModel): Record<string, number> | undefined {
   return instances === undefined ? undefined : { [contract.instances!.axis]: instances };
 }
@@ -239,7 +243,7 @@ function disposeGpu(tensor: Tensor): void {
   if (tensor.location === 'gpu-buffer') tensor.dispose();
 }
 
-/** Rows of all tensors of Gaussians, which must agree. */
+/** Returns the number of rows of one instance, which must be equal for all tensors of Gaussians. */
 function rowsOf(
   dims: Readonly<Record<string, readonly number[]>>,
   outputs: readonly ModelOutput[],

@@ -1,19 +1,22 @@
 import type { ProgressListener } from './fetch-bytes.js';
 
 /**
- * Bytes of the runtime's WebAssembly, onnxruntime-web 1.30.0: known before the request, and even if a server with
- * compression does not declare the length. Its script, under 1 % of that, is not counted.
+ * Bytes of the WebAssembly modules of onnxruntime-web 1.30.0, because servers that compress a file do not declare its
+ * length. The script, which has less than 1 % of these bytes, is not counted.
  */
 export const WASM_BYTES = { jspi: 16_758_545, asyncify: 26_781_914 } as const;
 
-/** The build with JSPI, or the larger one for all other browsers. */
+/** Returns the name of the build for this browser: with JSPI if the browser supports it, else the larger one. */
 export const wasmBuild = (): keyof typeof WASM_BYTES => ('Suspending' in WebAssembly ? 'jspi' : 'asyncify');
 
 const listeners = new Set<ProgressListener>();
-/** Undefined before the request, null once the runtime is loaded. */
+/** Progress of the download; undefined before the request, null when the runtime is loaded. */
 let state: readonly [loaded: number, total: number] | null | undefined;
 
-/** Reports the received bytes of the runtime. @param progress null at the end, undefined after a failure. */
+/**
+ * Reports the progress of the download to all listeners.
+ * @param progress Received and total bytes; null at the end, undefined after a failure.
+ */
 export function noteRuntimeBytes(progress: typeof state): void {
   state = progress;
   for (const listener of listeners) notify(listener);
@@ -21,8 +24,8 @@ export function noteRuntimeBytes(progress: typeof state): void {
 }
 
 /**
- * Reports the progress of the runtime, now and whenever more bytes arrive. A loaded runtime counts as no bytes, because
- * no one waits for them.
+ * Calls a listener with the progress of the runtime at once, and whenever more bytes arrive. A loaded runtime counts as
+ * 0 bytes, because nothing is to be downloaded.
  * @returns A function that unsubscribes.
  */
 export function watchRuntimeBytes(listener: ProgressListener): () => void {

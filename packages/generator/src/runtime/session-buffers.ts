@@ -1,6 +1,6 @@
 import { TENSOR_USAGE } from './tensor-buffers.js';
 
-/** GPU buffers of one session, by name; they grow with images or numbers of rows. */
+/** GPU buffers of one session, by name. They are replaced by larger ones if images or numbers of rows grow. */
 export class SessionBuffers {
   readonly #device: GPUDevice;
   readonly #buffers = new Map<string, GPUBuffer>();
@@ -20,14 +20,17 @@ export class SessionBuffers {
     return buffer;
   }
 
-  /** Copies the beginning of a buffer, in whole words. */
+  /** Copies the first `bytes` bytes of a buffer, rounded up to whole 32-bit words. */
   copy(from: GPUBuffer, to: GPUBuffer, bytes: number): void {
     const encoder = this.#device.createCommandEncoder({ label: 'gs.generator.copy' });
     encoder.copyBufferToBuffer(from, 0, to, 0, Math.ceil(bytes / 4) * 4);
     this.#device.queue.submit([encoder.finish()]);
   }
 
-  /** GPU buffers are written in whole words, but an odd number of float16 is not a multiple of one. */
+  /**
+   * Writes numbers to a buffer. Fills the last 32-bit word, because GPU buffers are written in whole words and an odd
+   * number of float16 ends within one.
+   */
   write(buffer: GPUBuffer, { buffer: memory, byteOffset, byteLength }: ArrayBufferView<ArrayBuffer>): void {
     const whole = byteLength - (byteLength % 4);
     this.#device.queue.writeBuffer(buffer, 0, memory, byteOffset, whole);

@@ -1,12 +1,12 @@
-import type { StartWorker } from '../proof/run-on-cpu.js';
+import type { StartWorker } from '../cpu-check/run-on-cpu.js';
 import { GeneratorSession } from './generator-session.js';
 import type { FetchOptions } from './fetch-bytes.js';
-import { openModel, type ModelSource } from './open-model.js';
+import { addressOf, openModel, type ModelSource } from './open-model.js';
 
-/** A reference to a shared session. */
+/** A counted reference to a shared session. */
 export interface SessionLease {
   readonly session: GeneratorSession;
-  /** Releases the reference; the last one releases the session. Further calls have no effect. */
+  /** Releases the reference. Releasing the last one releases the session. Further calls have no effect. */
   release(): void;
 }
 
@@ -14,7 +14,7 @@ interface Entry {
   users: number;
   readonly abort: AbortController;
   readonly session: Promise<GeneratorSession>;
-  /** Whether it is unusable for all users. */
+  /** Whether the session is unusable for all users. */
   readonly hasGivenUp: () => boolean;
   readonly fallbackListeners: Set<(reason: string) => void>;
   fallback: string | undefined;
@@ -23,19 +23,20 @@ interface Entry {
 const devices = new WeakMap<GPUDevice, Map<string, Entry>>();
 
 export interface AcquireOptions extends Pick<FetchOptions, 'signal' | 'onProgress'> {
-  /** Called with the reason when the model runs on the CPU. */
+  /** Called when the model runs on the CPU, with the reason in English. */
   readonly onFallback?: (reason: string) => void;
   /**
    * Whether the output of the first run on the GPU is compared with that on the CPU: in a worker, when the page is
-   * idle, once for each model and adapter. If they differ the model runs on the CPU from then on. Default true; of
-   * several users of a model the first one's value applies. A function starts the worker: see {@link StartWorker}.
+   * idle, once for each model and adapter. If the outputs differ, the model runs on the CPU from then on. Default true.
+   * If a model has several users, the value of the first applies. A function starts the worker: see {@link
+   * StartWorker}.
    */
-  readonly compare?: boolean | StartWorker;
+  readonly gpuCheck?: boolean | StartWorker;
 }
 
 /**
- * Returns the session of a generator on a device, shared by all users with the same address and contract.
- * @throws as `openModel` does.
+ * Returns a reference to the session of a generator on a device, shared by all users with the same URL and contract.
+ * @throws the errors of `openModel`
  */
 export async function acquireSession(
   source: ModelSource,
@@ -47,7 +48,7 @@ export async function acquireSession(
   devices.set(device, entries);
   const key = keyOf(source);
   let entry = entries.get(key);
-  // A new request may find another file at the address.
+  // A session that is unusable is opened again, because there may be another file at the URL.
   if (entry === undefined || entry.hasGivenUp()) entries.set(key, (entry = open(source, device, options)));
   const shared = entry;
   const { onFallback = () => undefined } = options;
@@ -68,14 +69,14 @@ export async function acquireSession(
     const session = await unlessAborted(shared.session, options.signal);
     return { session, release };
   } catch (error) {
-    // The next request tries again.
+    // The next request opens the session again.
     if (!options.signal?.aborted && entries.get(key) === shared) entries.delete(key);
     release();
     throw error;
   }
 }
 
-function open(source: ModelSource, device: GPUDevice, { onProgress, compare }: AcquireOptions): Entry {
+function open(source: ModelSource, device: GPUDevice, { onProgress, gpuCheck }: AcquireOptions): Entry {
   const abort = new AbortController();
   const fallbackListeners: Entry['fallbackListeners'] = new Set();
   const onFallback = (reason: string): void => {
@@ -84,7 +85,7 @@ function open(source: ModelSource, device: GPUDevice, { onProgress, compare }: A
   };
   let opened: GeneratorSession | undefined;
   const session = openModel(source, { onProgress, signal: abort.signal }).then(
-    (model) => (opened = new GeneratorSession(model, device, onFallback, compare)),
+    (model) => (opened = new GeneratorSession(model, device, onFallback, gpuCheck)),
   );
   const hasGivenUp = (): boolean => opened?.hasGivenUp ?? false;
   const entry: Entry = { users: 0, abort, session, hasGivenUp, fallbackListeners, fallback: undefined };
@@ -92,10 +93,10 @@ function open(source: ModelSource, device: GPUDevice, { onProgress, compare }: A
 }
 
 function keyOf({ url, contract, credentials }: ModelSource): string {
-  return JSON.stringify([new URL(url, globalThis.location?.href).href, contract ?? null, credentials ?? null]);
+  return JSON.stringify([addressOf(url), contract ?? null, credentials ?? null]);
 }
 
-/** Rejects with the signal's reason as soon as it aborts. */
+/** Returns a promise like the given one that also rejects as soon as the signal is aborted, with its reason. */
 function unlessAborted<T>(promise: Promise<T>, signal: AbortSignal | undefined): Promise<T> {
   if (signal === undefined) return promise;
   return new Promise((resolve, reject) => {

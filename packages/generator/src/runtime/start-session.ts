@@ -1,50 +1,61 @@
 import { ContractError, type ContractFault } from '@gaussian-splat/core/contract';
 import { constantOutputs, miscomputedConvolutions } from '@gaussian-splat/core/onnx';
-import { isOnGpu, type GpuTensor, type Inputs, type InputValue } from '../input-value.js';
-import type { Evidence } from '../proof/prove.js';
+import { elementsOf, isOnGpu, type GpuTensor, type Inputs, type InputValue } from '../input-value.js';
+import type { Evidence } from '../cpu-check/prove.js';
 import { cadenceOf } from './cadence.js';
 import { copyOf, evidenceOf, isEqual, readRun, type WrittenRun } from './first-run.js';
 import { OrtSession, type FixedOutputs, type RunOutputs, type SessionKind } from './ort-session.js';
 import { loadRuntime, RuntimeGone } from './load-runtime.js';
 import type { GeneratorModel } from './open-model.js';
-import { TENSOR_USAGE } from './tensor-buffers.js';
+import { ELEMENT_BYTES, TENSOR_USAGE } from './tensor-buffers.js';
 
 export interface StartOptions {
   readonly model: GeneratorModel;
   readonly device: GPUDevice;
-  /** Inputs of the warm-up. */
+  /** Inputs of the first run. */
   readonly inputs: Inputs;
-  /** Throws once the session is not needed any more, or the device is lost: then further attempts are pointless. */
+  /** Throws if the session is not needed anymore or the device is lost, so that further attempts are useless. */
   readonly requireLife: () => void;
   /** Called when the model has broken a copy of the runtime. */
   readonly onBreakage: () => void;
-  /** Called when the model runs on the CPU, with the reason for display. */
+  /** Called when the model runs on the CPU, with the reason in English. */
   readonly onFallback: (reason: string) => void;
-  /** Reason that the GPU must not be tried; undefined to try it. */
+  /** Reason that the model must not run on the GPU; undefined if it may. */
   readonly refusal?: string;
-  /** Whether to keep the output of the first run on the GPU for a comparison. */
+  /** Whether the output of the first run on the GPU is read back for a comparison with the CPU. */
   readonly keepsEvidence?: boolean;
   /**
-   * Called with the outputs of the first run: they serve the request that starts the session, before any run for graph
-   * capture. It must submit its work before it returns, and must not throw. It is called again only if a later start
-   * replaces the first one.
+   * Called with the outputs of the first run, which serve the request that starts the session, before any run for graph
+   * capture. The function must submit its GPU work before it returns, and must not throw. It is called again only if a
+   * later start replaces the first one.
    */
   readonly onFirstRun?: (outputs: RunOutputs) => void;
 }
 
-/** A session that has run, and the output of its first run on the GPU, if that is to be compared. */
+/** A session that has run, and the evidence of its first run on the GPU if a comparison is requested. */
 export interface StartedSession {
   readonly session: OrtSession;
   readonly evidence?: Evidence;
 }
 
 /**
- * Starts a session and runs it once, so that everything is compiled: with graph capture if model and runtime allow it,
- * else with commands encoded for every run, else on the CPU.
+ * Starts a session and runs it once, so that all kernels are compiled. Uses graph capture if model and runtime allow
+ * it, else commands that are encoded for every run, else the CPU.
  * @throws ContractError `contract/run` if the model does not run; GaussianSplatError `network/*` if the runtime is
  * unavailable; RuntimeGone if another model has broken the runtime meanwhile; errors of `requireLife`.
  */
 export async function startSession(options: StartOptions): Promise<StartedSession> {
+  // All runs of the start must have equal inputs. The first run replaces the state of the model, and a page may upload
+  // another image before the last run.
+  const { inputs, buffers } = replaceGpuInputs(options, copied);
+  try {
+    return await startWith({ ...options, inputs });
+  } finally {
+    for (const buffer of buffers) buffer.destroy();
+  }
+}
+
+async function startWith(options: StartOptions): Promise<StartedSession> {
   const { model, device, onFallback, refusal } = options;
   const refusals: string[] = [];
   if (refusal !== undefined) {
@@ -59,7 +70,7 @@ export async function startSession(options: StartOptions): Promise<StartedSessio
   }
   const reason = refusals.join('; ');
   const started = await start('wasm', options, refusals, (outputs) => {
-    // Listeners request results again that the GPU may have computed wrongly: this run serves that request.
+    // Listeners may request results again that the GPU has computed wrongly. This run serves that request.
     onFallback(reason);
     options.onFirstRun?.(outputs);
   });
@@ -68,9 +79,10 @@ export async function startSession(options: StartOptions): Promise<StartedSessio
 }
 
 /**
- * Captured commands must write the same results as encoded ones, also for other inputs than those of the capture. Only
- * kernels are captured: a reshaped result is copied in the first run and then never again. Outputs that are constants
- * are kept from the first run.
+ * Starts a session on the GPU, with graph capture if its results equal those of encoded commands, for the inputs of the
+ * capture and for others. This check is needed because only kernels are captured: a reshaped result is copied in the
+ * first run and then never again. Outputs that are constants are kept from the first run. Returns undefined if the
+ * model does not run on the GPU, with reasons in `refusals`.
  */
 async function startOnGpu(options: StartOptions, refusals: string[]): Promise<StartedSession | undefined> {
   const { model, device, keepsEvidence } = options;
@@ -97,7 +109,11 @@ async function startOnGpu(options: StartOptions, refusals: string[]): Promise<St
   return session && { session, evidence };
 }
 
-/** @param changed The same with other inputs. */
+/**
+ * Replaces a session by a captured one, or by one with encoded commands if capture fails or gives other results.
+ * Returns undefined if that session does not start, either.
+ * @param changed The options with other inputs.
+ */
 async function startRecorded(
   options: StartOptions,
   plain: Started,
@@ -110,7 +126,7 @@ async function startRecorded(
     await plain.session.release();
     return (await start('webgpu', options, refusals))?.session;
   }
-  // One after the other, because both hold the weights.
+  // The first session is released before the second is created, because each holds the weights.
   await plain.session.release();
   const recorded = await start('captured', options, [], undefined, fixed);
   if (recorded && isEqual(recorded.written, plain.written)) {
@@ -121,14 +137,14 @@ async function startRecorded(
   return (await start('webgpu', options, refusals))?.session;
 }
 
-/** Describes a fault of the runtime. */
+/** Returns the contract fault for an error of the runtime. @param found Message of the error. */
 export function runFault({ header }: GeneratorModel, found: string): ContractFault {
   return {
     code: 'contract/run',
     where: header.name,
     expected: 'a model that ONNX Runtime runs',
     found: found.slice(0, 1000),
-    remedy: 'run it in a shell (gaussian-splat check MODEL --run), and mend or simplify what the runtime refuses',
+    remedy: 'run it in a shell (gaussian-splat check MODEL --run), and correct or simplify the refused nodes',
   };
 }
 
@@ -142,7 +158,9 @@ function isHalfWithoutFeature({ header, outputs }: GeneratorModel, device: GPUDe
   return isHalf && !device.features.has('shader-f16');
 }
 
-/** Graph capture requires fixed shapes and all inputs on the GPU, which has no 64-bit integers. */
+/**
+ * Whether graph capture is possible: all shapes are fixed, and all inputs are on the GPU, which has no 64-bit integers.
+ */
 function canBeRecorded({ header }: GeneratorModel): boolean {
   const isFixed = [...header.inputs, ...header.outputs].every(({ dims }) =>
     dims?.every((dim) => typeof dim === 'number'),
@@ -150,27 +168,38 @@ function canBeRecorded({ header }: GeneratorModel): boolean {
   return isFixed && header.inputs.every(({ dtype }) => dtype !== 'int64');
 }
 
-/** Result of {@link otherInputs}. */
-interface OtherInputs {
+/** Inputs with buffers of their own. */
+interface OwnInputs {
   readonly inputs: Inputs;
-  /** To be destroyed once no run uses them any more. */
+  /** Buffers that the caller destroys when no run uses them anymore. */
   readonly buffers: readonly GPUBuffer[];
 }
 
-/**
- * Inputs that differ from the given ones, including images and Gaussians on the GPU. They need not be meaningful to the
- * model, because two runs are compared.
- */
-function otherInputs({ device, inputs }: StartOptions): OtherInputs {
+/** Replaces the buffer of each input on the GPU, such as an image, a state or Gaussians, by the result of `replace`. */
+function replaceGpuInputs(
+  { device, inputs }: StartOptions,
+  replace: (device: GPUDevice, input: GpuTensor) => GPUBuffer,
+): OwnInputs {
   const buffers: GPUBuffer[] = [];
+  const own = Object.entries(inputs).map(([name, value]): [string, InputValue] => {
+    if (!isOnGpu(value)) return [name, value];
+    const buffer = replace(device, value);
+    buffers.push(buffer);
+    return [name, { ...value, buffer }];
+  });
+  return { inputs: Object.fromEntries(own), buffers };
+}
+
+/**
+ * Returns inputs that differ from the given ones, including images and Gaussians on the GPU. They need not be
+ * meaningful to the model, because only two runs are compared.
+ */
+function otherInputs(options: StartOptions): OwnInputs {
+  const { inputs, buffers } = replaceGpuInputs(options, filled);
   const changed = Object.entries(inputs).map(([name, value]): [string, InputValue] => {
-    if (isOnGpu(value)) {
-      const buffer = filled(device, value);
-      buffers.push(buffer);
-      return [name, { ...value, buffer }];
-    }
+    if (isOnGpu(value)) return [name, value];
     if (value.dtype === 'float32') return [name, { ...value, data: numbers(value.data).map((x) => 0.75 * x + 0.125) }];
-    // 0 and 1 are the integers most likely to be valid as indices.
+    // Uses 0 and 1, the integers most likely to be valid as indices.
     if (value.dtype === 'int32') return [name, { ...value, data: numbers(value.data).map((x) => (x === 0 ? 1 : 0)) }];
     return [name, value];
   });
@@ -180,12 +209,12 @@ function otherInputs({ device, inputs }: StartOptions): OtherInputs {
 const numbers = (data: unknown): Float32Array | Int32Array => data as Float32Array | Int32Array;
 
 /**
- * A bit pattern that no image and no Gaussians contain everywhere: 0.25 as float32, and twice as float16. Counts of
- * rows keep 0.
+ * Words to fill a tensor with, by element type: 0.25 as float32, and twice 0.25 as float16. No image and no Gaussians
+ * have this value everywhere. Counts of rows are 0.
  */
 const QUARTERS = { float32: 0x3e80_0000, float16: 0x3400_3400, int32: 0 } as const;
 
-/** A buffer of the same size, filled with one number. */
+/** Returns a buffer of the same size as a tensor's, filled with one number. */
 function filled(device: GPUDevice, { buffer, dtype }: GpuTensor): GPUBuffer {
   const size = Math.ceil(buffer.size / 4) * 4;
   const other = device.createBuffer({ label: 'gs.generator.other', size, usage: TENSOR_USAGE, mappedAtCreation: true });
@@ -194,9 +223,19 @@ function filled(device: GPUDevice, { buffer, dtype }: GpuTensor): GPUBuffer {
   return other;
 }
 
+/** Returns a buffer with the content of a tensor. */
+function copied(device: GPUDevice, { buffer, dtype, dims }: GpuTensor): GPUBuffer {
+  const size = Math.ceil((elementsOf(dims) * ELEMENT_BYTES[dtype]) / 4) * 4;
+  const own = device.createBuffer({ label: 'gs.generator.start', size, usage: TENSOR_USAGE });
+  const encoder = device.createCommandEncoder({ label: 'gs.generator.copy' });
+  encoder.copyBufferToBuffer(buffer, 0, own, 0, size);
+  device.queue.submit([encoder.finish()]);
+  return own;
+}
+
 interface Started {
   readonly session: OrtSession;
-  /** Output of its first run. */
+  /** Output of the session's first run. */
   readonly written: WrittenRun;
 }
 
@@ -221,7 +260,7 @@ async function start(
   const written = await attempt(session, options, refusals, onOutputs);
   if (written) return { session, written };
   await session.release();
-  // A model that broke the runtime would do so again; on the CPU a run without end would block the page.
+  // A model that has broken the runtime would break it again, and on the CPU a run without end would block the page.
   if (runtime.isBroken) {
     options.onBreakage();
     throw new ContractError([runFault(model, refusals.join('; '))]);
@@ -229,7 +268,10 @@ async function start(
   return undefined;
 }
 
-/** One run, and ranges of its output; undefined if it fails. @throws RuntimeGone, after releasing the session. */
+/**
+ * Runs a session once, and returns ranges of the output; undefined if the run fails.
+ * @throws RuntimeGone, after releasing the session
+ */
 async function attempt(
   session: OrtSession,
   { device, inputs, model }: StartOptions,

@@ -1,24 +1,27 @@
-import { loadModule } from '@gaussian-splat/core';
+import { loadModule, type GaussianSplatError } from '@gaussian-splat/core';
 import { BUFFER_USAGE, perDevice } from '../gpu/kernel.js';
 import { PREFERRED, setVariants, FALLBACK, type Variants } from '../variants.js';
 import { keyFor, pageStore, readStored, writeStored, type AutotuneStore } from './store.js';
 import type * as trials from './timing.js';
 
 export interface AutotuneOptions {
-  /** Default: the `localStorage` of the page, if it has one. null: no storage. */
+  /** Storage of results. Default: the `localStorage` of the page, if it is available. Null for no storage. */
   readonly store?: AutotuneStore | null;
-  /** Awaited before each step of the work, for pages that have more urgent work. */
+  /** Function that is awaited before each step, for pages that have more urgent work. */
   readonly pause?: () => Promise<void>;
-  /** Format of the frames to come: their pipelines are compiled at the same time. */
+  /** Format of the targets of later frames, whose pipelines are compiled concurrently. */
   readonly format?: GPUTextureFormat;
 }
 
 export interface StartOptions extends AutotuneOptions {
-  /** Upper limit in milliseconds of a small frame with the preferred variants; default 8. */
+  /** Maximum milliseconds of a small frame with the preferred variants; slower ones are not accepted. Default: 8. */
   readonly maxFrameMs?: number;
 }
 
-/** Autotuning of one device, running or finished. */
+/**
+ * Autotuning of one device, which is running or finished: the choice for the first frame, and the result of {@link
+ * autotune}.
+ */
 interface Choice {
   started?: Promise<Variants>;
   chosen?: Promise<Variants>;
@@ -26,23 +29,32 @@ interface Choice {
 
 const choiceOf = (device: GPUDevice): Choice => perDevice(device, 'choice', () => ({}));
 
-/** GPUMapMode.READ, which Node defines only if Dawn is loaded. */
+/** `GPUMapMode.READ` as a number, because Node defines this global only if Dawn is loaded. */
 const MAP_READ = 1;
 
 const QUICK_MS = 8;
 
-/** The self-test, loaded while the bytes of a scene are in transit. */
-const loadTiming = (): Promise<typeof trials> => loadModule('the self-test of the GPU', () => import('./timing.js'));
+/** Name of the code that is loaded late, for error messages. */
+const SELF_TEST = 'the GPU self-test';
+
+/** Loads the self-test, while the bytes of a scene are in transit. */
+const loadTiming = (): Promise<typeof trials> => loadModule(SELF_TEST, () => import('./timing.js'));
 
 /**
- * Finds variants for an early first frame, once for each device: the stored ones of an earlier visit; else the variants
- * that most GPUs prefer, if they pass the self-test and are fast enough; else the result of {@link autotune}, which
- * takes seconds. A page that got preferred variants may autotune later, at rest.
- * @throws GaussianSplatError as {@link autotune}
+ * Selects variants for an early first frame, once for each device. The stored variants of an earlier visit come first.
+ * Without them, the variants that most GPUs prefer are selected if they pass the self-test and are fast enough.
+ * Otherwise {@link autotune} selects them, which takes seconds. A page that got the preferred variants may autotune
+ * later, at rest.
+ * @throws GaussianSplatError as {@link autotune} does.
  */
 export function pickInitialVariants(device: GPUDevice, options: StartOptions = {}): Promise<Variants> {
   const choice = choiceOf(device);
-  return (choice.started ??= choice.chosen ?? start(device, options, choice));
+  return (choice.started ??= (choice.chosen ?? start(device, options, choice)).catch((error: unknown) => {
+    // Forgets a choice whose code could not be loaded, so that the next request chooses again.
+    if ((error as Partial<GaussianSplatError>).code === 'network/unreachable')
+      choice.started = choice.chosen = undefined;
+    throw error;
+  }));
 }
 
 async function start(device: GPUDevice, options: StartOptions, choice: Choice): Promise<Variants> {
@@ -57,12 +69,13 @@ async function start(device: GPUDevice, options: StartOptions, choice: Choice): 
 }
 
 /**
- * Finds the fastest variants that draw the right image on a device, once for each device: variants that fail the
- * self-test are excluded, the others are timed on small scenes. Viewpoints created afterwards use the result for `auto`
- * settings; earlier ones use the stored result of a previous visit, or else `quads`, `rgba16float` and `parallel`,
- * which work everywhere. Takes about a second the first time on an adapter, most of it to compile variants that are not
- * chosen; then the result is kept in `store`, and only its self-test is repeated. The duration is in the performance
- * timeline as `gaussian-splat.search`, of it `detail.paused` milliseconds of pauses.
+ * Finds the fastest variants that draw the correct image on a device, once for each device. Variants that fail the
+ * self-test are excluded; the others are timed on small scenes. Viewpoints created afterwards use the result for `auto`
+ * settings. Earlier viewpoints use the stored result of a previous visit, or else `quads`, `rgba16float` and
+ * `parallel`, which work on every device. The first call on an adapter takes about a second, most of it to compile
+ * variants that are not chosen. The result is then kept in `store`, and later visits only repeat its self-test. The
+ * performance timeline contains the duration as `gaussian-splat.search`, with the milliseconds of pauses as
+ * `detail.paused`.
  * @throws GaussianSplatError `unsupported/wrong-image` if no variant passes the self-test.
  */
 export function autotune(device: GPUDevice, options: AutotuneOptions = {}): Promise<Variants> {
@@ -70,24 +83,20 @@ export function autotune(device: GPUDevice, options: AutotuneOptions = {}): Prom
 }
 
 async function choose(device: GPUDevice, options: AutotuneOptions): Promise<Variants> {
-  const { store = pageStore(), pause = noPause, format } = options;
+  const { store = pageStore(), pause = async () => undefined, format } = options;
   const kept = readStored(store, device);
   const variants =
     kept !== undefined && (await (await loadTiming()).passes(device, kept, format))
       ? kept
       : await search(device, pause);
-  // Results of a lost device say nothing about the adapter, so they are not stored for its other devices.
+  // Results of a lost device say nothing about its adapter, so they are not stored.
   if (!(await isAlive(device))) return FALLBACK;
   setVariants(device, variants);
   writeStored(store, keyFor(device), variants);
   return variants;
 }
 
-async function noPause(): Promise<void> {
-  // A failed compilation needs no handling here.
-}
-
-/** Loaded on demand, because most visits find a stored result. */
+/** Runs the search, whose code is loaded on demand, because most visits find a stored result. */
 async function search(device: GPUDevice, pause: () => Promise<void>): Promise<Variants> {
   const detail = { paused: 0 };
   const timedPause = async (): Promise<void> => {
@@ -96,13 +105,10 @@ async function search(device: GPUDevice, pause: () => Promise<void>): Promise<Va
     detail.paused += performance.now() - begin;
   };
   const find = async (): Promise<Variants> => {
-    const { searchVariants, wrongImage } = await loadModule(
-      'the code that tries variants',
-      () => import('./search.js'),
-    );
+    const { searchVariants, wrongImage } = await loadModule(SELF_TEST, () => import('./search.js'));
     const found = await searchVariants(device, timedPause);
     if (found) return found;
-    // A wrong image is worse than none. A lost device draws none, and reports its own error.
+    // A wrong image is worse than no image. A lost device draws nothing, and its loss is reported elsewhere.
     if (!(await isAlive(device))) return FALLBACK;
     throw wrongImage(device);
   };
@@ -119,7 +125,7 @@ async function measured<T>(name: string, work: () => Promise<T>, detail?: object
   }
 }
 
-/** Whether a device still works: a lost one stays lost. */
+/** Whether a device still works. A lost device never works again. */
 async function isAlive(device: GPUDevice): Promise<boolean> {
   const buffer = device.createBuffer({ label: 'gs.probe.alive', size: 4, usage: BUFFER_USAGE.mapRead });
   try {

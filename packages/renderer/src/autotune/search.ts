@@ -1,39 +1,42 @@
-/** The autotuning search: a second of trials, once for each adapter and origin. */
+/** Searches the fastest variants with trials of about a second, once for each adapter and origin. */
 import { GaussianSplatError } from '@gaussian-splat/core';
 import { mortonOrder } from '../pack/morton.js';
 import type { PackedGaussians } from '../pack/pack.js';
 import { PREFERRED, FALLBACK, type Variants } from '../variants.js';
-import { packSpheres, sphereCloud } from './self-test.js';
+import { copiesOf, packSpheres, sphereCloud } from './spheres.js';
 import { FrameClock, FRAMES, passes, timeFrames, type TimingScene } from './timing.js';
 
-/** Rounds run until one candidate is left, or the time is up. */
+/** Rounds of trials. They are run in order until one candidate is left, or the time is used up. */
 export const ROUNDS: readonly TimingScene[] = [
   { scene: () => spheres(1), width: 320, height: 180 },
   { scene: () => spheres(16), width: 1920, height: 1080 },
 ];
-/** Spheres of a scene: packing more of them would block the main thread. */
+/** Number of different spheres in a scene. Packing more spheres would block the main thread. */
 const SPHERES = 4_096;
-/** Milliseconds for all rounds, and the expected ratio of one round's duration to the previous one's. */
+/** Maximum milliseconds of all rounds together. */
 const BUDGET = 800;
+/** Expected ratio of the duration of a round to that of the previous one. */
 const GROWTH = 16;
-/** A candidate slower than the fastest by this factor is excluded, in a round of at least MEASURABLE ms. */
+/** Factor of the fastest candidate's time above which a candidate is excluded. */
 const HOPELESS = 1.5;
+/** Minimum milliseconds of the fastest candidate in a round that excludes others. */
 const MEASURABLE = 1.5;
 
-/** Variants for software adapters: tiles need barriers, which are slow there. float32 quads need no conversion. */
+/** Variants for software adapters. Tiles need barriers, which are slow on these adapters. */
 const SERIAL: Variants = { ...FALLBACK, threads: 'serial' };
+/** Variants for software adapters with float32 blending, which needs no conversion. */
 const PRECISE: Variants = { ...SERIAL, accumulation: 'rgba32float' };
-/** Milliseconds of the smallest trial that no GPU exceeds. */
+/** Milliseconds of the smallest trial from which on an adapter may be a software adapter. */
 const NO_GPU_MS = 60;
 type Pause = () => Promise<void>;
 
-/** Returns the fastest variants that draw the right image on a device; undefined if none does. */
+/** Returns the fastest variants that draw the correct image on a device; undefined if no variant does. */
 export async function searchVariants(device: GPUDevice, pause: Pause): Promise<Variants | undefined> {
   const processors = device.features.has('float32-blendable') ? [SERIAL, PRECISE] : [SERIAL];
   const preferred = device.adapterInfo?.isFallbackAdapter ? processors : [PREFERRED, FALLBACK];
   const candidates = await rightOf(device, preferred, pause);
   const clock = await FrameClock.on(device);
-  // A software adapter that does not report itself as one.
+  // A slow adapter may be a software adapter that does not report itself as one.
   if (preferred !== processors && !(await isQuick(device, candidates, clock)))
     candidates.push(...(await rightOf(device, processors, pause)));
   if (candidates.length > 0) return chooseFastest(device, candidates, clock, pause);
@@ -41,7 +44,7 @@ export async function searchVariants(device: GPUDevice, pause: Pause): Promise<V
   return undefined;
 }
 
-/** Variants that are right, however slow: their speed excluded them before. */
+/** Variants that are tried in order if no candidate draws the correct image. */
 const LAST_RESORTS: readonly Variants[] = [PREFERRED, FALLBACK, SERIAL, { ...PREFERRED, threads: 'serial' }];
 
 async function rightOf(device: GPUDevice, candidates: readonly Variants[], pause: Pause): Promise<Variants[]> {
@@ -66,9 +69,9 @@ async function chooseFastest(
   let left = candidates.map((variants) => ({ variants, time: 0 }));
   let spent = 0;
   for (const round of ROUNDS) {
-    // Only GPU time counts: compiled pipelines are reused.
+    // Only GPU time counts, because compiled pipelines are reused.
     const last = FRAMES * left.reduce((sum, { time }) => sum + time, 0);
-    // A clock that does not advance cannot compare candidates, so the small round decides.
+    // A clock that does not advance cannot compare candidates. The result of the smaller round is then used.
     const isBlind = last === 0 && round !== ROUNDS[0];
     if (left.length === 1 || isBlind || spent + GROWTH * last > BUDGET) break;
     for (const candidate of left) {
@@ -83,7 +86,7 @@ async function chooseFastest(
   return left[0].variants;
 }
 
-/** Error for a device on which no variant draws the right image. */
+/** Returns the error for a device on which no variant draws the correct image. */
 export function wrongImage({ adapterInfo }: GPUDevice): GaussianSplatError {
   const { vendor = '', architecture = '', description = '' } = adapterInfo ?? {};
   return new GaussianSplatError('unsupported/wrong-image', {
@@ -94,23 +97,12 @@ export function wrongImage({ adapterInfo }: GPUDevice): GaussianSplatError {
   });
 }
 
-/** A scene of this many copies of the same spheres at the same positions. */
+/** Returns a scene of `copies` copies of the same spheres at the same positions. */
 function spheres(copies: number): PackedGaussians {
   const cloud = sphereCloud(SPHERES, Math.cbrt(400 / (copies * SPHERES)));
   const order = mortonOrder(
     cloud.positions,
     Uint32Array.from({ length: SPHERES }, (_, i) => i),
   );
-  const { geometry, sh, chunks, ...facts } = packSpheres(cloud, 'int8', order);
-  const copied = <T extends Uint32Array | Float32Array>(words: T, all: T): T => {
-    for (let k = 0; k < copies; k++) all.set(words, k * words.length);
-    return all;
-  };
-  return {
-    ...facts,
-    count: copies * SPHERES,
-    geometry: copied(geometry, new Uint32Array(copies * geometry.length)),
-    sh: copied(sh, new Uint32Array(copies * sh.length)),
-    chunks: copied(chunks, new Float32Array(copies * chunks.length)),
-  };
+  return copiesOf(packSpheres(cloud, 'int8', order), copies);
 }

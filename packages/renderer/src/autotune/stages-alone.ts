@@ -6,14 +6,16 @@ import { SortStage } from '../stages/sort.js';
 import { planStage, scanBytes, type Threads } from '../stages/stage.js';
 
 const { DIGITS, SORT_BLOCK } = constants;
-/** Number of blocks: the sums over blocks are divided among threads, and the last block is partly filled. */
+/**
+ * Number of blocks of the sort. The sums over blocks are divided among threads, and the last block is partly filled.
+ */
 const BLOCKS = 19;
 const KEYS = BLOCKS * SORT_BLOCK - 100;
-/** More than a workgroup sums in one step. */
+/** Number of counts for the prefix sums: more than a workgroup sums in one step. */
 const COUNTS = 5_003;
 const WORD = 4;
 
-/** Whether prefix sums and sorting are right for more numbers than an image of the self-test has. */
+/** Resolves to whether prefix sums and sorting are correct for more numbers than an image of the self-test has. */
 export async function sumsAndSorts(device: GPUDevice, threads: Threads): Promise<boolean> {
   const memory = new GpuMemory(device);
   const { storage, uniform, copySource, copyDestination, mapRead } = BUFFER_USAGE;
@@ -21,7 +23,8 @@ export async function sumsAndSorts(device: GPUDevice, threads: Threads): Promise
     const [bytes, words] = typeof content === 'number' ? [content, undefined] : [content.byteLength, content];
     return memory.buffer('gs.probe', bytes, usage | copySource | copyDestination, words);
   };
-  const keys = Uint32Array.from({ length: KEYS }, (_, i) => Math.imul(i % 9001, 0x9e3779b1));
+  const keys = new Uint32Array(KEYS);
+  for (let i = 0; i < KEYS; i++) keys[i] = Math.imul(i % 9001, 0x9e3779b1);
   const order = [make(keys.byteLength), make(keys.byteLength)] as const;
   const sort = new SortStage(device, threads);
   const passes = sort.bind({
@@ -66,18 +69,23 @@ function planOf(keys: number): Uint32Array {
   return plan;
 }
 
-/** Strictly ascending by key and index, so every index occurs once. */
-const isOrder = (order: Uint32Array, keys: Uint32Array): boolean =>
-  order.every((place, i) => {
-    const [key, before] = [keys[place], keys[order[i - 1]]];
-    return place < KEYS && (i === 0 || before < key || (before === key && order[i - 1] < place));
-  });
+/** Whether indices are strictly ascending by key and index: every index then occurs once. */
+function isOrder(order: Uint32Array, keys: Uint32Array): boolean {
+  for (let i = 0; i < order.length; i++) {
+    if (order[i] >= KEYS) return false;
+    if (i === 0) continue;
+    const before = keys[order[i - 1]];
+    const key = keys[order[i]];
+    if (before > key || (before === key && order[i - 1] >= order[i])) return false;
+  }
+  return true;
+}
 
 function areSums(found: Uint32Array, counts: Uint32Array): boolean {
   let sum = 0;
-  return found.every((value, i) => {
-    const expected = sum;
+  for (let i = 0; i < found.length; i++) {
+    if (found[i] !== sum) return false;
     sum += counts[i];
-    return value === expected;
-  });
+  }
+  return true;
 }

@@ -6,27 +6,27 @@ export interface AutotuneStore {
   setItem(key: string, value: string): void;
 }
 
-/** Incremented whenever a variant changes, to invalidate stored results. */
+/** Version of the variants, which is incremented when a variant changes, so that stored results become invalid. */
 const VERSION = 4;
 
-/** Storage key: the adapter and its capabilities. */
+/** Returns the storage key of a device: its adapter and its features. */
 export function keyFor(device: GPUDevice): string {
   const { vendor = '', architecture = '', device: model = '', description = '' } = device.adapterInfo ?? {};
   const features = [...device.features].sort().join(' ');
   return `gaussian-splat ${VERSION} ${[vendor, architecture, model, description].join(' ')} ${features}`;
 }
 
-/** The default storage of a page; null if it has none or may not use it. */
+/** Returns the default storage of a page; null if the page has none or may not use it. */
 export function pageStore(): AutotuneStore | null {
   try {
     return (globalThis as { localStorage?: AutotuneStore }).localStorage ?? null;
   } catch {
-    // The page may be denied its storage.
+    // The browser may deny a page its storage.
     return null;
   }
 }
 
-/** Returns the result of an earlier visit; undefined if there is none that this device supports. */
+/** Returns the result of an earlier visit; undefined without a valid result that this device supports. */
 export function readStored(store: AutotuneStore | null, device: GPUDevice): Variants | undefined {
   try {
     const { rasterizer, accumulation, threads } = JSON.parse(

@@ -1,4 +1,4 @@
-/** Tests of a device before its first frame: whether a variant is right, and how fast it is. */
+/** Tests a device before its first frame: whether a variant is correct, and how fast it is. */
 import { GaussianBuffers } from '../gaussian-buffers.js';
 import { madeTogether, perDevice, TEXTURE_USAGE } from '../gpu/kernel.js';
 import { QueueClock } from '../gpu/queue-clock.js';
@@ -6,12 +6,13 @@ import { Viewpoint } from '../viewpoint.js';
 import { World } from '../world.js';
 import type { PackedGaussians } from '../pack/pack.js';
 import { faultsOf, type Variants } from '../variants.js';
-import { faultOf, packSpheres, probeCamera, sphereCloud, viewpointOf } from './self-test.js';
+import { faultOf, viewpointOf } from './self-test.js';
+import { copiesOf, packSpheres, probeCamera, sphereCloud } from './spheres.js';
 
-/** Frames in one trial. */
+/** Number of frames in one trial. */
 export const FRAMES = 4;
 
-/** A scene, and the image size in pixels. */
+/** A scene to time, and the image size in pixels. */
 export interface TimingScene {
   readonly scene: () => PackedGaussians;
   readonly width: number;
@@ -19,8 +20,8 @@ export interface TimingScene {
 }
 
 /**
- * Whether a variant passes the self-test, cached for each device.
- * @param format Format of the frames to come: their pipelines are compiled meanwhile.
+ * Resolves to whether a variant passes the self-test. The result is cached for each device.
+ * @param format Format of the targets of later frames, whose pipelines are compiled meanwhile.
  */
 export const passes = (device: GPUDevice, variants: Variants, format?: GPUTextureFormat): Promise<boolean> =>
   perDevice(device, `right ${JSON.stringify(variants)}`, async () => {
@@ -31,33 +32,37 @@ export const passes = (device: GPUDevice, variants: Variants, format?: GPUTextur
     return isKnown;
   });
 
-/** Starts compiling the pipelines of a first frame. */
+/** Starts to compile the pipelines of a first frame. */
 function prepare(device: GPUDevice, variants: Variants, format: GPUTextureFormat): void {
   const renderer = new Viewpoint(device, new World(), { settings: variants });
   renderer.prepare([{}], format);
   renderer.destroy();
 }
 
-/** Whether a self-test passes without a WebGPU validation error. */
+/** Resolves to whether a self-test passes without a WebGPU validation error. */
 export async function isValid(device: GPUDevice, answer: () => Promise<boolean>): Promise<boolean> {
   device.pushErrorScope('validation');
   const isAnswer = await answer().catch(() => false);
   return (await device.popErrorScope().catch(() => undefined)) === null && isAnswer;
 }
 
-/** Target of the self-test. */
+/** Texture properties of the self-test's target. */
 export const ANSWER_TARGET = { format: 'rgba32float', usage: TEXTURE_USAGE.renderAttachment } as const;
 
-/** A target like that of a canvas. */
+/** Texture properties of a target that resembles a canvas. */
 const PAGE_TARGET = {
   format: 'rgba8unorm',
   usage: TEXTURE_USAGE.renderAttachment | TEXTURE_USAGE.storageBinding,
 } as const;
 
-/** Smallest scene of the trials. */
-const SMALL: TimingScene = { scene: () => packSpheres(sphereCloud(4_000, 0.46), 'int8'), width: 320, height: 180 };
+/** The smallest scene of the trials. */
+const SMALL: TimingScene = {
+  scene: () => copiesOf(packSpheres(sphereCloud(256, 0.46), 'int8'), 16),
+  width: 320,
+  height: 180,
+};
 
-/** Whether a variant passes the self-test and draws a small frame within this many milliseconds. */
+/** Resolves to whether a variant passes the self-test and draws a small frame within `maxFrameMs` milliseconds. */
 export async function isGoodStart(
   device: GPUDevice,
   variants: Variants,
@@ -66,11 +71,11 @@ export async function isGoodStart(
 ): Promise<boolean> {
   if (!(await passes(device, variants, format))) return false;
   const clock = await FrameClock.on(device);
-  // Uses the target of the self-test, so that no pipeline is compiled for this trial alone.
+  // Uses the target of the self-test, so that this trial compiles no pipeline of its own.
   return (await timeFrames(device, variants, SMALL, clock, ANSWER_TARGET)) <= maxFrameMs;
 }
 
-/** Milliseconds per frame over a few consecutive frames. */
+/** Resolves to the milliseconds of a frame, averaged over {@link FRAMES} consecutive frames. */
 export async function timeFrames(
   device: GPUDevice,
   variants: Variants,
@@ -83,7 +88,7 @@ export async function timeFrames(
   const texture = device.createTexture({ label: 'gs.probe', size: [width, height], ...target });
   const camera = probeCamera(width, height);
   const draw = (): void => renderer.draw(camera, { target: texture });
-  // The first frame also compiles pipelines.
+  // The first frame also compiles pipelines, so its time is ignored.
   await clock.time(1, draw);
   const time = await clock.time(FRAMES, draw);
   texture.destroy();
@@ -92,7 +97,7 @@ export async function timeFrames(
   return time;
 }
 
-/** Times several consecutive frames, with one wait for the queue. */
+/** Measures the duration of several consecutive frames, with a single wait for the queue. */
 export class FrameClock {
   readonly #clock: QueueClock;
 
@@ -106,7 +111,7 @@ export class FrameClock {
     this.#clock = clock;
   }
 
-  /** Milliseconds per frame of the `count` frames that `draw` submits. */
+  /** Resolves to the milliseconds of a frame, averaged over the `count` frames that `draw` submits. */
   async time(count: number, draw: () => void): Promise<number> {
     const begin = performance.now();
     for (let frame = 0; frame < count; frame++) draw();

@@ -1,4 +1,4 @@
-/** Description of one shader, from scripts/build-shaders.mjs. */
+/** Description of a shader, which scripts/build-shaders.mjs generates. */
 export interface ShaderDescription {
   readonly name: string;
   readonly code: string;
@@ -8,14 +8,14 @@ export interface ShaderDescription {
 interface ShaderBinding {
   readonly binding: number;
   readonly type: 'uniform' | 'storage' | 'read-only-storage' | 'texture' | 'storage-texture';
-  /** Only for a storage texture. */
+  /** Format of a storage texture; undefined for other types. */
   readonly format?: GPUTextureFormat;
 }
 
-/** A resource for each binding of a shader, by its name in the WGSL. */
+/** Resources of a shader, keyed by the names of its bindings in WGSL. */
 export type Resources<S extends ShaderDescription> = Readonly<Record<keyof S['bindings'], Resource>>;
 
-/** A whole buffer, a range of one, or a texture view. */
+/** A whole buffer, a range of a buffer, or a texture view. */
 export type Resource = GPUBuffer | GPUBufferBinding | GPUTextureView;
 
 /** The bind group layout and shader module of a shader on one device. */
@@ -64,7 +64,7 @@ function layoutEntry(
   }
 }
 
-/** Bare buffers are a recent addition to WebGPU, so they are wrapped for older browsers. */
+/** Wraps a buffer in a binding: bare buffers as bindings are a recent addition to WebGPU, which older browsers lack. */
 function asBindingResource(resource: Resource): GPUBindingResource {
   return 'mapState' in resource ? { buffer: resource } : resource;
 }
@@ -72,7 +72,7 @@ function asBindingResource(resource: Resource): GPUBindingResource {
 /** Values of the `override` constants of a shader, by their names. */
 export type Overrides = Readonly<Record<string, number>>;
 
-/** A compute shader that can be dispatched. Its entry point is `main`. */
+/** A compute shader on one device. Its entry point is `main`. */
 export class ComputeKernel<S extends ShaderDescription> {
   readonly #device: GPUDevice;
   readonly #name: string;
@@ -89,8 +89,8 @@ export class ComputeKernel<S extends ShaderDescription> {
   }
 
   /**
-   * Compiles the pipeline, by far the most expensive part, so that no frame has to; concurrently with others within
-   * {@link madeTogether}.
+   * Compiles the pipeline, the most expensive part of a kernel, so that no frame compiles it. Within {@link
+   * madeTogether} all pipelines are compiled concurrently.
    */
   prepare(): this {
     const { together } = makingOn(this.#device);
@@ -100,7 +100,7 @@ export class ComputeKernel<S extends ShaderDescription> {
   }
 
   async #makeBeside(): Promise<void> {
-    // A failure occurs again at the first use, and is reported there.
+    // A failed compilation fails again at the first use of the pipeline, which reports the error.
     const made = await this.#device.createComputePipelineAsync(this.#descriptor).catch(() => undefined);
     this.#made ??= made;
   }
@@ -118,18 +118,21 @@ export class ComputeKernel<S extends ShaderDescription> {
   }
 
   get #pipeline(): GPUComputePipeline {
-    // A frame cannot wait, so it compiles synchronously.
+    // Compiles synchronously if the pipeline is missing, because a frame cannot wait.
     return (this.#made ??= this.#device.createComputePipeline(this.#descriptor));
   }
 
-  /** Dispatches a grid of workgroups, each side at most 65,535. */
+  /** Dispatches a grid of workgroups: `columns` by `rows`, each at most 65,535. */
   dispatchGrid(pass: GPUComputePassEncoder, bindGroup: GPUBindGroup, columns: number, rows: number): void {
     pass.setPipeline(this.#pipeline);
     pass.setBindGroup(0, bindGroup);
     pass.dispatchWorkgroups(columns, rows);
   }
 
-  /** Dispatches a number of workgroups, in two dimensions beyond 65,535: the shader finds its number by `group_index`. */
+  /**
+   * Dispatches a number of workgroups. More than 65,535 are dispatched in two dimensions; the shader gets its index
+   * from `group_index`.
+   */
   dispatch(pass: GPUComputePassEncoder, bindGroup: GPUBindGroup, groups: number): void {
     if (groups === 0) return;
     pass.setPipeline(this.#pipeline);
@@ -138,12 +141,14 @@ export class ComputeKernel<S extends ShaderDescription> {
   }
 }
 
-/** Pipelines that are compiled concurrently. */
+/**
+ * Compilations on a device that {@link madeTogether} waits for; `together` is undefined outside its call of `prepare`.
+ */
 const makingOn = (device: GPUDevice): { together?: Promise<void>[] } => perDevice(device, 'making', () => ({}));
 
 /**
- * Waits for the compute pipelines that `prepare` requests, which the browser compiles concurrently. In sequence they
- * take a GPU driver a second, during which the browser updates no page.
+ * Compiles the compute pipelines that `prepare` requests concurrently, and waits for all of them. Sequential
+ * compilation takes about a second with a GPU driver, and the browser updates no page during that time.
  */
 export async function madeTogether(device: GPUDevice, prepare: () => void): Promise<void> {
   const making = makingOn(device);
@@ -160,15 +165,18 @@ export async function madeTogether(device: GPUDevice, prepare: () => void): Prom
 /** WebGPU's default limit of workgroups in one dimension (`MAX_GROUPS_X` in the shaders). */
 const MAX_GROUPS = 65535;
 
-/** Workgroups across and down for a total number: the inverse of `group_index` of shaders/shared/group.wgsl. */
+/**
+ * Returns the columns and rows of a grid for a number of workgroups: the inverse of `group_index` of
+ * shaders/shared/group.wgsl.
+ */
 export function dispatchGrid(groups: number): [columns: number, rows: number] {
   return [Math.min(groups, MAX_GROUPS), Math.ceil(groups / MAX_GROUPS)];
 }
 
-/** `GPUShaderStage`, which is undefined if a module is imported outside a browser. */
+/** Bits of `GPUShaderStage`, a global that is undefined if a module is imported outside a browser. */
 export const SHADER_STAGE = { vertex: 1, fragment: 2, compute: 4 } as const;
 
-/** Bits of `GPUBufferUsage` and `GPUTextureUsage`. */
+/** Bits of `GPUBufferUsage`. */
 export const BUFFER_USAGE = {
   mapRead: 0x1,
   mapWrite: 0x2,
@@ -188,7 +196,10 @@ export const TEXTURE_USAGE = {
 
 const cache = new WeakMap<object, Map<string, unknown>>();
 
-/** An object that is created once for a device (a pipeline, for example) and shared by all its renderers. */
+/**
+ * Returns the object of a device with this key, for example a pipeline. The first call creates it with `make`; all
+ * renderers of the device share the object.
+ */
 export function perDevice<T>(device: object, key: string, make: () => T): T {
   let made = cache.get(device);
   if (made === undefined) cache.set(device, (made = new Map()));
@@ -196,7 +207,10 @@ export function perDevice<T>(device: object, key: string, make: () => T): T {
   return made.get(key) as T;
 }
 
-/** Returns the kernel of a compute shader with the given overrides, created once for a device and compiled at once. */
+/**
+ * Returns the kernel of a compute shader with the given overrides. The kernel is created and compiled once for each
+ * device.
+ */
 export function kernelOf<S extends ShaderDescription>(
   device: GPUDevice,
   shader: S,
@@ -205,7 +219,10 @@ export function kernelOf<S extends ShaderDescription>(
   return rareKernelOf(device, shader, overrides).prepare();
 }
 
-/** The same for rarely used shaders: call {@link ComputeKernel.prepare} when a scene needs one. */
+/**
+ * Returns the kernel of a rarely used compute shader, which {@link kernelOf} would compile at once. Call {@link
+ * ComputeKernel.prepare} when a scene needs the kernel.
+ */
 export function rareKernelOf<S extends ShaderDescription>(
   device: GPUDevice,
   shader: S,
@@ -215,18 +232,16 @@ export function rareKernelOf<S extends ShaderDescription>(
   return perDevice(device, key, () => new ComputeKernel(device, shader, overrides));
 }
 
-/** Replaces the format of the storage texture `image` of a shader, because WGSL cannot parameterize it. */
+/** Returns a shader whose storage texture `image` has another format, because WGSL cannot parameterize the format. */
 export function storingInto<S extends ShaderDescription & { bindings: { image: ShaderBinding } }>(
   shader: S,
   format: GPUTextureFormat,
 ): S {
   const { image } = shader.bindings;
-  const declared = `texture_storage_2d<${image.format}`;
-  if (!shader.code.includes(declared)) throw new Error(`shader ${shader.name} has no "${declared}"`);
   return {
     ...shader,
     name: `${shader.name}.${format}`,
-    code: shader.code.replace(declared, `texture_storage_2d<${format}`),
+    code: shader.code.replace(`texture_storage_2d<${image.format}`, `texture_storage_2d<${format}`),
     bindings: { ...shader.bindings, image: { ...image, format } },
   };
 }

@@ -1,9 +1,14 @@
 import { GaussianSplatError } from '@gaussian-splat/core';
 
-/** Bytes: a binding must hold at least one element of its array, even for an empty scene. */
+/**
+ * Minimum size of a buffer in bytes. A binding must contain at least one element of its array, even for an empty scene.
+ */
 const SMALLEST_BUFFER = 64;
 
-/** GPU objects with one owner: counts their bytes, checks the limits of the device, and destroys them together. */
+/**
+ * GPU buffers with one owner. This class counts their bytes, checks the limits of the device, and destroys all of them
+ * together.
+ */
 export class GpuMemory {
   readonly #device: GPUDevice;
   readonly #buffers = new Map<GPUBuffer, number>();
@@ -12,7 +17,7 @@ export class GpuMemory {
     this.#device = device;
   }
 
-  /** Bytes of all living buffers. */
+  /** Number of bytes of all buffers that are not destroyed. */
   get byteLength(): number {
     let total = 0;
     for (const size of this.#buffers.values()) total += size;
@@ -20,7 +25,8 @@ export class GpuMemory {
   }
 
   /**
-   * Creates a buffer, its size rounded up to 4 bytes and at least {@link SMALLEST_BUFFER}.
+   * Creates a buffer, whose size is rounded up to 4 bytes and to {@link SMALLEST_BUFFER}.
+   * @param content Initial content; undefined for zeros.
    * @throws GaussianSplatError `out-of-memory/buffer-limit` if the device does not allow a buffer of that size.
    */
   buffer(label: string, byteLength: number, usage: GPUBufferUsageFlags, content?: Uint32Array): GPUBuffer {
@@ -58,8 +64,9 @@ function requireBufferSize(device: GPUDevice, label: string, size: number): void
 }
 
 /**
- * Runs `allocate` and waits until the device has confirmed the allocation.
- * @throws GaussianSplatError `out-of-memory/allocation`; also rethrows errors of `allocate`.
+ * Runs `allocate`, waits until the device has confirmed the allocation, and resolves to its result.
+ * @param where Name of the owner, for error messages.
+ * @throws GaussianSplatError `out-of-memory/allocation` if the device has too little memory; errors of `allocate`.
  */
 export async function withMemoryCheck<T extends { destroy(): void }>(
   device: GPUDevice,

@@ -1,6 +1,6 @@
 /** The main thread: yields to other tasks, and records when it was last blocked. */
 
-/** Yields to other tasks. A message is used because timers are delayed on hidden pages. */
+/** Resolves after other tasks of the thread have run. Uses a message, because browsers delay timers on hidden pages. */
 export function turn(): Promise<void> {
   const { port1, port2 } = new MessageChannel();
   return new Promise((resolve) => {
@@ -12,26 +12,30 @@ export function turn(): Promise<void> {
   });
 }
 
-/** Interval of the checks whether the main thread is free, in ms, and their tolerated delay. */
+/** Milliseconds between checks whether the main thread is free. */
 const BEAT_MS = 4;
+/** Maximum delay of a check in milliseconds that does not count as blocked. */
 const LATE_MS = 2;
 
-/** Notification on the main thread, ms. */
+/** Time of a notification on the main thread, in milliseconds as `performance.now()` returns. */
 export interface ObservedTime {
   readonly now: number;
-  /** Earliest possible time of the event: earlier than `now` if the thread was busy until then. */
+  /** Earliest possible time of the event. It is earlier than `now` if the thread was blocked until the notification. */
   readonly since: number;
 }
 
-/** Records when the main thread was last blocked while anything is awaited, because notifications are late then. */
+/** Records when the main thread was last blocked while a promise is awaited, because its notification is late then. */
 class ThreadWatch {
   #waiting = 0;
   #timer: ReturnType<typeof setTimeout> | undefined;
-  /** Time of the last check and due time of the next; earliest begin and the end of the last block. */
+  /** Time of the last check. */
   #looked = 0;
+  /** Due time of the next check. */
   #due = 0;
+  /** Beginning, at the earliest, and end of the last period when the thread was blocked. */
   #block = { from: -Infinity, to: -Infinity };
 
+  /** Waits for a promise, and resolves to the time of its notification. */
   async during(waiting: Promise<unknown>): Promise<ObservedTime> {
     this.#waiting++;
     if (this.#timer === undefined) this.#next(0);
@@ -65,5 +69,5 @@ class ThreadWatch {
   };
 }
 
-/** One for the page, because it has one main thread. */
+/** The watch of this page, which has one main thread. */
 export const threadWatch = new ThreadWatch();

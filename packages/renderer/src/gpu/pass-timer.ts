@@ -1,6 +1,6 @@
 import { BUFFER_USAGE } from './kernel.js';
 
-/** Start and end of one pass of one frame, in milliseconds on the GPU's own clock. */
+/** Beginning and end of one pass of a frame, in milliseconds of the GPU's own clock. */
 export interface PassTime {
   /** `project`, `sort`, `bin`, `rasterize` or `compose`. */
   readonly label: string;
@@ -8,25 +8,25 @@ export interface PassTime {
   readonly end: number;
 }
 
-/** Records on the GPU the start and the end of the passes of frames. */
+/** Records the beginning and the end of the passes of frames on the GPU. */
 export interface FrameTimer {
-  /** Starts the next frame. The renderer calls this. */
+  /** Called by the renderer at the beginning of each frame. */
   startFrame(): void;
   /** Returns the timestamp entry of a pass descriptor; undefined for a pass that is not timed. */
   timestampWrites(label: string): GPUComputePassTimestampWrites | undefined;
-  /** Ends the frame, with the last encoder of it. */
+  /** Called by the renderer at the end of the frame, with its last encoder. */
   endFrame?(encoder: GPUCommandEncoder): void;
-  /** Called when the frame has been submitted. */
+  /** Called after the submit of the frame. */
   submitted?(): void;
 }
 
-/** Timestamps that one query set holds: WebGPU's limit. */
+/** Maximum number of timestamps in a query set: WebGPU's limit. */
 const MAX_QUERIES = 4096;
 const QUERY_RESOLVE = 0x200;
 
 /**
- * Timestamps around the passes of many frames, read back together afterwards so that measuring never waits between
- * frames. Browsers round timestamps to 100 µs unless a flag disables it.
+ * Records timestamps around the passes of many frames. They are read back together afterwards, so that a measurement
+ * never waits between frames. Browsers round timestamps to 100 µs unless a flag disables this.
  */
 export class PassTimer implements FrameTimer {
   readonly #device: GPUDevice;
@@ -34,7 +34,7 @@ export class PassTimer implements FrameTimer {
   readonly #frames: string[][] = [];
   #used = 0;
 
-  /** The device must have the feature `timestamp-query`. */
+  /** @param device A device with the feature `timestamp-query`. */
   constructor(device: GPUDevice) {
     this.#device = device;
     this.#queries = device.createQuerySet({ label: 'gs.timer', type: 'timestamp', count: MAX_QUERIES });
@@ -44,7 +44,7 @@ export class PassTimer implements FrameTimer {
     this.#frames.push([]);
   }
 
-  /** Returns undefined once the query set is full. */
+  /** Returns the timestamp entry of a pass; undefined if the query set is full. */
   timestampWrites(label: string): GPUComputePassTimestampWrites | undefined {
     if (this.#used + 2 > MAX_QUERIES) return undefined;
     this.#frames.at(-1)?.push(label);
@@ -53,7 +53,7 @@ export class PassTimer implements FrameTimer {
     return { querySet: this.#queries, beginningOfPassWriteIndex: at, endOfPassWriteIndex: at + 1 };
   }
 
-  /** Waits for the GPU and returns the passes of each frame since the last call. */
+  /** Waits for the GPU, and resolves to the times of the passes of each frame since the last call. */
   async read(): Promise<PassTime[][]> {
     const [frames, count] = [this.#frames.splice(0), this.#used];
     this.#used = 0;

@@ -1,31 +1,34 @@
 import { perDevice } from './kernel.js';
 import { threadWatch, type ObservedTime } from './page-thread.js';
 
-/** Number of empty submissions in a calibration; the fastest is the latency of an idle GPU. */
+/** Number of empty submissions in a calibration. The fastest one is the latency of an idle GPU. */
 const TRIES = 4;
-/** Validity of a calibration, ms. */
+/** Duration of the validity of a calibration in milliseconds. */
 const VALID_MS = 60_000;
 
-/** Notifications closer together than this, ms, may have been delayed until the later one. */
+/** Maximum milliseconds between two notifications if the first may have been delayed until the second. */
 const TOGETHER_MS = 1;
 
-/** GPU time of some work, ms: a single value if the main thread was free when the work finished. */
+/**
+ * Bounds of the GPU time of some work, in milliseconds. They are equal if the main thread was free when the work
+ * finished.
+ */
 export interface WorkTime {
-  /** End of the work, by the page's clock. */
+  /** Completion time of the work, as `performance.now()` returns. */
   readonly doneAt: number;
   readonly lowerBound: number;
   readonly upperBound: number;
 }
 
 /**
- * Times work as a page experiences it: until the queue reports completion, minus the latency of an empty submission.
- * GPU timestamps exclude the browser's work between passes, which can be most of a frame. Never blocks, and submits
- * only for calibration.
+ * Measures the duration of work as a page experiences it: until the queue reports completion, minus the latency of an
+ * empty submission. GPU timestamps exclude the browser's work between passes, which can be most of a frame. The clock
+ * never blocks, and submits only for calibration.
  */
 export class QueueClock {
   /**
-   * Whether other code that does not use this clock submits to the queue: then its completion is queried before each
-   * frame.
+   * Whether other code also submits to the queue without this clock. The completion of its work is then queried before
+   * each frame.
    */
   isShared = false;
   readonly #device: GPUDevice;
@@ -33,7 +36,9 @@ export class QueueClock {
   #measuredAt = -Infinity;
   /** Last known completion time of submitted work. */
   #last: ObservedTime = { now: -Infinity, since: -Infinity };
-  /** Work reported at about the same moment: start, number of items, and their total time, ms. */
+  /**
+   * Work that was reported at about the same time: time of the report, number of items, and their total milliseconds.
+   */
   #together = { now: -Infinity, count: 0, milliseconds: 0 };
 
   /** Returns the clock of a device. */
@@ -51,8 +56,8 @@ export class QueueClock {
   }
 
   /**
-   * Measures the latency with a few empty submissions, unless a recent measurement exists. Call it while the GPU is
-   * idle.
+   * Measures the latency with four empty submissions, unless the last measurement is still valid. Call this while the
+   * GPU is idle.
    */
   async calibrate(): Promise<void> {
     if (performance.now() - this.#measuredAt < VALID_MS) return;
@@ -66,7 +71,10 @@ export class QueueClock {
     this.#latency = Math.min(...times);
   }
 
-  /** Waits for all submitted work. @returns The time of the notification, and the previous completion time. */
+  /**
+   * Waits for all submitted work.
+   * @returns The time of the notification, and in `before` that of the previous one. Rejects if the device is lost.
+   */
   async done(): Promise<ObservedTime & { readonly before: ObservedTime }> {
     const observed = await threadWatch.during(this.#device.queue.onSubmittedWorkDone());
     const before = this.#last;
@@ -74,17 +82,17 @@ export class QueueClock {
     return { ...observed, before };
   }
 
-  /** Times the work that `submit` submits. Rejects if the device is lost. */
+  /** Measures the GPU time of the work that `submit` submits. Rejects if the device is lost. */
   async time(submit: () => void): Promise<WorkTime> {
     if (this.isShared) this.done().catch(() => undefined);
     submit();
     const submitted = performance.now();
     const { now, since, before } = await this.done();
-    // The latency is the shortest time ever measured.
+    // A shorter time than ever before is a better estimate of the latency.
     this.#latency = Math.min(this.#latency, now - submitted);
     const upperBound = this.spent(before.since, submitted, now);
     const lowerBound = Math.min(upperBound, this.spent(before.now, submitted, since));
-    // If several results are reported together, the first seems to take the time of all.
+    // The first of several results reported together seems to take the time of all; each gets an equal part.
     const isTogether = before.now > submitted && now - this.#together.now < TOGETHER_MS;
     const together = isTogether ? this.#together : (this.#together = { now, count: 0, milliseconds: 0 });
     together.count++;
@@ -96,9 +104,10 @@ export class QueueClock {
   }
 
   /**
-   * Milliseconds of GPU time: from its earliest start, which is after its submission and after the completion of
+   * Returns the milliseconds of GPU time of some work. Work starts after its submission, and after the completion of
    * earlier work.
    * @param before Completion time of the earlier work.
+   * @param submitted Time of the submission of this work.
    * @param done Completion time of this work.
    */
   spent(before: number, submitted: number, done: number): number {

@@ -3,14 +3,16 @@ import { BUFFER_USAGE } from './kernel.js';
 /** A range of a buffer to read. */
 export interface ReadPart {
   readonly buffer: GPUBuffer;
-  /** Offset from the start of the buffer, default 0, and length, default all, in bytes. */
+  /** Offset of the range from the beginning of the buffer in bytes; default 0. */
   readonly byteOffset?: number;
+  /** Length of the range in bytes; default: all bytes of the buffer. */
   readonly byteLength?: number;
 }
 
 /**
- * Reads buffers back, in one submission. Rejects if the device is lost meanwhile.
- * @param encoder Contains the commands that write the buffers; default: a new one.
+ * Reads ranges of buffers back in one submission, and resolves to a copy of each. Rejects if the device is lost
+ * meanwhile.
+ * @param encoder Encoder with the commands that write the buffers; default: a new one.
  */
 export async function readBack(
   device: GPUDevice,
@@ -21,8 +23,10 @@ export async function readBack(
 }
 
 /**
- * The same, for callers that copy the bytes elsewhere.
- * @param take Is called with the bytes of each range, which are valid until it returns.
+ * Reads ranges of buffers back in one submission, for callers that copy the bytes elsewhere. Rejects if the device is
+ * lost meanwhile.
+ * @param take Called with the bytes of each range, which are valid until the function returns.
+ * @returns The results of `take`, in the order of `parts`.
  */
 export async function readBackWith<Taken>(
   device: GPUDevice,

@@ -2,31 +2,33 @@ import { BUFFER_USAGE } from './kernel.js';
 import type { GpuMemory } from './memory.js';
 
 /**
- * Bytes of a staging block. A partly filled block is transferred completely; larger ones were hardly faster to fill
- * (docs/lod-format.md).
+ * Number of bytes of a staging block. A partly filled block is transferred completely. Larger blocks were hardly faster
+ * to fill (docs/lod-format.md).
  */
 export const BLOCK_BYTES = 1 << 18;
 
-/** Mapped memory, and the number of its bytes in use. */
+/** A block of mapped memory, and the copies from it. */
 interface Block {
   readonly buffer: GPUBuffer;
+  /** Mapped memory of the block; empty while the block is not mapped. */
   words: Uint32Array<ArrayBuffer>;
+  /** Number of words in use. */
   used: number;
   readonly copies: { readonly to: GPUBuffer; readonly at: number; readonly from: number; readonly words: number }[];
 }
 
 /**
- * Writes to GPU buffers through a fixed number of blocks that are mapped on the main thread and allocated once: a copy
- * into mapped memory takes a third of the time of `queue.writeBuffer`. {@link StagingBelt.record} records the copies to
- * the GPU; a block is reused when the GPU has finished with it.
+ * Writes to GPU buffers through a fixed number of staging blocks, which are allocated once and mapped on the main
+ * thread. A copy to mapped memory takes a third of the time of `queue.writeBuffer`. {@link StagingBelt.record} records
+ * the copies to the buffers. A block is reused when the GPU has executed its copies.
  */
 export class StagingBelt {
   readonly #free: Block[] = [];
   readonly #filled: Block[] = [];
-  /** Blocks whose copies are recorded. */
+  /** Blocks whose copies are recorded but not yet submitted. */
   #leaving: Block[] = [];
 
-  /** @param blocks Number of blocks of {@link BLOCK_BYTES} each; they become writable once the device has mapped them. */
+  /** @param blocks Number of blocks of {@link BLOCK_BYTES} each. A block is writable once the device has mapped it. */
   constructor(memory: GpuMemory, label: string, blocks: number) {
     for (let k = 0; k < blocks; k++) {
       const buffer = memory.buffer(label, BLOCK_BYTES, BUFFER_USAGE.mapWrite | BUFFER_USAGE.copySource);
@@ -34,14 +36,15 @@ export class StagingBelt {
     }
   }
 
-  /** Whether nothing has been written since the last {@link record}. */
+  /** Whether no words were written since the last {@link record}. */
   get isEmpty(): boolean {
     return this.#filled.length === 0;
   }
 
   /**
-   * Copies words into staging blocks; {@link record} records their copy to the buffer.
-   * @param at Byte offset of the first word in the buffer, a multiple of 4.
+   * Copies words to staging blocks; {@link record} then records their copy to a buffer.
+   * @param to Destination buffer.
+   * @param at Byte offset of the first word in this buffer, a multiple of 4.
    * @returns Number of words, from the first on, that fit the available blocks.
    */
   write(to: GPUBuffer, at: number, words: Uint32Array): number {
@@ -60,8 +63,8 @@ export class StagingBelt {
   }
 
   /**
-   * Records the copies of everything written since the last call. The commands must be submitted, and {@link recall}
-   * called, before anything else is written.
+   * Records the copies of all words written since the last call. Before the next write, submit the commands and call
+   * {@link recall}.
    */
   record(encoder: GPUCommandEncoder): void {
     for (const { buffer, copies } of this.#filled) {
@@ -72,7 +75,7 @@ export class StagingBelt {
     this.#leaving = this.#filled.splice(0);
   }
 
-  /** Maps the blocks again whose copies have been submitted. */
+  /** Maps the blocks again whose copies were submitted. */
   recall(): void {
     this.#leaving.splice(0).forEach((block) => this.#map(block));
   }
@@ -93,7 +96,7 @@ export class StagingBelt {
         block.used = 0;
         this.#free.push(block);
       },
-      // The buffer has been destroyed, or its device is lost.
+      // Fails if the buffer was destroyed or its device is lost.
       () => undefined,
     );
   }

@@ -1,4 +1,4 @@
-/** Byte layout of a WGSL struct, reflected by scripts/build-shaders.mjs. */
+/** Byte layout of a WGSL struct, which scripts/build-shaders.mjs generates. */
 export interface StructLayout {
   readonly size: number;
   readonly fields: Readonly<Record<string, { readonly offset: number; readonly type: string }>>;
@@ -7,8 +7,8 @@ export interface StructLayout {
 export type StructValues<L extends StructLayout> = Readonly<Record<keyof L['fields'], number | ArrayLike<number>>>;
 
 /**
- * Writes a struct into `target` at a byte offset: integers for `u32`, `i32` and their vectors, float32 for all other
- * fields.
+ * Writes a struct to `target` at a byte offset, a multiple of 4. Fields of the types `u32` and `i32`, and their
+ * vectors, are written as integers; all other fields as float32.
  */
 export function writeStruct<L extends StructLayout>(
   layout: L,

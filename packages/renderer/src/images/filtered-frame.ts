@@ -6,21 +6,21 @@ import { FullScreenStage } from '../stages/full-screen.js';
 import { SceneDepth } from '../scene-depth.js';
 import { ImageTensor, type ImageShape } from './image-tensor.js';
 
-/** An output image of a model on the GPU. */
+/** Output image of a model, on the GPU. */
 export interface ModelImage {
   readonly buffer: GPUBuffer;
   readonly dtype: 'float32' | 'float16';
-  /** [1, 3, height, width]; the batch dimension may be missing, and a fourth plane is ignored. */
+  /** [1, 3, height, width] or [3, height, width]; a fourth plane is ignored */
   readonly dims: readonly number[];
 }
 
 const [FORMAT, PIXEL_BYTES] = ['rgba16float', 8] as const;
-/** Buffers of models with cached bindings. */
+/** Maximum number of buffers of models with cached bindings. */
 const MAX_BINDINGS = 8;
 
 /**
- * Textures of one frame that a model processes, all of one size: the drawn frame, the input frame of the model, and the
- * model's output.
+ * Textures of one frame that a model processes, all of the same size: the drawn frame, the input frame of the model,
+ * and the filtered frame.
  *
  * ```ts
  * const frame = new FilteredFrame(device, width, height);
@@ -33,9 +33,9 @@ const MAX_BINDINGS = 8;
 export class FilteredFrame {
   readonly width: number;
   readonly height: number;
-  /** Target for the renderer. */
+  /** Target texture for the renderer. */
   readonly drawn: GPUTexture;
-  /** Depth of the drawn frame, for its target; undefined if no model takes depth. */
+  /** Depth output of the drawn frame, for its frame target; undefined if the model does not take depth. */
   readonly depth: SceneDepth | undefined;
   readonly #depthTexture: GPUTexture | undefined;
   #depthTensor: ImageTensor | undefined;
@@ -50,7 +50,10 @@ export class FilteredFrame {
   readonly #filteredView: GPUTextureView;
   #tensor: ImageTensor | undefined;
 
-  /** @param takesDepth whether the model takes the depth of the frame, too: frames are then drawn with `depth`, by the rasterizer `tiles` */
+  /**
+   * @param takesDepth Whether the model also takes the depth of the frame. Draw frames with {@link depth} then, by the
+   * rasterizer `tiles`.
+   */
   constructor(device: GPUDevice, width: number, height: number, takesDepth = false) {
     this.width = width;
     this.height = height;
@@ -86,8 +89,8 @@ export class FilteredFrame {
   }
 
   /**
-   * Copies the drawn frame into a tensor for the model. The tensor, and the frame that supplies the alpha of the
-   * result, stay unchanged until the next call.
+   * Copies the drawn frame to a tensor for the model, and keeps the frame for the alpha of the result. Both do not
+   * change until the next call.
    */
   handOver(shape: ImageShape): ImageTensor {
     const { width, height, dtype, channels } = this.#tensor?.shape ?? {};
@@ -104,7 +107,10 @@ export class FilteredFrame {
     return this.#tensor!;
   }
 
-  /** Copies the depth of the drawn frame into a tensor [1,1,height,width] for the model. It stays as it is until the next call. */
+  /**
+   * Copies the depth of the drawn frame to a tensor [1, 1, height, width] for the model. The tensor does not change
+   * until the next call.
+   */
   handOverDepth({ width, height, dtype }: Pick<ImageShape, 'width' | 'height' | 'dtype'>): ImageTensor {
     const { shape } = this.#depthTensor ?? {};
     if (shape?.width !== width || shape.height !== height || shape.dtype !== dtype) {
@@ -115,7 +121,7 @@ export class FilteredFrame {
     return this.#depthTensor!;
   }
 
-  /** Accepts the model's output for the last input frame; submits its work before it returns. */
+  /** Accepts the model's output for the last input frame. The work is submitted before the function returns. */
   accept({ buffer, dtype, dims }: ModelImage): void {
     const bytes = new ArrayBuffer(layouts.TensorToImage.size);
     writeStruct(
@@ -129,7 +135,7 @@ export class FilteredFrame {
     this.#device.queue.submit([encoder.finish()]);
   }
 
-  /** Copies one of the images into a texture of the same size. */
+  /** Copies the drawn or the filtered frame to a texture of the same size. */
   present(image: 'drawn' | 'filtered', target: GPUTexture): void {
     const encoder = this.#device.createCommandEncoder({ label: 'gs.filter.present' });
     this.#present.record(encoder, this.#shown[image], target.createView(), target.format);

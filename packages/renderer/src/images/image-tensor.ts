@@ -6,47 +6,47 @@ import { BUFFER_USAGE, kernelOf, TEXTURE_USAGE, type ComputeKernel } from '../gp
 import { GpuMemory } from '../gpu/memory.js';
 import { writeStruct } from '../gpu/struct.js';
 
-/** Size and element type of a tensor [views,channels,height,width]. */
+/** Size and element type of a tensor [views, channels, height, width]. */
 export interface ImageShape {
   readonly width: number;
   readonly height: number;
   readonly dtype: 'float32' | 'float16';
-  /** 4 with alpha; 1 for depth, which is copied from the nearest texel. Default 3. */
+  /** Number of channels: 3 for colors, 4 with alpha, 1 for depth, which is copied from the nearest texel. Default 3. */
   readonly channels?: 1 | 3 | 4;
   /** Number of images in the tensor. Default 1. */
   readonly views?: number;
 }
 
 /**
- * Fit of an image of another size: `stretch` uses all of it, `cover` the largest central region with the proportions of
- * the tensor.
+ * Fit of an image of another size: `stretch` uses the whole image, `cover` the largest central region with the
+ * proportions of the tensor.
  */
 export type ImageFit = 'stretch' | 'cover';
 
 /**
- * An image, or several, as a tensor [1,3,height,width] on the GPU: red, green and blue planes in 0..1, sRGB-encoded,
- * top row first, over black if the image is transparent. Images of another size are resampled: bilinear, antialiased
- * when they shrink.
+ * Images as a tensor [views, channels, height, width] on the GPU, by default one image with three channels. The
+ * channels are planes of red, green and blue in 0..1, sRGB-encoded, top row first, over black if the image is
+ * transparent. Images of another size are resampled bilinearly, with antialiasing when they shrink.
  */
 export class ImageTensor {
   readonly shape: ImageShape;
   /** [views, channels, height, width] */
   readonly dims: readonly [number, 1 | 3 | 4, number, number];
-  /** The elements; two float16 in each word. */
+  /** Elements of the tensor; a word contains two float16. */
   readonly buffer: GPUBuffer;
   readonly #device: GPUDevice;
   readonly #kernel: ComputeKernel<typeof imageToTensor>;
   readonly #memory: GpuMemory;
   readonly #uniform: GPUBuffer;
   readonly #uniformBytes = new ArrayBuffer(layouts.ImageToTensor.size);
-  /** Words of one image. */
+  /** Number of words of one image. */
   readonly #words: number;
   readonly #bindings = new WeakMap<GPUTexture, GPUBindGroup>();
   #version = 0;
 
   /**
    * @throws GaussianSplatError `out-of-memory/buffer-limit` for a size that the device does not allow; `argument/value`
-   * for several float16 images with an odd number of elements.
+   * for several float16 images with an odd number of elements each.
    */
   constructor(device: GPUDevice, shape: ImageShape) {
     const { width, height, dtype, channels = 3, views = 1 } = shape;
@@ -58,7 +58,7 @@ export class ImageTensor {
     this.#kernel = kernelOf(device, imageToTensor);
     this.#memory = new GpuMemory(device);
     const { storage, uniform, copySource, copyDestination } = BUFFER_USAGE;
-    // A multiple of 16 bytes, because ONNX Runtime copies no smaller units.
+    // The size is a multiple of 16 bytes, because ONNX Runtime does not copy smaller units.
     const size = Math.ceil((4 * views * this.#words) / 16) * 16;
     this.buffer = this.#memory.buffer('gs.picture.tensor', size, storage | copySource | copyDestination);
     const usage = uniform | copyDestination;
@@ -74,16 +74,16 @@ export class ImageTensor {
     return this.#memory.byteLength;
   }
 
-  /** Number of images written until now. */
+  /** Number of images written since the creation of the tensor. */
   get version(): number {
     return this.#version;
   }
 
   /**
-   * Writes an image from a texture with the usage TEXTURE_BINDING: encodes and submits one compute pass; nothing is
-   * read back. Textures with alpha hold premultiplied colors.
+   * Writes an image from a texture with the usage TEXTURE_BINDING. Encodes and submits one compute pass; nothing is
+   * read back. Colors of textures with alpha must be premultiplied.
    * @param view Index of the image in the tensor, from 0.
-   * @param part Pixels of the texture that are the image, from its upper left corner; default all.
+   * @param part Size in pixels of the image in the texture, from the upper left corner; default: the whole texture.
    */
   write(
     texture: GPUTexture,
@@ -106,7 +106,7 @@ export class ImageTensor {
   }
 
   /**
-   * Writes an image source of the browser (an ImageBitmap, an image, a canvas, a video frame), without a read-back.
+   * Writes an image source of the browser (an ImageBitmap, an image, a canvas, or a video frame) without a read-back.
    * @throws GaussianSplatError `argument/value` for an image without pixels, or larger than the textures of the device.
    */
   upload(source: GPUCopyExternalImageSource, fit: ImageFit = 'cover', view = 0): void {
@@ -122,7 +122,7 @@ export class ImageTensor {
     });
     this.#device.queue.copyExternalImageToTexture({ source }, { texture, premultipliedAlpha: true }, [width, height]);
     this.write(texture, fit, view);
-    // Submitted commands keep the texture alive.
+    // The submitted commands keep the texture alive until they are executed.
     texture.destroy();
   }
 
@@ -144,7 +144,7 @@ export class ImageTensor {
   }
 }
 
-/** Size of an image in pixels; 0 by 0 if it has not loaded. */
+/** Returns the size of an image source in pixels; 0 by 0 if the image has not loaded. */
 function sizeOf(source: GPUCopyExternalImageSource): { width: number; height: number } {
   if ('displayWidth' in source) return { width: source.displayWidth, height: source.displayHeight };
   if ('videoWidth' in source) return { width: source.videoWidth, height: source.videoHeight };

@@ -2,29 +2,30 @@ import { constants } from '../generated/shaders.js';
 import { FACTOR_NUMBERS, shNumbers, type LevelSource, type SplatLevel } from './splat-level.js';
 import { areaOf, BLUE, covarianceOf, factorOf, GREEN, MASS, OPACITY, RED, ROW, SPREAD, X, Y, Z } from './splat-rows.js';
 
-/** Splats that are merged with one another: those of the chunks with the same parent. */
+/** Maximum number of splats that are merged with one another: those of four chunks with the same parent. */
 export const BLOCK = 4 * constants.CULL_GROUP;
 
 const SH_C0 = 0.28209479177387814;
-/** Keeps ratios finite for splats that cover nothing. */
+/** Added to denominators, so that ratios are finite for splats that cover nothing. */
 const TINY = 1e-30;
 
 /** The splats of a block while they are merged. */
 export class Block {
   count = 0;
-  /** See {@link LevelSource.dilation}. */
+  /** Variance that the renderer adds to splats, in px²: see {@link LevelSource.dilation}. */
   dilation = 0;
-  /** [count] see splat-rows.ts. */
+  /** [count, ROW] properties of the splats: see splat-rows.ts. */
   readonly rows = new Float64Array(ROW * BLOCK);
-  /** Harmonics of the loaded splats. */
+  /** Spherical harmonics of the loaded splats, in their order. */
   readonly #sh = new Float32Array(shNumbers(3) * BLOCK);
-  /** For each loaded splat: its mass, and the index of the merged splat that contains it. */
+  /** {@link MASS} of each loaded splat before merging: opacity times area. */
   readonly #loadedMass = new Float64Array(BLOCK);
+  /** Index of the merged splat that contains each loaded splat. */
   readonly #cluster = new Int32Array(BLOCK);
   readonly #place = new Int32Array(BLOCK);
   #loaded = 0;
 
-  /** Loads `count` splats of a level from `first` on, at most {@link BLOCK}. */
+  /** Loads `count` splats of a level, from index `first` on; at most {@link BLOCK}. */
   load(level: LevelSource, first: number, count: number): void {
     const { positions, factors, opacities, spreads, shDegree } = level;
     const { rows } = this;
@@ -51,7 +52,10 @@ export class Block {
     this.count = count;
   }
 
-  /** Removes splats that were merged into another: `partOf[k]` is its index, or -1. The rest keep their order. */
+  /**
+   * Removes the splats that were merged into others. The other splats keep their order.
+   * @param partOf Index of the splat into which each splat was merged, or -1.
+   */
   closeRanks(partOf: Int32Array): void {
     const { rows } = this;
     let kept = 0;
@@ -69,7 +73,7 @@ export class Block {
     this.count = kept;
   }
 
-  /** Writes the splats to a level from `at` on. */
+  /** Writes the splats to a level, from index `at` on. */
   store(level: SplatLevel, at: number): void {
     const { rows } = this;
     for (let k = 0, p = 0; k < this.count; k++, p += ROW) {

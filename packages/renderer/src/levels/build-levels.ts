@@ -3,26 +3,29 @@ import { Block, BLOCK } from './block.js';
 import { BlockReducer } from './reduce-block.js';
 import { chunksOf, emptyLevel, leafLevel, type LevelSource, type SplatLevel } from './splat-level.js';
 
-/** Ratio of the splats of the next level to those of this one. */
+/** Number of splats of the next coarser level, as a fraction of the current level's. */
 const KEPT = 1 / 4;
-/** Blocks in each step: about ten milliseconds. */
+/** Number of blocks in each step, which takes about ten milliseconds. */
 const BLOCKS_A_STEP = 8;
 
 /**
- * Builds all levels of detail of the splats `kept` of a cloud, finest first: each level merges the splats of four
- * chunks into those of one, until one chunk represents the scene. All levels together have 4/3 of the splats.
+ * Builds all levels of detail of the splats `kept` of a cloud, finest first. Each level merges the splats of four
+ * chunks into one chunk, until one chunk represents the scene. All levels together have 4/3 of the splats.
  */
 export function buildLevels(cloud: GaussianCloud, kept: Uint32Array): SplatLevel[] {
   const leaves = leafLevel(cloud, kept);
   return [leaves, ...levelsAbove(leaves)];
 }
 
-/** Builds all levels coarser than the given one. */
+/** Builds all levels that are coarser than the given one, finest first. */
 export function levelsAbove(finest: LevelSource): SplatLevel[] {
   return finish(buildLevelsAbove(finest));
 }
 
-/** The same in steps of about ten milliseconds, for callers whose thread has other tasks. */
+/**
+ * Builds all levels that are coarser than the given one, finest first. Each step takes about ten milliseconds, so that
+ * the thread can run other tasks.
+ */
 export function* buildLevelsAbove(finest: LevelSource): Generator<void, SplatLevel[]> {
   const levels: SplatLevel[] = [];
   let level = finest;
@@ -34,7 +37,7 @@ export function* buildLevelsAbove(finest: LevelSource): Generator<void, SplatLev
   return levels;
 }
 
-/** Builds the next coarser level: its chunk k represents chunks 4 k to 4 k + 3. */
+/** Builds the next coarser level, in steps. Its chunk k represents chunks 4 k to 4 k + 3 of the given level. */
 function* buildNextLevel(level: LevelSource): Generator<void, SplatLevel> {
   const reducer = new BlockReducer();
   const block = new Block();
@@ -49,7 +52,7 @@ function* buildNextLevel(level: LevelSource): Generator<void, SplatLevel> {
   return next;
 }
 
-/** Runs all steps at once. */
+/** Runs all steps of a generator without a pause, and returns its result. */
 export function finish<T>(steps: Generator<void, T>): T {
   for (;;) {
     const { done, value } = steps.next();

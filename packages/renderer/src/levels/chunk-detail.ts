@@ -1,15 +1,16 @@
 import { constants, layouts } from '../generated/shaders.js';
-import { chunksOf, FACTOR_NUMBERS, type SplatLevel } from './splat-level.js';
+import { FACTOR_NUMBERS, type SplatLevel } from './splat-level.js';
+import { boundRuns } from '../pack/chunks.js';
 import { CHUNK_NUMBERS } from '../pack/words.js';
 
-/** Numbers in one `ChunkLod` of shaders/shared/lod.wgsl. */
+/** Number of 32-bit words in one `ChunkDetail` of the shaders. */
 export const DETAIL_NUMBERS = layouts.ChunkDetail.size / 4;
 
 const { CULL_GROUP, ALPHA_MIN, NO_CHILDREN } = constants;
 const fields = layouts.ChunkDetail.fields;
 const place = (name: keyof typeof fields): number => fields[name].offset / 4;
 
-/** Offsets of the fields of a row. */
+/** Index of each field in a row. */
 export const DETAIL_PLACES = {
   sphere: place('sphere'),
   parentSphere: place('parent_sphere'),
@@ -22,46 +23,37 @@ export const DETAIL_PLACES = {
 /** Parent error of a chunk without a parent: larger than any threshold. */
 export const ENDLESS = 1e25;
 
-/** Factor of the error and the sphere of a parent over those of its children: more than the rounding error of float32. */
+/**
+ * Factor of the error and the sphere of a parent. It exceeds the rounding error of float32, so that both are strictly
+ * larger than those of the children.
+ */
 const STRICTLY = 1.00001;
 
-/** Sphere and error of each chunk of a level. */
+/** Sphere and error of each of the C chunks in a level. */
 export interface ChunkErrors {
   readonly count: number;
-  /** [C, 4] center and radius: encloses the centers of the splats and the spheres of the child chunks. */
+  /**
+   * [C, 4] center and radius in world units: encloses the centers of the splats and the spheres of the child chunks.
+   */
   readonly spheres: Float32Array;
-  /** [C] world units: 0 for the finest level, larger than those of the child chunks. */
+  /** [C] errors in world units: 0 for the finest level, otherwise larger than those of the child chunks. */
   readonly errors: Float32Array;
 }
 
 /** `Chunk` rows of merged splats: boxes of their centers, and their reach. */
-export function boundLevel({ count, positions, factors, opacities }: SplatLevel): Float32Array {
-  const chunks = new Float32Array(CHUNK_NUMBERS * chunksOf(count));
-  for (let first = 0, at = 0; first < count; first += CULL_GROUP, at += CHUNK_NUMBERS) {
-    const low = [Infinity, Infinity, Infinity];
-    const high = [-Infinity, -Infinity, -Infinity];
-    let reach = 0;
-    for (let i = first; i < Math.min(count, first + CULL_GROUP); i++) {
-      for (let axis = 0; axis < 3; axis++) {
-        const x = positions[3 * i + axis];
-        if (x < low[axis]) low[axis] = x;
-        if (x > high[axis]) high[axis] = x;
-      }
-      reach = Math.max(reach, Math.sqrt(traceOf(factors, i) * 2 * Math.log(Math.max(1, opacities[i] / ALPHA_MIN))));
-    }
-    chunks.set([...low, reach, ...high, 0], at);
-  }
-  return chunks;
-}
+export const boundLevel = ({ count, positions, factors, opacities }: SplatLevel): Float32Array =>
+  boundRuns(count, positions, (i) =>
+    Math.sqrt(traceOf(factors, i) * 2 * Math.log(Math.max(1, opacities[i] / ALPHA_MIN))),
+  );
 
-/** Trace of a splat's covariance: at least the variance along the longest axis. */
+/** Returns the trace of a splat's covariance, which is at least the variance along its longest axis. */
 function traceOf(factors: Float32Array, i: number): number {
   let sum = 0;
   for (let k = 0; k < FACTOR_NUMBERS; k++) sum += factors[FACTOR_NUMBERS * i + k] ** 2;
   return sum;
 }
 
-/** Errors of the finest level, which are 0. Its spheres enclose the boxes. */
+/** Returns the errors of the finest level, which are 0. Its spheres enclose the boxes of the chunks. */
 export function leafErrors(chunks: Float32Array): ChunkErrors {
   const count = chunks.length / CHUNK_NUMBERS;
   const spheres = new Float32Array(4 * count);
@@ -70,7 +62,7 @@ export function leafErrors(chunks: Float32Array): ChunkErrors {
 }
 
 /**
- * Errors of a coarser level, whose chunk c represents chunks 4 c to 4 c + 3 of `finer`.
+ * Returns the errors of a coarser level, whose chunk c represents chunks 4 c to 4 c + 3 of `finer`.
  * @param rounding Twice the maximum rounding error of centers, as a fraction of the diagonal of a chunk's box.
  */
 export function parentErrors(level: SplatLevel, chunks: Float32Array, finer: ChunkErrors, rounding = 0): ChunkErrors {
@@ -85,7 +77,7 @@ export function parentErrors(level: SplatLevel, chunks: Float32Array, finer: Chu
       radius = Math.max(radius, Math.hypot(x - cx, y - cy, z - cz) + r);
       error = Math.max(error, finer.errors[child]);
     }
-    // Centers far from the origin are rounded themselves.
+    // Adds the float32 rounding of the center itself, which matters far from the origin.
     const rounded = 1e-6 * Math.hypot(x, y, z);
     spheres.set([x, y, z, radius * STRICTLY + rounded], 4 * c);
     errors[c] = Math.max(error * STRICTLY, MIN_ERROR);
@@ -96,7 +88,10 @@ export function parentErrors(level: SplatLevel, chunks: Float32Array, finer: Chu
 /** Minimum error of a merge, even without displacement, so that a threshold of 0 draws the leaves. */
 const MIN_ERROR = 1e-20;
 
-/** Twice the root mean square displacement of the splats that were merged in a chunk; nearly all are displaced less. */
+/**
+ * Returns twice the root mean square displacement of the splats that were merged in a chunk, in world units. Nearly all
+ * splats are displaced less.
+ */
 function ownError({ count, spreads }: SplatLevel, chunk: number): number {
   const [first, end] = [CULL_GROUP * chunk, Math.min(count, CULL_GROUP * (chunk + 1))];
   let [sum, merged] = [0, 0];
@@ -114,7 +109,10 @@ function sphereOfBox(chunks: Float32Array, c: number): [number, number, number, 
   return [x, y, z, radius * STRICTLY];
 }
 
-/** Rows of one level; `parents` are those of the next coarser level, none for the coarsest. */
+/**
+ * Returns [C, DETAIL_NUMBERS] rows of one level.
+ * @param parents Errors of the next coarser level; undefined for the coarsest.
+ */
 export function detailRows(own: ChunkErrors, parents: ChunkErrors | undefined): Float32Array {
   const rows = new Float32Array(DETAIL_NUMBERS * own.count);
   const words = new Uint32Array(rows.buffer);

@@ -10,11 +10,11 @@ import type { PackedLevels } from './packed-levels.js';
 import type { ShPrecision } from '../pack/words.js';
 
 /**
- * A scene on the GPU with added levels of detail: its own splats in place, and the coarser ones in extra blocks. If the
- * setting `lodError` is 0, the image equals that of the scene byte for byte.
+ * A scene on the GPU with additional levels of detail. It shares the splats of the scene, and has the coarser splats in
+ * extra blocks. If the setting `detail` is 0 without a splat budget, the image equals that of the scene byte for byte.
  */
 export class DetailedGaussians implements GaussianScene {
-  /** Splats over all levels. */
+  /** Number of splats over all levels. */
   readonly count: number;
   readonly shDegree: ShDegree;
   readonly shPrecision: ShPrecision;
@@ -22,7 +22,7 @@ export class DetailedGaussians implements GaussianScene {
   /** Variance in px² of the screen-space low-pass filter of training; undefined is the classic 0.3. */
   readonly filterVariance?: number | undefined;
   readonly origin: Vector3;
-  readonly pages: readonly GaussianBlock[];
+  readonly blocks: readonly GaussianBlock[];
   readonly #leaves: GaussianScene;
   readonly #coarser: GaussianBuffers;
   readonly #memory: GpuMemory;
@@ -40,7 +40,7 @@ export class DetailedGaussians implements GaussianScene {
     } = leaves);
     this.count = leaves.count + coarser.count;
     try {
-      this.pages = [...withDetails(leaves.pages, details, this.#memory), ...coarser.pages];
+      this.blocks = [...withDetails(leaves.blocks, details, this.#memory), ...coarser.blocks];
     } catch (error) {
       this.#memory.destroy();
       throw error;
@@ -48,9 +48,10 @@ export class DetailedGaussians implements GaussianScene {
   }
 
   /**
-   * Adds levels to a scene on the GPU; the caller keeps the scene, which must outlive this object.
-   * @param levels Built from exactly this scene by `buildPackedLevels`.
-   * @throws GaussianSplatError `out-of-memory/budget` if the levels alone exceed `memoryBudget`,
+   * Adds levels to a scene on the GPU. The caller keeps the scene, which must outlive the result.
+   * @param leaves The scene, which becomes the finest level.
+   * @param levels Levels that `buildPackedLevels` built from exactly this scene.
+   * @throws GaussianSplatError `out-of-memory/budget` if the levels alone exceed `memoryBudget`;
    * `out-of-memory/allocation` if the device has too little memory.
    */
   static async upload(
@@ -89,12 +90,12 @@ export class DetailedGaussians implements GaussianScene {
   }
 }
 
-/** The same blocks, each with the rows of its chunks. */
-function withDetails(pages: readonly GaussianBlock[], details: Float32Array, memory: GpuMemory): GaussianBlock[] {
+/** Returns the same blocks, each with the detail rows of its chunks. */
+function withDetails(blocks: readonly GaussianBlock[], details: Float32Array, memory: GpuMemory): GaussianBlock[] {
   const words = new Uint32Array(details.buffer, details.byteOffset, details.length);
   const usage = BUFFER_USAGE.storage | BUFFER_USAGE.copyDestination | BUFFER_USAGE.copySource;
   let start = 0;
-  return pages.map((page) => {
+  return blocks.map((page) => {
     const end = start + DETAIL_NUMBERS * Math.ceil(page.count / constants.CULL_GROUP);
     const rows = memory.buffer('gs.gaussians.details', 4 * (end - start), usage, words.subarray(start, end));
     start = end;

@@ -20,24 +20,27 @@ import {
 } from './splat-rows.js';
 
 /**
- * Coverage of a splat, relative to its own area 2π √|Σ|: its opacity, if that is at most 1. A merged splat may have to
- * cover more than its area: an opacity above 1, clamped when drawn, gives it a flat top (∫ min(1, o e^(−r²/2)) = 2π (1
- * + ln o)).
+ * Returns the coverage of a splat relative to its own area 2π √|Σ|: its opacity, if that is at most 1. A merged splat
+ * may have to cover more than its area. It then has an opacity above 1, which is clamped when it is drawn and gives a
+ * flat top (∫ min(1, o e^(−r²/2)) = 2π (1 + ln o)).
  */
 export const coverOfOpacity = (opacity: number): number => (opacity <= 1 ? opacity : 1 + Math.log(opacity));
 
-/** Maximum coverage of a splat: opacities end at e. */
+/** Maximum coverage of a splat, whose opacity is then e. */
 const MAX_COVER = 2;
 
-/** Opacity of a splat with this coverage of its area. */
+/** Returns the opacity of a splat with this coverage of its area: the inverse of {@link coverOfOpacity}. */
 export function opacityOfCover(cover: number): number {
   return cover <= 1 ? cover : Math.exp(Math.min(MAX_COVER, cover) - 1);
 }
 
-/** Weight of the displacement of a splat if the colors differ by 1 in a channel. */
+/** Weight of a color difference in the displacement: for a difference of 1 in one channel. */
 const COLOR_WEIGHT = 2;
 
-/** Squared displacement from merging the splats at p and q, in world units²: by distance, shape and color difference. */
+/**
+ * Returns the squared displacement from merging the splats at p and q, in world units². It depends on their distance,
+ * shapes and colors.
+ */
 function displacement(rows: Float64Array, p: number, q: number): number {
   const dx = rows[p + X] - rows[q + X];
   const dy = rows[p + Y] - rows[q + Y];
@@ -49,7 +52,7 @@ function displacement(rows: Float64Array, p: number, q: number): number {
   const xz = rows[p + XZ] - rows[q + XZ];
   const yz = rows[p + YZ] - rows[q + YZ];
   const size = rows[p + TRACE] + rows[q + TRACE];
-  // Σ1 − Σ2 over the size of both has the unit of an area again: 0 for equal shapes.
+  // The difference Σ1 − Σ2, squared and divided by the size of both, has the unit of an area: 0 for equal shapes.
   const shape = size > 0 ? (xx * xx + yy * yy + zz * zz + 2 * (xy * xy + xz * xz + yz * yz)) / size : 0;
   const red = rows[p + RED] - rows[q + RED];
   const green = rows[p + GREEN] - rows[q + GREEN];
@@ -59,8 +62,8 @@ function displacement(rows: Float64Array, p: number, q: number): number {
 }
 
 /**
- * Ward's criterion (1963): increase of the total squared displacement, weighted by mass, from merging the splats at p
- * and q.
+ * Returns the cost of merging the splats at p and q: the increase of the total squared displacement, weighted by mass
+ * (Ward's criterion, 1963).
  */
 export function mergeCost(rows: Float64Array, p: number, q: number): number {
   const first = rows[p + MASS];
@@ -69,9 +72,10 @@ export function mergeCost(rows: Float64Array, p: number, q: number): number {
 }
 
 /**
- * Merges two splats into the one at i: it keeps their first two moments and their coverage along the three axes. The
- * coverage is computed for the distance that makes their displacement a pixel, because they are first drawn merged
- * there; small splats are wider at that distance, by the dilation.
+ * Merges the splat at j into the one at i, which keeps the first two moments of both, and their coverage along the
+ * three axes. The coverage is computed for the distance at which their displacement is one pixel, because the merged
+ * splat is first drawn there. At that distance the dilation makes small splats wider.
+ * @param dilation Variance that the renderer adds to splats, in px².
  */
 export function mergePair(rows: Float64Array, i: number, j: number, dilation: number): void {
   const mass = rows[i + MASS] + rows[j + MASS];
@@ -93,8 +97,9 @@ export function mergePair(rows: Float64Array, i: number, j: number, dilation: nu
 }
 
 /**
- * Joint area of two splats in units of 2π, summed over views along the three axes, with all variances increased by
- * `low`: the sum of both areas minus their overlap, ∫ G₁ G₂ = 2π √|Σ₁| √|Σ₂| / √|Σ₁ + Σ₂| · exp(−δᵀ (Σ₁ + Σ₂)⁻¹ δ / 2).
+ * Returns the area that two splats cover together in units of 2π, summed over views along the three axes, with all
+ * variances increased by `low`. Each area is weighted by the {@link coverOfOpacity} of its splat. The weighted overlap is
+ * subtracted: ∫ G₁ G₂ = 2π √|Σ₁| √|Σ₂| / √|Σ₁ + Σ₂| · exp(−δᵀ (Σ₁ + Σ₂)⁻¹ δ / 2).
  */
 function jointCover(rows: Float64Array, i: number, j: number, low: number): number {
   const dx = rows[j + X] - rows[i + X];

@@ -4,7 +4,9 @@ import { packSh } from '../pack/sh.js';
 import { FACTOR_NUMBERS, type SplatLevel } from './splat-level.js';
 import { GEOMETRY_WORDS, type ShPrecision } from '../pack/words.js';
 
-/** Writes the geometry words of splats `from` to `end` of a level, by default all, to `words` from splat `first` on. */
+/**
+ * Writes the geometry words of splats `from` to `end` of a level (by default all) to `words`, from splat `first` on.
+ */
 export function packLevelGeometry(
   level: SplatLevel,
   words: Uint32Array,
@@ -22,13 +24,13 @@ export function packLevelGeometry(
   }
 }
 
-/** Fills up the last chunk of a level with invisible splats. */
+/** Writes invisible splats of opacity 0 at indices `first` to `end`, to fill the last chunk of a level. */
 export function packFiller(words: Uint32Array, first: number, end: number): void {
   const factor = Float64Array.of(1e-6, 0, 1e-6, 0, 0, 1e-6);
   for (let i = first; i < end; i++) packShape(words, GEOMETRY_WORDS * i + 3, factor, 0);
 }
 
-/** Packs the spherical harmonics of splats `from` to `end` of a level, by default all. */
+/** Returns the packed spherical harmonics of splats `from` to `end` of a level, by default of all. */
 export function packLevelSh(level: SplatLevel, precision: ShPrecision, from = 0, end = level.count): Uint32Array {
   const { sh, shDegree } = level;
   const order = level.shOrder?.subarray(from, end) ?? Uint32Array.from({ length: end - from }, (_, k) => from + k);

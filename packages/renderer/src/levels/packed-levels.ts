@@ -8,7 +8,10 @@ import { chunksOf, type SplatLevel, FACTOR_NUMBERS, type LevelSource } from './s
 import { shReader, unpackSplat } from '../pack/unpack.js';
 import { CHUNK_NUMBERS, GEOMETRY_WORDS, shWords } from '../pack/words.js';
 
-/** The splats of a packed scene as the finest level; its source, file or generator, is not needed. */
+/**
+ * Returns the splats of a packed scene as the finest level. The source of the scene, a file or generator, is not
+ * required.
+ */
 export function packedLeaves(packed: PackedGaussians): LevelSource {
   const { count, geometry, shDegree, antialiased, filterVariance = constants.DILATION } = packed;
   const positions = new Float32Array(3 * count);
@@ -23,20 +26,20 @@ export function packedLeaves(packed: PackedGaussians): LevelSource {
 const { CULL_GROUP } = constants;
 
 /**
- * The coarser levels of a packed scene, separate from it. Plain data with transferable buffers, so that a worker can
- * build it.
+ * The coarser levels of a packed scene, without the scene itself. Plain data with transferable buffers, so that a
+ * worker can build it.
  */
 export interface PackedLevels {
-  /** [ceil(N / 256), 12] numbers: `ChunkLod` of each chunk of the scene itself. */
+  /** [ceil(N / 256), 12] `ChunkDetail` of each chunk of the scene itself */
   readonly leafDetails: Float32Array;
-  /** All coarser levels in sequence, each aligned to a chunk, with `details`. */
+  /** All coarser levels in sequence, finest first, with their `details`. Each level starts a new chunk. */
   readonly coarser: PackedGaussians;
 }
 
 /**
  * Builds the levels of detail of a packed scene: a third as many splats, which replace groups of four, sixteen and
- * more. Runs in steps of about ten milliseconds: call `next()` until `done`. Undefined for a scene that is too small
- * for levels.
+ * more. Each step takes about ten milliseconds: call `next()` until `done`. The result is undefined for a scene that is
+ * too small for levels.
  */
 export function* buildPackedLevels(leaves: PackedGaussians): Generator<void, PackedLevels | undefined> {
   if (chunksOf(leaves.count) <= 1) return undefined;
@@ -55,7 +58,7 @@ export function* buildPackedLevels(leaves: PackedGaussians): Generator<void, Pac
   return { leafDetails: details[0], coarser };
 }
 
-/** Splats packed in one step. */
+/** Number of splats packed in one step. */
 const PACKED_A_STEP = 64 * CULL_GROUP;
 
 function* packLevels(levels: readonly SplatLevel[], { geometry, sh, shPrecision }: PackedGaussians): Generator<void> {
@@ -74,14 +77,14 @@ function* packLevels(levels: readonly SplatLevel[], { geometry, sh, shPrecision 
   }
 }
 
-/** Rows of each level, leaves first. */
+/** Returns the detail rows of each level, the scene itself first. */
 function detailsOf(levels: readonly SplatLevel[], chunks: readonly Float32Array[]): Float32Array[] {
   const errors: ChunkErrors[] = [leafErrors(chunks[0])];
   levels.forEach((level, k) => errors.push(parentErrors(level, chunks[k + 1], errors[k])));
   return errors.map((own, k) => detailRows(own, errors[k + 1]));
 }
 
-/** Joins a scene and its levels. */
+/** Returns one packed scene that contains a scene and its coarser levels. */
 export function joinLevels(leaves: PackedGaussians, { leafDetails, coarser }: PackedLevels): PackedGaussians {
   const start = CULL_GROUP * (leafDetails.length / DETAIL_NUMBERS);
   const count = start + coarser.count;
@@ -101,9 +104,9 @@ export function joinLevels(leaves: PackedGaussians, { leafDetails, coarser }: Pa
 }
 
 /**
- * Packs a cloud with all its levels of detail: the splats of {@link packGaussians}, in the same order, followed by a
- * third as many that replace groups of four, sixteen and more. The settings `lodError` and `splatBudget` select among
- * them; with neither the image is the same.
+ * Packs a cloud with all its levels of detail. The splats of {@link packGaussians}, in the same order, are followed by
+ * a third as many that replace groups of four, sixteen and more. The settings `detail` and `splatBudget` select among
+ * them; with neither the image is that of {@link packGaussians}.
  * @throws GaussianSplatError `argument/cloud` if the arrays do not match `count` and `shDegree`.
  */
 export function packWithDetail(given: GaussianCloud, options: PackOptions = {}): PackedGaussians {

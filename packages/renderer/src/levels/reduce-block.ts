@@ -2,24 +2,30 @@ import { BLOCK, type Block } from './block.js';
 import { mergeCost, mergePair } from './merge-pair.js';
 import { ROW } from './splat-rows.js';
 
-/** Number of following splats in the order that are candidates for a merge. */
+/** Number of subsequent splats in the order that are candidates for a merge with a splat. */
 const WINDOW = 6;
-/** Marks an unknown cost; costs are not negative. */
+/** Marks a cost that is not computed; costs are not negative. */
 const UNKNOWN = -1;
 
-/** Merges pairs of near neighbors until the target number of splats is reached. */
+/** Merges pairs of near neighbors in a block until the target number of splats remains. */
 export class BlockReducer {
   readonly #best = new Int32Array(BLOCK);
   readonly #bestCost = new Float64Array(BLOCK);
   readonly #partOf = new Int32Array(BLOCK);
-  /** Costs of the pairs of one round. */
+  /** Costs of the pairs of mutual partners in one round. */
   readonly #pairCosts = new Float64Array(BLOCK);
-  /** For each splat the known costs of merging it with those that follow: most pairs survive a round. */
+  /**
+   * [count, WINDOW] costs of merging each splat with the subsequent ones. They are kept between rounds, because most
+   * pairs survive a round.
+   */
   readonly #costs = new Float64Array(WINDOW * BLOCK);
-  /** Maps each splat after a round to its index before. */
+  /** Index before the round of each splat after the round. */
   readonly #before = new Int32Array(BLOCK);
 
-  /** Each round merges the pairs of mutual best partners; the last round only the cheapest of them. */
+  /**
+   * Reduces a block to `target` splats. Each round merges the pairs of splats that are each other's cheapest partner;
+   * the last round merges only the cheapest of these pairs.
+   */
   reduce(block: Block, target: number): void {
     this.#costs.fill(UNKNOWN, 0, WINDOW * block.count);
     while (block.count > target) {
@@ -52,7 +58,10 @@ export class BlockReducer {
     }
   }
 
-  /** Merges at most this many pairs; always at least one, because the cheapest pair is mutual. */
+  /**
+   * Merges the cheapest pairs of mutual partners, at most `max` of them. At least one pair is merged, because the
+   * cheapest of all pairs is mutual.
+   */
   #mergePairs(block: Block, max: number): void {
     const best = this.#best;
     const partOf = this.#partOf;
@@ -68,7 +77,7 @@ export class BlockReducer {
     }
   }
 
-  /** Keeps the costs of pairs with two unmerged splats for the next round. */
+  /** Keeps the costs of pairs whose splats were both not merged, for the next round. */
   #keepCosts(count: number): void {
     const partOf = this.#partOf;
     const before = this.#before;
@@ -80,19 +89,19 @@ export class BlockReducer {
       for (let step = 1; step <= WINDOW && i + step < left; step++) {
         const other = before[i + step];
         const isKept = other - old <= WINDOW && !this.#isMerged(old) && !this.#isMerged(other);
-        // The read index is never below the write index.
+        // Moves the costs in place: the read index is never below the write index.
         costs[WINDOW * i + step - 1] = isKept ? costs[WINDOW * old + other - old - 1] : UNKNOWN;
       }
     }
   }
 
-  /** Whether a splat has absorbed another in this round. */
+  /** Whether another splat was merged into splat k in this round. */
   #isMerged(k: number): boolean {
     const partner = this.#best[k];
     return this.#partOf[partner] === k;
   }
 
-  /** Cost of the most expensive pair that is merged in this round. */
+  /** Returns the largest cost among the `max` cheapest pairs of mutual partners; Infinity if no more pairs exist. */
   #dearest(count: number, max: number): number {
     const costs = this.#pairCosts;
     let pairs = 0;

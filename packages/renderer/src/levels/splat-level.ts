@@ -2,42 +2,48 @@ import { shCoefficientCount, type GaussianCloud, type ShDegree } from '@gaussian
 import { constants } from '../generated/shaders.js';
 import { scaleRotationFactor } from '../pack/factor.js';
 
-/** Entries of the lower triangular root of a covariance: xx, yx, yy, zx, zy, zz. */
+/** Number of entries of the lower triangular root of a covariance: xx, yx, yy, zx, zy, zz. */
 export const FACTOR_NUMBERS = 6;
 
-/** Source of a coarser level: splats in an order that keeps neighbors in space mostly adjacent. */
+/** Splats that are merged to build a coarser level. Their order keeps neighbors in space mostly adjacent. */
 export interface LevelSource {
   readonly count: number;
-  /** [N, 3] world units, relative to the origin of the cloud. */
+  /** [N, 3] positions in world units, relative to the origin of the cloud */
   readonly positions: Float32Array;
   /** [N, 6] lower triangular roots of the covariances, world units. */
   readonly factors: Float32Array;
   /** [N] opacities; those of merged splats may exceed 1 (see `opacityOfCover`). */
   readonly opacities: Float32Array;
-  /** [N] mean squared displacement of the splats that each splat represents, in world units². */
+  /** [N] mean squared displacement, in world units², of the original splats that each splat represents */
   readonly spreads: Float32Array;
   readonly shDegree: ShDegree;
-  /** Variance in px² that the renderer adds on the screen without compensating opacities: see `mergePair`. */
+  /**
+   * Variance in px² that the renderer adds to splats on the screen without compensating their opacities: see
+   * `mergePair`.
+   */
   readonly dilation: number;
-  /** Writes the harmonics of `count` splats from `first` on, {@link shNumbers} of each, to the start of `out`. */
+  /**
+   * Writes the spherical harmonics of `count` splats, from index `first` on, to the beginning of `out`: {@link
+   * shNumbers} for each splat.
+   */
   readonly readSh: (first: number, count: number, out: Float32Array) => void;
 }
 
 /** One level of detail of a scene. */
 export interface SplatLevel extends LevelSource {
-  /** Spherical harmonics, {@link shNumbers} of each splat. */
+  /** [N, {@link shNumbers}] spherical harmonics */
   readonly sh: Float32Array;
-  /** Index in `sh`, in splats, of the harmonics of each splat; undefined if in order. */
+  /** [N] index in `sh` of the harmonics of each splat; undefined if `sh` has the order of the splats. */
   readonly shOrder?: Uint32Array;
 }
 
-/** Number of spherical harmonics coefficients of one splat, over all channels. */
+/** Returns the number of spherical harmonics coefficients of one splat, over all channels. */
 export const shNumbers = (degree: ShDegree): number => 3 * shCoefficientCount(degree);
 
-/** Number of chunks of a level. */
+/** Returns the number of chunks for a number of splats. */
 export const chunksOf = (splats: number): number => Math.ceil(splats / constants.CULL_GROUP);
 
-/** Allocates a level of merged splats. */
+/** Allocates a level of `count` merged splats; all values are 0. */
 export function emptyLevel(count: number, { shDegree, dilation }: LevelSource): SplatLevel {
   const stride = shNumbers(shDegree);
   const sh = new Float32Array(stride * count);
@@ -51,7 +57,7 @@ export function emptyLevel(count: number, { shDegree, dilation }: LevelSource): 
   };
 }
 
-/** The finest level: the splats `kept` of a cloud, in that order. */
+/** Returns the finest level: the splats `kept` of a cloud, in that order. */
 export function leafLevel(cloud: GaussianCloud, kept: Uint32Array): SplatLevel {
   const count = kept.length;
   const positions = new Float32Array(3 * count);

@@ -1,23 +1,23 @@
 /**
- * Splats during merging, {@link ROW} contiguous float64 numbers each, because pairs of near neighbors are compared by
- * the million. The constants are indices in a row.
+ * Number of contiguous float64 of a splat during merging, because millions of pairs of near neighbors are compared. The
+ * other constants are indices in such a row.
  */
 export const ROW = 16;
 
 export const [X, Y, Z] = [0, 1, 2] as const;
-/** Covariance, and its trace. */
+/** Entries of the covariance, and its trace. */
 export const [XX, YY, ZZ, XY, XZ, YZ, TRACE] = [3, 4, 5, 6, 7, 8, 9] as const;
-/** Mean color, of degree 0 only. */
+/** Mean color, from spherical harmonics of degree 0 only. */
 export const [RED, GREEN, BLUE] = [10, 11, 12] as const;
-/** Weight of a splat in every mean: opacity times area, summed over the splats that it represents. */
+/** Weight of a splat in every mean: opacity times area, summed over the original splats that it represents. */
 export const MASS = 13;
 export const OPACITY = 14;
-/** Accumulated mean squared displacement. */
+/** Mean squared displacement of the original splats, in world units². */
 export const SPREAD = 15;
 
 /**
- * Area of the splat at `p` with its variances increased by `low`, in units of 2π: the sum of the projections along the
- * three axes.
+ * Returns the area of the splat at `p`, with its variances increased by `low`, in units of 2π: the sum of its
+ * projections along the three axes.
  */
 export function areaOf(rows: Float64Array, p: number, low = 0): number {
   const xx = rows[p + XX] + low;
@@ -33,7 +33,10 @@ export function areaOf(rows: Float64Array, p: number, low = 0): number {
   );
 }
 
-/** Writes a covariance from its lower triangular root at `at` of `factors` in the order xx, yx, yy, zx, zy, zz. */
+/**
+ * Writes the covariance of the splat at `p` of `rows`. It is computed from the lower triangular root at `at` of
+ * `factors`, in the order xx, yx, yy, zx, zy, zz.
+ */
 export function covarianceOf(factors: Float32Array | Float64Array, at: number, rows: Float64Array, p: number): void {
   const xx = factors[at];
   const yx = factors[at + 1];
@@ -50,7 +53,10 @@ export function covarianceOf(factors: Float32Array | Float64Array, at: number, r
   rows[p + TRACE] = rows[p + XX] + rows[p + YY] + rows[p + ZZ];
 }
 
-/** Cholesky factor of a covariance; pivots of flat splats and needles that rounding has made negative become zero. */
+/**
+ * Writes the lower triangular root (Cholesky factor) of a covariance to `out`, from index `at` on. Pivots that rounding
+ * has made negative, of flat splats and needles, become zero.
+ */
 export function factorOf(rows: Float64Array, p: number, out: Float32Array, at: number): void {
   const xx = Math.sqrt(Math.max(0, rows[p + XX]));
   const inverseX = xx > 0 ? 1 / xx : 0;
@@ -67,8 +73,8 @@ export function factorOf(rows: Float64Array, p: number, out: Float32Array, at: n
 }
 
 /**
- * Sets the mean and the covariance of the splat at `i` to those of the mixture of `i` and `j` with weights `p` and 1 −
- * `p`.
+ * Sets the mean and the covariance of the splat at `i` to those of a mixture: the splat at `i` with weight `p`, and the
+ * splat at `j` with weight 1 − `p`.
  */
 export function joinMoments(rows: Float64Array, i: number, j: number, p: number): void {
   const q = 1 - p;

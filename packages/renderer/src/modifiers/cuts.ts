@@ -2,40 +2,46 @@ import { inverse, multiply, type Matrix4, type Vector3 } from '@gaussian-splat/c
 import { constants } from '../generated/shaders.js';
 import type { ModifierCut } from '../generated/modified-layouts.js';
 import type { StructValues } from '../gpu/struct.js';
-import { opticalFactor } from '../page-table.js';
+import { opticalFactor } from '../block-table.js';
 import { UNCHANGED, type ColorMap } from './color-maps.js';
 
 export const CUT_SHAPES = ['box', 'sphere', 'cylinder', 'plane'] as const;
 
-/** A unit cube, or a sphere or a cylinder (axis y) of diameter and height 1, about the origin; or all that lies below the plane y = 0. */
+/**
+ * Shape of a cut. `box`: a unit cube about the origin. `sphere` and `cylinder` (axis y): diameter and height 1, about
+ * the origin. `plane`: the half-space below y = 0.
+ */
 export type CutShape = (typeof CUT_SHAPES)[number];
 
 /**
- * Changes splats in a region of space. A splat at its edge changes by the fraction that lies inside. A splat that is
- * hidden in part is trimmed: the rest becomes the Gaussian of its mass, mean and variance.
+ * Changes splats in a region of space. A splat at the edge of the region changes by the fraction of it that is inside.
+ * A partly hidden splat is trimmed: it becomes the Gaussian with the mass, mean and variance of its visible part.
  */
 export interface SplatCut {
   readonly shape: CutShape;
-  /** Row-major 4x4, last row (0, 0, 0, 1): from shape coordinates to world coordinates. */
+  /** Matrix from shape coordinates to world coordinates: row-major 4x4, last row (0, 0, 0, 1). */
   readonly shapeToWorld: Matrix4;
-  /** Side of the surface that changes. Default: `inside`. */
+  /** Side of the surface on which splats change. Default: `inside`. */
   readonly side?: 'inside' | 'outside' | undefined;
   /**
-   * Standard deviation of the edge in world units, in addition to the splat's own; `hard` decides by the centers of
-   * splats. Default: 0.
+   * Standard deviation of the edge in world units, in addition to that of each splat. With `hard` the centers of splats
+   * decide. Default: 0.
    */
   readonly edge?: number | 'hard' | undefined;
-  /** Factor of the opacity, 0 to 1; 0 hides. Default: 1. */
+  /** Factor of the opacity of splats, 0 to 1; 0 hides them. Default: 1. */
   readonly opacity?: number | undefined;
-  /** Opacity of an otherwise opaque surface, 0 to 1, same as `Placement.opacity`. Default: 1. */
+  /** Opacity, 0 to 1, that an otherwise opaque surface gets: see `Placement.opacity`. Default: 1. */
   readonly surfaceOpacity?: number | undefined;
-  /** Default: colors are unchanged. */
+  /** Map of the colors of splats. Default: no change. */
   readonly color?: ColorMap | undefined;
   /** Displacement in world units. Default: none. */
   readonly offset?: Vector3 | undefined;
 }
 
-/** Accessed by literal names, because a computed access would keep all constants in the bundle. */
+/**
+ * Value of each shape in the shaders. Constants are accessed by literal names, because a computed access would keep all
+ * constants in the bundle.
+ */
 const NUMBERS: Readonly<Record<CutShape, number>> = {
   box: constants.CUT_BOX,
   sphere: constants.CUT_SPHERE,
@@ -43,13 +49,13 @@ const NUMBERS: Readonly<Record<CutShape, number>> = {
   plane: constants.CUT_PLANE,
 };
 
-/** Map to a shape without volume: everything is outside. */
+/** Row of the matrix to a shape without volume. It places all points outside the shape. */
 const NOWHERE = [0, 0, 0, 1e6];
 
 /**
  * Converts a cut to the layout of the shaders.
- * @param toWorld From block-local coordinates.
- * @param toLocal Its inverse.
+ * @param toWorld Matrix from the coordinates of blocks to world coordinates.
+ * @param toLocal Inverse of `toWorld`.
  */
 export function cutValues(cut: SplatCut, toWorld: Matrix4, toLocal: Matrix4): StructValues<typeof ModifierCut> {
   const { shape, side, edge = 0, opacity = 1, surfaceOpacity = 1, color = UNCHANGED, offset = [0, 0, 0] } = cut;
@@ -74,7 +80,7 @@ export function cutValues(cut: SplatCut, toWorld: Matrix4, toLocal: Matrix4): St
 export const directionIn = (m: Matrix4, [x, y, z]: Vector3): number[] =>
   [0, 1, 2].map((k) => m[4 * k] * x + m[4 * k + 1] * y + m[4 * k + 2] * z);
 
-/** Mean scale factor of a matrix: the cube root of its scale of volumes. */
+/** Returns the mean scale factor of a matrix: the cube root of its factor of volumes. */
 function sizeOf(m: Matrix4): number {
   const determinant =
     m[0] * (m[5] * m[10] - m[6] * m[9]) - m[1] * (m[4] * m[10] - m[6] * m[8]) + m[2] * (m[4] * m[9] - m[5] * m[8]);

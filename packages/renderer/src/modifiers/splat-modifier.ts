@@ -12,35 +12,35 @@ import type { SplatUniform } from './splat-shader.js';
 /** Maximum number of cuts of one scene. */
 export const MAX_CUTS: number = constants.MAX_CUTS;
 
-/** Changes that a {@link SplatModifier} applies. */
+/** Changes that a {@link SplatModifier} applies to the splats of a placement. */
 export interface SplatChanges {
-  /** At most 16. */
+  /** Cuts of the scene, at most 16. Default: none. */
   readonly cuts?: readonly SplatCut[] | undefined;
-  /** Scale of the scene about {@link center}: 1 is complete, 0 is nothing. Default: 1. */
+  /** Scale of the scene about {@link center}: 1 shows the complete scene, 0 nothing. Default: 1. */
   readonly grown?: number | undefined;
-  /** Center of the growth in world coordinates. Default: the origin. */
+  /** Fixed point of {@link grown} in world coordinates. Default: the origin. */
   readonly center?: Vector3 | undefined;
-  /** Fraction of the splats that are drawn, enlarged to represent all: 0 for none, 1 for all. Default: 1. */
+  /** Fraction of the splats that are drawn, 0 to 1. Drawn splats are enlarged to replace the others. Default: 1. */
   readonly share?: number | undefined;
-  /** Values of the uniforms of the program's shader. */
+  /** Values of the uniforms of the program's shader. Default: 0. */
   readonly uniforms?: Readonly<Record<string, SplatUniform>> | undefined;
-  /** Seconds. Default: 0. */
+  /** Time in seconds for the program's shader. Default: 0. */
   readonly time?: number | undefined;
-  /** Rotation from world space to the space of the program's shader, row-major 4x4. Default: none. */
+  /** Row-major 4x4 rotation from world space to the space of the program's shader. Default: the identity. */
   readonly worldToViewer?: Matrix4 | undefined;
 }
 
 const IDENTITY = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1];
 
-/** Cuts, tints, reveals and moves the splats of one placement. A change writes one uniform buffer. */
+/** Cuts, tints, reveals and moves the splats of one placement. A change writes a single uniform buffer. */
 export class SplatModifier implements PlacementModifier {
   readonly values: GPUBuffer;
   readonly program: SplatProgram;
-  /** Changes with what it does. */
+  /** Changes whenever the effect of the modifier changes. */
   version = 0;
   readonly #device: GPUDevice;
   readonly #bytes = new ArrayBuffer(Modifiers.size);
-  /** The last written values. */
+  /** Words of the last written uniform. */
   readonly #written = new Uint32Array(Modifiers.size / 4);
 
   constructor(device: GPUDevice, program: SplatProgram) {
@@ -58,7 +58,7 @@ export class SplatModifier implements PlacementModifier {
     return this.program.reading(kind);
   }
 
-  /** Writes the changes for the next frames. @returns Whether they differ from the previous ones. */
+  /** Writes the changes for subsequent frames of a placement. @returns Whether they differ from the previous ones. */
   write(changes: SplatChanges, { scene, sceneToWorld = IDENTITY }: Placement): boolean {
     const { cuts = [], grown = 1, center = [0, 0, 0], share = 1, time = 0, uniforms = {}, worldToViewer } = changes;
     const [x, y, z] = scene.origin;
@@ -99,7 +99,7 @@ export class SplatModifier implements PlacementModifier {
   }
 }
 
-/** Pads a uniform to a vector of four finite numbers. */
+/** Returns a uniform as four numbers; missing and non-finite ones become 0. */
 function fourOf(value: SplatUniform): number[] {
   const numbers = typeof value === 'number' ? [value] : value;
   return [0, 1, 2, 3].map((k) => (Number.isFinite(numbers[k]) ? numbers[k] : 0));

@@ -22,14 +22,16 @@ const QUANTIZED: Required<GeometryReading> = {
   probeSurface: modified.probeSurfaceQuantizedModified,
 };
 
-/** The module that a hook replaces, and the name of its function. */
+/** WGSL module that a hook replaces. The next line finds the name of its function. */
 const HOOK = modified.sharedSplatHookPart;
 const [, HOOK_NAME] = /\bfn (\w+)/.exec(HOOK)!;
 
-/** Counter for unique names of shaders with a hook, because several may be compiled at once. */
+/** Counter for unique names of shaders with a hook, because several may be compiled at the same time. */
 let hooks = 0;
 
-/** Programs of a device by the code of the hook and the types of its uniforms; '' for none. */
+/**
+ * Returns the programs of a device, keyed by the code of the hook with the types of its uniforms; '' without a hook.
+ */
 const programsOn = (device: GPUDevice): Map<string, SplatProgram> =>
   perDevice(device, 'splat programs', () => new Map<string, SplatProgram>());
 
@@ -48,9 +50,9 @@ export class SplatProgram {
   }
 
   /**
-   * Compiles the shaders concurrently with frames, or returns compiled ones.
-   * @param scenes The scenes to draw with them.
-   * @throws GaussianSplatError `argument/splat-shader` for a hook that does not compile: `found` names the line.
+   * Returns compiled shaders. They are compiled concurrently with frames, once for each hook and device.
+   * @param scenes Scenes that are drawn with these shaders.
+   * @throws GaussianSplatError `argument/splat-shader` for a hook that does not compile; `found` contains the line.
    */
   static async compile(
     device: GPUDevice,
@@ -70,14 +72,14 @@ export class SplatProgram {
     return program;
   }
 
-  /** The shaders that read geometry of a kind. */
+  /** Returns the shaders that read a kind of geometry; default: `PackedGaussian`. */
   reading(kind?: GeometryReading): GeometryReading {
     return kind ? this.#quantized : this.#packed;
   }
 
-  /** Compiles the missing pipelines for frames of these scenes. */
+  /** Compiles the missing pipelines for frames of these scenes, and resolves when all are compiled. */
   prepare(scenes: readonly GaussianScene[]): Promise<void> {
-    const kinds = new Set(scenes.flatMap(({ pages }) => pages.map(({ reading }) => reading)));
+    const kinds = new Set(scenes.flatMap(({ blocks }) => blocks.map(({ reading }) => reading)));
     const { threads } = variantsOf(this.#device);
     return madeTogether(this.#device, () => {
       for (const kind of kinds) {
@@ -89,7 +91,7 @@ export class SplatProgram {
   }
 }
 
-/** Inserts a hook into the shaders of a geometry. */
+/** Returns the shaders of a kind of geometry with a hook. @param key Suffix of their names. */
 function hooked(reading: Required<GeometryReading>, shader: SplatShader, key: string): Required<GeometryReading> {
   const withHook = <S extends ShaderDescription>(stage: S): S => {
     if (!stage.code.includes(HOOK)) return stage;

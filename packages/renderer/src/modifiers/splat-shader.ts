@@ -1,6 +1,6 @@
 /**
- * The WGSL hook of a page: validated, renamed to avoid collisions, and inserted after the function that the stages
- * call.
+ * The WGSL hook of a page. It is validated, renamed to avoid collisions, and inserted in place of the function that the
+ * stages call.
  */
 import { GaussianSplatError } from '@gaussian-splat/core';
 import { constants } from '../generated/shaders.js';
@@ -13,19 +13,19 @@ export interface SplatShader {
   /** WGSL with a function `modify(splat: Splat, uniforms: Uniforms) -> Splat`. */
   readonly code: string;
   /**
-   * Values of the fields of `Uniforms` by name, at most 8. Their names and sizes are part of the code; their values may
+   * Initial values of the fields of `Uniforms` by name, at most 8. Names and sizes are part of the code; values may
    * change in each frame.
    */
   readonly uniforms?: Readonly<Record<string, SplatUniform>> | undefined;
   /** Whether `uniforms.time` advances automatically. Default: false. */
   readonly animated?: boolean | undefined;
-  /** Whether positions and sizes change; false allows culling of whole chunks. Default: true. */
+  /** Whether the hook changes positions or sizes. False allows the renderer to cull whole chunks. Default: true. */
   readonly moves?: boolean | undefined;
 }
 
 const TYPES = ['', 'f32', 'vec2f', 'vec3f', 'vec4f'];
 const sizeOf = (value: SplatUniform): number => (typeof value === 'number' ? 1 : value.length);
-/** Declarations that would connect the module to the outside. */
+/** Matches declarations that would give the module access to resources, entry points or overrides. */
 const FORBIDDEN = /@\s*(group|binding|compute|vertex|fragment|id)\b|\b(enable|requires|override)\s|\bvar\s*</;
 const DECLARED = /\b(?:fn|struct|alias|const)\s+([A-Za-z_]\w*)/g;
 const NAME = /^[A-Za-z]\w*$/;
@@ -41,11 +41,10 @@ const withoutComments = (code: string): string =>
   code.replace(/\/\*[^]*?\*\/|\/\/.*/g, (comment) => comment.replace(/[^\n]/g, ' '));
 
 /**
- * Returns the text of the hook.
+ * Returns the WGSL text of a hook: its function, and the code of the page.
  * @param name Name of the function that the stages call.
  * @param others Text of a stage, whose names the hook must not redeclare.
- * @param maxValues Parameter count of the array of values.
- * @throws GaussianSplatError `argument/splat-shader`
+ * @throws GaussianSplatError `argument/splat-shader` for code or uniforms that are not allowed.
  */
 export function hookText({ code, uniforms = {} }: SplatShader, name: string, others: string): string {
   if (typeof code !== 'string') throw refused('WGSL text in `code`', typeof code);
@@ -63,7 +62,7 @@ export function hookText({ code, uniforms = {} }: SplatShader, name: string, oth
   const fields = entries.map(([key, value]) => `${key}: ${TYPES[sizeOf(value)]},`);
   const values = entries.map(([, value], k) => `, v[${k}]${['', '.x', '.xy', '.xyz', ''][sizeOf(value)]}`);
   const max = constants.MAX_VALUES;
-  // The text of the page starts on a new line, so that line numbers in errors can be converted.
+  // The text of the page starts on a new line, so that the line numbers of errors can be converted.
   return [
     'struct Splat { position: vec3f, color: vec3f, opacity: f32, scale: f32 }',
     `struct Uniforms { time: f32, ${fields.join(' ')} }`,
@@ -75,10 +74,10 @@ export function hookText({ code, uniforms = {} }: SplatShader, name: string, oth
   ].join('\n');
 }
 
-/** Lines in front of the page's text in {@link hookText}. */
+/** Number of lines in front of the page's text in {@link hookText}. */
 const LINES_BEFORE = 6;
 
-/** Renames declarations of a page that the text of the stage has, too. */
+/** Renames the declarations of a page whose names the text of a stage also contains. */
 function renamed(own: string, others: string): string {
   const words = new Set(others.match(/[A-Za-z_]\w*/g));
   const declared = new Set([...own.matchAll(DECLARED)].map(([, name]) => name));
@@ -89,9 +88,9 @@ function renamed(own: string, others: string): string {
 const lineAt = (text: string, index: number): string => ` in line ${text.slice(0, index).split('\n').length}`;
 
 /**
- * Compiles a stage with a hook, and reports its errors.
+ * Compiles a stage with a hook, and throws its first error.
  * @param before Text of the stage in front of the hook.
- * @throws GaussianSplatError `argument/splat-shader` that names the line of the page's text.
+ * @throws GaussianSplatError `argument/splat-shader` with the line of the page's text.
  */
 export async function requireCompiles(device: GPUDevice, code: string, before: string): Promise<void> {
   device.pushErrorScope('validation');

@@ -1,16 +1,17 @@
 import type { GaussianCloud } from '@gaussian-splat/core';
 
 /**
- * Writes the lower triangular root L of a splat's covariance Σ = L Lᵀ into `out` as xx, yx, yy, zx, zy, zz (world
+ * Writes the lower triangular root L of the covariance Σ = L Lᵀ of splat `i` to `out`: xx, yx, yy, zx, zy, zz (world
  * units).
  *
- * Computed by orthogonalizing the rows of R S, never from Σ itself: Σ contains the squares of the axes, so a needle
- * would lose twice the digits.
+ * L is computed by orthogonalizing the rows of R S, never from Σ itself. Σ contains the squares of the axes, so a
+ * needle would lose twice as many digits.
  */
 export function scaleRotationFactor({ rotations, scales }: GaussianCloud, i: number, out: Float64Array): void {
   const [sx, sy, sz] = [scales[3 * i], scales[3 * i + 1], scales[3 * i + 2]];
   let [w, x, y, z] = [rotations[4 * i], rotations[4 * i + 1], rotations[4 * i + 2], rotations[4 * i + 3]];
-  // Divided by the largest first, because squares of tiny or huge components would leave the range of float64.
+  // Divides by the largest component first, because squares of tiny or huge components would exceed the range of
+  // float64.
   const largest = Math.max(Math.abs(w), Math.abs(x), Math.abs(y), Math.abs(z));
   [w, x, y, z] = [w / largest, x / largest, y / largest, z / largest];
   const unit = 1 / Math.sqrt(w * w + x * x + y * y + z * z);

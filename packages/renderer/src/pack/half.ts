@@ -4,7 +4,10 @@ const bits = new Uint32Array(float.buffer);
 /** Largest finite float16. */
 export const HALF_MAX = 65504;
 
-/** The bits of the float16 nearest to a finite number, ties to even; magnitudes beyond {@link HALF_MAX} become ±HALF_MAX. */
+/**
+ * Returns the bits of the float16 nearest to a finite number, ties to even. Magnitudes above {@link HALF_MAX} become
+ * ±HALF_MAX.
+ */
 export function halfBits(value: number): number {
   float[0] = Math.min(HALF_MAX, Math.max(-HALF_MAX, value));
   const b = bits[0];
@@ -12,7 +15,7 @@ export function halfBits(value: number): number {
   const exponent = (b >>> 23) & 0xff;
   const mantissa = b & 0x7fffff;
   if (exponent > 112) {
-    // Normal: rounding up may carry into the exponent, which is right.
+    // Normal number: rounding up may carry into the exponent, which gives the correct result.
     return sign | roundedShift(((exponent - 112) << 23) | mantissa, 13);
   }
   if (exponent < 102) return sign;
@@ -20,7 +23,7 @@ export function halfBits(value: number): number {
   return sign | roundedShift(mantissa | 0x800000, 126 - exponent);
 }
 
-/** value / 2^shift, to the nearest integer, ties to even. */
+/** Returns value / 2^shift, rounded to the nearest integer, ties to even. */
 function roundedShift(value: number, shift: number): number {
   const floor = value >>> shift;
   const rest = value & ((1 << shift) - 1);

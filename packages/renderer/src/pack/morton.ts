@@ -1,37 +1,36 @@
 /**
- * An order that keeps neighbors in space mostly adjacent: along the Z-order curve (Morton 1966), so that blocks of
- * consecutive splats are compact and can be culled as a whole.
+ * Orders splats along the Z-order curve (Morton 1966), which keeps neighbors in space mostly adjacent. Runs of
+ * consecutive splats are therefore compact, and can be culled as a whole.
  */
 import { sortByKey } from './radix-sort.js';
 
-/** Bits of each axis in a 32-bit code. */
+/** Number of bits of each axis in a 32-bit code. */
 const AXIS_BITS = [11, 11, 10] as const;
 const SAMPLE = 4096;
-/** A scene counts as made of planes or layers if this fraction of its splats has the same coordinate. */
+/** Minimum fraction of splats with the same coordinate in a scene that counts as made of planes or layers. */
 const FLAT_SHARE = 0.01;
-/** Minimum number of splats for reordering. */
+/** Minimum number of splats that are reordered. */
 const MIN_COUNT = 1024;
 
 /**
- * A Z-order curve through a scene, fitted to a sample of its splats on each axis. The curve is logarithmic far out, so
- * a sample from a small part of the scene serves the whole scene.
+ * A Z-order curve through a scene, fitted to a sample of its splats on each axis. The curve is logarithmic far from the
+ * center, so that a sample from a small part of the scene suffices for the whole scene.
  */
 export type Curve = readonly Axis[];
 
 /**
- * Returns the curve through the given splats. Undefined for a scene of planes, which keeps its order: its splats may
- * have equal depths, and those are blended in the order of the file.
+ * Returns the curve through the given splats. Undefined for fewer than 1,024 splats, and for a scene of planes. Such a
+ * scene keeps its order: its splats may have equal depths, and are then blended in the order of the file.
  * @param positions [3 N] world units
  * @param kept Indices of splats; not changed.
- * @param samples Number of sampled splats.
  */
-export function curveThrough(positions: Float32Array, kept: Uint32Array, samples = SAMPLE): Curve | undefined {
+export function curveThrough(positions: Float32Array, kept: Uint32Array): Curve | undefined {
   if (kept.length < MIN_COUNT) return undefined;
-  const axes = [0, 1, 2].map((axis) => sampleAxis(positions, kept, axis, samples));
+  const axes = [0, 1, 2].map((axis) => sampleAxis(positions, kept, axis));
   return axes.some(isFlat) ? undefined : axes;
 }
 
-/** Position of each of the splats `kept` on a curve, as a 32-bit code. */
+/** Returns the position on a curve of each splat in `kept`, as a 32-bit code. */
 export function codesAlong(curve: Curve, positions: Float32Array, kept: Uint32Array): Uint32Array {
   const codes = new Uint32Array(kept.length);
   for (let k = 0; k < kept.length; k++) codes[k] = mortonCode(positions, 3 * kept[k], curve);
@@ -39,8 +38,8 @@ export function codesAlong(curve: Curve, positions: Float32Array, kept: Uint32Ar
 }
 
 /**
- * The given splats in the order of the curve through them; unchanged if they are few or lie in planes. Parameters as in
- * {@link curveThrough}.
+ * Returns the given splats in the order of the curve through them; unchanged if they are few or are in planes.
+ * Parameters as in {@link curveThrough}.
  */
 export function mortonOrder(positions: Float32Array, kept: Uint32Array): Uint32Array {
   const curve = curveThrough(positions, kept);
@@ -48,36 +47,37 @@ export function mortonOrder(positions: Float32Array, kept: Uint32Array): Uint32A
 }
 
 /**
- * Whether splats lie in planes or layers. Some of them share a coordinate, so they have equal depths for a camera along
- * its axis, and another order changes the image.
+ * Whether splats are in planes or layers. Many of them then share a coordinate, and have equal depths for a camera
+ * along its axis: another order would change the image.
  * @param positions [3 N] world units
- * @param kept Indices of splats; default all.
+ * @param kept Indices of splats; default: all.
  */
 export function isOfPlanes(positions: Float32Array, kept: Uint32Array = spread(positions.length / 3)): boolean {
   return [0, 1, 2].some((axis) => isFlat(sampleAxis(positions, kept, axis)));
 }
 
-/** Evenly spaced sample indices over all splats. */
+/** Returns up to {@link SAMPLE} evenly spaced indices from 0 to `count` - 1. */
 function spread(count: number): Uint32Array {
   const samples = Math.min(SAMPLE, count);
   return Uint32Array.from({ length: samples }, (_, k) => Math.floor((k * count) / samples));
 }
 
-/** A single splat shares its coordinate with no other. */
+/** Whether too many sampled splats share one coordinate. A tie of 1 does not count: it is a single splat. */
 const isFlat = ({ largestTie, samples }: Axis): boolean => largestTie > Math.max(1, FLAT_SHARE * samples);
 
+/** Statistics of the coordinates of splats on one axis. */
 export interface Axis {
   readonly median: number;
-  /** Median distance from the median, or 1 if that is 0. */
+  /** Median distance of the coordinates from `median`; 1 if that is 0. */
   readonly spread: number;
-  /** Largest number of samples with one and the same coordinate. */
+  /** Largest number of samples that have the same coordinate. */
   readonly largestTie: number;
   readonly samples: number;
 }
 
-/** Statistics of an axis over a sample of the splats. */
-export function sampleAxis(positions: Float32Array, kept: Uint32Array, axis: number, samples = SAMPLE): Axis {
-  const count = Math.min(samples, kept.length);
+/** Returns the statistics of an axis, 0 to 2, over a sample of the splats in `kept`. */
+export function sampleAxis(positions: Float32Array, kept: Uint32Array, axis: number): Axis {
+  const count = Math.min(SAMPLE, kept.length);
   const sample = Float32Array.from({ length: count }, (_, k) => {
     const i = kept[Math.floor((k * kept.length) / count)];
     return positions[3 * i + axis];
@@ -94,8 +94,8 @@ export function sampleAxis(positions: Float32Array, kept: Uint32Array, axis: num
 }
 
 /**
- * Coordinates are compressed by asinh first: nearly linear in the dense part, logarithmic far out, so that a few
- * distant splats do not take the resolution from all others.
+ * Returns the 32-bit code of the position at index `at`. Coordinates are first compressed by asinh: nearly linear in
+ * the dense part, logarithmic far from it. A few distant splats therefore do not reduce the resolution for all others.
  */
 function mortonCode(positions: Float32Array, at: number, axes: readonly Axis[]): number {
   let code = 0;
@@ -113,8 +113,8 @@ const bits = new Uint32Array(float.buffer);
 const BIAS = 127 * 2 ** 23;
 
 /**
- * asinh, to within 0.06 and monotonic: its logarithm is read from the exponent and mantissa of a float32, linear
- * between powers of two.
+ * Returns asinh of a number to within 0.06. The function is monotonic: its logarithm is read from the exponent and
+ * mantissa of a float32, and is linear between powers of two.
  */
 function squeezed(x: number): number {
   float[0] = Math.abs(x) + Math.sqrt(x * x + 1);
@@ -122,7 +122,7 @@ function squeezed(x: number): number {
   return x < 0 ? -size : size;
 }
 
-/** Spreads the lowest 11 bits of a number, two zeros after each. */
+/** Spreads the lowest 11 bits of a number, with two zeros after each. */
 function spreadBits(cell: number): number {
   let x = cell & 0x7ff;
   x = (x | (x << 16)) & 0x070000ff;

@@ -6,7 +6,7 @@ import { shWords } from './words.js';
 const ATTRIBUTES = ['position', 'rotation', 'scale', 'opacity', 'color'] as const;
 type Attribute = (typeof ATTRIBUTES)[number];
 
-/** Motion of splats over some frames: `Motion` of the package formats. */
+/** Motion of splats over several frames: `Motion` of the package formats. */
 export interface Motions {
   readonly frames: number;
   readonly parts: Readonly<
@@ -15,22 +15,32 @@ export interface Motions {
       {
         readonly rank: number;
         readonly step: number;
-        /** [frames, rank] */
+        /** [frames, rank] values of each curve in each frame */
         readonly curves: Float32Array;
-        /** [width, rank] of [splats] */
+        /** [width × rank] planes of [splats] codes: the weight of each curve, for each component of the attribute */
         readonly codes: readonly Int16Array[];
       }
     >
   >;
-  /** Frames that contain each splat; undefined: all. */
-  readonly lives?: { readonly first: Uint16Array; readonly end: Uint16Array } | undefined;
+  /** Range of frames that contain each splat; undefined if all frames contain all splats. */
+  readonly lives?:
+    | {
+        /** [splats] index of the first frame */
+        readonly first: Uint16Array;
+        /** [splats] index of the first frame after the last */
+        readonly end: Uint16Array;
+        /** Fades of the opacity at both ends; undefined if all splats appear and disappear abruptly. */
+        readonly fades?: Readonly<Record<'begin' | 'rise' | 'last' | 'fall', Uint8Array>> | undefined;
+      }
+    | undefined;
 }
 
 /**
- * Splats and their motion in the bytes that the GPU reads. Plain data with transferable buffers, so that a worker can
+ * Splats and their motion, in the layout that the GPU reads. Plain data with transferable buffers, so that a worker can
  * build it.
  */
 export interface PackedAnimation {
+  /** Number of splats. */
   readonly rows: number;
   readonly frames: number;
   /** Number of curves of each attribute. */
@@ -39,27 +49,31 @@ export interface PackedAnimation {
   readonly bases: Uint32Array;
   /** [rows, shWords] words, float16. */
   readonly sh: Uint32Array;
-  /** [planes, rows made even / 2] words. */
+  /** [planes + {@link FADE_PLANES}, {@link planeCodes} / 2] words, each with two 16-bit codes */
   readonly codes: Uint32Array;
-  /** [frames, sum of ranks], multiplied by the quantization steps. */
+  /** [frames, sum of ranks] curves, multiplied by their quantization steps */
   readonly curves: Float32Array;
 }
 
 export const BASE_WORDS = 12;
+/** Number of planes after those of the attributes: one for the appearance of each splat, one for its disappearance. */
+const FADE_PLANES = 2;
+/** Code of an absent fade: the full opacity from the first frame on. */
+const NO_FADE = 255;
 
-/** Codes of a plane in memory: an even number. */
+/** Returns the number of 16-bit codes of a plane in memory: `rows` rounded up to an even number. */
 export const planeCodes = (rows: number): number => rows + (rows & 1);
 
-/** @param origin Origin of the packed positions. */
+/** Packs a cloud and its motion. @param origin Origin of the packed positions. */
 export function packAnimation(cloud: GaussianCloud, motions: Motions, origin: Vector3): PackedAnimation {
   const { frames, parts } = motions;
   const rows = cloud.count;
   const all = Uint32Array.from({ length: rows }, (_, i) => i);
   const ranks = ATTRIBUTES.map((name) => parts[name].rank);
   const planes = ATTRIBUTES.flatMap((name) => parts[name].codes);
-  const codes = new Uint32Array((planeCodes(rows) / 2) * planes.length);
+  const codes = new Uint32Array((planeCodes(rows) / 2) * (planes.length + FADE_PLANES));
   const halves = new Int16Array(codes.buffer);
-  planes.forEach((plane, k) => halves.set(plane, k * planeCodes(rows)));
+  [...planes, ...fadePlanes(rows, motions.lives?.fades)].forEach((plane, k) => halves.set(plane, k * planeCodes(rows)));
   const curveCount = ranks.reduce((sum, rank) => sum + rank, 0);
   const curves = new Float32Array(frames * curveCount);
   let at = 0;
@@ -74,6 +88,13 @@ export function packAnimation(cloud: GaussianCloud, motions: Motions, origin: Ve
     bases: packBases(cloud, motions, origin),
     sh: packSh(cloud, all, 'float16'),
   };
+}
+
+function fadePlanes(rows: number, fades: NonNullable<Motions['lives']>['fades']): readonly Int16Array[] {
+  if (!fades) return Array.from({ length: FADE_PLANES }, () => new Int16Array(rows).fill(NO_FADE));
+  const plane = (ends: Uint8Array, slopes: Uint8Array): Int16Array =>
+    Int16Array.from(ends, (end, i) => end | (slopes[i] << 8));
+  return [plane(fades.begin, fades.rise), plane(fades.last, fades.fall)];
 }
 
 function packBases(cloud: GaussianCloud, { lives, frames }: Motions, origin: Vector3): Uint32Array {
@@ -92,7 +113,7 @@ function packBases(cloud: GaussianCloud, { lives, frames }: Motions, origin: Vec
   return words;
 }
 
-/** Bytes of GPU memory that a part takes. */
+/** Returns the bytes of GPU memory of each buffer of a part. */
 export function animationBytes({
   rows,
   planes,
@@ -102,13 +123,13 @@ export function animationBytes({
   return {
     bases: 4 * BASE_WORDS * rows,
     sh: 4 * shWords(shDegree, 'float16') * rows,
-    codes: 2 * planeCodes(rows) * planes,
-    // Each plane belongs to a curve.
+    codes: 2 * planeCodes(rows) * (planes + FADE_PLANES),
+    // Each plane contains the weights of one curve.
     curves: 4 * frames * planes,
   };
 }
 
-/** Capacity of a part. */
+/** Capacity of a part: its rows, planes and frames. */
 export interface AnimationRoom {
   readonly rows: number;
   readonly planes: number;

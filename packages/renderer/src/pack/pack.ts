@@ -17,10 +17,10 @@ import { GEOMETRY_WORDS, SH_PRECISION, type ShPrecision } from './words.js';
 /** Options of {@link packGaussians}. */
 export interface PackOptions {
   /**
-   * Precision of the spherical harmonics. `int8` keeps eight bits and a scale for each band of each splat, and float16
-   * for the mean color; `float16` takes nearly twice the memory. `auto`, the default, is `int8` if its rounding error
-   * stays below -62 dB per splat over all of them, 75 dB PSNR and more in images, and 50 dB in each 256 neighbors.
-   * docs/decisions/0008 has the figures.
+   * Precision of the spherical harmonics. `int8` stores eight bits for each coefficient, a scale for each band of each
+   * splat, and float16 for the mean color. `float16` takes nearly twice the memory. `auto`, the default, is `int8` if
+   * its rounding error is below -62 dB per splat over all splats (75 dB PSNR and more in images), and below -50 dB in
+   * each run of 256 neighbors. docs/decisions/0008 has the figures.
    */
   readonly sh?: ShPrecision | 'auto';
 }
@@ -35,11 +35,13 @@ export interface PackedHead {
   readonly filterVariance?: number | undefined;
   readonly origin: Vector3;
   readonly droppedCount: number;
-  /** Splats of the finest level, which come first, if there are levels of detail. */
+  /** Number of splats of the finest level, which precede all others; undefined without levels of detail. */
   readonly leafCount?: number;
 }
 
-/** A cloud in the exact bytes that the GPU reads. Plain data with transferable buffers, so that a worker can build it. */
+/**
+ * A cloud in the exact layout that the GPU reads. Plain data with transferable buffers, so that a worker can build it.
+ */
 export interface PackedGaussians extends PackedHead {
   /** [N, 8] words: `PackedGaussian` of shaders/shared/packed_gaussian.wgsl. */
   readonly geometry: Uint32Array;
@@ -47,7 +49,7 @@ export interface PackedGaussians extends PackedHead {
   readonly sh: Uint32Array;
   /** [ceil(N / 256), 8] numbers: `Chunk` of shaders/cull_chunks.wgsl. */
   readonly chunks: Float32Array;
-  /** [ceil(N / 256), 12] numbers, if there are levels of detail: `ChunkLod` of shaders/shared/lod.wgsl. */
+  /** [ceil(N / 256), 12] `ChunkDetail` of the shaders; undefined without levels of detail */
   readonly details?: Float32Array;
 }
 
@@ -56,14 +58,14 @@ const { ALPHA_MIN } = constants;
 const float = new Float32Array(1);
 const bits = new Uint32Array(float.buffer);
 float[0] = ALPHA_MIN;
-/** Smallest 28-bit prefix of a float32 that represents at least 1/255. */
+/** Smallest 28-bit prefix of a float32 whose value is at least 1/255. */
 const FIRST_VISIBLE = Math.ceil(bits[0] / 16);
 
 /**
- * Packs a cloud for {@link GaussianBuffers.upload}: neighbors in space become neighbors in memory, with 32 bytes of
- * geometry for each splat (positions in float32, the covariance's root to 14 significant bits, opacities to 20) and its
+ * Packs a cloud for {@link GaussianBuffers.upload}. Neighbors in space become neighbors in memory. Each splat has 32
+ * bytes of geometry (positions in float32, the root of the covariance to 14 significant bits, opacities to 20), and its
  * spherical harmonics. Splats that `isUsable` of core rejects are dropped and added to `droppedCount`. A cloud with
- * `levelRuns` is drawn completely; `packLevelRuns` selects levels.
+ * `levelRuns` is packed completely; `packLevelRuns` selects levels.
  * @throws GaussianSplatError `argument/cloud` if the arrays do not match `count` and `shDegree`; `argument/value` for
  * an unknown precision.
  */
@@ -89,7 +91,7 @@ function unknownPrecision(found: unknown): GaussianSplatError {
   });
 }
 
-/** Packs some splats of a cloud, in the given order. */
+/** Packs the splats `kept` of a cloud, in the given order. */
 export function packKept(
   cloud: GaussianCloud,
   kept: Uint32Array,
@@ -102,12 +104,12 @@ export function packKept(
   };
 }
 
-/** Index in the cloud of each packed splat. */
+/** Returns the index in the cloud of each packed splat. */
 export function packedOrder(cloud: GaussianCloud): Uint32Array {
   return mortonOrder(cloud.positions, usableIndices(cloud));
 }
 
-/** Indices of the drawable splats, ascending. */
+/** Returns the indices of the drawable splats of a cloud, ascending. */
 export function usableIndices(cloud: GaussianCloud): Uint32Array {
   const indices = new Uint32Array(cloud.count);
   let kept = 0;
@@ -115,7 +117,7 @@ export function usableIndices(cloud: GaussianCloud): Uint32Array {
   return indices.subarray(0, kept);
 }
 
-/** Packs their geometry only. */
+/** Returns [kept, 8] geometry words of the splats `kept`. */
 export function packGeometry(cloud: GaussianCloud, kept: Uint32Array): Uint32Array {
   const words = new Uint32Array(kept.length * GEOMETRY_WORDS);
   const floats = new Float32Array(words.buffer);
@@ -132,21 +134,21 @@ export function packGeometry(cloud: GaussianCloud, kept: Uint32Array): Uint32Arr
   return words;
 }
 
-/** Rounds to the highest bits of a float32; the rest is cut off. */
+/** Returns the `count` highest bits of a float32, rounded to nearest. */
 function highBits(value: number, count: number): number {
   float[0] = value;
   return (bits[0] + (1 << (31 - count))) >>> (32 - count);
 }
 
-/** The 28 highest bits of an opacity, on the same side of 1/255 as the opacity, because splats below it are not drawn. */
+/** Returns the 28 highest bits of an opacity. Rounding never crosses 1/255, because splats below it are not drawn. */
 function opacityBits(opacity: number): number {
   const nearest = highBits(Math.max(0, opacity), 28);
   return opacity >= ALPHA_MIN ? Math.max(nearest, FIRST_VISIBLE) : Math.min(nearest, FIRST_VISIBLE - 1);
 }
 
 /**
- * Writes five words of a factor and an opacity (above 1 only for merged splats): the upper 22 bits of each hold an
- * entry of the factor, the lower 10 a part of the sixth and of the opacity.
+ * Writes five words of a covariance factor and an opacity, which is above 1 only for merged splats. The upper 22 bits
+ * of each word contain an entry of the factor. The lower 10 bits contain parts of the sixth entry and of the opacity.
  */
 export function packShape(words: Uint32Array, at: number, factor: Float64Array, opacity: number): void {
   const last = highBits(factor[5], 22);

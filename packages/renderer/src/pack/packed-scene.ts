@@ -16,23 +16,23 @@ const notWhole = (): GaussianSplatError =>
   });
 
 /**
- * Reads a packed scene back from the GPU, for tools that derive another one. Scenes of generators cannot be read.
- * Rejects if the device is lost meanwhile, and with GaussianSplatError `argument/value` for a streamed scene.
- * @param check Called before each of its buffers is read, which takes several tasks: throws if they were freed
- * meanwhile.
+ * Reads a packed scene back from the GPU, for tools that derive another scene from it. Scenes of generators cannot be
+ * read. Rejects if the device is lost meanwhile, and with GaussianSplatError `argument/value` for a streamed scene.
+ * @param check Called before each buffer is read, because the call takes several tasks. It must throw if the buffers
+ * were freed meanwhile.
  */
 export async function readPacked(
   device: GPUDevice,
   scene: GaussianScene,
   check: () => void = () => undefined,
 ): Promise<PackedGaussians> {
-  const { shDegree, shPrecision, antialiased, filterVariance, origin, pages, pageRequests } = scene;
+  const { shDegree, shPrecision, antialiased, filterVariance, origin, blocks, pageRequests } = scene;
   if (pageRequests) throw notWhole();
   const stride = shWords(shDegree, shPrecision);
   const read = (name: 'geometry' | 'sh' | 'chunks', words: (count: number) => number): Promise<Uint32Array> =>
     readPages(
       device,
-      pages.map((page) => ({ buffer: page[name], words: words(page.count) })),
+      blocks.map((page) => ({ buffer: page[name], words: words(page.count) })),
       check,
     );
   const geometry = await read('geometry', (count) => GEOMETRY_WORDS * count);

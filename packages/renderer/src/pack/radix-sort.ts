@@ -9,8 +9,8 @@ interface Items {
 const itemsOf = (count: number): Items => ({ values: new Uint32Array(count), keys: new Uint32Array(count) });
 
 /**
- * Returns values in ascending order of their keys, equal keys in their order: radix sort, 11 bits in each pass. The
- * arguments are not modified.
+ * Returns values in ascending order of their keys; values with equal keys keep their order. Radix sort with 11 bits in
+ * each pass. The arguments are not modified.
  */
 export function sortByKey(values: Uint32Array, keys: Uint32Array): Uint32Array {
   let from: Items = { values, keys };
@@ -23,7 +23,7 @@ export function sortByKey(values: Uint32Array, keys: Uint32Array): Uint32Array {
   return from.values;
 }
 
-/** Sorts items by a digit (stable). */
+/** Moves items to `to` in the order of one digit of their keys; the sort is stable. */
 function moveByDigit({ values, keys }: Items, to: Items, shift: number): void {
   const starts = new Uint32Array(DIGITS + 1);
   for (const key of keys) starts[((key >>> shift) & (DIGITS - 1)) + 1]++;

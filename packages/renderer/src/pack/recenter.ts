@@ -1,17 +1,17 @@
 import type { GaussianCloud, Vector3 } from '@gaussian-splat/core';
 
-/** Number of positions that are sampled for the center and the extent of a cloud. */
+/** Number of positions that are sampled to find the center and the extent of a cloud. */
 const SAMPLE = 4096;
 /**
- * Maximum distance of a cloud from its origin, in units of its own extent. At 16 a pixel is still accurate to
- * thousandths.
+ * Maximum distance of a cloud from its origin, as a multiple of its own extent. At 16, float32 positions are still
+ * accurate to thousandths of a pixel.
  */
 const FAR = 16;
 
 /**
- * Returns the cloud with its origin moved among its splats, in float64, if they lie far from it: a file may hold
- * float32 coordinates of a million, and a camera matrix in float32 would then round the whole image to their steps.
- * Clouds near their origin are returned unchanged.
+ * Returns the cloud with its origin moved, in float64, into the middle of its splats if they are far from it. A file
+ * may contain float32 coordinates of a million. A camera matrix in float32 would then round the whole image to their
+ * steps. Clouds near their origin are returned unchanged.
  */
 export function recentered(cloud: GaussianCloud): GaussianCloud {
   const columns = [0, 1, 2].map((axis) => sampleOf(cloud, axis));
@@ -27,7 +27,7 @@ export function recentered(cloud: GaussianCloud): GaussianCloud {
   };
 }
 
-/** Finite coordinates along an axis, in ascending order. */
+/** Returns a sample of the finite coordinates along an axis, in ascending order. */
 function sampleOf({ count, positions }: GaussianCloud, axis: number): Float64Array {
   const step = Math.max(1, Math.ceil(count / SAMPLE));
   const values: number[] = [];

@@ -8,16 +8,18 @@ import { GEOMETRY_WORDS, shWords } from './words.js';
 const bits = new Uint32Array(1);
 const float = new Float32Array(bits.buffer);
 
-/** The number with these highest bits. */
+/** Returns the float32 with these bits. */
 function fromBits(word: number): number {
   bits[0] = word;
   return float[0];
 }
 
-/** Upper 22 bits of a float32. */
+/** Mask of the upper 22 bits of a float32. */
 const HIGH_22 = 0xfffffc00;
 
-/** Writes position, factor (xx, yx, yy, zx, zy, zz) and opacity of splat `i` to element `i` of three arrays. */
+/**
+ * Writes the position, the factor (xx, yx, yy, zx, zy, zz) and the opacity of splat `i` to element `i` of three arrays.
+ */
 export function unpackSplat(
   geometry: Uint32Array,
   i: number,
@@ -43,7 +45,7 @@ export function unpackSplat(
 
 let halves: Float32Array | undefined;
 
-/** All float16 values, by their bits. */
+/** Returns the values of all 65,536 float16, indexed by their bits. */
 function halfTable(): Float32Array {
   if (halves !== undefined) return halves;
   halves = new Float32Array(1 << 16);
@@ -55,10 +57,10 @@ function halfTable(): Float32Array {
   return halves;
 }
 
-/** Writes the harmonics of `count` splats from `first` on to the start of `out`. */
+/** Writes the harmonics of `count` splats, from index `first` on, to the beginning of `out`. */
 export type ShReader = (first: number, count: number, out: Float32Array) => void;
 
-/** Reads packed harmonics. */
+/** Returns a function that reads the packed harmonics of a scene. */
 export function shReader({
   sh,
   shDegree,
@@ -94,7 +96,7 @@ function int8Reader(words: Uint32Array, degree: ShDegree): ShReader {
         const scaleCode = codes[from + SCALE_BYTES[band]] & 0xff;
         const step = scaleCode === 0 ? 0 : 2 ** (scaleCode / SCALE_STEPS - SCALE_BIAS) / 127;
         for (let n = 0; n < 3 * BAND_SIZES[band]; n++, code++) {
-          // The last code of degree 1 does not fit behind the others: see packSh.
+          // The last code of degree 1 replaces the scale of band 2: see packSh.
           out[to++] = step * codes[code < from + stride ? code : from + SCALE_BYTES[1]];
         }
       }

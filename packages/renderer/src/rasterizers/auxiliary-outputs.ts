@@ -12,7 +12,8 @@ import { rasterizeKernel, type PaintedTiles, type RasterizeKernel, type Rasteriz
 import { BoundImages } from './tile-painter.js';
 
 /**
- * Auxiliary outputs of a frame: see {@link AuxiliaryTargets}. Few pages use any, so the code is loaded with this class.
+ * Auxiliary outputs of a frame: see {@link AuxiliaryTargets}. Few pages use them, so their code is loaded with this
+ * class.
  */
 export class AuxiliaryOutputs implements AuxiliaryOutputsOf {
   readonly #targets: AuxiliaryTargets;
@@ -26,7 +27,7 @@ export class AuxiliaryOutputs implements AuxiliaryOutputsOf {
   }
 }
 
-/** Also writes auxiliary outputs. */
+/** Rasterizes tiles, and also writes auxiliary outputs. */
 class AuxiliaryPainter implements AuxiliaryTilePainter {
   readonly tile = constants.TILE;
   readonly #device: GPUDevice;
@@ -41,7 +42,7 @@ class AuxiliaryPainter implements AuxiliaryTilePainter {
     this.#survivors = survivors;
   }
 
-  /** Inputs of the frame's rasterization; undefined before it is recorded. */
+  /** Inputs of the frame's rasterization; undefined before the frame is recorded. */
   get frame(): AuxiliaryFrame | undefined {
     return this.#frame;
   }
@@ -50,7 +51,7 @@ class AuxiliaryPainter implements AuxiliaryTilePainter {
     return rasterizeKernel(this.#device, rasterizeTilesAuxiliary, variant);
   }
 
-  /** Bound again for each frame, because few frames have auxiliary outputs. */
+  /** Returns new bindings for each frame. They are not cached, because few frames have auxiliary outputs. */
   bind(kernel: RasterizeKernel, painted: PaintedTiles): GPUBindGroup {
     const unused = unusedOutputs(this.#device);
     const { contributions = unused.contributions, depth = unused.depth } = this.#outputs;

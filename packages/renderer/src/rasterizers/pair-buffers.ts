@@ -6,27 +6,30 @@ import { scanBytes } from '../stages/stage.js';
 import type { RasterizerInputs, Room } from './rasterizer.js';
 
 const { PREFIX_THREADS, PROJECT_GROUP, SORT_BLOCK, DIGITS } = constants;
-/** A slot, or a bin. */
+/** Bytes of one array element, a u32: the index of a slot or of a bin. */
 const WORD_BYTES = 4;
 
-/** Buffers whose size follows the scene. */
+/** Buffers whose size depends on the capacity in splats and pairs. */
 export interface PairBuffers {
-  /** Shares memory with the second of {@link bins}, which is first written when pairs are sorted. */
+  /**
+   * Rectangle of bins of each splat. Shares memory with the second of {@link bins}, which is first written when pairs
+   * are sorted.
+   */
   readonly rects: GPUBuffer;
   readonly groupPairs: GPUBuffer;
   readonly plan: GPUBuffer;
-  /** The second is a ping-pong buffer of {@link RasterizerInputs}. */
+  /** Bin of each pair. The second buffer is a ping-pong buffer of {@link RasterizerInputs}. */
   readonly bins: readonly [GPUBuffer, GPUBuffer];
-  /** The first is the other ping-pong buffer. */
+  /** Slot of each pair. The first buffer is the other ping-pong buffer. */
   readonly pairs: readonly [GPUBuffer, GPUBuffer];
   readonly digitCounts: GPUBuffer;
   readonly digitTotals: GPUBuffer;
 }
 
-/** `bin_index` writes its bits in whole groups. */
+/** Rounds a number of pairs up to whole groups, because `bin_index` writes the bits of whole groups. */
 const wholeGroups = (pairs: number): number => PROJECT_GROUP * Math.ceil(pairs / PROJECT_GROUP);
 
-/** Bytes of either ping-pong buffer. */
+/** Returns the bytes of each of the two ping-pong buffers. */
 export const releasableBytesOf = ({ capacity, pairCapacity }: Room): number =>
   WORD_BYTES * Math.max(wholeGroups(pairCapacity), capacity);
 
@@ -49,7 +52,7 @@ export function pairBuffers(
   };
 }
 
-/** Maximum number of pairs that the device's buffers can hold: whole groups. */
+/** Returns the maximum number of pairs that a buffer of the device can hold, in whole groups. */
 export function maxPairs(device: GPUDevice): number {
   const { maxBufferSize, maxStorageBufferBindingSize } = device.limits;
   const bytes = Math.min(maxBufferSize, maxStorageBufferBindingSize);

@@ -1,4 +1,4 @@
-/** Per-pixel order for the rasterizer `tiles`, loaded with the first frame that requests it. */
+/** Order of splats for each pixel, for the rasterizer `tiles`. Loaded with the first frame that requests it. */
 import type { Camera } from '@gaussian-splat/core';
 import type { FrameBindings } from '../bindings.js';
 import { pixelDepths, pixelDepthsQuantized, rasterizeTilesOrder } from '../generated/order-shaders.js';
@@ -19,10 +19,10 @@ import { BoundImages, type TilePainter } from './tile-painter.js';
 
 type DepthResources = PaintingDepth['resources'];
 
-/** See shaders/pixel_depths.wgsl and shaders/rasterize_tiles_order.wgsl. */
+/** Device resources of `order: 'pixel'`: see shaders/pixel_depths.wgsl and shaders/rasterize_tiles_order.wgsl. */
 export class PixelOrder {
   readonly #device: GPUDevice;
-  /** Bindings for the blocks of a frame. */
+  /** Kernels and bind groups for the blocks of a frame. */
   readonly #pages = new WeakMap<FrameBindings, readonly Recorded[]>();
   readonly #bound = new BoundImages();
 
@@ -31,7 +31,7 @@ export class PixelOrder {
   }
 
   /**
-   * Computes how the depth of each visible splat changes from pixel to pixel, and replaces the sort keys. Record it
+   * Computes how the depth of each visible splat changes from pixel to pixel, and replaces the sort keys. Record this
    * after `project`.
    */
   recordDepths(pass: GPUComputePassEncoder, bindings: FrameBindings): void {
@@ -41,8 +41,9 @@ export class PixelOrder {
   }
 
   /**
-   * @param scratch Buffers of the frame; undefined to compile pipelines only.
-   * @param depth Depth of meshes in the frame.
+   * Returns the variant of tile rasterization that sorts splats for each pixel.
+   * @param scratch Buffers of the frame; undefined if pipelines are only to be compiled.
+   * @param depth Depth of the meshes in the frame; undefined for none.
    */
   painter(
     { orderWindow }: Pick<RenderSettings, 'orderWindow'>,
@@ -67,7 +68,7 @@ export class PixelOrder {
 
   #bindPages({ table, scratch }: FrameBindings): Recorded[] {
     const { order, plan, cullStats, keys } = scratch;
-    return table.pages.map((page, i) => {
+    return table.blocks.map((page, i) => {
       const plain = page.reading ? pixelDepthsQuantized : pixelDepths;
       const kernel = kernelOf<DepthsShader>(this.#device, table.readingOf(i)?.pixelDepths ?? plain);
       const group = kernel.bind({
@@ -80,10 +81,10 @@ export class PixelOrder {
   }
 }
 
-/** array<PixelDepth> by slot */
+/** Returns the buffer array<PixelDepth>, by slot. */
 const depthsIn = (scratch: Scratch): GPUBuffer => scratch.kept('pixel_depths', layouts.PixelDepth.size);
 
-/** Either of the two shaders. */
+/** Shader of `pixel_depths`, for any kind of geometry. */
 type DepthsShader = ShaderDescription & Pick<typeof pixelDepths, 'bindings'>;
 
 interface Recorded {
@@ -92,7 +93,7 @@ interface Recorded {
   readonly groups: number;
 }
 
-/** Placeholder bindings for frames without depth, which are not read. */
+/** Returns placeholders for the bindings of depth in frames without it. The shader does not read them. */
 const noDepth = (device: GPUDevice): DepthResources =>
   perDevice(device, 'order without depth', () => {
     const texture = (usage: number): GPUTextureView =>

@@ -12,12 +12,12 @@ import type {
 } from './rasterizer.js';
 
 const { QUAD_BATCH } = constants;
-/** Two triangles. */
+/** Number of indices of the two triangles of a quad. */
 const INDICES_PER_QUAD = 6;
 
 type Program = ShaderProgram<typeof rasterizeQuads>;
 
-/** Rasterizes quads with the hardware, back to front, blended into a float texture. */
+/** Rasterizes splats as quads with the hardware, back to front, and blends them into a float texture. */
 export class QuadsRasterizer implements Rasterizer {
   readonly name = 'quads';
   readonly #device: GPUDevice;
@@ -46,12 +46,12 @@ export class QuadsRasterizer implements Rasterizer {
     });
   }
 
-  /** Negligible, because quads need no memory of their own. */
+  /** Bytes of the uniform buffer; quads need no other memory. */
   get byteLength(): number {
     return this.#uniform.size;
   }
 
-  /** False, because blending needs an accumulation texture. */
+  /** Returns false, because blending always needs an accumulation texture. */
   finishes(): boolean {
     return false;
   }
@@ -66,7 +66,7 @@ export class QuadsRasterizer implements Rasterizer {
     this.#bindings = this.#program.bind({ raster: this.#uniform, plan, splats, order });
   }
 
-  /** One pipeline serves all settings. */
+  /** Compiles the pipeline, which is the same for all settings. */
   prepare(): void {
     this.#pipeline();
   }
@@ -77,7 +77,7 @@ export class QuadsRasterizer implements Rasterizer {
   record(encoder: GPUCommandEncoder, { surface, timer, depth, depths }: Painting, slice: Slice): void {
     const { view, width, height } = surface;
     const layers = depth?.layers ?? 0;
-    // A frame with layers is not divided, because each slice of the splats lies on both sides of them.
+    // A frame with layers is not divided, because each slice contains splats on both sides of a layer.
     if (layers > 0 && slice.index > 0) return;
     const [index, slices] = layers > 0 ? [0, 1] : [slice.index, slice.count];
     writeStruct(layouts.RasterView, { viewport: [width, height], slice: index, slices }, this.#uniformBytes);
@@ -106,7 +106,7 @@ export class QuadsRasterizer implements Rasterizer {
       for (let part = layers; part >= 0; part--) {
         pass.setPipeline(this.#pipeline(deep, { layers, part }));
         pass.setBindGroup(0, deep && depths ? deep.bind(resources, depth!, depths) : this.#bindings);
-        // Draws the full capacity: the vertices of missing splats are clipped.
+        // Draws as many quads as the capacity; the vertices of missing splats are clipped.
         pass.drawIndexed(QUAD_BATCH * INDICES_PER_QUAD, Math.ceil(capacity / QUAD_BATCH));
         if (part === 0) break;
         pass.setPipeline(this.#layerPipeline(depth!, { layers, nth: part - 1 }));
@@ -156,7 +156,7 @@ function makePipeline(
   });
 }
 
-/** Two triangles for each quad of a batch: corners 0, 1, 2 and 2, 1, 3. */
+/** Creates the indices for a batch of quads: each has the triangles 0, 1, 2 and 2, 1, 3 of its corners. */
 function makeIndices(device: GPUDevice): GPUBuffer {
   const indices = Uint16Array.from(
     { length: QUAD_BATCH * INDICES_PER_QUAD },

@@ -4,39 +4,40 @@ import type { Overrides, ShaderDescription, ShaderProgram } from '../gpu/kernel.
 import type { RenderSettings } from '../render-settings.js';
 import type { TilePainter } from './tile-painter.js';
 
-/** `quads`: hardware rasterization and blending. `tiles`: compute shaders. */
+/** Name of a rasterizer. `quads`: hardware rasterization and blending. `tiles`: compute shaders. */
 export type RasterizerName = 'quads' | 'tiles';
 
-/** Formats of the accumulation texture. Quads blend into `rgba32float` only with the feature `float32-blendable`. */
+/**
+ * Format of the accumulation texture. Quads are blended into `rgba32float` only with the feature `float32-blendable`.
+ */
 export type AccumulationFormat = 'rgba16float' | 'rgba32float';
 
 /** Inputs of every rasterizer. */
 export interface RasterizerInputs {
-  /** `Plan`: number of splats to draw. */
+  /** `Plan`, which contains the number of splats to draw */
   readonly plan: GPUBuffer;
-  /** array<ProjectedSplat> by slot. */
+  /** array<ProjectedSplat>, by slot */
   readonly splats: GPUBuffer;
-  /** Slots from near to far. */
+  /** Slots of the visible splats, from near to far */
   readonly order: GPUBuffer;
   /**
-   * At least {@link Rasterizer.pingPongBytes} each: reserved for the rasterizer from the end of the sort until the next
-   * frame.
+   * Two buffers of at least {@link Rasterizer.pingPongBytes} each. They are reserved for the rasterizer from the end of
+   * the sort until the next frame.
    */
   readonly pingPong: readonly [GPUBuffer, GPUBuffer];
   /** Maximum number of visible splats. */
   readonly capacity: number;
-  /** Required capacity in pairs of splat and bin. */
+  /** Maximum number of pairs of splat and bin. */
   readonly pairCapacity: number;
 }
 
-/** Required capacities. */
+/** Capacities that a rasterizer requires. */
 export type Room = Pick<RasterizerInputs, 'capacity' | 'pairCapacity'>;
 
-/** Destination of a rasterizer. */
+/** Texture view that a rasterizer draws to. Width and height are in pixels. */
 export interface Surface {
   readonly view: GPUTextureView;
   readonly format: GPUTextureFormat;
-  /** Pixels. */
   readonly width: number;
   readonly height: number;
 }
@@ -44,46 +45,49 @@ export interface Surface {
 /** Auxiliary outputs of a frame, besides its image. */
 export interface AuxiliaryTargets {
   /**
-   * One word for each splat, in the order of `packedOrder`, with blocks padded to whole chunks of 256: the bits of the
-   * largest weight, alpha times transmittance, of the splat in any pixel. Larger weights of earlier frames are kept:
-   * clear the buffer for those of a single frame. Usage: storage.
+   * One u32 for each splat, in the order of `packedOrder`, with blocks padded to whole chunks of 256. It contains the
+   * float32 bits of the largest weight (alpha times transmittance) of the splat in any pixel. Larger weights of earlier
+   * frames are kept: clear the buffer for the weights of a single frame. Usage: STORAGE.
    */
   readonly contributions?: GPUBuffer;
   /**
-   * Receives the camera depth of each pixel, in world units to 11 bits: that of the splat that reduces its
-   * transmittance to half or less, 0 if none does. A texture of the target's size, format `r32float`, usage
-   * STORAGE_BINDING.
+   * Texture that receives the camera depth of each pixel, in world units to 11 bits. This is the depth of the splat
+   * that reduces the transmittance to half or less; 0 if no splat does. Same size as the target, format `r32float`,
+   * usage STORAGE_BINDING.
    */
   readonly depth?: GPUTexture;
 }
 
-/** Writes auxiliary outputs: implemented by the class of this name in `@gaussian-splat/renderer/tools`. */
+/** Writes auxiliary outputs. The class of this name in `@gaussian-splat/renderer/tools` implements it. */
 export interface AuxiliaryOutputs {
-  /** @param survivors Indices of the visible splats by slot. */
+  /** Returns the variant of tile rasterization for a frame. @param survivors Indices of the visible splats by slot. */
   painter(device: GPUDevice, survivors: GPUBuffer): AuxiliaryTilePainter;
 }
 
 export interface AuxiliaryTilePainter extends TilePainter {
-  /** Inputs of the frame's rasterization; undefined before it is recorded. */
+  /** Inputs of the frame's rasterization; undefined before the frame is recorded. */
   readonly frame: AuxiliaryFrame | undefined;
 }
 
 /**
- * Rasterization inputs of a frame with auxiliary outputs, for passes that process it again. The renderer owns them:
- * read them before the next frame.
+ * Rasterization inputs of a frame with auxiliary outputs, for passes that process the frame again. They belong to the
+ * renderer: read them before the next frame.
  */
 export interface AuxiliaryFrame {
-  /** `BinView` of shaders/shared/bins.wgsl. */
+  /** `BinView` of shaders/shared/bins.wgsl */
   readonly view: GPUBuffer;
-  /** array<ProjectedSplat> by slot. */
+  /** array<ProjectedSplat>, by slot */
   readonly splats: GPUBuffer;
-  /** array<u32>: slots, bin by bin and in depth order. */
+  /** array<u32>: slots, bin by bin, in depth order within each bin */
   readonly pairs: GPUBuffer;
-  /** Bits of the pairs that touch each tile: `tile_word` of shaders/shared/bins.wgsl. */
+  /**
+   * One bit for each tile of a bin and each pair, set if the splat touches the tile: `tile_word` of
+   * shaders/shared/bins.wgsl
+   */
   readonly tile_bits: GPUBuffer;
-  /** array<vec2u>: for each bin the first pair, and the one after the last. */
+  /** array<vec2u>: for each bin the index of its first pair, and of the first pair after its last */
   readonly ranges: GPUBuffer;
-  /** Indices of the splats by slot, as in {@link AuxiliaryTargets.contributions}. */
+  /** Indices of the splats by slot, in the order of {@link AuxiliaryTargets.contributions} */
   readonly survivors: GPUBuffer;
 }
 
@@ -91,26 +95,29 @@ export interface AuxiliaryFrame {
 export type DepthTexture = 'stored_depth' | 'median_depth' | 'layer_color' | 'second_depth' | 'second_color';
 
 /**
- * Depth of a frame besides its own: `SceneDepth` implements it. Frames provide it, so that pages without it load none
- * of its code.
+ * Depth of meshes and depth output of a frame; `SceneDepth` implements it. Frames provide it, so that pages without
+ * depth do not load its code.
  */
 export interface PaintingDepth {
-  /** Called before a frame is recorded, with its resolution. @throws GaussianSplatError if it does not fit the frame. */
+  /**
+   * Prepares a frame before it is recorded. @param drawn Size of the rendered image in pixels. @throws
+   * GaussianSplatError if the textures do not fit the frame.
+   */
   prepare(
     camera: Camera,
     drawn: { readonly width: number; readonly height: number },
     rasterizer: RasterizerName,
     auxiliary: AuxiliaryOutputs | undefined,
   ): void;
-  /** @param depths Camera depths of the splats by slot. */
+  /** Returns the variant of tile rasterization with depth. @param depths Camera depths of the splats by slot. */
   painter(depths: GPUBuffer): TilePainter;
   readonly quadsProgram: QuadsWithDepth;
-  /** Layers of color among the splats; 0 if the depth only ends pixels. */
+  /** Number of layers of color among the splats, 0 to 2. With 0, pixels end at the depth. */
   readonly layers: number;
-  /** For quads: blends a layer over the splats behind it. */
+  /** Program for `quads` that blends a layer over the splats behind it. */
   readonly layerProgram: Pick<ShaderProgram<ShaderDescription>, 'module' | 'pipelineLayout'>;
   readonly layerBindings: GPUBindGroup;
-  /** Resources and overrides of a shader that reads depth. */
+  /** Resources of a shader that reads depth. */
   readonly resources: Readonly<Record<'scene', GPUBuffer> & Record<DepthTexture, GPUTextureView>>;
   readonly overrides: Overrides;
 }
@@ -125,7 +132,7 @@ export interface QuadsWithDepth extends Pick<ShaderProgram<ShaderDescription>, '
   ): GPUBindGroup;
 }
 
-/** Settings of rasterizers. */
+/** Settings that rasterizers use. */
 export type RasterSettings = Pick<RenderSettings, 'transmittanceMin'>;
 
 /** One frame to draw. */
@@ -133,22 +140,24 @@ export interface Painting {
   readonly surface: Surface;
   readonly settings: RasterSettings;
   /**
-   * Premultiplied background color; the surface then receives the final image. Without it the surface receives color,
-   * with the transmittance in the alpha channel. Only for surfaces that the rasterizer `finishes`.
+   * Premultiplied background color, for which the surface receives the final image: only for surfaces that the
+   * rasterizer `finishes`. Without it the surface receives color, with the transmittance in the alpha channel.
    */
   readonly background?: readonly [number, number, number, number];
   readonly timer?: FrameTimer | undefined;
-  /** `quads` only: depth of meshes. */
+  /** Depth of meshes, for `quads` only. */
   readonly depth?: PaintingDepth | undefined;
-  /** Camera depths of the splats by slot; with {@link depth}. */
+  /** Camera depths of the splats by slot; required with {@link depth}. */
   readonly depths?: GPUBuffer | undefined;
-  /** `tiles` only: variant of the tile rasterization; default is the plain one. */
+  /**
+   * Variant of the tile rasterization, for `tiles` only. Default: without depth, auxiliary outputs and per-pixel order.
+   */
   readonly painter?: TilePainter | undefined;
 }
 
 /**
- * A slice of a frame's rasterization: all `count` of them, in order, give the image. Each rasterizer defines its
- * slices.
+ * A slice of a frame's rasterization; `index` is 0 to `count` - 1. All slices in order draw the image. Each rasterizer
+ * divides a frame in its own way.
  */
 export interface Slice {
   readonly index: number;
@@ -156,26 +165,26 @@ export interface Slice {
 }
 
 /**
- * Rasterizes projected, depth-sorted splats. Rasterizers are interchangeable: same inputs, same falloff
- * (shaders/shared/falloff.wgsl), same output.
+ * Rasterizes projected splats that are sorted by depth. Rasterizers are interchangeable: they have the same inputs, the
+ * same falloff (shaders/shared/falloff.wgsl) and the same output.
  */
 export interface Rasterizer {
   readonly name: RasterizerName;
   /** Bytes of allocated GPU memory. */
   readonly byteLength: number;
-  /** `Plan` of the pairs of splat and bin, if the rasterizer uses pairs. */
+  /** `Plan` of the pairs of splat and bin; undefined for a rasterizer without pairs. */
   readonly pairPlan?: GPUBuffer;
-  /** Whether the rasterizer can write a final image of this format directly. */
+  /** Whether the rasterizer can write a final image of this format directly to the target. */
   finishes(format: GPUTextureFormat): boolean;
-  /** Required bytes of each buffer of {@link RasterizerInputs.spare}. */
+  /** Returns the required bytes of each buffer of {@link RasterizerInputs.pingPong}. */
   pingPongBytes(room: Room): number;
-  /** Binds the buffers; called again only when they are replaced. */
+  /** Binds the buffers. Called again only when buffers are replaced. */
   bind(inputs: RasterizerInputs): void;
-  /** Compiles the pipelines for other settings, so that no frame has to. @param format Format of the targets. */
+  /** Compiles the pipelines for other settings, so that no frame compiles them. @param format Format of the targets. */
   prepare(settings: RasterSettings, format: GPUTextureFormat, painter?: TilePainter): void;
-  /** Records the common work of all slices of a frame, before the first of them. */
+  /** Records the work that all slices of a frame share, before the first slice. */
   prepareFrame(encoder: GPUCommandEncoder, painting: Painting): void;
-  /** Records one slice of a frame. Slices are submitted one by one. */
+  /** Records one slice of a frame. Each slice is submitted separately. */
   record(encoder: GPUCommandEncoder, painting: Painting, slice: Slice): void;
   destroy(): void;
 }

@@ -9,7 +9,7 @@ import {
   type ShaderDescription,
 } from '../gpu/kernel.js';
 
-/** Kernels that list splats for bins: the same for any image. */
+/** Kernels that list splats for bins. They are the same for all formats and variants. */
 export interface ListingKernels {
   readonly count: ComputeKernel<typeof binCount>;
   readonly plan: ComputeKernel<typeof binPlan>;
@@ -18,7 +18,7 @@ export interface ListingKernels {
   readonly order: ComputeKernel<typeof binOrder>;
 }
 
-/** @param tile Side of a tile in pixels. */
+/** Returns the kernels that list splats for bins. @param tile Side of a tile in pixels. */
 export function listingKernels(device: GPUDevice, tile: number): ListingKernels {
   const side = { tile_side: tile };
   return {
@@ -30,21 +30,25 @@ export function listingKernels(device: GPUDevice, tile: number): ListingKernels 
   };
 }
 
-/** Rasterizes tiles. Most variants have more bindings than `rasterize_tiles`. */
+/** Kernel that rasterizes tiles. Most variants have more bindings than `rasterize_tiles`. */
 export type RasterizeKernel = ComputeKernel<typeof rasterizeTiles>;
 
-/** Common bindings of every kernel that rasterizes tiles. */
+/** Bindings that all kernels which rasterize tiles have. */
 export type PaintedTiles = Parameters<RasterizeKernel['bind']>[0] & { readonly image: GPUTextureView };
 
-/** Key of one pipeline. */
+/** Properties that select the pipeline of a kernel. */
 export interface RasterizeVariant {
   readonly format: GPUTextureFormat;
+  /** Whether the image is final: composed over the background. */
   readonly isFinal: boolean;
-  /** See `transmittanceMin` of the settings. */
+  /**
+   * Whether pixels end before the splat that would reach the minimum transmittance: see
+   * `RenderSettings.transmittanceMin`.
+   */
   readonly refusesLast: boolean;
 }
 
-/** The pipeline of a shader for a variant, created once for each device. */
+/** Returns the pipeline of a shader for a variant, which is created once for each device. */
 export function rasterizeKernel(
   device: GPUDevice,
   shader: ShaderDescription,

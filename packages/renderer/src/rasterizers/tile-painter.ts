@@ -1,21 +1,23 @@
-/** Variants of tile rasterization: one is selected for each frame. */
+/** Variants of tile rasterization. Each frame uses one of them. */
 import { constants, rasterizeTiles } from '../generated/shaders.js';
 import type { Resource } from '../gpu/kernel.js';
 import { rasterizeKernel, type PaintedTiles, type RasterizeKernel, type RasterizeVariant } from './tile-kernels.js';
 
 /** A variant of tile rasterization. */
 export interface TilePainter {
-  /** Side of its tiles, pixels. */
+  /** Side of the tiles in pixels. */
   readonly tile: number;
+  /** Returns the kernel with the pipeline for a variant. */
   kernel(variant: RasterizeVariant): RasterizeKernel;
+  /** Returns the bind group for a frame's resources. */
   bind(kernel: RasterizeKernel, painted: PaintedTiles): GPUBindGroup;
 }
 
-/** Bind groups by target image, created again when other resources are bound. */
+/** Cache of bind groups by target image. A group is created again when other resources are bound. */
 export class BoundImages {
   readonly #known = new WeakMap<GPUTextureView, { readonly key: readonly unknown[]; readonly group: GPUBindGroup }>();
 
-  /** @param more Additional bindings of the kernel. */
+  /** Returns the bind group of a kernel for an image. @param more Additional bindings of the kernel. */
   bind(kernel: RasterizeKernel, painted: PaintedTiles, more: Readonly<Record<string, Resource>> = {}): GPUBindGroup {
     const resources = { ...painted, ...more };
     const key = [kernel, ...Object.values(resources)];
@@ -27,7 +29,7 @@ export class BoundImages {
   }
 }
 
-/** Rasterizes splats only. */
+/** Rasterizes splats without depth, auxiliary outputs or per-pixel order. */
 export class PlainPainter implements TilePainter {
   readonly tile = constants.TILE;
   readonly #device: GPUDevice;

@@ -22,19 +22,19 @@ const { BIN_COLUMNS, BIN_ROWS, PREFIX_THREADS, PROJECT_GROUP, TILES_PER_BIN } = 
 
 const groupsOf = (splats: number): number => Math.ceil(splats / PREFIX_THREADS);
 
-/** Bins across and down in an image, and the bits of a bin's index. */
+/** Number of columns and rows of bins in an image, and number of bits of the index of a bin. */
 interface Grid {
   readonly columns: number;
   readonly rows: number;
   readonly bits: number;
 }
 
-/** Bindings for one scene, one number of bins and one tile size. */
+/** Bindings for one scratch, one number of bins and one tile size. */
 interface GridBindings {
   readonly grid: Grid;
   readonly kernels: ListingKernels;
   readonly ranges: GPUBuffer;
-  /** The bins in rasterization order. */
+  /** Indices of the bins in the order of rasterization: longest lists first. */
   readonly binOrder: GPUBuffer;
   readonly count: GPUBindGroup;
   readonly emit: GPUBindGroup;
@@ -44,27 +44,28 @@ interface GridBindings {
   readonly order: GPUBindGroup;
 }
 
-/** Image formats that a compute shader may write without an optional feature, and the one that requires one. */
+/** Image formats that a compute shader can write without an optional feature. */
 const STORABLE: readonly GPUTextureFormat[] = ['rgba8unorm', 'rgba16float', 'rgba32float'];
+/** Image format that a compute shader can write with the feature `bgra8unorm-storage`. */
 const STORABLE_WITH_FEATURE: GPUTextureFormat = 'bgra8unorm';
 
-/** Number of grids with cached bindings. */
+/** Maximum number of grids with cached bindings. */
 const MAX_GRIDS = 12;
 
 /**
- * At the threshold of training, the splat that would go below it is rejected; at higher ones it is the last one that is
- * blended.
+ * Whether a pixel ends before the splat that would reach the minimum transmittance, as in training. With a minimum
+ * above that of training, the pixel ends after this splat.
  */
 const refusesLast = ({ transmittanceMin }: RasterSettings): boolean => transmittanceMin <= TRAINED_TRANSMITTANCE;
 
 const TRANSPARENT = [0, 0, 0, 0] as const;
 
 /**
- * Compute shaders on two scales of tiles. Splats are listed, in depth order, for bins of 8 x 4 tiles: counted, written,
- * and sorted by bin with a stable sort that keeps the depth order. Tiles then walk their bin's list front to back,
- * longest lists first, and stop when all their pixels are opaque.
+ * Rasterizes splats with compute shaders on two scales of tiles. Splats are listed, in depth order, for bins of 8 x 4
+ * tiles: pairs of splat and bin are counted, written, and sorted by bin with a stable sort. Each tile then blends the
+ * splats of its bin front to back, and stops when all its pixels are opaque. Bins with the longest lists come first.
  *
- * Pairs beyond the capacity belong to the farthest splats; they are dropped.
+ * Pairs beyond the capacity are dropped. They belong to the farthest splats.
  */
 export class TilesRasterizer implements Rasterizer {
   readonly name = 'tiles';
@@ -77,7 +78,7 @@ export class TilesRasterizer implements Rasterizer {
   readonly #viewBytes = new ArrayBuffer(layouts.BinView.size);
   #inputs: RasterizerInputs | undefined;
   #buffers: PairBuffers | undefined;
-  /** Keyed by tile size and the number of bins across and down, because images in motion may have fewer pixels. */
+  /** Bindings by tile size and number of columns and rows of bins, because images in motion may have fewer pixels. */
   readonly #bound = new Map<string, GridBindings>();
 
   constructor(device: GPUDevice, accumulation: AccumulationFormat, threads: Threads) {
@@ -122,7 +123,7 @@ export class TilesRasterizer implements Rasterizer {
     prepare({ format: this.#accumulation, isFinal: false });
   }
 
-  /** Lists the splats for the bins. */
+  /** Records the lists of splats for all bins. */
   prepareFrame(encoder: GPUCommandEncoder, painting: Painting): void {
     if (this.#inputs === undefined || this.#buffers === undefined) return;
     const bound = this.#gridFor(painting, this.#inputs, this.#buffers);
@@ -131,7 +132,7 @@ export class TilesRasterizer implements Rasterizer {
     const { count, plan, emit, index, order } = bound.kernels;
     const timestampWrites = painting.timer?.timestampWrites('bin');
     const bin = encoder.beginComputePass({ label: 'gs.bin', timestampWrites });
-    // Dispatches the full capacity: groups beyond the actual splats and pairs end at once.
+    // Dispatches groups for the whole capacity; those beyond the actual splats and pairs end at once.
     const groups = groupsOf(this.#inputs.capacity);
     count.dispatch(bin, bound.count, groups);
     plan.dispatch(bin, bound.plan, 1);
@@ -146,11 +147,11 @@ export class TilesRasterizer implements Rasterizer {
     const { surface, settings, background, painter = this.#plain, timer } = painting;
     if (this.#inputs === undefined || this.#buffers === undefined) return;
     const bound = this.#gridFor(painting, this.#inputs, this.#buffers);
-    // Tiles are interleaved, so that all slices of a frame have long and short lists.
+    // Each slice contains every `count`-th tile, so that all slices have long and short lists.
     const tiles = bound.grid.columns * bound.grid.rows * TILES_PER_BIN;
     const groups = Math.ceil((tiles - slice.index) / slice.count);
     if (groups <= 0) return;
-    // An undivided frame uses the view that its splats were listed with.
+    // An undivided frame uses the view with which its splats were listed.
     if (slice.count > 1) this.#writeView(painting, bound.grid, slice);
     const paint = encoder.beginComputePass({
       label: 'gs.rasterize',
@@ -169,7 +170,7 @@ export class TilesRasterizer implements Rasterizer {
   }
 
   #release(): void {
-    // The ping-pong buffers belong to other memory, and stay.
+    // `free` ignores the ping-pong buffers, because they belong to another `GpuMemory`.
     for (const buffer of Object.values(this.#buffers ?? {}).flat()) this.#memory.free(buffer as GPUBuffer);
     this.#forgetGrids();
     this.#buffers = undefined;
@@ -241,7 +242,7 @@ export class TilesRasterizer implements Rasterizer {
       splats,
       pairs: pairs[sorted],
       ...{ ranges: bound.ranges, bin_order: bound.binOrder },
-      // The unsorted input is free once the pairs are sorted.
+      // The unsorted input is not needed after the sort.
       tile_bits: bins[1 - sorted]!,
       image,
     };

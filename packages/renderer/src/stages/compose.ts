@@ -8,8 +8,8 @@ const { COMPOSE_SIDE } = constants;
 const OVER: GPUBlendComponent = { srcFactor: 'one', dstFactor: 'one-minus-src-alpha', operation: 'add' };
 
 /**
- * Resources of the composition, bound for drawing; for storing they are bound to each view of a target at its first
- * use.
+ * Resources of the composition. `drawn` is bound for {@link ComposeStage.draw}; `stored` contains the bind group of
+ * each target view, which is created at its first use.
  */
 export interface ComposeBindings {
   readonly resources: Resources<typeof compose>;
@@ -18,9 +18,9 @@ export interface ComposeBindings {
 }
 
 /**
- * Composes the accumulated splats over the background: `draw` into a view of any renderable color format, `store` into
- * one that a compute shader may write. The image is the same up to the rounding of its format. A GPU with few raster
- * units (an H200 has them only in a small part) takes longer for one triangle than for all tiles.
+ * Composes the accumulated splats over the background. `draw` writes to a view of any renderable color format, `store`
+ * to a view that a compute shader may write. Both write the same image, except for the rounding of its format. On a GPU
+ * with few raster units, such as an H200, drawing one triangle takes longer than rasterizing all tiles.
  */
 export class ComposeStage {
   readonly #device: GPUDevice;
@@ -39,13 +39,18 @@ export class ComposeStage {
     return { resources, drawn: this.#program.bind(resources), stored: new WeakMap() };
   }
 
-  /** Compiles the pipeline for targets of a format, so that no frame has to. */
+  /**
+   * Compiles the pipeline for targets of a format, so that no frame compiles it. @param isStored Whether `store` is
+   * used instead of `draw`.
+   */
   prepare(format: GPUTextureFormat, isStored: boolean): void {
     if (isStored) this.#kernel(format).prepare();
     else this.#pipeline(format);
   }
 
-  /** @param keeps Composes over the content of the target instead of a background. */
+  /**
+   * Records a render pass that composes the image. @param keeps Whether the content of the target is the background.
+   */
   draw(
     encoder: GPUCommandEncoder,
     bindings: ComposeBindings,

@@ -2,11 +2,11 @@ import { detailAllow, detailCount } from '../generated/budget-shaders.js';
 import { constants } from '../generated/shaders.js';
 import { Stage } from './stage.js';
 
-/** Finds the error threshold on screen that keeps a frame within its splat budget. */
+/** Stages that find the error threshold in pixels which keeps a frame within its splat budget. */
 export interface DetailBudget {
-  /** Counts one block; `lod_counts` must be 0 before the first. */
+  /** Counts the splats of one block; `detail_counts` must be 0 before the first block. */
   readonly count: Stage<typeof detailCount>;
-  /** Runs after the last block. */
+  /** Finds the threshold; runs after the last block. */
   readonly threshold: Stage<typeof detailAllow>;
 }
 

@@ -1,6 +1,6 @@
 import { perDevice, SHADER_STAGE, ShaderProgram, type Resources, type ShaderDescription } from '../gpu/kernel.js';
 
-/** A shader that draws every pixel of a target once: entry points `vertex` and `fragment`. */
+/** A stage that draws every pixel of a target once. The entry points of its shader are `vertex` and `fragment`. */
 export class FullScreenStage<S extends ShaderDescription> {
   readonly #device: GPUDevice;
   readonly #name: string;

@@ -12,22 +12,25 @@ import { BUFFER_USAGE, kernelOf, perDevice, type ComputeKernel } from '../gpu/ke
 import { writeStruct } from '../gpu/struct.js';
 import type { Threads } from './stage.js';
 
-/** Buffers of {@link SortStage}. */
+/** Buffers that a {@link SortStage} reads and writes. */
 export interface SortBuffers {
-  /** `Plan`: the number of keys. */
+  /** `Plan`, which contains the number of keys. */
   readonly plan: GPUBuffer;
-  /** The input keys are in the first. Passes alternate between the two: see {@link sortedIn}. */
+  /**
+   * Keys. The first buffer contains the input. Passes alternate between the two buffers; {@link sortedIn} returns the
+   * one that contains the result.
+   */
   readonly keys: readonly [GPUBuffer, GPUBuffer];
   /**
-   * Values that move with the keys. Given words start in the first buffer, too. Indices are written by the first pass,
-   * and end in the first buffer.
+   * Values that move with the keys. For `given` values the first buffer contains the input, and the result is in the
+   * same buffer as the keys. For `indices` the first pass writes them, and the first buffer contains the result.
    */
   readonly values: readonly [GPUBuffer, GPUBuffer];
   readonly digitCounts: GPUBuffer;
   readonly digitTotals: GPUBuffer;
 }
 
-/** Bind groups of one pass over the keys. */
+/** Bind groups of one pass over a digit of the keys. */
 interface SortPass {
   readonly count: GPUBindGroup;
   readonly scan: GPUBindGroup;
@@ -38,21 +41,20 @@ const { DIGITS, DIGITS_PER_GROUP, DIGITS_PER_SERIAL_GROUP } = constants;
 const MAX_KEY_BITS = 32;
 const DIGIT_BITS = Math.log2(DIGITS);
 
-/** Number of passes for keys of this many bits. */
+/** Returns the number of passes for keys of `keyBits` bits. */
 const passCount = (keyBits: number): number => Math.max(1, Math.ceil(keyBits / DIGIT_BITS));
 
-/** Value of a key: its index, or a word of the caller. */
+/** Values that are sorted: the indices of the keys, or words of the caller. */
 export type SortValues = 'indices' | 'given';
 
 /**
- * Index of the buffer, of keys and of given words, that holds the result for keys of this many bits: the first (0) or
- * the second (1).
+ * Returns the index of the buffer that contains the sorted keys and given values, for keys of `keyBits` bits: 0 or 1.
  */
 export const sortedIn = (keyBits: number): 0 | 1 => (passCount(keyBits) % 2 === 0 ? 0 : 1);
 
 /**
- * Stable least-significant-digit radix sort of keys of up to 32 bits: for each digit a pass of count, scan, scatter.
- * Counts are reduced and scanned between dispatches, so no workgroup ever waits for another.
+ * Stable radix sort of keys of up to 32 bits, from the least significant digit. Each pass counts, scans and scatters
+ * one digit. Counts are reduced and scanned between dispatches, so that no workgroup waits for another.
  */
 export class SortStage {
   readonly #moving: SortValues;
@@ -72,7 +74,10 @@ export class SortStage {
     this.#passUniforms = perDevice(device, `sort passes ${moving}`, () => makePassUniforms(device, moving));
   }
 
-  /** @param keyBits Number of low bits of a key to sort by; the others must be 0 or are ignored. */
+  /**
+   * Returns the bind groups of all passes. @param keyBits Number of low bits that keys are sorted by; higher bits are
+   * ignored.
+   */
   bind({ plan, keys, values, digitCounts, digitTotals }: SortBuffers, keyBits = MAX_KEY_BITS): readonly SortPass[] {
     const passes = passCount(keyBits);
     return this.#passUniforms.slice(0, passes).map((uniform, index) => {
@@ -95,7 +100,7 @@ export class SortStage {
     });
   }
 
-  /** @param most Maximum number of keys: blocks beyond the actual number end at once. */
+  /** Records all passes. @param max Maximum number of keys; workgroups beyond the actual number end at once. */
   record(pass: GPUComputePassEncoder, bindings: readonly SortPass[], max: number): void {
     const blocks = Math.ceil(max / constants.SORT_BLOCK);
     for (const { count, scan, scatter } of bindings) {

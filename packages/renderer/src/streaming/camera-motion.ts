@@ -10,26 +10,28 @@ import {
   type Vector3,
 } from '@gaussian-splat/core';
 
-/** Milliseconds of one measuring interval; motion is compared between the current and the previous one. */
+/**
+ * Milliseconds of one measuring interval. The motion of the current interval is compared with that of the previous one.
+ */
 const STRETCH_MS = 50;
-/** After this time without a camera, ms, earlier samples are discarded. */
+/** Maximum milliseconds between two cameras. After a longer time earlier samples are discarded. */
 const PAUSE_MS = 250;
-/** Maximum ratio of the speeds of two consecutive intervals. */
+/** Maximum ratio of the speed of the current interval to that of the previous one. */
 const MAX_GROWTH = 2;
 /** Maximum predicted rotation in radians. */
 const MAX_TURN = 1;
-/** Tolerance of the row lengths of a matrix that counts as rotation and translation. */
+/** Tolerance of the squared row lengths of a matrix that counts as rotation and translation. */
 const SKEW = 1e-3;
 
 /**
- * Milliseconds to request, read back and fetch a page and its parent, which must be resident first; and the maximum
- * prediction time.
+ * Milliseconds that are added to the arrival time of a page: for the feedback pass, its read-back, and the parent page,
+ * which must be resident first. The second number is the maximum prediction time.
  */
 const [LOOK_MS, MAX_AHEAD_MS] = [250, 600];
 
 /**
- * Prediction time of a camera for page requests, in milliseconds. @param arrivalMs Milliseconds that a page takes to
- * arrive.
+ * Returns the prediction time of a camera for page requests, in milliseconds.
+ * @param arrivalMs Mean milliseconds from the request of a page to its upload.
  */
 export const aheadMs = (arrivalMs: number): number => Math.min(MAX_AHEAD_MS, LOOK_MS + arrivalMs);
 
@@ -39,7 +41,10 @@ interface Sample {
   readonly at: number;
 }
 
-/** World units and radians (about an axis in camera coordinates) per millisecond. */
+/**
+ * Velocity of a camera. `moves`: world units per millisecond. `turns`: radians per millisecond, times the axis in
+ * camera coordinates.
+ */
 interface Velocity {
   readonly moves: Vector3;
   readonly turns: Vector3;
@@ -48,20 +53,20 @@ interface Velocity {
 const STILL: Vector3 = [0, 0, 0];
 
 /**
- * Predicts the motion of a camera: it keeps the speed of the last 50 ms, as far as the 50 ms before agree. A camera
- * that rests, jumps, oscillates, or was not observed for a while is predicted to stay.
+ * Predicts the motion of a camera. The camera keeps the speed of the last 50 ms, limited by the speed of the 50 ms
+ * before. A camera that rests, jumps, oscillates, or was not observed for a while is predicted to stay.
  */
 export class CameraMotion {
   readonly #samples: Sample[] = [];
 
-  /** Records a camera. @param now Milliseconds. */
+  /** Records the camera of a frame. @param now Current time in milliseconds, from any origin. */
   observe(camera: Camera, now: number): void {
     const last = this.#samples.at(-1);
     if (last && now - last.at > PAUSE_MS) this.#samples.length = 0;
     // Copied, because callers may reuse one matrix for every frame.
     const worldToCamera = Float64Array.from(camera.worldToCamera);
     this.#samples.push({ camera: { ...camera, worldToCamera }, eye: eyeOf(worldToCamera), at: now });
-    // Keeps the newest sample that is two intervals old; frames longer than an interval leave three samples.
+    // Keeps the newest sample that is at least two intervals old. Frames longer than an interval leave three samples.
     while (this.#samples.length > 3 && now - this.#samples[1].at >= 2 * STRETCH_MS) this.#samples.shift();
   }
 
@@ -71,7 +76,10 @@ export class CameraMotion {
     return length(moves) > 0 || length(turns) > 0;
   }
 
-  /** Predicts the last recorded camera after this many milliseconds; returns that camera itself if it does not move. */
+  /**
+   * Predicts the last recorded camera after this many milliseconds. Returns the same object if the camera does not
+   * move.
+   */
   ahead(milliseconds: number): Camera {
     const { camera, eye } = this.#samples.at(-1)!;
     const { moves, turns } = this.#velocity();
@@ -93,8 +101,8 @@ export class CameraMotion {
 }
 
 /**
- * Damps a velocity by the previous one: zero if they oppose each other, else at most {@link MAX_GROWTH} times the
- * previous one.
+ * Limits a velocity by the previous one. Returns zero if they oppose each other; otherwise the speed is at most {@link
+ * MAX_GROWTH} times the previous one.
  */
 function lasting(before: Vector3, now: Vector3): Vector3 {
   if (dot(before, now) <= 0) return STILL;
@@ -112,17 +120,21 @@ const row = (m: Matrix4, k: number): Vector3 => [m[4 * k], m[4 * k + 1], m[4 * k
 
 const isRigid = (m: Matrix4): boolean => [0, 1, 2].every((k) => Math.abs(length(row(m, k)) - 1) < SKEW);
 
-/** Axis times angle of the rotation B Aᵀ between the axes of two cameras. */
+/** Returns the rotation B Aᵀ between the axes of two cameras as a rotation vector: axis times angle in radians. */
 function rotationVector(a: Matrix4, b: Matrix4): Vector3 {
   const of = (i: number, j: number): number => dot(row(b, i), row(a, j));
   const twice: Vector3 = [of(2, 1) - of(1, 2), of(0, 2) - of(2, 0), of(1, 0) - of(0, 1)];
   const sine = length(twice) / 2;
-  // Half a turn between two frames has no axis, and is not counted as motion.
+  // A rotation by 180° between two frames has no defined axis, and does not count as motion.
   if (sine < 1e-9) return STILL;
   return scale(twice, Math.atan2(sine, (of(0, 0) + of(1, 1) + of(2, 2) - 1) / 2) / (2 * sine));
 }
 
-/** A camera's matrix with its axes rotated about an axis in camera coordinates (Rodrigues' formula), and another eye. */
+/**
+ * Returns the matrix of a camera whose axes are rotated about an axis in camera coordinates (Rodrigues' formula).
+ * @param angle Radians.
+ * @param eye World position of the rotated camera.
+ */
 function turned(m: Matrix4, about: Vector3, angle: number, eye: Vector3): Float64Array {
   const axis = angle === 0 ? STILL : scale(about, 1 / length(about));
   const [cosine, sine] = [Math.cos(angle), Math.sin(angle)];

@@ -27,15 +27,16 @@ const HALF_CODE = 2 ** 24;
 const ALL_CODES = 2 ** 48;
 
 /**
- * Decodes the words of a coded page file for the GPU.
- * @throws GaussianSplatError `decode/corrupt`, or `decode/truncated`, for malformed bytes.
+ * Decodes a coded page file. Resolves to the words that the GPU reads, in the layout of docs/lod-format.md.
+ * @param where Name of the file, for error messages.
+ * @throws GaussianSplatError `decode/corrupt` or `decode/truncated` for malformed bytes.
  */
 export async function decodePage(where: string, bytes: Uint8Array<ArrayBuffer>, file: CodedFile): Promise<ArrayBuffer> {
   const inflated = await inflate(where, bytes, maxBytes(file));
   return new PageDecoder(where, inflated, file).decode();
 }
 
-/** Inflates at most this many bytes, regardless of the size that a file declares. */
+/** Inflates raw deflate data. Throws if the result exceeds `max` bytes, regardless of the size that a file declares. */
 async function inflate(where: string, bytes: Uint8Array<ArrayBuffer>, max: number): Promise<Uint8Array> {
   const whole = new Uint8Array(max);
   let length = 0;
@@ -67,7 +68,7 @@ class PageDecoder {
   readonly #bytes: Uint8Array;
   readonly #counts: Uint8Array;
   readonly #splats: number;
-  /** Number of splats with harmonics. */
+  /** Number of splats with a class above 0: only they have harmonics. */
   #classed = 0;
   readonly #floats: Float32Array;
 
@@ -97,7 +98,7 @@ class PageDecoder {
     this.#undoDifferences(PLANES.harmonics, planesOf(shDegree));
   }
 
-  /** Reads numbers whose bytes are stored plane by plane. */
+  /** Reads `count` float32 from byte `at` on. Their bytes are stored plane by plane. */
   #readFloats(at: number, count: number): Float32Array {
     const words = new Uint32Array(count);
     for (let k = 0; k < count; k++) {
@@ -134,7 +135,7 @@ class PageDecoder {
     return words.buffer;
   }
 
-  /** Number `field` of a chunk. */
+  /** Returns number `field` of a chunk, 0 to `CHUNK_FLOATS` - 1. */
   #of(chunk: number, field: number): number {
     return this.#floats[CHUNK_FLOATS * chunk + field];
   }
@@ -157,7 +158,7 @@ class PageDecoder {
     }
   }
 
-  /** Chunks, and the boxes of their centers. */
+  /** Writes the geometry of all chunks, and the boxes of their splat centers to `bounds`. */
   #putGeometry(words: Uint32Array, bounds: Float32Array): void {
     const { chunks, coding } = this.#file;
     const heads = new Float32Array(words.buffer, words.byteOffset, words.length);
@@ -208,7 +209,7 @@ class PageDecoder {
     }
   }
 
-  /** Layout `int8` of packSh in pack/sh.ts. */
+  /** Writes the harmonics of all splats in the layout `int8` of packSh in pack/sh.ts. */
   #putHarmonics(words: Uint32Array): void {
     const { chunks, shDegree, coding } = this.#file;
     const bytes = new Uint8Array(words.buffer, words.byteOffset, 4 * words.length);
@@ -236,7 +237,7 @@ class PageDecoder {
         halves[at / 2 + 2] = halfBits(rest - o / 2);
         const own = classes?.[i] ?? 0;
         if (own === 0) continue;
-        // A scale of 0 means that all coefficients are zero.
+        // Splats of class 0 keep a scale of 0, which makes all their coefficients zero.
         const scale = Math.min(255, coding.scale + CLASS_STEP * (own - 1));
         for (let band = 0; band < shDegree; band++) bytes[at + SCALE_BYTES[band]] = scale;
         for (let k = 0; k < count; k++) {
@@ -255,10 +256,11 @@ class PageDecoder {
 
 const limited = (code: number): number => Math.min(127, Math.max(-127, code));
 
-/** Byte offsets of the coefficients above the constant one, from the start of a splat. */
+/** Returns the byte offsets of the coefficients above the constant one, relative to the beginning of a splat. */
 function harmonicPlaces(degree: number, stride: number): readonly number[] {
   const all = BAND_SIZES.slice(0, degree).reduce((sum, size) => sum + 3 * size, 0);
   const places = Array.from({ length: all }, (_, k) => FIRST_CODE_BYTE + k);
-  // Degree 1 has nine codes but eight places: see packSh.
+  // Degree 1 has nine codes but eight places after the scales; the ninth takes the place of an unused scale: see
+  // packSh.
   return places.map((place) => (place < stride ? place : SCALE_BYTES[1]));
 }

@@ -3,11 +3,15 @@ import { SLOT_CHUNKS } from './manifest.js';
 
 const SLOT_NUMBERS = DETAIL_NUMBERS * SLOT_CHUNKS;
 /**
- * Unchanged slots between changed ones are written as well, up to this number: their 8 kB cost less than another write.
+ * Maximum number of unchanged slots between two changed ones that are written together with them. These 8 kB cost less
+ * than another write.
  */
 export const BRIDGED = 40;
 
-/** CPU copy of the LOD rows of all slots. Changes are written once in each frame, neighbors in one range. */
+/**
+ * CPU copy of the LOD rows of all slots. Changed rows are written once in each frame; neighboring slots are written
+ * together.
+ */
 export class DetailTable {
   readonly #numbers: Float32Array<ArrayBuffer>;
   readonly #isChanged: Uint8Array;
@@ -18,20 +22,21 @@ export class DetailTable {
     this.#isChanged = new Uint8Array(slots);
   }
 
-  /** The rows of a slot; {@link touch} must follow a change. */
+  /** Returns the rows of a slot as a view of the table. Call {@link touch} after a change. */
   rowsOf(slot: number): Float32Array<ArrayBuffer> {
     return this.#numbers.subarray(SLOT_NUMBERS * slot, SLOT_NUMBERS * (slot + 1));
   }
 
+  /** Marks the rows of a slot as changed. */
   touch(slot: number): void {
     this.#isChanged[slot] = 1;
     this.#hasChanged = true;
   }
 
   /**
-   * Writes the changes since the last call.
-   * @param slotsPerBuffer A range never crosses a multiple of it.
-   * @param write Is called with the first slot of a range and the rows of its slots.
+   * Writes the rows that changed since the last call.
+   * @param slotsPerBuffer Number of slots in a buffer; a range of slots never crosses two buffers.
+   * @param write Called with the first slot of a range, and the rows of all its slots.
    */
   flush(slotsPerBuffer: number, write: (slot: number, rows: Float32Array<ArrayBuffer>) => void): void {
     if (!this.#hasChanged) return;

@@ -1,28 +1,32 @@
-/** Maximum number of views that are tracked; the most recently drawn ones are kept. */
+/** Maximum number of views that are tracked. The views with the most recent feedback passes are kept. */
 export const MAX_VIEWS = 4;
 
 interface ViewSample {
-  /** Version of the scene at the feedback pass. */
+  /** Version of the scene at the feedback pass of the view. */
   readonly version: number;
-  /** Whether the pass used only this view, without the predicted one of a moving camera. */
+  /** Whether the pass used only this view, without the predicted view of a moving camera. */
   readonly isStill: boolean;
   /** Index of the last frame that drew the view. */
   drawnAt: number;
+  /** Result of the pass; undefined until it is read back. */
   requests?: Float32Array;
 }
 
 /**
- * Views with a feedback pass: a view that is drawn again unchanged needs no other pass, and the requests of each view
- * stay valid until its next pass. A view is identified by all parameters that it depends on.
+ * Views with a feedback pass. A view that is drawn again unchanged needs no other pass, and the requests of each view
+ * are valid until its next pass. The name of a view contains all parameters that its requests depend on.
  */
 export class FeedbackViews {
-  /** The most recent one is last. */
+  /** Views by name; the one with the most recent pass is last. */
   readonly #looks = new Map<string, ViewSample>();
   #frames = 0;
-  /** Frames at the last two feedback passes. */
+  /** Frame indices of the last two feedback passes, the most recent first. */
   #sampledAt: readonly [number, number] = [0, 0];
 
-  /** Records that a view is drawn. @returns Whether a feedback pass of the unchanged scene exists for it. */
+  /**
+   * Records that a view is drawn.
+   * @returns Whether the view has a feedback pass for this version of the scene, taken with a resting camera.
+   */
   draw(view: string, version: number): boolean {
     this.#frames++;
     const sample = this.#looks.get(view);
@@ -30,7 +34,7 @@ export class FeedbackViews {
     return sample?.version === version && sample.isStill;
   }
 
-  /** Starts a feedback pass of the last drawn view. */
+  /** Records the beginning of a feedback pass, for the last drawn view. */
   begin(view: string, version: number, isStill: boolean): void {
     this.#looks.delete(view);
     this.#looks.set(view, { version, isStill, drawnAt: this.#frames });
@@ -39,7 +43,11 @@ export class FeedbackViews {
     this.#sampledAt = [this.#frames, this.#sampledAt[0]];
   }
 
-  /** Records the result of the pass. @returns It combined with the requests of the other views that are still drawn. */
+  /**
+   * Records the result of the last pass.
+   * @param requests Screen error of each missing page in pixels.
+   * @returns The maximum, for each page, over this result and those of the other views that are still drawn.
+   */
   end(requests: Float32Array): Float32Array {
     const last = [...this.#looks.values()].at(-1);
     if (last === undefined) return requests;
@@ -52,7 +60,7 @@ export class FeedbackViews {
     return merged;
   }
 
-  /** Discards all passes. */
+  /** Discards all views and their requests. */
   clear(): void {
     this.#looks.clear();
   }

@@ -10,50 +10,51 @@ import { CHUNK_NUMBERS } from '../pack/words.js';
 
 /** A region of a scene whose file has its own levels of detail. */
 export interface LevelBox {
-  /** Corners, world units. */
+  /** Lower corner of the box, world units. */
   readonly min: readonly number[];
+  /** Upper corner of the box, world units. */
   readonly max: readonly number[];
   /** Maximum number of splats in each level, coarsest first. */
   readonly counts: readonly number[];
 }
 
-/** A level of a box as a page: it replaces the next coarser one. */
+/** A level of a box as a page, which replaces the next coarser level. */
 export interface LevelPage {
+  /** Index of the box. */
   readonly box: number;
   /** Index into the box's `counts`: 1 or more. */
   readonly level: number;
   /** Maximum number of splats. */
   readonly count: number;
   /**
-   * Center and radius, world units relative to the origin of the scene; the same for all levels of a box, so that only
-   * their errors decide.
+   * Center and radius of a sphere in world units, relative to the origin of the scene. All levels of a box have the
+   * same sphere, so that only their errors select a level.
    */
   readonly sphere: readonly number[];
-  /** Error in world units. */
+  /** Displacement of this level in world units; 0 for the finest. */
   readonly error: number;
 }
 
 /**
- * A scene whose file has its own levels, ready for streaming. Plain data with a transferable buffer, so that a worker
- * can build it.
+ * A scene whose file has its own levels, prepared for streaming. Plain data with a transferable buffer, so that a
+ * worker can build it.
  */
 export interface LevelScene {
   readonly scene: StreamedScene;
-  /** The page that is always resident: the coarsest level of each box, and the splats outside all boxes. */
+  /** Words of the page that is always resident: the coarsest level of each box, then the splats outside all boxes. */
   readonly first: Uint32Array<ArrayBuffer>;
-  /** Chunks of each box in it, in sequence. */
+  /** Number of chunks of each box in `first`; they are consecutive. */
   readonly firstChunks: readonly number[];
-  /** All other pages, box by box, coarser before finer. */
+  /** All other pages, box by box, coarser levels before finer ones. */
   readonly pages: readonly LevelPage[];
 }
 
 /**
- * Lays out a scene whose file has its own levels. Their errors are unknown before they are loaded: the spacing of
- * splats is measured in the coarsest level, and assumed to scale with the inverse square root of their number, as for
- * splats on surfaces.
- * @param coarsest The coarsest level of each box: its `levelRuns` have the index of the box as `node`. Runs of other
- * nodes are always shown.
- * @param boxes Each with at least one level.
+ * Lays out a scene whose file has its own levels. The errors of unloaded levels are estimated: the spacing of splats is
+ * measured in the coarsest level. It scales with the inverse square root of their number, as for splats on surfaces.
+ * @param coarsest The coarsest level of each box. The `node` of its `levelRuns` is the index of a box; runs of other
+ * nodes are always drawn.
+ * @param boxes Boxes of the scene, each with at least one level.
  * @throws GaussianSplatError `argument/cloud` if the arrays do not match `count` and `shDegree`.
  */
 export function layoutLevels(
@@ -96,7 +97,10 @@ export function layoutLevels(
   return { scene, first: joinSlots(runs, scene), firstChunks, pages };
 }
 
-/** Usable splats of each box, neighbors together, followed by those outside all boxes. */
+/**
+ * Returns the indices of the usable splats of each box in Morton order; the last array contains those outside all
+ * boxes.
+ */
 function keptOfNodes({ positions, levelRuns = [] }: GaussianCloud, usable: Uint32Array, boxes: number): Uint32Array[] {
   const kept: Uint32Array[] = Array.from({ length: boxes }, () => new Uint32Array(0));
   const others: number[] = [];
@@ -111,7 +115,10 @@ function keptOfNodes({ positions, levelRuns = [] }: GaussianCloud, usable: Uint3
   return [...kept, mortonOrder(positions, Uint32Array.from(others))];
 }
 
-/** Splats outside all boxes, such as the sky, do not indicate the position of the scene. */
+/**
+ * Returns the bounds of the splats in boxes. Splats outside all boxes, such as the sky, do not indicate the position of
+ * the scene.
+ */
 function boundsWithin(cloud: GaussianCloud, boxes: number): Bounds {
   const runs = (cloud.levelRuns ?? []).filter(({ node, count }) => node < boxes && count > 0);
   const total = runs.reduce((sum, { count }) => sum + count, 0);
@@ -127,8 +134,8 @@ function boundsWithin(cloud: GaussianCloud, boxes: number): Bounds {
 }
 
 /**
- * Errors of the levels of a box, coarsest first, from the measured spacing, or from the radius of the box if there is
- * none.
+ * Estimates the errors of the levels of a box in world units, coarsest first.
+ * @param measured Spacing of the coarsest level in world units; 0 if unknown, the radius of the box then replaces it.
  */
 function errorsOf(counts: readonly number[], measured: number, radius: number): number[] {
   const spacing = measured > 0 ? measured : (2 * radius) / Math.sqrt(counts[0]);
@@ -141,7 +148,7 @@ type Corners = Pick<LevelBox, 'min' | 'max'>;
 /** Factor that enlarges the radius by more than the rounding error of float32. */
 const RADIUS_MARGIN = 1.00001;
 
-/** Center and radius of a sphere around the boxes of chunks, and around the declared box of all levels. */
+/** Returns center and radius of a sphere around the boxes of chunks, and around the box that the file declares. */
 function sphereAround(chunks: Float32Array, box?: Corners): number[] {
   const low = box ? box.min.map((x, axis) => Math.min(x, box.max[axis])) : [Infinity, Infinity, Infinity];
   const high = box ? box.max.map((x, axis) => Math.max(x, box.min[axis])) : [-Infinity, -Infinity, -Infinity];

@@ -10,9 +10,9 @@ import { slotBySlot, type SlotWords } from './slot-words.js';
 import { chunksOf } from '../levels/splat-level.js';
 
 /**
- * Returns the words of a page.
- * @param cloud Its splats.
- * @throws GaussianSplatError `argument/cloud` for a cloud without usable splats, or with more than the page has.
+ * Returns the words of a page: chunks in the layout of docs/lod-format.md, slot by slot.
+ * @param cloud Splats of the page.
+ * @throws GaussianSplatError `argument/cloud` for a cloud without usable splats, or with more splats than the page has.
  */
 export function packLevelPage(
   cloud: GaussianCloud,
@@ -33,14 +33,14 @@ export function packLevelPage(
   return joinSlots([{ ...run, sphere, error }], scene);
 }
 
-/** The cloud relative to the origin of the scene, with harmonics of its degree. */
+/** Returns the cloud relative to the origin of the scene, with spherical harmonics of the scene's degree. */
 function placedIn(cloud: GaussianCloud, { origin, shDegree }: StreamedScene): GaussianCloud {
   const shift = cloud.origin.map((x, axis) => x - origin[axis]);
   const positions = shift.every((x) => x === 0) ? cloud.positions : cloud.positions.map((x, i) => x + shift[i % 3]);
   return { ...cloud, origin, positions, sh: shOfDegree(cloud, shDegree), shDegree };
 }
 
-/** Harmonics truncated to a degree, or padded with zeros. */
+/** Returns the spherical harmonics of a cloud, truncated to a degree or padded with zeros. */
 function shOfDegree(cloud: GaussianCloud, degree: ShDegree): Float32Array {
   if (cloud.shDegree === degree) return cloud.sh;
   const [from, to] = [cloud.shDegree, degree].map((one) => 3 * shCoefficientCount(one));
@@ -68,8 +68,8 @@ function listLevels({ first, firstChunks, pages, scene }: LevelScene): PageList 
 
 /**
  * Returns the page source of a scene whose file has its own levels.
- * @param levels Its first page is transferred to the source.
- * @param fetchLevel Fetches a page: see {@link packLevelPage}. Best done in a worker.
+ * @param levels Levels of the scene. The first page keeps their buffer `first`.
+ * @param fetchLevel Fetches a page and resolves to its words: see {@link packLevelPage}, preferably in a worker.
  */
 export function levelSource(
   levels: LevelScene,

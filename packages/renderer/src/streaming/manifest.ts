@@ -5,59 +5,66 @@ import { CLASSES, CLASS_STEP, MIN_OPACITY_STEP, type PageCoding } from './page-c
 import { QUANTIZED_CHUNK_WORDS } from './quantized-geometry.js';
 import { CHUNK_NUMBERS, GEOMETRY_WORDS, type ShPrecision, shWords } from '../pack/words.js';
 
-/** Maximum number of chunks with the same parent: those of a page, which fill a slot of the pool. */
+/** Maximum number of chunks with the same parent. They form a page, which fills one slot of the pool. */
 export const { SLOT_CHUNKS } = constants;
-/** Maximum number of chunks in a file: four with one parent, and the children of these four. */
+/** Maximum number of chunks in a file: four with one parent, and four children of each of these. */
 const FILE_CHUNKS = 20;
+/** Maximum length of an address in characters. The main thread parses it for each request of a page. */
+const MAX_PATH = 2048;
 /**
- * Maximum number of pages over all instances, for 4.3 billion splats. Each takes about 90 bytes of CPU memory before
- * any is loaded, and shaders index them with 24 bits.
+ * Maximum number of pages over all instances, for 4.3 billion splats. Each page takes about 90 bytes of CPU memory
+ * before any page is loaded. Shaders use indices of 24 bits.
  */
 export const MAX_PAGES = 1 << 22;
 
 /**
- * A file of a tree: a page of chunks with one parent, followed by the child pages of each of these chunks, all full but
- * the last.
+ * A file of a tree. It contains a page of chunks with one parent, followed by the child pages of each of these chunks.
+ * All pages except the last are full.
  */
 export interface TreePage {
-  /** Address, relative to the manifest. */
+  /** Address of the file, relative to the manifest. */
   readonly file: string;
+  /** Number of chunks in the file. */
   readonly chunks: number;
-  /** Number of its first chunks that have their parent in another file or none. */
+  /** Number of the first chunks, whose parent is in another file or missing. */
   readonly upper: number;
   /**
-   * File of the tree that holds the parent, and the index of the parent chunk in it. Missing for the first file of a
-   * tree.
+   * Index of the file in the tree that contains the parent, and index of the parent chunk in that file. Missing for the
+   * first file of a tree.
    */
   readonly parent?: readonly [page: number, chunk: number];
 }
 
-/** Files of a tree, parents before children. */
+/** A tree of files; parents precede their children. */
 export interface Tree {
   readonly pages: readonly TreePage[];
 }
 
-/** An instance of a tree at its position in the scene, below a chunk of the first instance. */
+/** An instance of a tree at its own position in the scene. It refines a chunk of the first instance. */
 export interface TreeInstance {
+  /** Index of the tree in {@link DetailManifest.trees}. */
   readonly tree: number;
-  /** World units, added to every position of the tree. */
+  /** Translation in world units, added to every position of the tree. */
   readonly translate: Vector3;
-  /** File of the first instance, and chunk in it, that the tree refines. Missing for the first instance. */
+  /**
+   * Index of the file of the first instance, and of the chunk in it, that this tree refines. Missing for the first
+   * instance.
+   */
   readonly parent?: readonly [page: number, chunk: number];
 }
 
-/** Manifest (`lod.json`) of a streamed scene. docs/lod-format.md describes the files. */
+/** Manifest (`detail.json`) of a streamed scene. docs/lod-format.md describes the files. */
 export interface DetailManifest {
   readonly format: 'gaussian-splat-detail';
-  /** 2 if {@link geometry} is given, 4 if {@link coding} is, too. 3 was never released. */
+  /** 2 with {@link geometry}, 4 with {@link coding}, otherwise 1. Version 3 was never released. */
   readonly version: 1 | 2 | 4;
-  /** Splats of the finest level. */
+  /** Number of splats in the finest level. */
   readonly splats: number;
   readonly shDegree: ShDegree;
   readonly shPrecision: ShPrecision;
   /**
-   * Storage of centers, shapes and opacities: {@link packQuantizedChunk}. Default: as `PackedGaussian`, in twice the
-   * bytes.
+   * Layout of centers, shapes and opacities: see `packQuantizedChunk`. Default: that of `PackedGaussian`, which takes
+   * twice the bytes.
    */
   readonly geometry?: 'quantized';
   /** Coding of the files, which `decodePage` converts to words. Default: files contain the words. */
@@ -65,7 +72,7 @@ export interface DetailManifest {
   readonly antialiased: boolean;
   /** Variance in px² of the screen-space low-pass filter of training; undefined is the classic 0.3. */
   readonly filterVariance?: number | undefined;
-  /** Sort order of splats in training; undefined is that of their centers. */
+  /** Sort order of splats in training; undefined if splats were sorted by the depth of their centers. */
   readonly order?: 'pixel' | undefined;
   readonly origin: Vector3;
   readonly bounds: Bounds;
@@ -76,7 +83,7 @@ export interface DetailManifest {
 /** Properties that determine the size of a page. */
 export type PageFormat = Pick<DetailManifest, 'shDegree' | 'shPrecision' | 'geometry'>;
 
-/** Words of each section of a file, or of a page, in sequence. */
+/** Returns the number of words of each section of a file, or of a page, in the order of the sections. */
 export function pageLayout(
   { shDegree, shPrecision, geometry }: PageFormat,
   chunks: number,
@@ -95,15 +102,16 @@ function shown(value: unknown): string {
   try {
     return String(JSON.stringify(value)).slice(0, 80);
   } catch {
-    // Lists may be nested deeper than calls can be.
+    // JSON.stringify throws for values that are nested deeper than the call stack allows.
     return 'a value that is too deep to be shown';
   }
 }
 
 /**
- * Validates a parsed manifest.
- * @param maxPages Maximum number of pages that the load may hold in memory.
- * @throws GaussianSplatError `out-of-memory/budget` for more, `decode/unsupported` for another format or version,
+ * Validates a parsed manifest, and returns it.
+ * @param where Name of the manifest, for error messages.
+ * @param maxPages Maximum number of pages that the caller can hold in memory.
+ * @throws GaussianSplatError `out-of-memory/budget` for more pages; `decode/unsupported` for another format or version;
  * `decode/header` for other faults.
  */
 export function checkManifest(value: unknown, where: string, maxPages = MAX_PAGES): DetailManifest {
@@ -155,7 +163,7 @@ export function checkManifest(value: unknown, where: string, maxPages = MAX_PAGE
   return manifest as DetailManifest;
 }
 
-/** Lower and upper limits of the values of a coding; color steps may have any size. */
+/** Minimum and maximum of each value of a coding. The upper limit of color steps has no practical meaning. */
 const CODING_RANGES: Readonly<Record<keyof PageCoding, readonly [min: number, max: number]>> = {
   size: [1 / 48, 1],
   directions: [3, 255],
@@ -176,7 +184,7 @@ function checkCoding({ version, coding, shPrecision }: Partial<DetailManifest>, 
   }
 }
 
-/** Checks the consistency of files and instances that are valid on their own. */
+/** Checks that files and instances, which are valid on their own, are consistent with each other. */
 function checkPages({ trees, instances }: DetailManifest, fail: Fail, maxPages: number): void {
   const lengths = new Map<string, number>();
   const taken = trees.map((tree, t) => {
@@ -200,10 +208,10 @@ function checkPages({ trees, instances }: DetailManifest, fail: Fail, maxPages: 
     fail('instances', `at most ${maxPages} pages in a file of this size`, count, 'out-of-memory/budget');
 }
 
-/** Number of pages in a file. */
+/** Returns the number of pages in a file. */
 const pagesIn = ({ chunks, upper }: TreePage): number => 1 + Math.ceil((chunks - upper) / SLOT_CHUNKS);
 
-/** Chunks of a tree that have children. */
+/** Marks the chunks of a tree that have children. */
 class Places {
   readonly #pages: readonly TreePage[];
   readonly #taken = new Set<number>();
@@ -212,7 +220,7 @@ class Places {
     this.#pages = pages;
   }
 
-  /** Marks a chunk as having children. @returns False if it was marked already. */
+  /** Marks a chunk as a parent. @returns False if the chunk already had children. */
   take([page, chunk]: readonly [number, number]): boolean {
     const place = FILE_CHUNKS * page + chunk;
     const isTaken = this.#taken.has(place) || chunk < pagesIn(this.#pages[page]) - 1;
@@ -228,6 +236,7 @@ function checkTree(tree: Tree, fail: Fail): void {
   tree.pages.forEach((page, p) => {
     const isFine =
       typeof page?.file === 'string' &&
+      page.file.length <= MAX_PATH &&
       isCount(page.chunks) &&
       page.chunks >= 1 &&
       isCount(page.upper) &&
@@ -245,7 +254,7 @@ const isCount = (value: unknown): value is number => Number.isSafeInteger(value)
 const isVector = (value: unknown): value is Vector3 =>
   Array.isArray(value) && value.length === 3 && value.every((number) => Number.isFinite(number));
 
-/** Whether the value is the position of a chunk in one of the first `end` files. */
+/** Whether the value is the index of a file below `end`, and the index of a chunk in that file. */
 function isPlace(value: unknown, pages: readonly TreePage[], end = pages.length): boolean {
   if (!Array.isArray(value) || value.length !== 2) return false;
   const [page, chunk] = value as [unknown, unknown];

@@ -12,24 +12,26 @@ import { CHUNK_NUMBERS } from '../pack/words.js';
 
 const { CULL_GROUP } = constants;
 
-/** Splats in whole chunks, the last one padded. */
+/** Packed splats of a run in whole chunks. The last chunk is padded with splats of opacity 0. */
 export interface RunWords {
   readonly geometry: Uint32Array;
   readonly sh: Uint32Array;
   readonly chunks: Float32Array;
 }
 
-/** A run whose chunks have one sphere and one error. */
+/** A packed run whose chunks share one sphere and one error. */
 export interface PackedRun extends RunWords {
-  /** Center and radius. */
+  /** Center and radius in world units, relative to the origin of the scene. */
   readonly sphere: readonly number[];
-  /** World units. */
+  /** Error in world units. */
   readonly error: number;
 }
 
 /**
- * Packs some splats of a cloud, in the given order.
- * @param place Position of a run without drawable splats: one empty chunk, which finer ones can replace.
+ * Packs splats of a cloud in the given order.
+ * @param kept Indices of the splats.
+ * @param place Box of a run that may have no drawable splats: it then becomes one empty chunk, which finer levels can
+ * replace.
  */
 export function packRun(
   cloud: GaussianCloud,
@@ -61,7 +63,10 @@ function quantizeRun({ geometry, chunks }: RunWords, level: SplatLevel): void {
   }
 }
 
-/** Joins runs in slots: each has the layout of docs/lod-format.md, all but the last full. None of them has a parent. */
+/**
+ * Joins runs slot by slot, in the layout of docs/lod-format.md. All slots except the last are full. Their chunks have
+ * no parent.
+ */
 export function joinSlots(runs: readonly PackedRun[], format: PageFormat): Uint32Array<ArrayBuffer> {
   const total = runs.reduce((sum, { chunks }) => sum + chunks.length / CHUNK_NUMBERS, 0);
   const words = new Uint32Array(pageLayout(format, 1).total * total);

@@ -12,16 +12,17 @@ import { CHUNK_NUMBERS, GEOMETRY_WORDS, type ShPrecision, shWords } from '../pac
 
 const { CULL_GROUP } = constants;
 
-/** A run of usable splats, neighbors together. */
+/** A run of usable splats in Morton order. */
 interface PackedRun extends LevelRun {
+  /** Indices of the splats in the cloud. */
   readonly kept: Uint32Array;
-  /** See {@link spacingOf}, world units. */
+  /** Spacing of the splats in world units: see {@link spacingOf}. */
   readonly spacing: number;
 }
 
 /**
- * Packs a cloud whose file has its own levels of detail (`levelRuns`), with each run aligned to a chunk: the level of
- * each node is selected by its screen error, by the rule of all levels of detail.
+ * Packs a cloud whose file has its own levels of detail (`levelRuns`). Each run starts a new chunk. The screen error of
+ * each run selects the level of a node, as with other levels of detail.
  * @throws GaussianSplatError `argument/cloud` if the arrays do not match `count` and `shDegree`.
  */
 export function packLevelRuns(given: GaussianCloud, options: PackOptions = {}): PackedGaussians {
@@ -66,7 +67,7 @@ function packRuns(
   return packed;
 }
 
-/** Non-empty runs, those of one node together, the finest first. */
+/** Returns the non-empty runs; those of one node are consecutive, the finest first. */
 function keptRuns({ positions, levelRuns = [] }: GaussianCloud, usable: Uint32Array): PackedRun[] {
   const byPlace = [...levelRuns].sort((a, b) => a.first - b.first);
   let at = 0;
@@ -83,7 +84,10 @@ function keptRuns({ positions, levelRuns = [] }: GaussianCloud, usable: Uint32Ar
 
 const finestOf = (runs: readonly PackedRun[]): PackedRun[] => runs.filter(({ node }, r) => runs[r - 1]?.node !== node);
 
-/** All levels of a node have one sphere, so that only their errors decide. */
+/**
+ * Writes the details of all chunks. All levels of a node have one sphere, so that only their errors select a level.
+ * @param firstChunks Index of the first chunk of each run, and the total.
+ */
 function writeDetails(
   { chunks, details = new Float32Array(0) }: Pick<PackedGaussians, 'chunks' | 'details'>,
   runs: readonly PackedRun[],
@@ -104,7 +108,7 @@ function writeDetails(
   }
 }
 
-/** Center and radius of a sphere around the boxes of some chunks. */
+/** Returns center and radius of a sphere around the boxes of chunks `first` to `end`. */
 function sphereAround(chunks: Float32Array, first: number, end: number): Float32Array {
   const corner = (axis: number, place: number, pick: (a: number, b: number) => number): number => {
     let found = chunks[CHUNK_NUMBERS * first + place + axis];

@@ -12,19 +12,20 @@ import { QUANTIZED_CHUNK_WORDS, readRow, ROW_CODES } from './quantized-geometry.
 
 const { CULL_GROUP, QUANTIZED_HEAD_ROWS, QUANTIZED_T_ZERO, QUANTIZED_UV_ZERO, QUANTIZED_OPAQUE } = constants;
 
-/** Some chunks of a file. */
+/** Selected chunks of a file of pages. */
 export interface PageChunks {
-  /** In the quantized layout of the GPU. */
+  /** Words of the file, with geometry in the quantized layout of the GPU. */
   readonly words: Uint32Array<ArrayBuffer>;
-  /** Number of chunks in the file, and the selected ones. */
+  /** Number of chunks in the file. */
   readonly of: number;
+  /** Indices of the selected chunks. */
   readonly chunks: readonly number[];
-  /** World units, added to every position; default none. */
+  /** Translation in world units, added to every position; default: none. */
   readonly translate?: Vector3;
 }
 
 /**
- * Returns the visible splats of some chunks as a cloud: for renderers without pages, and for tools that compare pages
+ * Returns the visible splats of some chunks as a cloud. Renderers without pages use it, and tools that compare pages
  * with their source scene.
  */
 export function cloudOfChunks(

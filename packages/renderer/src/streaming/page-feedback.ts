@@ -1,8 +1,7 @@
-import type { Camera, Vector3 } from '@gaussian-splat/core';
+import { eyeOf, inverse, multiply, type Camera } from '@gaussian-splat/core';
 import type { FeedbackInputs, PageRequests, FeedbackSettings } from '../gaussian-scene.js';
 import { BUFFER_USAGE } from '../gpu/kernel.js';
 import type { GpuMemory } from '../gpu/memory.js';
-import { cameraValues } from '../view.js';
 import { CameraMotion } from './camera-motion.js';
 import { MAX_VIEWS, FeedbackViews } from './feedback-views.js';
 import { constants } from '../generated/shaders.js';
@@ -10,43 +9,44 @@ import { pageFeedback } from '../generated/streamed-shaders.js';
 import { Stage } from '../stages/stage.js';
 
 /**
- * Frames between two feedback passes: of a resting camera, and of a moving one. Both odd, so that two views that are
- * drawn alternately both get passes.
+ * Frames between two feedback passes of a resting camera. Odd, so that two views that are drawn alternately both get
+ * passes.
  */
 const INTERVAL = 5;
+/** Frames between two feedback passes of a moving camera. */
 const MOVING_INTERVAL = 3;
 /**
- * Milliseconds after which views without a feedback pass are drawn again to get one; until then views with one are
- * skipped in their favor.
+ * Milliseconds without a frame after which views without a feedback pass are drawn again to get one. For the same time
+ * afterwards, views that have one are skipped in their favor.
  */
 const STALE_MS = 120;
 
-/** Numbers of `ahead` in shaders/page_feedback.wgsl: four columns and the eye. */
+/** Number of float32 in `ahead` of shaders/page_feedback.wgsl: four columns of a matrix, and a position. */
 const AHEAD_NUMBERS = 20;
 
 export interface PageFeedbackOptions {
+  /** Number of pages of the scene. */
   readonly pages: number;
-  /** World position of the origin of all positions. */
-  readonly origin: Vector3;
   /** Prediction time of a moving camera in milliseconds: the arrival time of a page. */
   readonly aheadMs: () => number;
-  /** Changes when pages arrive or are evicted. */
+  /** Returns the version of the scene, which changes when pages arrive or are evicted. */
   readonly version: () => number;
   /**
-   * Called with the screen errors in pixels of all missing pages, for the view or the predicted one; and with the
-   * largest error of the view.
+   * Called after each read-back with the screen errors in pixels of all missing pages, each the larger of the view and
+   * the predicted view. The second argument is the largest error of the view in pixels.
    */
   readonly onFeedback: (requests: Float32Array, lacking: number) => void;
   /** Called when the last view lacks a feedback pass and needs another frame. */
   readonly onStale: () => void;
 }
 
-/** Reads the page requests of views back from the GPU at intervals, asynchronously. */
+/** Reads the page requests of views back from the GPU at intervals. No frame waits for them. */
 export class PageFeedback implements PageRequests {
   readonly #stage: Stage<typeof pageFeedback>;
   /**
-   * For each page the screen error of its absence, float32 bits; at 0, the page that is always resident, the largest
-   * error of the view. Cleared before each pass.
+   * [P] float32 bits of the screen error in pixels that each page, resident or not, causes if it is missing; 0 if no view
+   * needs the page. Element 0, the page that is always resident, has the largest error of the view. Cleared before each
+   * pass.
    */
   readonly #requests: GPUBuffer;
   readonly #staging: GPUBuffer;
@@ -57,10 +57,13 @@ export class PageFeedback implements PageRequests {
   readonly #views = new FeedbackViews();
   /** Recently drawn views without a feedback pass. */
   readonly #unseen = new Set<string>();
+  /** Time in milliseconds until which views with a feedback pass are skipped in favor of others. */
   #givesWayUntil = -Infinity;
   #frames = INTERVAL;
   #timer: ReturnType<typeof setTimeout> | undefined;
   #isReading = false;
+  /** Matrix of the last camera. */
+  #worldToCamera: Camera['worldToCamera'] = [];
 
   constructor(device: GPUDevice, memory: GpuMemory, options: PageFeedbackOptions) {
     this.#device = device;
@@ -74,14 +77,15 @@ export class PageFeedback implements PageRequests {
   }
 
   /**
-   * Whether this frame must record requests; then {@link begin}, {@link note}, {@link copy} and, after the submit,
-   * {@link read} follow.
+   * Whether this frame must record requests. If so, call {@link begin}, {@link note}, {@link copy} and, after the
+   * submit, {@link read}.
    */
-  isDue(camera: Camera, settings: FeedbackSettings): boolean {
+  isDue(camera: Camera, settings: FeedbackSettings, changes: number): boolean {
     const now = performance.now();
     this.#motion.observe(camera, now);
+    this.#worldToCamera = camera.worldToCamera;
     const { isMoving } = this.#motion;
-    const [view, version] = [nameOf(camera, settings), this.#options.version()];
+    const [view, version] = [`${nameOf(camera, settings)} ${changes}`, this.#options.version()];
     const isSeen = this.#views.draw(view, version);
     const isEarly = this.#frames < (isMoving ? MOVING_INTERVAL : INTERVAL) || this.#isReading;
     const isDue = !isEarly && !(isSeen && now < this.#givesWayUntil);
@@ -95,7 +99,7 @@ export class PageFeedback implements PageRequests {
     clearTimeout(this.#timer);
   }
 
-  /** Ensures that every view gets a feedback pass, even if no other frame is drawn. */
+  /** Schedules a sample if a view has no feedback pass, for the case that no other frame is drawn. */
   #wait(view: string, isSeen: boolean): void {
     this.#unseen.delete(view);
     if (!isSeen) this.#unseen.add(view);
@@ -114,16 +118,17 @@ export class PageFeedback implements PageRequests {
 
   begin(encoder: GPUCommandEncoder): void {
     encoder.clearBuffer(this.#requests);
-    const { origin, aheadMs } = this.#options;
-    const { local_to_camera, eye } = cameraValues(this.#motion.ahead(aheadMs()), origin);
+    const { worldToCamera } = this.#motion.ahead(this.#options.aheadMs());
+    // Relative to the camera, because each placement of the scene has its own transform to camera coordinates.
+    const toAhead = multiply(worldToCamera, inverse(this.#worldToCamera));
     const numbers = new Float32Array(AHEAD_NUMBERS);
-    numbers.set(local_to_camera as ArrayLike<number>);
-    numbers.set(eye as ArrayLike<number>, AHEAD_NUMBERS - 4);
+    for (let k = 0; k < 16; k++) numbers[k] = toAhead[4 * (k % 4) + (k >> 2)];
+    numbers.set(eyeOf(toAhead), AHEAD_NUMBERS - 4);
     this.#device.queue.writeBuffer(this.#ahead, 0, numbers);
   }
 
   bind(page: FeedbackInputs): GPUBindGroup {
-    // The image size or the set of scenes has changed.
+    // New bindings mean another image size or another set of scenes, so all passes are invalid.
     this.#views.clear();
     return this.#stage.bind({ ...page, ahead: this.#ahead, requests: this.#requests });
   }
@@ -145,13 +150,13 @@ export class PageFeedback implements PageRequests {
         this.#isReading = false;
         this.#options.onFeedback(requests, requests[0]);
       },
-      // The device is lost, or the scene was destroyed meanwhile.
+      // Fails if the device is lost or the scene was destroyed meanwhile.
       () => undefined,
     );
   }
 }
 
-/** Identifies all parameters of a feedback pass, except the content of the scene. */
+/** Returns a name of a view that contains all parameters of its feedback pass, except the world and the scene. */
 function nameOf(camera: Camera, { detail, detailFade, splatBudget }: FeedbackSettings): string {
   const { width, height, fx, fy, cx, cy, near, far, worldToCamera } = camera;
   return [...worldToCamera, width, height, fx, fy, cx, cy, near, far, detail, detailFade, splatBudget].join(' ');

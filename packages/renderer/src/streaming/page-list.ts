@@ -4,39 +4,52 @@ import { NONE } from '../ranked-heap.js';
 
 export { NONE };
 
-/** The pages of a streamed scene, parents before children. */
+/**
+ * The pages of a streamed scene, P of them, parents before children. [P] denotes an array with one element for each
+ * page.
+ */
 export interface PageList {
+  /** Number of pages, P. */
   readonly count: number;
   /** [P] number of slots of each page, one for each {@link SLOT_CHUNKS} chunks. */
   readonly slots: Uint32Array;
-  /** [P] number of chunks of each page; a run has fewer if some of its splats are unusable. */
+  /** [P] number of chunks of each page; a run of a level has fewer if some of its splats are unusable. */
   readonly chunks: Uint32Array;
-  /** [P] number of chunks that have their parent in another page or none. */
+  /** [P] number of the first chunks, whose parent is in another page or missing. */
   readonly upper: Uint32Array;
-  /** [P] page of the parent chunks, or {@link NONE}, the first of these chunks in it and their number. */
+  /** [P] page that contains the parent chunks, or {@link NONE}. */
   readonly parent: Uint32Array;
+  /** [P] index of the first parent chunk in that page. */
   readonly parentChunk: Uint32Array;
+  /** [P] number of parent chunks, which are consecutive. */
   readonly parentChunks: Uint32Array;
-  /** [P] index of a page's first chunk in {@link children}. */
+  /** [P] index in {@link children} of the first chunk of each page. */
   readonly firstChunk: Uint32Array;
-  /** Page with the children of each chunk, or {@link NONE}; {@link SLOT_CHUNKS} for each slot. */
+  /**
+   * Index of the page that contains the children of each chunk, or {@link NONE}. Each slot has {@link SLOT_CHUNKS}
+   * elements.
+   */
   readonly children: Uint32Array;
 }
 
-/** Location of a page of a folder: a file, the first chunk in it, and the number of chunks. */
+/** Location of a page in the files of a folder. */
 export interface PagePlace {
   readonly file: TreePage;
+  /** Index in the file of the first chunk of the page. */
   readonly first: number;
+  /** Number of chunks of the page. */
   readonly chunks: number;
 }
 
-/** The pages of all instances of a scene, numbered consecutively, first instance first. */
+/** The pages of all instances of a scene, numbered consecutively. The pages of the first instance are first. */
 export interface InstanceList extends PageList {
+  /** Returns the location of a page in the files of the folder. */
   readonly place: (page: number) => PagePlace;
+  /** Returns the translation of a page in world units. */
   readonly translate: (page: number) => Vector3;
 }
 
-/** A list of pages with these numbers of slots, without parents yet. */
+/** Returns a list of pages with these numbers of slots. Numbers of chunks are 0, and no page has a parent. */
 export function emptyList(slots: Uint32Array): PageList {
   const count = slots.length;
   const firstChunk = new Uint32Array(count);
@@ -52,7 +65,7 @@ export function emptyList(slots: Uint32Array): PageList {
   };
 }
 
-/** Makes a page the child of some chunks of an earlier one. */
+/** Makes a page the child of consecutive chunks of an earlier page. */
 export function putBelow(list: PageList, page: number, parent: number, firstChunk: number, chunks: number): void {
   list.parent[page] = parent;
   list.parentChunk[page] = firstChunk;
@@ -61,13 +74,13 @@ export function putBelow(list: PageList, page: number, parent: number, firstChun
   list.children.fill(page, from, from + chunks);
 }
 
-/** Indices of the child pages of the chunks in one slot of a page, {@link NONE} for none. */
+/** Returns the indices of the child pages of the chunks in a slot of a page; {@link NONE} for chunks without one. */
 export function childrenIn(list: PageList, page: number, slot: number): Uint32Array {
   const from = list.firstChunk[page] + SLOT_CHUNKS * slot;
   return list.children.subarray(from, from + Math.min(SLOT_CHUNKS, list.chunks[page] - SLOT_CHUNKS * slot));
 }
 
-/** [P] 1 for pages that need more slots, including all their ancestors, than this limit. */
+/** Returns [P] 1 for each page that needs more than `max` slots together with all its ancestors; otherwise 0. */
 export function largerThan(max: number, { count, slots, parent }: PageList): Uint8Array {
   const withAbove = new Float64Array(count);
   for (let page = 0; page < count; page++) {
@@ -76,12 +89,12 @@ export function largerThan(max: number, { count, slots, parent }: PageList): Uin
   return Uint8Array.from(withAbove, (needed) => (needed > max ? 1 : 0));
 }
 
-/** A page of a tree, and its parent page and chunk. */
+/** A page of a tree, and its parent: the index of the parent page in the tree, and of the chunk in that page. */
 interface TreePart extends PagePlace {
   readonly parent?: readonly [part: number, chunk: number];
 }
 
-/** The pages of a tree, and the index of the first page of each of its files. */
+/** Returns the pages of a tree, and the index of the first page of each of its files. */
 function partsOf({ pages }: Tree): { readonly parts: readonly TreePart[]; readonly firsts: readonly number[] } {
   const [parts, firsts]: [TreePart[], number[]] = [[], []];
   for (const file of pages) {
@@ -96,7 +109,7 @@ function partsOf({ pages }: Tree): { readonly parts: readonly TreePart[]; readon
   return { parts, firsts };
 }
 
-/** The page that holds a chunk of a file, and its index in that page. */
+/** Returns the index of the page that contains a chunk of a file, and the index of the chunk in that page. */
 function partAt(
   files: readonly TreePage[],
   firsts: readonly number[],
@@ -107,6 +120,7 @@ function partAt(
   return [firsts[file] + 1 + Math.floor(lower / SLOT_CHUNKS), lower % SLOT_CHUNKS];
 }
 
+/** Returns the pages of all instances of a manifest. */
 export function listPages({ trees, instances }: DetailManifest): InstanceList {
   const cut = trees.map(partsOf);
   const count = instances.reduce((sum, { tree }) => sum + cut[tree].parts.length, 0);
@@ -122,7 +136,7 @@ export function listPages({ trees, instances }: DetailManifest): InstanceList {
       list.chunks[first + p] = chunks;
       list.upper[first + p] = chunks;
       if (parent) putBelow(list, first + p, first + parent[0], parent[1], 1);
-      // The first instance has the lowest indices.
+      // The parent is in the first instance, whose pages have the lowest indices.
       else if (above)
         putBelow(list, first + p, ...partAt(trees[instances[0].tree].pages, cut[instances[0].tree].firsts, above), 1);
     });

@@ -14,32 +14,35 @@ import { chunkLayout, movePoints, numbersOf, startOf, type ChunkLayout, type Slo
 import { CHUNK_NUMBERS } from '../pack/words.js';
 
 const SLOT_SPLATS = SLOT_CHUNKS * constants.CULL_GROUP;
-/** Maximum size of a pool's buffer in bytes: several of this size can be allocated when one large one cannot (iOS). */
+/**
+ * Maximum size of a pool's buffer in bytes. Several buffers of this size can be allocated when a single larger one
+ * cannot (iOS).
+ */
 const LARGEST_BUFFER = 1 << 27;
 /**
- * Fraction of the pool's memory for staging uploads, and its upper limit in bytes: with that many, one frame in a
- * hundred lacked staging memory at the maximum upload rate.
+ * Fraction of the pool's memory for staging uploads, and its upper limit in bytes. At the maximum upload rate, one
+ * frame in a hundred lacked staging memory with this limit.
  */
 const STAGING = { share: 1 / 32, max: 24e6 } as const;
 
-/** Bytes of GPU memory that one slot takes. */
+/** Returns the bytes of GPU memory of one slot. */
 export function slotBytes(format: PageFormat): number {
   return 4 * pageLayout(format, SLOT_CHUNKS).total;
 }
 
-/** Size of a pool. */
+/** Number of slots and staging blocks of a pool. */
 export interface PoolSize {
   readonly slots: number;
   /** Number of staging blocks of mapped memory. */
   readonly blocks: number;
 }
 
-/** Bytes of GPU memory of slots and staging blocks. */
+/** Returns the bytes of GPU memory of the slots and staging blocks. */
 export const poolBytes = (format: PageFormat, { slots, blocks }: PoolSize): number =>
   slots * slotBytes(format) + blocks * BLOCK_BYTES;
 
 /**
- * Returns the largest pool within this number of bytes, with at most as many slots as the pages need.
+ * Returns the largest pool within a budget in bytes, with at most as many slots as all pages need.
  * @throws GaussianSplatError `out-of-memory/budget` if the first page does not fit.
  */
 export function poolSize(format: PageFormat, list: PageList, budget: number): PoolSize {
@@ -57,14 +60,14 @@ export function poolSize(format: PageFormat, list: PageList, budget: number): Po
 }
 
 /**
- * Slots on the GPU, allocated once, each for one page of a streamed scene or a part of one. The content of a slot
- * without a page is never drawn.
+ * Slots on the GPU, allocated once. Each slot contains a page of a streamed scene or a part of one. The content of a
+ * slot without a page is never drawn.
  */
 export class PagePool {
   readonly pages: readonly GaussianBlock[];
   readonly #device: GPUDevice;
   readonly #layout: ChunkLayout;
-  /** Boxes of the chunks of the slot that is being written. */
+  /** Boxes of the chunks in the slot that is being written. */
   readonly #boxes = new Float32Array(CHUNK_NUMBERS * SLOT_CHUNKS);
   /** Number of slots in one buffer. */
   readonly slotsPerBuffer: number;
@@ -97,13 +100,13 @@ export class PagePool {
   }
 
   /**
-   * Writes chunks into a slot, directly from their file, because another copy would cost as much time again. {@link
-   * writeDetails} writes their LOD rows; {@link flush} must follow before the slot is drawn.
-   * @param by World units, added to all positions.
+   * Writes chunks to a slot, directly from the words of their file, because another copy would cost as much time again.
+   * Write their LOD rows with {@link writeDetails}, and call {@link flush} before the slot is drawn.
+   * @param by Translation in world units, added to all positions.
    */
   write(slot: number, words: SlotWords, by: Vector3): void {
     const { page, place } = this.#find(slot);
-    // A part may be submitted before everything has been written.
+    // A part of these writes may be submitted before the others, so an earlier translation must not run on it.
     this.#mover.forget(slot);
     const layout = this.#layout;
     const first = SLOT_CHUNKS * place;
@@ -121,15 +124,16 @@ export class PagePool {
   }
 
   /**
-   * Writes LOD rows, {@link SLOT_CHUNKS} for each slot from the given one on; all of them must lie in one buffer.
-   * {@link flush} must follow.
+   * Writes LOD rows of consecutive slots, {@link SLOT_CHUNKS} for each slot. All slots must be in one buffer. Call
+   * {@link flush} afterwards.
+   * @param first Index of the first slot.
    */
   writeDetails(first: number, rows: Float32Array<ArrayBuffer>): void {
     const { page, place } = this.#find(first);
     this.#write(page.details!, 4 * DETAIL_NUMBERS * SLOT_CHUNKS * place, wordsOf(rows));
   }
 
-  /** Submits all writes. */
+  /** Submits all writes and translations. */
   flush(): void {
     if (this.#belt.isEmpty && this.#mover.isEmpty) return;
     const encoder = this.#device.createCommandEncoder({ label: 'gs.pool' });
@@ -142,7 +146,7 @@ export class PagePool {
   #write(to: GPUBuffer, at: number, words: Uint32Array<ArrayBuffer>): void {
     const taken = this.#belt.write(to, at, words);
     if (taken === words.length) return;
-    // Earlier writes must not execute after this one.
+    // Without staging memory the write goes to the queue, after all earlier writes.
     this.flush();
     this.#device.queue.writeBuffer(to, at + 4 * taken, words, taken);
   }

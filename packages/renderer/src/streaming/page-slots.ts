@@ -1,19 +1,19 @@
 import { NONE } from './page-list.js';
 
-/** A new page, and the pages that were evicted for it. */
+/** Slots of a new page, and the pages that were evicted for it with their former slots. */
 export interface Settled {
   readonly slots: readonly number[];
   readonly left: readonly { readonly page: number; readonly slots: readonly number[] }[];
 }
 
-/** Maps pages to the slots of a pool. */
+/** Maps pages to the slots of a pool. A page may have several slots. */
 export class PageSlots {
   /** [S] page in each slot, or {@link NONE}. */
   readonly pageIn: Uint32Array;
   /** [P] first slot of each page, or {@link NONE}. */
   readonly slotOf: Uint32Array;
   readonly #slotsOf = new Map<number, readonly number[]>();
-  /** Empty slots; the last one is filled next. */
+  /** Indices of the empty slots; the last one is filled next. */
   readonly #empty: number[];
 
   constructor(pages: number, slots: number) {
@@ -22,7 +22,7 @@ export class PageSlots {
     this.#empty = Array.from({ length: slots }, (_, k) => slots - 1 - k);
   }
 
-  /** Slots without a page. */
+  /** Number of slots without a page. */
   get empty(): number {
     return this.#empty.length;
   }
@@ -32,17 +32,17 @@ export class PageSlots {
     return this.#slotsOf.size;
   }
 
-  /** The resident pages. */
+  /** Returns the indices of the resident pages. */
   pages(): Iterable<number> {
     return this.#slotsOf.keys();
   }
 
-  /** Slots of a page, in the order of its chunks; empty if it is not resident. */
+  /** Returns the slots of a page in the order of its chunks; empty if the page is not resident. */
   of(page: number): readonly number[] {
     return this.#slotsOf.get(page) ?? [];
   }
 
-  /** Assigns empty slots to a page. @returns The slots. */
+  /** Assigns `count` empty slots to a page; there must be enough of them. @returns The slots. */
   fill(page: number, count: number): readonly number[] {
     const slots: number[] = [];
     for (let k = 0; k < count; k++) {
@@ -55,7 +55,7 @@ export class PageSlots {
     return slots;
   }
 
-  /** Removes a page from its slots. @returns The slots. */
+  /** Removes a page from its slots. @returns The slots, now empty. */
   clear(page: number): readonly number[] {
     const slots = this.of(page);
     for (let k = slots.length - 1; k >= 0; k--) {

@@ -6,34 +6,35 @@ import type { CodedFile } from './page-coding.js';
 import { listPages, type PageList } from './page-list.js';
 import { chunkLayout, type SlotWords } from './slot-words.js';
 
-/** Properties of a streamed scene, known before any page is loaded. */
+/** Properties of a streamed scene that are known before any page is loaded. */
 export type StreamedScene = PageFormat &
   Pick<DetailManifest, 'splats' | 'antialiased' | 'filterVariance' | 'order' | 'origin' | 'bounds'>;
 
-/** A streamed scene, and the source of its pages. */
+/** A streamed scene, its list of pages, and the source of these pages. */
 export interface PageSource {
   readonly scene: StreamedScene;
   readonly list: PageList;
   /**
-   * Fetches a page: returns the words of each of its slots, all full but the last. Rejects if it is unavailable, or its
-   * number of chunks differs from {@link list}.
+   * Fetches a page, and resolves to the words of each of its slots; all slots except the last are full. Rejects if the
+   * page is unavailable, or its number of chunks differs from {@link list}.
    */
   readonly fetch: (page: number, signal: AbortSignal) => Promise<readonly SlotWords[]>;
-  /** Whether a page need not be fetched: it then precedes others with the same need. */
+  /** Returns whether a page is available without a fetch. Such a page precedes other pages with the same need. */
   readonly isCached?: (page: number) => boolean;
-  /** Translation of a page in world units. Default: none. */
+  /** Returns the translation of a page in world units. Default: none. */
   readonly translate?: (page: number) => Vector3;
 }
 
 /**
- * Bytes of cached files: the children of a page are often requested as soon as the page is resident, and lie in the
- * same file.
+ * Maximum bytes of cached files. The children of a page are often requested as soon as the page is resident, and are in
+ * the same file.
  */
 const KEPT_BYTES = 64e6;
 
 /**
- * Fetches a file of pages.
- * @param coded Parameters for {@link decodePage}; undefined if files are not coded.
+ * Fetches a file of pages, and resolves to its bytes.
+ * @param file Name of the file, relative to the manifest.
+ * @param coded Parameters of `decodePage`; undefined if files are not coded.
  */
 export type FetchPage = (
   file: string,
@@ -42,7 +43,7 @@ export type FetchPage = (
 ) => Promise<ArrayBuffer | ArrayBufferView<ArrayBuffer>>;
 
 /**
- * Returns the page source of a folder that the command `stream` wrote. A file of the wrong length is not cached: the
+ * Returns the page source of a folder that the command `detail` wrote. A file of the wrong length is not cached: the
  * next request fetches it again.
  * @param isDecoded Whether `fetchPage` decodes coded files.
  */
@@ -82,7 +83,7 @@ export function folderSource(manifest: DetailManifest, fetchPage: FetchPage, isD
 const loadDecoder = (): Promise<typeof decoder> =>
   loadModule('the code that decodes pages', () => import('./decode-page.js'));
 
-/** The bytes of a file in a buffer of their own, for any kind of view. */
+/** Returns the bytes of a file in a buffer without other content. Throws `decode/truncated` for another length. */
 function wholeFile(where: string, length: number, bytes: ArrayBuffer | ArrayBufferView<ArrayBuffer>): ArrayBuffer {
   if (bytes.byteLength === length) return ArrayBuffer.isView(bytes) ? bufferOf(bytes) : bytes;
   throw new GaussianSplatError('decode/truncated', {
@@ -93,7 +94,7 @@ function wholeFile(where: string, length: number, bytes: ArrayBuffer | ArrayBuff
   });
 }
 
-/** Splats without finite bounds are never drawn: such a page is an error, as is a file with only such splats. */
+/** Throws `decode/corrupt` for bounds that are not finite: splats with such bounds would never be drawn. */
 function requireBounds(where: string, bounds: Float32Array): void {
   if (bounds.every((number) => Number.isFinite(number))) return;
   throw new GaussianSplatError('decode/corrupt', {

@@ -2,22 +2,20 @@ import { BackOff } from '@gaussian-splat/core/fetch';
 import { NONE } from './page-list.js';
 import type { Residency } from './residency.js';
 
-/** Maximum number of concurrent fetches; a file holds up to five pages. */
+/** Maximum number of concurrent fetches; a file contains up to five pages. */
 export const MAX_FETCHES = 64;
 /**
- * Upper limit of the slots of pages in transit or waiting for their upload: at most 31 MB of CPU memory, plus one page
- * of any size; more if they share files with others.
+ * Maximum number of slots of the pages that are in transit or wait for their upload. These pages take up to 31 MB of
+ * CPU memory, plus one page of any size. They take more if their files contain other pages, too.
  */
 export const MAX_IN_FLIGHT = 240;
-/** Weight of the previous mean arrival time when a new page arrives. */
+/** Weight of the previous mean arrival time in an update. */
 const MEMORY = 0.95;
-/**
- * Milliseconds before a failed page is requested again, doubled after each further failure, and the maximum number of
- * attempts.
- */
+/** Milliseconds before a failed page is requested again; doubled after each further failure. */
 const RETRY_MS = 4_000;
+/** Maximum number of attempts for a page. */
 const MAX_TRIES = 8;
-/** Milliseconds after a failure before pages that did not fit beside it are tried again, once for many failures. */
+/** Milliseconds after a failure before pages that did not fit are tried again: once for all failures in this time. */
 const RECHECK_MS = 250;
 
 /** A fetched page. */
@@ -26,26 +24,28 @@ export interface FetchedPage<Words> {
   readonly words: Words;
 }
 
+/** Options of a {@link PageStreamer}. */
 export interface TrafficOptions<Words> {
-  /** Rejects if the page is unavailable. */
+  /** Fetches a page; rejects if the page is unavailable. */
   readonly fetch: (page: number, signal: AbortSignal) => Promise<Words>;
-  /** Called when a page waits for its upload. */
+  /** Called when a page has arrived and waits for its upload. */
   readonly onArrival: () => void;
+  /** Called at the first failure of a page. */
   readonly onError: (error: unknown) => void;
-  /** Milliseconds from any origin. Default: `performance.now`. */
+  /** Returns the current time in milliseconds, from any origin. Default: `performance.now`. */
   readonly now?: () => number;
 }
 
 /**
- * Streams pages from the server to slots: the most needed are fetched and uploaded first, a bounded number is in
- * transit, and pages that are no longer requested are canceled at any stage.
+ * Streams pages from the server to slots. The most needed pages are fetched and uploaded first. The number of pages in
+ * transit is limited, and pages that are no longer requested are canceled at any stage.
  */
 export class PageStreamer<Words> {
   readonly #residency: Residency;
   readonly #options: TrafficOptions<Words>;
   readonly #fetching = new Map<number, AbortController>();
   readonly #waiting = new Map<number, Words>();
-  /** Waiting and requested pages, the most needed last; undefined if the list is stale. */
+  /** Requested pages that wait for their upload, the most needed last; undefined if the list must be rebuilt. */
   #order: number[] | undefined;
   readonly #failures: BackOff<number>;
   #retry: ReturnType<typeof setTimeout> | undefined;
@@ -64,7 +64,7 @@ export class PageStreamer<Words> {
     this.#failures = new BackOff({ firstMs: RETRY_MS, factor: 2, maxTries: MAX_TRIES, now: options.now });
   }
 
-  /** Number of pages being fetched or waiting. */
+  /** Number of pages that are being fetched or wait for their upload. */
   get underWay(): number {
     return this.#fetching.size + this.#waiting.size;
   }
@@ -75,19 +75,21 @@ export class PageStreamer<Words> {
   }
 
   /**
-   * Number of fetched pages that were canceled, because they were no longer requested or no page could be evicted for
-   * them.
+   * Number of fetches that were canceled or whose page was discarded: it was no longer requested, or no page could be
+   * evicted for it.
    */
   get abandoned(): number {
     return this.#abandoned;
   }
 
-  /** Mean milliseconds of the latest pages from their request to their upload; 0 before the first. */
+  /**
+   * Mean milliseconds from the request of a page to its upload, weighted toward the latest pages; 0 before the first.
+   */
   get arrivalMs(): number {
     return this.#arrivalMs;
   }
 
-  /** Call after each feedback pass: cancels pages that are no longer requested, and fetches new ones. */
+  /** Cancels pages that are no longer requested, and fetches new ones: call it after each feedback pass. */
   follow(): void {
     this.#order = undefined;
     for (const page of [...this.#fetching.keys(), ...this.#waiting.keys()]) {
@@ -96,7 +98,7 @@ export class PageStreamer<Words> {
     this.sendForMore();
   }
 
-  /** Fetches the most needed pages, up to the limits. */
+  /** Fetches the most needed missing pages, up to the limits. */
   sendForMore(): void {
     while (!this.#isClosed && this.#fetching.size < MAX_FETCHES && this.#slotsUnderWay < MAX_IN_FLIGHT) {
       const page = this.#residency.nextMissing();
@@ -105,7 +107,7 @@ export class PageStreamer<Words> {
     }
   }
 
-  /** Returns the most needed of the waiting pages; undefined if none is requested. */
+  /** Removes and returns the most needed page that waits for its upload; undefined if no waiting page is requested. */
   next(): FetchedPage<Words> | undefined {
     const max = this.#nextWaiting();
     if (max === undefined) return undefined;
@@ -116,12 +118,12 @@ export class PageStreamer<Words> {
     return { page: max, words };
   }
 
-  /** Call if the returned page found no slot. */
+  /** Counts a page of {@link next} that found no slot as abandoned. */
   refused(): void {
     this.#abandoned++;
   }
 
-  /** Stops everything; no more callbacks follow. */
+  /** Aborts all fetches and stops all timers; no callbacks follow. */
   close(): void {
     this.#isClosed = true;
     clearTimeout(this.#retry);
@@ -140,14 +142,14 @@ export class PageStreamer<Words> {
   #noteFailure(page: number, error: unknown): void {
     if (this.#failures.fail(page) === 1) this.#options.onError(error);
     this.#retryLater();
-    // The reserved slots are available to other pages.
+    // Pages that did not fit may use the slots that the failed page had reserved.
     this.#recheckTimer ??= setTimeout(() => {
       this.#recheckTimer = undefined;
       this.#recheck();
     }, RECHECK_MS);
   }
 
-  /** A view at rest runs no feedback pass, so the last requests are repeated. */
+  /** Repeats the last requests later, because a view at rest runs no feedback pass. */
   #retryLater(): void {
     this.#retry ??= setTimeout(() => {
       this.#retry = undefined;
@@ -157,7 +159,7 @@ export class PageStreamer<Words> {
     }, RETRY_MS);
   }
 
-  /** Repeats all requests of the last feedback pass, including failed ones. */
+  /** Repeats all requests of the last feedback pass, including those for failed pages. */
   #recheck(): void {
     this.#residency.rebuildMissing();
     this.sendForMore();
@@ -184,7 +186,7 @@ export class PageStreamer<Words> {
     this.#fetching.set(page, controller);
     this.#sentAt.set(page, this.#now());
     this.#slotsUnderWay += this.#residency.slotsFor(page);
-    // A canceled page may have been requested again meanwhile: that is another fetch.
+    // A canceled page may have been requested again meanwhile, which is a separate fetch.
     const isOver = (): boolean => this.#fetching.get(page) !== controller;
     try {
       const words = await this.#options.fetch(page, controller.signal);
@@ -201,7 +203,7 @@ export class PageStreamer<Words> {
     }
     this.#fetching.delete(page);
     this.sendForMore();
-    // A failed page has nothing to draw.
+    // A failed page has no words, and needs no frame.
     if (this.#waiting.has(page)) this.#options.onArrival();
   }
 }

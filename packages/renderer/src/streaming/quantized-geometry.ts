@@ -2,10 +2,12 @@ import { constants, layouts } from '../generated/shaders.js';
 import { FACTOR_NUMBERS, type SplatLevel } from '../levels/splat-level.js';
 
 /**
- * Geometry of a chunk in half the bytes: 16 for each splat and 32 for each chunk, in the layout of
- * shaders/shared/quantized_gaussian.wgsl. Centers are stored to 1/131,070 of the chunk's box, lengths of the factor's
- * rows (standard deviations along x, y and z) to 1/2046 of the octaves between the chunk's smallest and largest,
- * directions of its rows to about 0.0004, opacities to 1/3000.
+ * Geometry of a chunk in half the bytes of `PackedGaussian`: 16 for each splat and 32 for each chunk. The layout is
+ * that of shaders/shared/quantized_gaussian.wgsl.
+ *
+ * Steps of each property: centers 1/65,535 of the chunk's box; lengths of the rows of the covariance factor (standard
+ * deviations along x, y and z) 1/1023 of the octaves between the smallest and the largest in the chunk. Directions of
+ * the rows have errors of about 0.0004, opacities of 1/3000.
  */
 
 const {
@@ -19,45 +21,48 @@ const {
   QUANTIZED_OPAQUE,
 } = constants;
 
-/** Codes of a splat: see {@link putRow}. */
+/** Number of codes of a splat: see {@link putRow}. */
 export const ROW_CODES = 10;
-/** 32-bit words of a chunk. */
+/** Number of 32-bit words of a chunk. */
 export const QUANTIZED_CHUNK_WORDS = 4 * QUANTIZED_CHUNK_ROWS;
 const CENTER_STEPS = 65535;
 /** Twice the maximum rounding error of a center, as a fraction of the diagonal of its chunk's box. */
 export const CENTER_ROUNDING = 1 / CENTER_STEPS;
 const MAX_OPACITY = 4095;
-/** The lowest visible opacity code. */
+/** The lowest code of an opacity that is drawn. */
 const FIRST_VISIBLE = Math.ceil(ALPHA_MIN * QUANTIZED_OPAQUE);
-/** Octaves below the largest row of a chunk: anything smaller is invisible beside it. */
+/**
+ * Maximum number of octaves from the smallest to the largest row of a chunk. Anything smaller is invisible beside the
+ * largest.
+ */
 const MAX_OCTAVES = 24;
 
-/** Factor of the reach for the rounding of sizes, and of opacities that are barely visible. */
+/** Factor of the reach of a chunk, which allows for the rounding of sizes, and of opacities that are barely visible. */
 const FARTHER = 1.02;
 const REACH = layouts.Chunk.fields.reach.offset / 4;
 
 const float = new Float32Array(1);
 const bits = new Uint32Array(float.buffer);
 
-/** Smallest float32 that is at least the given non-negative number. */
+/** Returns the smallest float32 that is at least the given non-negative number. */
 function roundedUp(value: number): number {
   float[0] = value;
   if (float[0] < value) bits[0]++;
   return float[0];
 }
 
-/** The nearest code, 0 for values below `least`. */
+/** Returns the nearest code of a value, 0 to `max`; 0 if `step` is 0. */
 const codeOf = (value: number, min: number, step: number, max: number): number =>
   step > 0 ? Math.min(max, Math.max(0, Math.round((value - min) / step))) : 0;
 
-/** Lengths of the rows of a factor (xx, yx, yy, zx, zy, zz) from number `f` on. */
+/** Writes the lengths of the three rows of a covariance factor (xx, yx, yy, zx, zy, zz), from index `f` on. */
 export function rowLengths(factors: Float32Array, f: number, lengths: Float64Array): void {
   lengths[0] = Math.abs(factors[f]);
   lengths[1] = Math.hypot(factors[f + 1], factors[f + 2]);
   lengths[2] = Math.hypot(factors[f + 3], factors[f + 4], factors[f + 5]);
 }
 
-/** log2 of the smallest and of the largest row of some splats, at most {@link MAX_OCTAVES} apart. */
+/** Returns log2 of the smallest and the largest row of some splats; they differ by at most {@link MAX_OCTAVES}. */
 function octavesOf({ factors }: SplatLevel, from: number, end: number): readonly [min: number, largest: number] {
   const lengths = new Float64Array(3);
   let [min, largest] = [Infinity, 0];
@@ -72,7 +77,7 @@ function octavesOf({ factors }: SplatLevel, from: number, end: number): readonly
 
 /**
  * Writes splats `from` to `end` of a level as one chunk, from word `at` on. The padding has opacity 0.
- * @param words Must be zero there.
+ * @param words Target array, which must be zero in the range of the chunk.
  */
 export function packQuantizedChunk(level: SplatLevel, words: Uint32Array, at: number, from: number, end: number): void {
   if (end - from > CULL_GROUP) throw new RangeError(`expected at most ${CULL_GROUP} splats, found ${end - from}`);
@@ -99,7 +104,7 @@ export function packQuantizedChunk(level: SplatLevel, words: Uint32Array, at: nu
     const f = FACTOR_NUMBERS * i;
     rowLengths(factors, f, lengths);
     const size = (row: number): number => code(3, Math.log2(lengths[row]), QUANTIZED_SIZES);
-    // L Lᵀ does not change with the sign of a column, so the diagonal is made non-negative.
+    // The sign of a column does not change L Lᵀ, so the diagonal is made non-negative.
     const [first, second] = [factors[f] < 0 ? -1 : 1, factors[f + 2] < 0 ? -1 : 1];
     const t = directionIn2(first * factors[f + 1], factors[f + 2]);
     const [u, v] = directionIn3(first * factors[f + 3], second * factors[f + 4], factors[f + 5]);
@@ -109,7 +114,10 @@ export function packQuantizedChunk(level: SplatLevel, words: Uint32Array, at: nu
   }
 }
 
-/** Writes a splat: x, y, z, three sizes, t, u, v, opacity. */
+/**
+ * Writes the codes of a splat: x, y, z, three sizes, t, u, v, opacity.
+ * @param row Index of the splat's first word.
+ */
 export function putRow(words: Uint32Array, row: number, codes: Int32Array): void {
   const t = codes[6];
   words[row] = codes[0] | (codes[1] << 16);
@@ -118,7 +126,7 @@ export function putRow(words: Uint32Array, row: number, codes: Int32Array): void
   words[row + 3] = codes[8] | (codes[9] << 13) | ((t >>> 5) << 25);
 }
 
-/** Reads the codes of {@link putRow}. */
+/** Reads the codes of a splat that {@link putRow} wrote. */
 export function readRow(words: Uint32Array, row: number, codes: Int32Array): void {
   const [a, b, c, d] = [words[row], words[row + 1], words[row + 2], words[row + 3]];
   codes[0] = a & 0xffff;
@@ -133,18 +141,20 @@ export function readRow(words: Uint32Array, row: number, codes: Int32Array): voi
   codes[9] = (d >>> 13) & 0xfff;
 }
 
-/** Widens the bounds of a chunk at number `at` to those of its quantized splats. */
+/**
+ * Increases the reach of a chunk by the rounding of its quantized splats. @param at Index of the chunk's first number.
+ */
 export function widenReach(bounds: Float32Array, at: number): void {
   bounds[at + REACH] *= FARTHER;
 }
 
-/** On the same side of 1/255 as the opacity, because splats below it are not drawn. */
+/** Returns the code of an opacity. Rounding never crosses 1/255, because splats below it are not drawn. */
 function opacityCode(opacity: number): number {
   const nearest = Math.min(MAX_OPACITY, Math.max(0, Math.round(opacity * QUANTIZED_OPAQUE)));
   return opacity >= ALPHA_MIN ? Math.max(nearest, FIRST_VISIBLE) : Math.min(nearest, FIRST_VISIBLE - 1);
 }
 
-/** Direction of (x, |y|): its intersection with the line |x| + y = 1. */
+/** Returns the code of the direction (x, |y|): its intersection with the line |x| + y = 1. */
 export function directionIn2(x: number, y: number): number {
   const sum = Math.abs(x) + Math.abs(y);
   if (!(sum > 0)) return QUANTIZED_T_ZERO;
@@ -152,8 +162,8 @@ export function directionIn2(x: number, y: number): number {
 }
 
 /**
- * Direction of (x, y, |z|): the octahedral map of the hemisphere, rotated by 45° so that it fills a square (Cigolle et
- * al. 2014, "A Survey of Efficient Representations for Independent Unit Vectors").
+ * Returns the codes of the direction (x, y, |z|). The octahedral map of the hemisphere is rotated by 45°, so that it
+ * fills a square (Cigolle et al. 2014, "A Survey of Efficient Representations for Independent Unit Vectors").
  */
 export function directionIn3(x: number, y: number, z: number): readonly [u: number, v: number] {
   const sum = Math.abs(x) + Math.abs(y) + Math.abs(z);

@@ -2,37 +2,35 @@ import { RankedHeap } from '../ranked-heap.js';
 import { largerThan, NONE, type PageList } from './page-list.js';
 import { PageSlots, type Settled } from './page-slots.js';
 
-/** A requested page must be more needed, by this factor, than a requested page that is evicted for it. */
+/** Factor by which a requested page must be more needed than a requested page that is evicted for it. */
 const WORTH = 1.5;
-/** Factor of the need of a page that is cached. */
+/** Factor of the need of a page that is cached, in the order of fetches. */
 const AT_HAND = 4;
 /**
- * Feedback passes in a row that must not request a page in transit before it is canceled, because alternating views
- * request different pages.
+ * Number of consecutive feedback passes without a request for a page in transit before it is canceled. Alternating
+ * views request different pages.
  */
 const STALE_AFTER = 2;
 
 /**
- * Decides which pages are resident, fetched and evicted. The ancestors of a resident page are always resident: pages
+ * Decides which pages are resident, fetched and evicted. The ancestors of a resident page are always resident. Pages
  * arrive from coarse to fine and are evicted from fine to coarse, so that the resident pages always cover the scene. A
- * page is resident in all of its slots or not at all; one that does not fit together with its ancestors is never
+ * page is resident in all of its slots or in none. A page that does not fit together with its ancestors is never
  * fetched.
  *
- * A feedback pass costs time linear in the pages, the arrival or eviction of a page its logarithm.
+ * A feedback pass costs time linear in the number of pages. The arrival or eviction of a page costs logarithmic time.
  */
 export class Residency {
   readonly #slots: PageSlots;
   readonly #list: PageList;
   readonly #isCached: (page: number) => boolean;
-  /**
-   * [P] screen error of a missing page in pixels, from the last feedback pass, and the index of the last pass that
-   * requested it.
-   */
+  /** [P] screen error of a missing page in pixels, from the last feedback pass; 0 if it is not requested. */
   readonly #request: Float32Array;
+  /** [P] index of the last feedback pass that requested each page. */
   readonly #requestedAt: Uint32Array;
-  /** [P] descendants of a page that are resident or in transit. */
+  /** [P] number of descendants of a page that are resident or in transit. */
   readonly #below: Uint32Array;
-  /** [P] 1 for pages that do not fit together with their ancestors. */
+  /** [P] 1 for pages that do not fit in the pool together with their ancestors. */
   readonly #isTooLarge: Uint8Array;
   readonly #coming = new Set<number>();
   readonly #missing: RankedHeap;
@@ -40,16 +38,24 @@ export class Residency {
   readonly #evictees: RankedHeap;
   /** [P] 1 for pages that are listed as evictable or reserved for eviction. */
   readonly #isListed: Uint8Array;
-  /** Pages reserved for eviction by pages in transit without empty slots, in order; drawn until then. */
+  /**
+   * Pages reserved for eviction, in order, because pages in transit need more than the empty slots. They are drawn
+   * until then.
+   */
   #reserved: number[] = [];
-  /** Number of their slots, and of the slots of pages in transit. */
+  /** Number of slots of the reserved pages. */
   #slotsAside = 0;
+  /** Number of slots of the pages in transit. */
   #slotsComing = 0;
-  /** Size and need of a page that did not fit since the last feedback pass. */
+  /** Number of slots and need of the smallest page that did not fit since the last feedback pass. */
   #noRoom = { slots: Infinity, need: 0 };
+  /** Index of the last feedback pass. */
   #sample = 0;
 
-  /** @param isAtHand Whether a page is cached and need not be fetched. */
+  /**
+   * @param slots Number of slots in the pool.
+   * @param isCached Returns whether a page is available without a fetch.
+   */
   constructor(list: PageList, slots: number, isCached: (page: number) => boolean = () => false) {
     this.#list = list;
     this.#isCached = isCached;
@@ -77,12 +83,12 @@ export class Residency {
     return this.slotOf[page] !== NONE;
   }
 
-  /** Slots of a resident page, in the order of its chunks; empty for others. */
+  /** Returns the slots of a resident page in the order of its chunks; empty for other pages. */
   slotsOf(page: number): readonly number[] {
     return this.#slots.of(page);
   }
 
-  /** Number of slots of a page. */
+  /** Returns the number of slots that a page needs. */
   slotsFor(page: number): number {
     return this.#list.slots[page];
   }
@@ -92,17 +98,40 @@ export class Residency {
     return this.#slots.count;
   }
 
-  /** Screen error of a missing page in pixels, from the last feedback pass; 0 if it is not requested. */
+  /** Number of slots of the resident pages. */
+  get slotsInUse(): number {
+    return this.pageIn.length - this.#slots.empty;
+  }
+
+  /** Number of chunks of the resident pages. */
+  get chunks(): number {
+    let chunks = 0;
+    for (const page of this.#slots.pages()) chunks += this.#list.chunks[page];
+    return chunks;
+  }
+
+  /** Whether a page that the last feedback pass requested found no slots. */
+  get lacksSlots(): boolean {
+    const isRefused = (isTooLarge: number, page: number): boolean => isTooLarge === 1 && this.#request[page] > 0;
+    return this.#noRoom.slots < Infinity || this.#isTooLarge.some(isRefused);
+  }
+
+  /**
+   * Returns the screen error of a missing page in pixels, from the last feedback pass; 0 if the page is not requested.
+   */
   need(page: number): number {
     return this.#request[page];
   }
 
-  /** Whether the last feedback passes have not requested the page. */
+  /** Whether the last {@link STALE_AFTER} feedback passes have not requested the page. */
   isStale(page: number): boolean {
     return this.#sample - this.#requestedAt[page] >= STALE_AFTER;
   }
 
-  /** Records a feedback pass: for each page the screen error in pixels if it is missing, 0 if it is not requested. */
+  /**
+   * Records a feedback pass.
+   * @param requests [P] screen error in pixels of each missing page; 0 if it is not requested.
+   */
   note(requests: Float32Array): void {
     this.#sample++;
     this.#noRoom = { slots: Infinity, need: 0 };
@@ -115,12 +144,13 @@ export class Residency {
   }
 
   /**
-   * Removes and returns the most needed of the requested pages that are neither resident nor in transit, but have a
-   * resident parent.
-   * @returns {@link NONE} if there is none.
+   * Removes and returns the most needed of the missing pages: requested, neither resident nor in transit, and with a
+   * resident parent or none.
+   * @returns Index of the page; {@link NONE} if there is none.
    */
   nextMissing(): number {
-    // Thousands may not fit: skips pages that are at most as needed, and at least as large, as one that did not.
+    // Thousands of pages may not fit. The loop skips pages that need at least as many slots, and are at most as needed,
+    // as one that did not fit.
     const { slots, need } = this.#noRoom;
     while (slots > 1 || this.#missing.largest > need) {
       const page = this.#missing.pop();
@@ -131,15 +161,16 @@ export class Residency {
     return NONE;
   }
 
-  /** Lets {@link nextMissing} return all requested missing pages again, even those that did not fit. */
+  /** Makes {@link nextMissing} return all requested missing pages again, even those that did not fit. */
   rebuildMissing(): void {
     this.#noRoom = { slots: Infinity, need: 0 };
     this.#listMissing();
   }
 
   /**
-   * Reserves slots for a page, empty ones or those of less needed pages; if there are none, equally large pages with at
-   * most the same need are skipped until the next feedback pass.
+   * Reserves slots for a page that is to be fetched: empty slots, or those of less needed pages. If there are too few,
+   * pages of this size with at most this need are skipped until the next feedback pass.
+   * @returns Whether slots are reserved.
    */
   begin(page: number): boolean {
     const parent = this.#list.parent[page];
@@ -154,7 +185,7 @@ export class Residency {
     return true;
   }
 
-  /** Cancels a page in transit. */
+  /** Cancels a page in transit, and releases its reserved slots. Does nothing for other pages. */
   cancel(page: number): void {
     if (!this.#coming.delete(page)) return;
     this.#slotsComing -= this.#list.slots[page];
@@ -167,7 +198,10 @@ export class Residency {
     }
   }
 
-  /** Makes a page resident. @returns Its slots and the pages that were evicted for it; undefined if it no longer fits. */
+  /**
+   * Makes a page in transit resident.
+   * @returns Its slots, and the pages that were evicted for it; undefined if the page no longer fits.
+   */
   settle(page: number): Settled | undefined {
     const evictees = this.#evicteesFor(page);
     if (evictees === undefined) {
@@ -186,7 +220,7 @@ export class Residency {
     return { slots, left };
   }
 
-  /** Slots that pages in transit need beyond the empty ones. */
+  /** Number of slots that pages in transit need beyond the empty ones. */
   get #lackingSlots(): number {
     return Math.max(0, this.#slotsComing - this.#slots.empty);
   }
@@ -230,18 +264,21 @@ export class Residency {
     }
   }
 
-  /** The coarsest page, and pages with resident descendants, are never evicted. */
+  /** Whether a page may be evicted. The coarsest page, and pages with resident descendants, are never evicted. */
   #isEvictable(page: number): boolean {
     return this.isResident(page) && this.#below[page] === 0 && this.#list.parent[page] !== NONE;
   }
 
-  /** Eviction priority: first the page not requested for the longest time; among requested ones the least needed. */
+  /**
+   * Returns the eviction priority of a page, largest first. Pages that were not requested for the longest time come
+   * first; among requested ones the least needed comes first.
+   */
   #evictionPriority(page: number): number {
     const age = this.#sample - this.#requestedAt[page];
     return age > 0 ? age : -this.#request[page];
   }
 
-  /** Lists a page as evictable, if it is. */
+  /** Adds a page to the list of evictable pages if it may be evicted. */
   #offer(page: number): void {
     if (this.#isListed[page] === 1 || !this.#isEvictable(page)) return;
     this.#isListed[page] = 1;
@@ -253,7 +290,10 @@ export class Residency {
     this.#offer(page);
   }
 
-  /** Removes the first evictable page; it counts as listed until it is evicted or returned. */
+  /**
+   * Removes and returns the first evictable page, or {@link NONE}. The page counts as listed until it is evicted or
+   * returned.
+   */
   #nextEvictable(): number {
     for (let page = this.#evictees.pop(); page !== NONE; page = this.#evictees.pop()) {
       if (this.#isEvictable(page)) return page;
@@ -267,7 +307,7 @@ export class Residency {
     this.#slotsAside += this.#list.slots[page];
   }
 
-  /** Returns the last reserved page to the list. */
+  /** Moves the last reserved page back to the list of evictable pages. */
   #putBack(): void {
     const page = this.#reserved.pop()!;
     this.#slotsAside -= this.#list.slots[page];
@@ -278,7 +318,9 @@ export class Residency {
     return this.#requestedAt[evictee] !== this.#sample || WORTH * this.#request[evictee] < this.#request[page];
   }
 
-  /** Reserves slots for one more page in transit. */
+  /**
+   * Reserves slots for one more page in transit. Returns false, and reserves nothing, if too few pages are less needed.
+   */
   #makeRoom(page: number): boolean {
     const lacking = this.#slotsComing + this.#list.slots[page] - this.#slots.empty;
     const before = this.#reserved.length;
@@ -295,7 +337,7 @@ export class Residency {
     return true;
   }
 
-  /** The pages to evict for a new one; undefined if too few are sufficiently less needed. */
+  /** Returns the pages to evict for a new page; undefined if too few pages are sufficiently less needed. */
   #evicteesFor(page: number): number[] | undefined {
     const evictees: number[] = [];
     for (let room = this.#slots.empty; room < this.#list.slots[page];) {
@@ -312,7 +354,7 @@ export class Residency {
     return evictees;
   }
 
-  /** A descendant is in transit, so the page must stay. */
+  /** Keeps a page resident for a descendant in transit. */
   #hold(page: number): void {
     this.#below[page]++;
     const at = this.#reserved.indexOf(page);
@@ -322,7 +364,7 @@ export class Residency {
     this.#isListed[page] = 0;
   }
 
-  /** A descendant was evicted or canceled. */
+  /** Releases a page after a descendant was evicted or canceled. */
   #release(page: number): void {
     this.#below[page]--;
     this.#offer(page);

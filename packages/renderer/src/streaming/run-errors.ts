@@ -1,13 +1,13 @@
-/**
- * Number of splats whose nearest neighbor is searched, and the number of splats before and after them in the order to
- * search.
- */
+/** Number of splats whose nearest neighbor is searched. */
 const SAMPLE = 128;
+/** Number of splats before and after each of them, in the given order, among which the neighbor is searched. */
 const REACH = 512;
 
 /**
- * Side of the cell that each splat of a surface occupies on median: twice the distance of nearest neighbors for
- * randomly scattered splats.
+ * Returns the spacing of splats on a surface, in the unit of the positions: the median side of the cell that each splat
+ * occupies. Twice the distance of nearest neighbors for randomly scattered splats. 0 if there are fewer than two
+ * splats.
+ * @param kept Indices of the splats, in Morton order.
  */
 export function spacingOf(positions: Float32Array, kept: Uint32Array): number {
   const count = Math.min(SAMPLE, kept.length);
@@ -31,15 +31,16 @@ function squaredDistance(positions: Float32Array, p: number, q: number): number 
 }
 
 /**
- * Twice the root mean square distance between points of a surface and the nearest splat scattered over it, 2 √(1/π) for
- * cells of side 1, and as much again (in squares) for a splat as wide as its cell.
+ * Error of a level as a factor of its spacing: twice the root mean square distance from a point of a surface to the
+ * nearest of the scattered splats, 2 √(1/π) for cells of side 1. A splat as wide as its cell adds as much again (in
+ * squares).
  */
 const CELL_ERROR = 1.6;
 
 /**
- * Estimates the errors of the levels of a node in world units from the spacing of their splats and of the finest,
- * because the file does not state them. They increase from level to level.
- * @param spacings Of each level (see {@link spacingOf}), finest first, world units.
+ * Estimates the errors of the levels of a node in world units, because the file does not state them. They depend on the
+ * spacing of each level and of the finest level, and increase from level to level.
+ * @param spacings Spacing of each level in world units, finest first: see {@link spacingOf}.
  */
 export function errorsOfSpacings(spacings: readonly number[]): number[] {
   const errors: number[] = [];

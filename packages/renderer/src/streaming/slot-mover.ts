@@ -7,12 +7,12 @@ import { moveQuantizedSlots } from '../generated/quantized-shaders.js';
 import { moveSlots } from '../generated/streamed-shaders.js';
 import { Stage } from '../stages/stage.js';
 
-/** Slots translated in one submission. */
+/** Maximum number of slots that one submission translates. */
 const MAX_MOVES = 256;
 const MOVE_WORDS = layouts.SlotMove.size / 4;
 const { by: BY, slot: SLOT } = layouts.SlotMove.fields;
 
-/** Translates the content of slots on the GPU: on the main thread it would cost as much as the upload. */
+/** Translates the positions of slots on the GPU. On the main thread this would cost as much time as the upload. */
 export class SlotMover {
   readonly #device: GPUDevice;
   readonly #stage: Stage<typeof moveSlots | typeof moveQuantizedSlots>;
@@ -41,22 +41,22 @@ export class SlotMover {
     return this.#pending.size === 0;
   }
 
-  /** Whether {@link record} must be called before another slot. */
+  /** Whether no further translation can be added before {@link record}. */
   get isFull(): boolean {
     return this.#pending.size === MAX_MOVES;
   }
 
-  /** Discards the translation of a slot that is about to be overwritten. */
+  /** Discards the pending translation of a slot that will be overwritten. */
   forget(slot: number): void {
     this.#pending.delete(slot);
   }
 
-  /** Adds the translation of a slot that was filled. */
+  /** Adds the translation of a filled slot, in world units. A translation by zero is ignored. */
   note(slot: number, by: Vector3): void {
     if (by.some((value) => value !== 0)) this.#pending.set(slot, by);
   }
 
-  /** Records the pending translations, to be submitted before others are added. */
+  /** Records the pending translations. Submit the encoder before others are added. */
   record(encoder: GPUCommandEncoder): void {
     if (this.isEmpty) return;
     const pass = encoder.beginComputePass({ label: 'gs.pool.move' });

@@ -10,6 +10,7 @@ import { NONE } from './page-list.js';
 import { PagePool, poolBytes, poolSize, slotBytes } from './page-pool.js';
 import { folderSource, type FetchPage, type PageSource } from './page-source.js';
 import { PageStreamer } from './page-streamer.js';
+import { progressOf, type StreamProgress } from './progress.js';
 import { TranslatedRows } from './translated-rows.js';
 import { Residency } from './residency.js';
 import type { SlotWords } from './slot-words.js';
@@ -20,54 +21,58 @@ import type { ShPrecision } from '../pack/words.js';
 
 export interface PoolOptions {
   /**
-   * Bytes of GPU memory for resident splats, allocated at once, up to a 32nd for staging. Default 256 MB, or the size
-   * of the whole scene if that is less.
+   * Limit of the GPU memory for resident splats in bytes. The memory is allocated at once, up to a 32nd of it for
+   * staging. Default: 256 MB, or the size of the whole scene if that is less.
    */
   readonly memoryBudget?: number;
-  /** Duration of the fade-in of a page over its parent in milliseconds, at least 16 frames; 0 for none. Default 400. */
+  /**
+   * Duration in milliseconds of the fade-in of a page over its parent, which takes at least 16 frames; 0 for none.
+   * Default 400.
+   */
   readonly arrivalMs?: number;
   /**
-   * Cancels the opening: it rejects with the reason of the signal, and holds no memory. Has no effect once the scene is
-   * open.
+   * Cancels the opening of the scene, which rejects with the reason of the signal and frees its memory. Has no effect
+   * once the scene is open.
    */
   readonly signal?: AbortSignal;
   /** Called when another frame is required: a page has arrived, or the last view has no feedback pass yet. */
   readonly onChange?: () => void;
   /**
-   * Called when a page fails; its parent stays visible. It is requested again after 4 s, after each further failure
-   * twice as long, up to 256 s.
+   * Called when a page fails; its parent stays visible. The page is requested again after 4 s, and after twice as long
+   * for each further failure, up to 256 s.
    */
   readonly onError?: (error: unknown) => void;
 }
 
 export interface StreamOptions extends PoolOptions {
   /**
-   * Fetches a file of pages, named relative to the manifest; at most 64 at a time. Aborted when no view needs any of
-   * its pages, and when the scene is destroyed. Best done in a worker: reading a response costs a thread more than all
-   * other work for a page.
+   * Fetches a file of pages, whose name is relative to the manifest; at most 64 fetches are concurrent. The signal
+   * aborts when no view needs any page of the file, and when the scene is destroyed. Fetch in a worker if possible:
+   * reading a response costs a thread more time than all other work for a page.
    */
   readonly fetchPage: FetchPage;
   /**
-   * Whether {@link fetchPage} decodes the files of a manifest with a `coding`, by `decodePage`. Default: they are
-   * decoded here.
+   * Whether {@link fetchPage} decodes the files of a manifest with a `coding`, by `decodePage`. Default false: they are
+   * decoded on this thread.
    */
   readonly isDecoded?: boolean;
 }
 
-/** Fits a phone. */
+/** Default of {@link PoolOptions.memoryBudget} in bytes, which suits phones. */
 const DEFAULT_BUDGET = 256e6;
 
 /** Translation of pages without one. */
 const IN_PLACE: Vector3 = [0, 0, 0];
 
-/** A page with slots, and the progress of its upload. */
+/** A page with assigned slots, and the progress of its upload. */
 interface Upload {
   readonly page: number;
   readonly slots: readonly number[];
-  /** Words of each slot that holds chunks. */
+  /** Words of each slot. */
   readonly parts: readonly SlotWords[];
-  /** World units. */
+  /** Translation in world units. */
   readonly by: Vector3;
+  /** Number of uploaded slots. */
   written: number;
 }
 
@@ -83,25 +88,26 @@ function requireTime(arrivalMs: number): void {
 
 /**
  * A scene of any size from static hosting. Only the pages that the view needs are on the GPU. The coarsest page is
- * always resident; the coarser parent of a missing page is drawn instead.
+ * always resident. For a missing page, its coarser parent is drawn.
  *
- * Draw it with the setting `lodError` above 0 or a `splatBudget`: without either, every view requests the finest pages.
+ * Draw the scene with the setting `detail` above 0 or with a `splatBudget`. Without either, every view requests the
+ * finest pages.
  */
 export class StreamedGaussians implements GaussianScene {
-  /** Capacity in splats. */
+  /** Capacity of the pool in splats. */
   readonly count: number;
-  /** Splats of the finest level. */
+  /** Number of splats in the finest level. */
   readonly leafCount: number;
   readonly shDegree: ShDegree;
   readonly shPrecision: ShPrecision;
   readonly antialiased: boolean;
   /** Variance in px² of the screen-space low-pass filter of training; undefined is the classic 0.3. */
   readonly filterVariance?: number | undefined;
-  /** See `CloudHints.order`. */
+  /** Sort order of splats in training: see `CloudHints.order`. */
   readonly order: 'pixel' | undefined;
   readonly origin: Vector3;
   readonly bounds: Bounds;
-  readonly pages: readonly GaussianBlock[];
+  readonly blocks: readonly GaussianBlock[];
   readonly detailBudget: DetailBudget;
   /** Page requests of the views, for the renderer. */
   readonly pageRequests: PageFeedback;
@@ -118,8 +124,10 @@ export class StreamedGaussians implements GaussianScene {
   readonly #arrivals: PageFadeIn;
   #upload: Upload | undefined;
   #isDestroyed = false;
+  /** Whether {@link update} was called in the current task. */
+  #isUpdated = false;
   #lacking = 0;
-  #uploaded = { pages: 0, bytes: 0, milliseconds: 0 };
+  #uploaded = { blocks: 0, bytes: 0, milliseconds: 0 };
   #version = 1;
 
   private constructor(device: GPUDevice, source: PageSource, options: PoolOptions) {
@@ -148,7 +156,6 @@ export class StreamedGaussians implements GaussianScene {
       this.#pool = new PagePool(device, this.#memory, scene, size);
       this.pageRequests = new PageFeedback(device, this.#memory, {
         pages: list.count,
-        origin,
         aheadMs: () => aheadMs(this.#traffic.arrivalMs),
         version: () => this.#version,
         onFeedback: (requests, lacking) => this.#take(requests, lacking),
@@ -158,7 +165,7 @@ export class StreamedGaussians implements GaussianScene {
       this.destroy();
       throw error;
     }
-    this.pages = this.#pool.pages;
+    this.blocks = this.#pool.pages;
     this.#residency = new Residency(list, slots, source.isCached);
     this.#traffic = new PageStreamer(this.#residency, {
       fetch: async (page, signal) => {
@@ -177,9 +184,9 @@ export class StreamedGaussians implements GaussianScene {
   }
 
   /**
-   * Allocates the pool and fetches the coarsest page.
-   * @param manifest See `checkManifest`.
-   * @throws GaussianSplatError `out-of-memory/*` if memory is insufficient; errors of `fetchPage`, `decode/truncated`
+   * Opens a streamed scene: allocates the pool, and fetches the coarsest page.
+   * @param manifest Manifest that `checkManifest` returned.
+   * @throws GaussianSplatError `out-of-memory/*` if memory is insufficient; errors of `fetchPage`; `decode/truncated`
    * for a page of the wrong length; `argument/value` for an invalid `arrivalMs`; the reason of `signal`.
    */
   static open(device: GPUDevice, manifest: DetailManifest, options: StreamOptions): Promise<StreamedGaussians> {
@@ -187,7 +194,7 @@ export class StreamedGaussians implements GaussianScene {
   }
 
   /**
-   * The same for any page source.
+   * Opens a streamed scene from any page source, as {@link open} does.
    * @throws GaussianSplatError `out-of-memory/*` if memory is insufficient; errors of the source for the first page;
    * `argument/value` and the reason of `signal` as {@link open} does.
    */
@@ -210,7 +217,7 @@ export class StreamedGaussians implements GaussianScene {
     }
   }
 
-  /** Incremented with every page that arrives. */
+  /** Incremented when a page arrives, fades in or is evicted. */
   get version(): number {
     return this.#version;
   }
@@ -220,39 +227,34 @@ export class StreamedGaussians implements GaussianScene {
     return this.#memory.byteLength;
   }
 
-  /**
-   * Pages on the GPU, all pages, and pages in transit or fading in. `error` is the largest screen error in pixels from
-   * a missing page, from the last feedback pass (pages outside the view count a quarter near it, else a sixteenth). At
-   * rest, with nothing in transit, a larger `memoryBudget` would reduce it.
-   */
-  get progress(): {
-    readonly resident: number;
-    readonly total: number;
-    readonly coming: number;
-    readonly error: number;
-  } {
-    return {
-      resident: this.#residency.residents,
+  /** The pages on the GPU, from the last feedback pass, and what limits them. */
+  get progress(): StreamProgress {
+    const { residents, slotsInUse, chunks, lacksSlots } = this.#residency;
+    return progressOf({
+      resident: residents,
       total: this.#source.list.count,
       coming: this.#traffic.underWay + this.#placing,
+      splats: chunks * constants.CULL_GROUP,
+      bytes: slotsInUse * this.#slotBytes,
       error: this.#lacking,
-    };
+      lacksSlots,
+    });
   }
 
   /**
-   * For each slot of the pool the index of its page, numbered through all files and instances of the manifest;
-   * undefined for an empty slot.
+   * Index of the page in each slot of the pool, through all files and instances of the manifest; undefined for an empty
+   * slot.
    */
   get pagesInSlots(): readonly (number | undefined)[] {
     return Array.from(this.#residency.pageIn, (page) => (page === NONE ? undefined : page));
   }
 
   /**
-   * Totals since the scene was opened: uploaded pages and bytes, milliseconds of main-thread time, and pages that were
-   * fetched in vain because the view had moved on.
+   * Totals since the scene was opened: number of uploaded pages and bytes, milliseconds of main-thread time, and the
+   * number of pages that were fetched in vain because the view had changed.
    */
   get traffic(): {
-    readonly pages: number;
+    readonly blocks: number;
     readonly bytes: number;
     readonly milliseconds: number;
     readonly abandoned: number;
@@ -260,8 +262,14 @@ export class StreamedGaussians implements GaussianScene {
     return { ...this.#uploaded, abandoned: this.#traffic.abandoned };
   }
 
-  /** Uploads some of the received pages and advances fades. The renderer calls it before each frame. */
+  /**
+   * Uploads some of the received pages, and advances fades. The renderer calls this before each view. Only the first
+   * call in a task has an effect, so that all views of a frame, such as two eyes, show the same pages.
+   */
   update(): void {
+    if (this.#isUpdated) return;
+    this.#isUpdated = true;
+    queueMicrotask(() => (this.#isUpdated = false));
     const start = performance.now();
     if (this.#arrivals.step(start)) this.#version++;
     this.#uploadSome(this.#uploadBudget.startFrame(start));
@@ -279,12 +287,12 @@ export class StreamedGaussians implements GaussianScene {
     this.#memory.destroy();
   }
 
-  /** Number of pages with slots that are not yet completely shown. */
+  /** Number of pages with assigned slots that are still uploading or fading in. */
   get #placing(): number {
     return (this.#upload ? 1 : 0) + this.#arrivals.count;
   }
 
-  /** Uploads the most needed waiting pages: one slot, and as many more as fit this number of bytes. */
+  /** Uploads the most needed waiting pages: at least one slot, and more while they fit in `max` bytes. */
   #uploadSome(max: number): void {
     const start = performance.now();
     let bytes = 0;
@@ -294,7 +302,7 @@ export class StreamedGaussians implements GaussianScene {
         if (next === undefined) break;
         if (!this.#begin(next.page, next.words)) {
           this.#traffic.refused();
-          // A page without a slot has used its part of the time budget as well.
+          // A page that found no slot counts as uploaded, because it used its part of the time budget.
           for (const { chunks } of next.words) bytes += this.#bytesOf(chunks);
           continue;
         }
@@ -305,8 +313,8 @@ export class StreamedGaussians implements GaussianScene {
   }
 
   /**
-   * Finds slots for a page; evicted pages are replaced by their parents in this frame. @returns False if there are
-   * none.
+   * Begins the upload of a page, and assigns slots to it. Pages evicted for it are replaced by their parents in this
+   * frame. @returns False if there are no slots.
    */
   #begin(page: number, parts: readonly SlotWords[]): boolean {
     const place = this.#residency.settle(page);
@@ -320,7 +328,7 @@ export class StreamedGaussians implements GaussianScene {
     return true;
   }
 
-  /** Uploads one slot of a page. With its last slot the page becomes visible. @returns The number of bytes. */
+  /** Uploads one slot of a page; the last slot makes the page visible. @returns Number of uploaded bytes. */
   #writeSlot(upload: Upload): number {
     const { page, slots, parts, by } = upload;
     const words = parts[upload.written];
@@ -331,7 +339,7 @@ export class StreamedGaussians implements GaussianScene {
       this.#upload = undefined;
       this.#rows.load(page, parts, by);
       this.#arrivals.begin(page);
-      this.#uploaded.pages++;
+      this.#uploaded.blocks++;
       this.#version++;
     }
     return bytes;

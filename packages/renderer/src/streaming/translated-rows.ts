@@ -6,12 +6,14 @@ import { PageRows } from './page-rows.js';
 import type { Residency } from './residency.js';
 import { chunkLayout, numbersOf, type ChunkLayout, type SlotWords } from './slot-words.js';
 
-/** LOD rows of all slots, page by page, which determine the weight of each chunk as pages arrive and are evicted. */
+/**
+ * LOD rows of all slots, updated page by page. They determine the weight of each chunk as pages arrive and are evicted.
+ */
 export class TranslatedRows {
   readonly #list: PageList;
   readonly #residency: Residency;
   readonly #table: DetailTable;
-  /** Rows of each slot. */
+  /** Rows by slot. */
   readonly #rows: readonly PageRows[];
   readonly #layout: ChunkLayout;
 
@@ -25,9 +27,9 @@ export class TranslatedRows {
   }
 
   /**
-   * Sets the rows of a page. None of its children is resident, and its fade-in has not started.
-   * @param parts Words of each slot that holds chunks.
-   * @param by World units, added to all positions.
+   * Sets the rows of a page. None of its children may be resident, and its fade-in must not have started.
+   * @param parts Words of each slot of the page.
+   * @param by Translation in world units, added to all positions.
    */
   load(page: number, parts: readonly SlotWords[], by: Vector3): void {
     const { upper, parent, parentChunk } = this.#list;
@@ -45,14 +47,14 @@ export class TranslatedRows {
     });
   }
 
-  /** Sets the fade-in, 0 to `ARRIVED`, of a page, which replaces its parent chunks to that degree. */
+  /** Sets the fade-in of a page, 0 to `ARRIVED`. The page replaces its parent chunks by this fraction. */
   setArrived(page: number, arrived: number): void {
     if (this.#list.slots[page] === 1) this.#setSlot(this.#residency.slotOf[page], arrived);
     else for (const slot of this.#residency.slotsOf(page)) this.#setSlot(slot, arrived);
     this.#setBelow(page, arrived);
   }
 
-  /** Removes an evicted page: its parent chunks are drawn again, and its slots are empty. */
+  /** Clears the slots of an evicted page; its parent chunks are drawn again. */
   leave(page: number, slots: readonly number[]): void {
     for (const slot of slots) {
       this.#rows[slot].clear();
@@ -61,7 +63,7 @@ export class TranslatedRows {
     this.#setBelow(page, 0);
   }
 
-  /** Writes the changes: see `LodTable.flush`. */
+  /** Writes the changed rows: see {@link DetailTable.flush}. */
   flush(slotsPerBuffer: number, write: (slot: number, rows: Float32Array<ArrayBuffer>) => void): void {
     this.#table.flush(slotsPerBuffer, write);
   }

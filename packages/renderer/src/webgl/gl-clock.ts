@@ -1,12 +1,15 @@
 import type { WorkTime } from '../gpu/queue-clock.js';
 
-/** Time of the notification that work was done, and of the last check before it, by the page's clock. */
+/**
+ * Time of the notification that work was done, and of the last check before it, both in milliseconds as
+ * `performance.now()` returns.
+ */
 interface ObservedTime {
   readonly now: number;
   readonly since: number;
 }
 
-/** Resolves when all commands up to now have completed. Rejects if the context is lost. */
+/** Resolves when the GPU has executed all commands issued before the call. Rejects if the context is lost. */
 export async function drawn(gl: WebGL2RenderingContext): Promise<ObservedTime> {
   const sync = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
   gl.flush();
@@ -25,7 +28,7 @@ export async function drawn(gl: WebGL2RenderingContext): Promise<ObservedTime> {
   }
 }
 
-/** Times frames as a page experiences them: the WebGL counterpart of `QueueClock`. */
+/** Measures the duration of frames as a page experiences them: the WebGL counterpart of `QueueClock`. */
 export class GlClock {
   readonly #gl: WebGL2RenderingContext;
   #last: ObservedTime = { now: -Infinity, since: -Infinity };
@@ -35,9 +38,9 @@ export class GlClock {
   }
 
   /**
-   * Times the commands of `draw`. Rejects if the context is lost.
-   * @param least Lower bound of the result in ms: some browsers wait for frames on the main thread, so little else is
-   * known.
+   * Measures the duration of the commands that `draw` issues. Rejects if the context is lost.
+   * @param min Lower bound of the result in milliseconds. Some browsers wait for frames on the main thread, so that
+   * little else is known.
    */
   async time(draw: () => void, min = 0): Promise<WorkTime> {
     const begin = performance.now();
@@ -45,7 +48,7 @@ export class GlClock {
     // If the browser draws synchronously, the thread was busy for the whole time.
     const busy = performance.now() - begin;
     const observed = await drawn(this.#gl);
-    // Time of the previous frame, which may not have completed when this one was drawn.
+    // The previous frame may have completed only after this frame was drawn.
     const before = this.#last;
     this.#last = observed;
     const upperBound = observed.now - Math.max(begin, before.since);

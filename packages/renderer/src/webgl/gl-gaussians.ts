@@ -4,21 +4,21 @@ import type { PackedGaussians } from '../pack/pack.js';
 import { makeTexture, requireMemory } from './gl.js';
 import { DATA_WIDTH } from './shaders.js';
 
-/** Words uploaded in one step: 4 MB, a few milliseconds. */
+/** Number of words uploaded in one step: 4 MB, a few milliseconds. */
 const WORDS_AT_ONCE = 1 << 20;
-/** 32-bit words of a splat's geometry; the first three are its position. */
+/** Number of 32-bit words of a splat's geometry. The first three are its position. */
 const GEOMETRY_WORDS = 8;
-/** Words of each splat for drawing: the projected splat, and its place in the order. */
+/** Number of words of each splat that frames write: the projected splat, and its entry in the order. */
 const FRAME_WORDS = 9;
 
-/** Properties of a scene that frames need. */
+/** Properties of a scene that frames need, without its splats. */
 export type GlGaussianFacts = Omit<PackedGaussians, 'geometry' | 'sh' | 'chunks' | 'details' | 'leafCount'>;
 
-/** Bytes of GPU memory of a packed scene, including the data that frames keep for each splat. */
+/** Returns the bytes of GPU memory of a packed scene, including the data that frames keep for each splat. */
 export const glBytes = ({ count, geometry, sh }: PackedGaussians): number =>
   geometry.byteLength + sh.byteLength + 4 * FRAME_WORDS * count;
 
-/** [N, 3] positions of packed splats, relative to their origin. */
+/** Returns [N, 3] positions of packed splats, relative to the origin of their scene. */
 export function positionsIn(geometry: Uint32Array): Float32Array {
   const numbers = new Float32Array(geometry.buffer, geometry.byteOffset, geometry.length);
   const positions = new Float32Array((3 * geometry.length) / GEOMETRY_WORDS);
@@ -30,13 +30,13 @@ export function positionsIn(geometry: Uint32Array): Float32Array {
   return positions;
 }
 
-/** Runs WebGL calls synchronously, and returns their result. */
+/** Runs a function with WebGL calls synchronously, and returns its result. */
 export type RunGl = <T>(work: () => T) => T;
 
-/** Number of texture rows for a number of texels. */
+/** Returns the number of texture rows for a number of texels, at least 1. */
 export const rowsOf = (texels: number): number => Math.max(1, Math.ceil(texels / DATA_WIDTH));
 
-/** Packed Gaussians in textures. */
+/** Packed Gaussians of a scene in textures. */
 export class GlGaussians {
   readonly facts: GlGaussianFacts;
   readonly geometry: WebGLTexture;
@@ -53,10 +53,10 @@ export class GlGaussians {
   }
 
   /**
-   * Uploads packed Gaussians to the GPU, in parts, so that other tasks can run in between.
-   * @param run Runs each part: `GlHost.run` in a context that this renderer shares with others.
-   * @throws GaussianSplatError `out-of-memory/buffer-limit` for more splats than textures hold,
-   * `out-of-memory/allocation`
+   * Uploads packed Gaussians to the GPU, in parts, so that other tasks of the thread can run in between.
+   * @param run Runs each part: `GlHost.run` in a context that the renderer shares with other code.
+   * @throws GaussianSplatError `out-of-memory/buffer-limit` for more splats than textures can hold;
+   * `out-of-memory/allocation` if the device has too little memory.
    */
   static async upload(
     gl: WebGL2RenderingContext,

@@ -9,21 +9,21 @@ import { borrowState } from './gl-state.js';
 import { DATA_WIDTH, hostedQuadsFragment, hostedQuadsVertex, HostedView } from './shaders.js';
 import { isSameView, orderView, SplatOrder, type OrderView } from './splat-order.js';
 
-/** A sort that takes longer, ms, does not run for each frame, and uses at most this fraction of the time. */
+/** Sorts that take more than these milliseconds do not run for each frame. They use at most this fraction of the time. */
 const [QUICK_SORT_MS, SORT_SHARE] = [8, 0.25];
 const TEXTURES = ['shapes', 'paints', 'order', 'geometry', 'stored_depth'];
 
-/** Destination in a host's frame, and the host's depth. */
+/** Destination of splats in a host's frame, and the host's depth. */
 export interface GlHostFrame extends Omit<GlFrameTarget, 'keeps'>, DepthPlanes {
   /**
-   * Depth that hides splats. `framebuffer`: the depth buffer of the framebuffer, which is copied. A depth texture,
-   * without comparison, as large as the region of the framebuffer up to the upper right corner of the rectangle. Or
-   * null for none. Default: `framebuffer`.
+   * Depth that hides splats. `framebuffer`, the default: the depth buffer of the framebuffer, which is copied. A depth
+   * texture without comparison: it must be as large as the region of the framebuffer up to the upper right corner of
+   * the rectangle. Null: no depth.
    */
   readonly depth?: 'framebuffer' | WebGLTexture | null | undefined;
 }
 
-/** Depth of a host, and the offset of the camera's image in it. */
+/** Depth texture of a host, and the frame and the request that it is for. */
 interface Hidden {
   readonly texture: WebGLTexture;
   readonly frame: GlHostFrame;
@@ -40,13 +40,13 @@ interface DepthCopy {
 }
 
 /**
- * Draws splats in the frame of a page with its own WebGL 2 context: a map, or an engine. Splats are blended over the
- * host's frame, and hidden by its depth. Each call restores the state of the context.
+ * Draws splats in the frame of a page that has its own WebGL 2 context, for example a map or an engine. Splats are
+ * blended over the host's frame, and hidden by its depth. Each call restores the state of the context.
  *
  * ```ts
  * const host = new GlHost(gl);
  * const splats = await host.load(packGaussians(cloud));
- * // In each frame, once the host has drawn opaque objects:
+ * // In each frame, after the host has drawn opaque objects:
  * const camera = cameraFromProjection(view, projection, { width, height, clipDepth: '-1..1' });
  * if (!splats.draw(camera, { framebuffer, x, y })) requestFrame();
  * ```
@@ -60,7 +60,7 @@ export class GlHost {
     this.#gl = gl;
   }
 
-  /** Runs calls of the renderer, or of WebGL, and restores the state of the context. */
+  /** Runs calls of the renderer or of WebGL, and then restores the state of the context. */
   readonly run: RunGl = (work) => {
     const giveBack = borrowState(this.#gl);
     try {
@@ -71,10 +71,10 @@ export class GlHost {
   };
 
   /**
-   * Draws a frame over the host's frame.
-   * @param request With the host's camera: see `cameraFromProjection`, with `clipDepth: '-1..1'`.
-   * @throws GaussianSplatError `argument/value` for a framebuffer whose depth cannot be copied; also as
-   * `GlRenderer.render` does.
+   * Draws the splats of a renderer over the host's frame.
+   * @param request Image to draw, with the host's camera: see `cameraFromProjection`, with `clipDepth: '-1..1'`.
+   * @throws GaussianSplatError `argument/value` for a framebuffer whose depth cannot be copied; errors of
+   * `GlRenderer.render`.
    */
   draw(renderer: GlRenderer, request: GlFrameRequest, frame: GlHostFrame = {}): void {
     this.run(() => {
@@ -87,11 +87,13 @@ export class GlHost {
 
   /**
    * Uploads a scene to the GPU, in parts.
-   * @throws GaussianSplatError `out-of-memory/*`, `unsupported/webgl`
+   * @throws GaussianSplatError `out-of-memory/*` if memory is insufficient; `unsupported/webgl` if the browser does not
+   * compile the shaders.
    */
   async load(packed: PackedGaussians): Promise<HostedSplats> {
     const gaussians = await GlGaussians.upload(this.#gl, packed, this.run);
     try {
+      await this.run(() => GlRenderer.prepare(this.#gl));
       const renderer = this.run(() => new GlRenderer(this.#gl, gaussians));
       return new HostedSplats(this, renderer, gaussians, new SplatOrder(positionsIn(packed.geometry)));
     } catch (error) {
@@ -100,7 +102,7 @@ export class GlHost {
     }
   }
 
-  /** Frees its GPU memory, except that of scenes. */
+  /** Frees the GPU memory of the host, without that of scenes. */
   destroy(): void {
     this.#program?.destroy();
     this.#program = undefined;
@@ -110,6 +112,7 @@ export class GlHost {
   #quads({ texture, frame, request: { camera: whole } }: Hidden): GlQuads {
     const gl = this.#gl;
     this.#program ??= new GlProgram(gl, [hostedQuadsVertex, hostedQuadsFragment], HostedView, TEXTURES);
+    this.#program.check();
     const program = this.#program;
     const { x = 0, y = 0 } = frame;
     return {
@@ -130,8 +133,8 @@ export class GlHost {
   }
 
   /**
-   * Rectangles of multisampled framebuffers can be copied only to the same place, so the copy begins at the
-   * framebuffer's corner.
+   * Copies the depth of a framebuffer. A rectangle of a multisampled framebuffer can be copied only to the same
+   * position, so the copy begins at the corner of the framebuffer.
    */
   #copyDepth({ camera }: GlFrameRequest, { framebuffer = null, x = 0, y = 0 }: GlHostFrame): WebGLTexture {
     const gl = this.#gl;
@@ -147,7 +150,7 @@ export class GlHost {
       blit(copy);
       return copy.texture;
     }
-    // The formats must be the same, and that of a canvas may differ from its attributes.
+    // The formats must be equal, and the depth format of a canvas may differ from the one its attributes suggest.
     for (const format of depthFormats(gl, framebuffer === null)) {
       const made = this.#makeCopy(format, framebuffer, width, height);
       blit(made);
@@ -175,7 +178,7 @@ export class GlHost {
   }
 }
 
-/** A scene in a host's frames, sorted by depth. */
+/** A scene in the frames of a host, which sorts its splats by depth. */
 export class HostedSplats {
   readonly #host: GlHost;
   readonly #renderer: GlRenderer;
@@ -197,10 +200,11 @@ export class HostedSplats {
 
   /**
    * Draws the scene over the host's frame.
-   * @param camera See `cameraFromProjection`, with `clipDepth: '-1..1'`; its view includes the position of the scene.
-   * @returns False if the order is that of an older view: draw again soon.
-   * @throws GaussianSplatError `argument/camera`, `argument/value` for a framebuffer whose depth cannot be copied,
-   * `out-of-memory/allocation`
+   * @param camera Camera of the host: see `cameraFromProjection`, with `clipDepth: '-1..1'`. Its view includes the
+   * position of the scene.
+   * @returns False if splats have the order of an older view: draw again soon.
+   * @throws GaussianSplatError `argument/camera` for a camera out of range; `argument/value` for a framebuffer whose
+   * depth cannot be copied; `out-of-memory/allocation` if the device has too little memory.
    */
   draw(camera: Camera, frame?: GlHostFrame, how: Partial<Omit<GlFrameRequest, 'camera'>> = {}): boolean {
     const isSorted = this.#sort(camera);
@@ -228,7 +232,7 @@ export class HostedSplats {
   }
 }
 
-/** Formats that the depth buffer of the bound framebuffer may have, most likely first. */
+/** Returns the formats that the depth buffer of the bound framebuffer may have, the most likely one first. */
 function depthFormats(gl: WebGL2RenderingContext, isCanvas: boolean): GLenum[] {
   const [depth, stencil] = isCanvas ? [gl.DEPTH, gl.STENCIL] : [gl.DEPTH_ATTACHMENT, gl.STENCIL_ATTACHMENT];
   const ask = (attachment: GLenum, name: GLenum): number =>

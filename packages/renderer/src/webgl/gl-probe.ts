@@ -1,20 +1,23 @@
-/** Finds the splats under single points of the last frame: the runs of `probe_depth`, joined on the CPU. */
+/**
+ * Finds the splats at points of the last frame: shaders compute the transmittance of runs of splats, which the CPU
+ * joins.
+ */
 import type { ProbeAnswer, ProbePoint } from '../depth-probe.js';
 import { makeTarget, makeTexture, type GlProgram } from './gl.js';
 import type { ProbeView } from './shaders.js';
 
-/** Runs for each point: one fragment each. */
+/** Number of runs for each point; each run is one fragment. */
 const RUNS = 1024;
 /** Maximum number of points in one pass. */
 const MAX_POINTS = 256;
 const NUMBERS = 4;
-/** GLSL compilers may assume that there are no infinities. */
+/** Replaces infinities, because GLSL compilers may assume that there are none. */
 const MAX_FLOAT32 = 3.4e38;
 
 export interface GlProbeSource {
   readonly gl: WebGL2RenderingContext;
   readonly program: GlProgram<typeof ProbeView>;
-  /** Shapes, paints and the order from near to far. */
+  /** Textures of projected shapes, paints, and the order from near to far. */
   readonly textures: readonly WebGLTexture[];
   /** Number of splats in the order. */
   readonly count: number;
@@ -22,16 +25,19 @@ export interface GlProbeSource {
   useSurface(asked: WebGLTexture): void;
 }
 
-/** Range of ranks to search for a point. */
+/** Range of ranks, which are positions in the order, to search for a point. */
 interface Range {
   readonly first: number;
   readonly end: number;
 }
 
-/** Transmittance behind the near, the middle and the far depth of an answer. */
+/** Fractions of the light that are left behind the near, the middle and the far depth of an answer. */
 const LEFT = [0.9, 0.5, 0.1] as const;
 
-/** Waits for the GPU, so that all passes see the same frame: call it for clicks and labels, not for every frame. */
+/**
+ * Probes points of the last frame, and returns an answer for each. Waits for the GPU, so that all passes use the same
+ * frame: call it for clicks and labels, not for every frame.
+ */
 export function probeSplats(source: GlProbeSource, points: readonly ProbePoint[]): ProbeAnswer[] {
   if (points.length > MAX_POINTS) {
     const first = probeSplats(source, points.slice(0, MAX_POINTS));
@@ -52,8 +58,8 @@ export function probeSplats(source: GlProbeSource, points: readonly ProbePoint[]
 }
 
 /**
- * Ranks of the splats behind which less than a fraction of the light is left: the runs that contain them are subdivided
- * until each is one splat.
+ * Returns, for each point, the rank of the first splat behind which less than a fraction of the light is left; null if
+ * none. Runs that contain this splat are subdivided until each run is one splat.
  */
 function ranksAt(
   source: GlProbeSource,
@@ -79,13 +85,16 @@ function ranksAt(
   return crossings.map((place, i) => (place === null ? null : current[i].first + place.at));
 }
 
-/** A splat, and its densest depth along the ray of a point. */
+/** A splat, and its depth of highest density along the ray of a point. */
 interface Surface {
   readonly depth: number;
   readonly index: number;
 }
 
-/** The splats at the given ranks, and their depths along the rays of the points; one fragment each. */
+/**
+ * Returns the splat at each given rank, and its depth along the ray of its point; null for no rank. A shader computes
+ * each splat in one fragment.
+ */
 function surfacesOf(
   { gl, useSurface }: GlProbeSource,
   points: readonly ProbePoint[],
@@ -132,7 +141,10 @@ function product(row: Float32Array, number: number): number {
   return result;
 }
 
-/** The first run behind which less than a fraction of the light is left, and the light in front of it. */
+/**
+ * Returns the first run behind which less than a fraction of the light is left, and the light in front of this run;
+ * null if none.
+ */
 function crossing(row: Float32Array, before: number, share: number): { at: number; light: number } | null {
   let light = before;
   for (let at = 0; at < RUNS; at++) {
@@ -143,7 +155,10 @@ function crossing(row: Float32Array, before: number, share: number): { at: numbe
   return null;
 }
 
-/** A row of runs for each point: the transmittance of each run, and that of its splats in front of the point. */
+/**
+ * Computes the runs of all points, one row of pixels for each point. Returns the transmittance of each run, and that of
+ * its splats in front of the point.
+ */
 function lookAt(
   { gl, program, textures }: GlProbeSource,
   points: readonly ProbePoint[],
@@ -158,7 +173,7 @@ function lookAt(
       const point = [x, y, Math.min(depth, MAX_FLOAT32)];
       program.use({ point, first, end, run: runOf(first, end) }, textures);
       gl.viewport(0, row, RUNS, 1);
-      // A triangle larger than the target, scissored to the row.
+      // Draws a triangle larger than the target, scissored to the row.
       gl.enable(gl.SCISSOR_TEST);
       gl.scissor(0, row, RUNS, 1);
       gl.drawArrays(gl.TRIANGLES, 0, 3);

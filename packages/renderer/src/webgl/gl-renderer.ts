@@ -7,85 +7,79 @@ import {
   type Vector3,
 } from '@gaussian-splat/core';
 import type { ProbeAnswer, ProbePoint } from '../depth-probe.js';
-import { constants, layouts } from '../generated/shaders.js';
+import { constants, type layouts } from '../generated/shaders.js';
 import type { StructValues } from '../gpu/struct.js';
 import type { Rgba } from '../frame-target.js';
 import type { AccumulationFormat } from '../rasterizers/rasterizer.js';
 import { cameraValues, MAX_FLOAT32, scaled } from '../view.js';
-import { GlProgram, makeTarget, makeTexture, requireMemory } from './gl.js';
+import { makeTarget, makeTexture, requireMemory } from './gl.js';
 import { rowsOf, type GlGaussians } from './gl-gaussians.js';
 import { probeSplats } from './gl-probe.js';
-import {
-  composeFragment,
-  DATA_WIDTH,
-  probeFragment,
-  probeSurfaceFragment,
-  ProbeView,
-  projectFragment,
-  quadsFragment,
-  QuadsView,
-  quadsVertex,
-  composeVertex,
-  fullScreenVertex,
-} from './shaders.js';
+import { GlPrograms } from './gl-programs.js';
+import { DATA_WIDTH } from './shaders.js';
 import { SH_PRECISION } from '../pack/words.js';
 
 const { QUAD_BATCH } = constants;
-/** Two triangles. */
+/** Number of indices of the two triangles of a quad. */
 const INDICES_PER_QUAD = 6;
 const TRANSPARENT: Rgba = [0, 0, 0, 0];
-/** A corner of a box that contains everything. */
+/** Upper corner of a crop that contains everything; the lower corner is its negative. */
 const EVERYWHERE = [MAX_FLOAT32, MAX_FLOAT32, MAX_FLOAT32];
-const SPLAT_TEXTURES = ['shapes', 'paints', 'order'];
-const SURFACE_TEXTURES = ['geometry', 'order', 'asked'];
 
-/** Formats for blending splats: `rgba8unorm` if the browser cannot blend floats. */
+/** Formats into which splats are blended: `rgba8unorm` only if the browser cannot blend floats. */
 export type GlAccumulationFormat = AccumulationFormat | 'rgba8unorm';
 
 const BYTES_PER_PIXEL: Record<GlAccumulationFormat, number> = { rgba8unorm: 4, rgba16float: 8, rgba32float: 16 };
 
-/** One image to draw with WebGL. */
+/** An image to draw with WebGL. */
 export interface GlFrameRequest {
-  /** Its width and height must be those of the canvas. */
+  /** Camera, whose width and height must be those of the canvas. */
   readonly camera: Camera;
   /** Maximum degree of spherical harmonics to evaluate. */
   readonly shDegree: ShDegree;
-  /** Overrides the filter of the scene. */
+  /** Low-pass filter that overrides that of the scene. */
   readonly filter?: SplatFilter | undefined;
-  /** `rgba32float` applies if the browser can blend it. */
+  /** Precision of blending. `rgba32float` applies only if the browser can blend it. */
   readonly accumulation: AccumulationFormat;
-  /** Fraction of the canvas's width and height that is rendered. */
+  /** Fraction of the canvas's width and height that is rendered, above 0 and at most 1. */
   readonly resolutionScale: number;
+  /**
+   * Range of rows of the image to draw, from the bottom, as fractions of the height. Default: 0 to 1. An expensive
+   * frame can be drawn in parts, so that other frames are drawn in between.
+   */
+  readonly rows?: readonly [first: number, end: number] | undefined;
 }
 
 /** A rectangle of a framebuffer, as large as the camera's image. */
 export interface GlFrameTarget {
-  /** null: the canvas. Default: the canvas. */
+  /** Framebuffer, or null for the canvas. Default: the canvas. */
   readonly framebuffer?: WebGLFramebuffer | null | undefined;
-  /** Its lower left corner, pixels. Default: 0, 0. */
+  /** Distance from the left edge of the framebuffer to the rectangle, in pixels. Default: 0. */
   readonly x?: number | undefined;
+  /** Distance from the bottom edge of the framebuffer to the rectangle, in pixels. Default: 0. */
   readonly y?: number | undefined;
-  /** Blends the splats over the content instead of a background. Default: false. */
+  /** Whether to blend the splats over the content of the framebuffer instead of a background. Default: false. */
   readonly keeps?: boolean | undefined;
 }
 
-/** Replaces the renderer's program for quads. */
+/** Program that replaces the renderer's own program for quads. */
 export interface GlQuads {
+  /** Makes the program current, and sets its uniforms and textures for a frame. */
   use(frame: GlQuadsFrame): void;
 }
 
 export interface GlQuadsFrame {
-  /** The camera, in rendered pixels. */
+  /** Camera whose width and height are those of the rendered image. */
   readonly camera: Camera;
-  /** Number of splats in the order. */
+  /** Number of splats to draw: the first elements of the order texture. */
   readonly count: number;
-  /** Origin of the positions in textures. */
+  /** World position of the origin of the positions in textures. */
   readonly origin: Vector3;
-  /** Textures: shapes, paints, order and geometry. */
+  /** Textures of shapes, paints, order and geometry. */
   readonly textures: readonly WebGLTexture[];
 }
 
-/** Target of the blending. */
+/** Texture into which splats are blended. */
 interface Accumulation {
   readonly texture: WebGLTexture;
   readonly target: WebGLFramebuffer;
@@ -94,7 +88,7 @@ interface Accumulation {
   readonly height: number;
 }
 
-/** The best format that a browser can blend, up to the requested one. */
+/** Returns the most precise format that a browser can blend, up to the requested one. */
 export function blendable(gl: WebGL2RenderingContext, wanted: AccumulationFormat): GlAccumulationFormat {
   const float = gl.getExtension('EXT_color_buffer_float');
   if (wanted === 'rgba32float' && float && gl.getExtension('EXT_float_blend')) return wanted;
@@ -102,18 +96,14 @@ export function blendable(gl: WebGL2RenderingContext, wanted: AccumulationFormat
 }
 
 /**
- * Draws one scene with WebGL 2, with the shaders of WebGPU: each splat is projected once into two textures, then drawn
- * as a quad in an externally computed order (`SplatOrder`), blended, and composed onto the canvas.
+ * Draws one scene with WebGL 2, with the shaders of WebGPU. Each splat is projected once to two textures. It is then
+ * drawn as a quad in an order that the caller computes (`SplatOrder`), blended, and composed onto the canvas.
  */
 export class GlRenderer {
   readonly #gl: WebGL2RenderingContext;
   readonly #gaussians: GlGaussians;
-  readonly #project: GlProgram<typeof layouts.View>;
-  readonly #quads: GlProgram<typeof QuadsView>;
-  readonly #compose: GlProgram<typeof layouts.Compose>;
-  #probe: GlProgram<typeof ProbeView> | undefined;
-  #surface: GlProgram<typeof layouts.View> | undefined;
-  /** Parameters of the last projection. */
+  readonly #programs: GlPrograms;
+  /** Uniforms of the last projection; undefined before the first. */
   #view: StructValues<typeof layouts.View> | undefined;
   readonly #corners: WebGLVertexArrayObject;
   readonly #indices: WebGLBuffer;
@@ -124,20 +114,27 @@ export class GlRenderer {
   /** Number of splats in the order. */
   #count = 0;
   #accumulation: Accumulation | undefined;
-  /** The last frame: at its displayed size, and at its rendered size. */
+  /** Cameras of the last frame, at its displayed and at its rendered size; undefined before the first. */
   #last: { readonly camera: Camera; readonly drawn: Camera } | undefined;
-  /** Key of the last projection. */
+  /** Key of the parameters of the last projection, which is reused while they are equal. */
   #projected = '';
 
   /**
-   * @throws GaussianSplatError `unsupported/webgl` if the browser does not compile the shaders, `out-of-memory/allocation`
+   * Resolves when the shaders of a context are compiled. Other tasks run meanwhile. Without this call the constructor
+   * blocks the thread.
+   */
+  static prepare(gl: WebGL2RenderingContext): Promise<void> {
+    return GlPrograms.of(gl).compiled();
+  }
+
+  /**
+   * @throws GaussianSplatError `unsupported/webgl` if the browser does not compile the shaders;
+   * `out-of-memory/allocation` if the device has too little memory.
    */
   constructor(gl: WebGL2RenderingContext, gaussians: GlGaussians) {
     this.#gl = gl;
     this.#gaussians = gaussians;
-    this.#project = new GlProgram(gl, [fullScreenVertex, projectFragment], layouts.View, ['geometry', 'harmonics']);
-    this.#quads = new GlProgram(gl, [quadsVertex, quadsFragment], QuadsView, SPLAT_TEXTURES);
-    this.#compose = new GlProgram(gl, [composeVertex, composeFragment], layouts.Compose, ['accumulated']);
+    this.#programs = GlPrograms.of(gl).check();
     [this.#corners, this.#indices] = makeCorners(gl);
     const size = [DATA_WIDTH, rowsOf(gaussians.facts.count)] as const;
     this.#shapes = makeTexture(gl, gl.RGBA32UI, size);
@@ -147,7 +144,7 @@ export class GlRenderer {
     requireMemory(gl, `scene of ${gaussians.facts.count} splats`);
   }
 
-  /** Bytes of GPU memory of the render targets, without the splats. */
+  /** Bytes of GPU memory of the accumulation texture, without the splats. */
   get byteLength(): number {
     const { format, width, height } = this.#accumulation ?? { format: 'rgba8unorm', width: 0, height: 0 };
     return BYTES_PER_PIXEL[format] * width * height;
@@ -168,22 +165,26 @@ export class GlRenderer {
   }
 
   /**
-   * Draws one frame, for {@link present}.
-   * @param quads Replaces the renderer's program for quads.
-   * @throws GaussianSplatError `argument/camera` for a camera out of range, `out-of-memory/allocation`
+   * Draws one frame into the accumulation texture: call {@link present} afterwards.
+   * @param quads Program that replaces the renderer's own program for quads.
+   * @throws GaussianSplatError `argument/camera` for a camera out of range; `out-of-memory/allocation` if the device
+   * has too little memory.
    */
   render(request: GlFrameRequest, quads?: GlQuads): void {
     const { camera, accumulation, resolutionScale } = request;
     validateCamera(camera);
     const drawn = scaled(camera, resolutionScale);
+    // Allocates first, because the query for failed allocations waits for all earlier commands.
+    const { target } = this.#accumulationOf(camera, accumulation);
     this.#projectSplats(request, drawn);
-    this.#drawQuads(this.#accumulationOf(camera, accumulation), drawn, quads);
+    this.#drawQuads(target, { ...request, camera: drawn }, quads);
     this.#last = { camera, drawn };
   }
 
   /**
-   * Composes the last frame onto the canvas, from its lower left corner, or into another target.
-   * @param background Premultiplied color.
+   * Composes the last frame onto the canvas, from its lower left corner, or into another target. Does nothing before
+   * the first frame.
+   * @param background Background color, premultiplied.
    */
   present(
     background: Rgba = TRANSPARENT,
@@ -200,25 +201,32 @@ export class GlRenderer {
     } else gl.disable(gl.BLEND);
     const scale = [drawn.width / camera.width, drawn.height / camera.height];
     const used = [drawn.width, drawn.height];
-    this.#compose.use({ background, scale, used }, [this.#accumulation.texture]);
+    this.#programs.compose.use({ background, scale, used }, [this.#accumulation.texture]);
     gl.drawArrays(gl.TRIANGLES, 0, 3);
   }
 
   /**
-   * Probes single points of the last frame, as `Viewpoint.probe` does. Waits for the GPU: call it for clicks and
-   * labels, not for every frame.
+   * Probes points of the last frame, as `Viewpoint.probe` does. Waits for the GPU: call it for clicks and labels, not
+   * for every frame.
+   * @returns An answer for each point; empty before the first frame.
    */
   probe(points: readonly ProbePoint[]): ProbeAnswer[] {
+    if (this.#view === undefined || this.#last === undefined) return [];
     const gl = this.#gl;
-    this.#probe ??= new GlProgram(gl, [fullScreenVertex, probeFragment], ProbeView, SPLAT_TEXTURES);
-    this.#surface ??= new GlProgram(gl, [fullScreenVertex, probeSurfaceFragment], layouts.View, SURFACE_TEXTURES);
+    const { camera, drawn } = this.#last;
+    const [across, down] = [drawn.width / camera.width, drawn.height / camera.height];
+    const inDrawn = points.map(({ x, y, depth }) => ({ x: across * x, y: down * y, depth }));
+    const { probe: program, surface } = this.#programs;
     const useSurface = (asked: WebGLTexture): void =>
-      this.#surface!.use(this.#view!, [this.#gaussians.geometry, this.#order, asked]);
-    const source = { gl, program: this.#probe, textures: this.#splatTextures, count: this.#count, useSurface };
-    return this.#view ? probeSplats(source, points) : [];
+      surface.use(this.#view!, [this.#gaussians.geometry, this.#order, asked]);
+    const source = { gl, program, textures: this.#splatTextures, count: this.#count, useSurface };
+    return probeSplats(source, inDrawn);
   }
 
-  /** Returns the number of splats in the last frame. Reads all of them back: call it for panels, not for every frame. */
+  /**
+   * Returns the number of splats drawn in the last frame. Reads all splats back: call it for panels, not for every
+   * frame.
+   */
   countDrawn(): number {
     const gl = this.#gl;
     const rows = rowsOf(this.#gaussians.facts.count);
@@ -227,15 +235,16 @@ export class GlRenderer {
     gl.readBuffer(gl.COLOR_ATTACHMENT1);
     gl.readPixels(0, 0, DATA_WIDTH, rows, gl.RGBA_INTEGER, gl.UNSIGNED_INT, words);
     let count = 0;
-    // The last word is the opacity.
+    // The last word of a splat is its opacity.
     for (let at = 3; at < words.length; at += 4) if (words[at] !== 0) count++;
     return count;
   }
 
-  /** Frees the GPU memory, except that of the Gaussians. */
+  /**
+   * Frees the GPU memory of the renderer. The Gaussians, and the programs that the scenes of the context share, remain.
+   */
   destroy(): void {
     const gl = this.#gl;
-    for (const program of [this.#project, this.#quads, this.#compose, this.#probe, this.#surface]) program?.destroy();
     for (const texture of [...this.#splatTextures, this.#accumulation?.texture]) gl.deleteTexture(texture ?? null);
     for (const target of [this.#splats, this.#accumulation?.target]) gl.deleteFramebuffer(target ?? null);
     gl.deleteVertexArray(this.#corners);
@@ -266,31 +275,45 @@ export class GlRenderer {
     gl.viewport(0, 0, DATA_WIDTH, rowsOf(facts.count));
     gl.disable(gl.BLEND);
     this.#view = values;
-    this.#project.use(values, [geometry, sh]);
+    this.#programs.project.use(values, [geometry, sh]);
     gl.drawArrays(gl.TRIANGLES, 0, 3);
   }
 
-  #drawQuads({ target }: Accumulation, camera: Camera, quads?: GlQuads): void {
+  #drawQuads(target: WebGLFramebuffer, { camera, rows }: GlFrameRequest, quads?: GlQuads): void {
     const gl = this.#gl;
     gl.bindFramebuffer(gl.FRAMEBUFFER, target);
     const { width, height } = camera;
     gl.viewport(0, 0, width, height);
+    if (rows) {
+      const [first, end] = rows.map((share) => Math.round(share * height));
+      gl.enable(gl.SCISSOR_TEST);
+      gl.scissor(0, first, width, end - first);
+    }
     // Clears to black with full transmittance.
     gl.clearBufferfv(gl.COLOR, 0, [0, 0, 0, 1]);
-    if (this.#count === 0) return;
+    if (this.#count > 0) this.#blendQuads(camera, quads);
+    gl.disable(gl.SCISSOR_TEST);
+  }
+
+  #blendQuads(camera: Camera, quads?: GlQuads): void {
+    const gl = this.#gl;
+    const { width, height } = camera;
     gl.enable(gl.BLEND);
     gl.blendFuncSeparate(gl.ONE, gl.ONE_MINUS_SRC_ALPHA, gl.ZERO, gl.ONE_MINUS_SRC_ALPHA);
     const { facts, geometry } = this.#gaussians;
     const [count, textures] = [this.#count, this.#splatTextures];
     if (quads) quads.use({ camera, count, origin: facts.origin, textures: [...textures, geometry] });
-    else this.#quads.use({ viewport: [width, height], count, unused: 0 }, textures);
+    else this.#programs.quads.use({ viewport: [width, height], count, unused: 0 }, textures);
     gl.bindVertexArray(this.#corners);
     const batches = Math.ceil(this.#count / QUAD_BATCH);
     gl.drawElementsInstanced(gl.TRIANGLES, QUAD_BATCH * INDICES_PER_QUAD, gl.UNSIGNED_SHORT, 0, batches);
     gl.bindVertexArray(null);
   }
 
-  /** Sized for the canvas at any resolution scale: nothing is allocated while only the camera moves. */
+  /**
+   * Returns the accumulation texture. It has the size of the canvas at any resolution scale, so that nothing is
+   * allocated while only the camera moves.
+   */
   #accumulationOf({ width, height }: Camera, wanted: AccumulationFormat): Accumulation {
     const gl = this.#gl;
     const format = blendable(gl, wanted);
@@ -307,7 +330,10 @@ export class GlRenderer {
   }
 }
 
-/** Two triangles for each quad of a batch: corners 0, 1, 2 and 2, 1, 3. */
+/**
+ * Creates the vertex array and the indices for a batch of quads: each has the triangles 0, 1, 2 and 2, 1, 3 of its
+ * corners.
+ */
 function makeCorners(gl: WebGL2RenderingContext): [WebGLVertexArrayObject, WebGLBuffer] {
   const corners = gl.createVertexArray();
   const indices = gl.createBuffer();

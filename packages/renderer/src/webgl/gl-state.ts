@@ -1,7 +1,7 @@
-/** Texture units of the renderer's programs. */
+/** Number of texture units that the renderer's programs use. */
 const UNITS = 6;
 
-/** State of a context that the renderer changes, or that would break its drawing. */
+/** Capabilities that the renderer changes, or that would disturb its drawing. */
 const ENABLED = [
   'BLEND',
   'CULL_FACE',
@@ -29,8 +29,8 @@ const PIXEL_STORE = {
 } as const;
 
 /**
- * Saves the state of a context that other code draws with, and sets the state that the renderer assumes.
- * @returns A function that restores it.
+ * Saves the state of a context that other code also uses, and sets the state that the renderer assumes.
+ * @returns A function that restores the saved state.
  */
 export function borrowState(gl: WebGL2RenderingContext): () => void {
   const get = (name: GLenum): never => gl.getParameter(name) as never;
@@ -81,7 +81,7 @@ export function borrowState(gl: WebGL2RenderingContext): () => void {
     gl.bindFramebuffer(gl.READ_FRAMEBUFFER, read);
     gl.bindBuffer(gl.PIXEL_UNPACK_BUFFER, unpack);
     gl.bindBuffer(gl.PIXEL_PACK_BUFFER, pack);
-    // A range of 0 bytes means the whole buffer.
+    // A size of 0 bytes means that the whole buffer was bound.
     if (size === 0 || first === null) gl.bindBufferBase(gl.UNIFORM_BUFFER, 0, first);
     else gl.bindBufferRange(gl.UNIFORM_BUFFER, 0, first, start, size);
     gl.bindBuffer(gl.UNIFORM_BUFFER, uniforms);

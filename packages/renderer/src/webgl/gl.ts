@@ -2,14 +2,18 @@
 import { GaussianSplatError } from '@gaussian-splat/core';
 import { writeStruct, type StructLayout, type StructValues } from '../gpu/struct.js';
 
-/** A shader's program, its textures by name, and the one struct of its uniforms. */
+/** A shader program, the names of its textures, and a uniform buffer that contains one struct. */
 export class GlProgram<L extends StructLayout> {
   readonly #gl: WebGL2RenderingContext;
   readonly #program: WebGLProgram;
+  /** Shaders of the program; empty after {@link check}. */
+  #shaders: readonly WebGLShader[];
+  readonly #textures: readonly string[];
   readonly #uniform: WebGLBuffer;
   readonly #layout: L;
   readonly #bytes: ArrayBuffer;
 
+  /** Starts the compilation of the shaders without blocking the thread. */
   constructor(
     gl: WebGL2RenderingContext,
     texts: readonly [vertex: string, fragment: string],
@@ -18,16 +22,39 @@ export class GlProgram<L extends StructLayout> {
   ) {
     this.#gl = gl;
     this.#layout = layout;
+    this.#textures = textures;
     this.#bytes = new ArrayBuffer(layout.size);
-    this.#program = link(gl, texts);
+    [this.#program, this.#shaders] = link(gl, texts);
     this.#uniform = gl.createBuffer();
     gl.bindBuffer(gl.UNIFORM_BUFFER, this.#uniform);
     gl.bufferData(gl.UNIFORM_BUFFER, layout.size, gl.DYNAMIC_DRAW);
-    gl.useProgram(this.#program);
-    textures.forEach((name, unit) => gl.uniform1i(gl.getUniformLocation(this.#program, `t_${name}`), unit));
   }
 
-  /** Makes the program current. @param textures In the order of their names. */
+  /** Whether {@link check} would return at once. Always true in browsers without `KHR_parallel_shader_compile`. */
+  get isCompiled(): boolean {
+    const gl = this.#gl;
+    const extension = gl.getExtension('KHR_parallel_shader_compile');
+    if (this.#shaders.length === 0 || extension === null || gl.isContextLost()) return true;
+    return gl.getProgramParameter(this.#program, extension.COMPLETION_STATUS_KHR) as boolean;
+  }
+
+  /**
+   * Blocks the thread until the program is compiled, and prepares it to draw.
+   * @throws GaussianSplatError `unsupported/webgl` if the browser does not compile the shaders.
+   */
+  check(): void {
+    const gl = this.#gl;
+    if (this.#shaders.length === 0) return;
+    requireLinked(gl, this.#program, this.#shaders);
+    this.#shaders = [];
+    gl.useProgram(this.#program);
+    this.#textures.forEach((name, unit) => gl.uniform1i(gl.getUniformLocation(this.#program, `t_${name}`), unit));
+  }
+
+  /**
+   * Makes the program current. @param values Values of the uniform struct. @param textures Textures in the order of
+   * their names.
+   */
   use(values: StructValues<L>, textures: readonly WebGLTexture[]): void {
     const gl = this.#gl;
     gl.useProgram(this.#program);
@@ -47,7 +74,10 @@ export class GlProgram<L extends StructLayout> {
   }
 }
 
-function link(gl: WebGL2RenderingContext, texts: readonly [vertex: string, fragment: string]): WebGLProgram {
+function link(
+  gl: WebGL2RenderingContext,
+  texts: readonly [vertex: string, fragment: string],
+): [WebGLProgram, WebGLShader[]] {
   const program = gl.createProgram();
   const shaders = [gl.VERTEX_SHADER, gl.FRAGMENT_SHADER].map((type, i) => {
     const shader = gl.createShader(type)!;
@@ -57,11 +87,14 @@ function link(gl: WebGL2RenderingContext, texts: readonly [vertex: string, fragm
     return shader;
   });
   gl.linkProgram(program);
+  return [program, shaders];
+}
+
+function requireLinked(gl: WebGL2RenderingContext, program: WebGLProgram, shaders: readonly WebGLShader[]): void {
   const isLinked = gl.getProgramParameter(program, gl.LINK_STATUS) as boolean;
+  // A lost context links no program, and its loss is reported elsewhere.
+  if (isLinked || gl.isContextLost()) return shaders.forEach((shader) => gl.deleteShader(shader));
   const said = [gl.getProgramInfoLog(program), ...shaders.map((shader) => gl.getShaderInfoLog(shader))];
-  for (const shader of shaders) gl.deleteShader(shader);
-  // A lost context links nothing, and reports its own error.
-  if (isLinked || gl.isContextLost()) return program;
   throw new GaussianSplatError('unsupported/webgl', {
     where: 'the WebGL 2 renderer',
     expected: 'shaders that this browser compiles',
@@ -70,7 +103,7 @@ function link(gl: WebGL2RenderingContext, texts: readonly [vertex: string, fragm
   });
 }
 
-/** A texture with one level, whose texels are read without filtering. */
+/** Creates a texture with one level, whose texels are read without filtering. */
 export function makeTexture(
   gl: WebGL2RenderingContext,
   format: GLenum,
@@ -85,7 +118,7 @@ export function makeTexture(
   return texture;
 }
 
-/** Creates a framebuffer. */
+/** Creates a framebuffer with the textures as its color attachments. */
 export function makeTarget(gl: WebGL2RenderingContext, textures: readonly WebGLTexture[]): WebGLFramebuffer {
   const target = gl.createFramebuffer();
   gl.bindFramebuffer(gl.FRAMEBUFFER, target);
@@ -97,8 +130,9 @@ export function makeTarget(gl: WebGL2RenderingContext, textures: readonly WebGLT
 }
 
 /**
- * @throws GaussianSplatError `out-of-memory/allocation` if the last creation ran out of memory. Waits for the browser:
- * not for frames.
+ * Checks whether the last allocations succeeded. The check waits for the browser: do not call it for each frame.
+ * @param what Name of the allocated object in the error.
+ * @throws GaussianSplatError `out-of-memory/allocation` if an allocation failed.
  */
 export function requireMemory(gl: WebGL2RenderingContext, what: string): void {
   if (gl.getError() !== gl.OUT_OF_MEMORY) return;

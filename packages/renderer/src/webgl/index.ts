@@ -14,4 +14,4 @@ export {
 export { OverdrawLimit } from '../overdraw.js';
 export { areasIn } from './splat-areas.js';
 export { DATA_WIDTH, SOURCE_DIGEST } from './shaders.js';
-export { distanceView, isSameView, orderView, SplatOrder, type OrderView } from './splat-order.js';
+export { distanceView, isSameImage, isSameView, orderView, SplatOrder, type OrderView } from './splat-order.js';

@@ -1,26 +1,34 @@
 /**
- * Sorts splats by depth on the CPU, because WebGL has no compute shaders. Uses no DOM and no GPU, because a worker runs
- * it.
+ * Sorts splats by depth on the CPU, because WebGL has no compute shaders. Uses neither the DOM nor a GPU, because a
+ * worker runs this code.
  */
 import { eyeOf, subtract, type Camera, type Vector3 } from '@gaussian-splat/core';
 
-/** Sort key of an order: the depth of a point p is axis · p + offset, or its distance from `point`. */
+/**
+ * Parameters of an order. Splats are sorted by the depth axis · p + offset of their position p, or by their distance
+ * from `point`.
+ */
 export interface OrderView {
   readonly axis: Vector3;
   readonly offset: number;
-  /** Only splats whose depth is within this range are listed. */
+  /** Minimum depth of the listed splats. */
   readonly near: number;
+  /** Maximum depth of the listed splats. */
   readonly far: number;
-  /** If set, splats are sorted by the distance from this point, and all are listed: camera rotations change nothing. */
+  /**
+   * Center of an order by distance, relative to the origin of the splat positions; undefined for an order by depth. An
+   * order by distance lists all splats, and does not change when the camera rotates.
+   */
   readonly point?: Vector3 | undefined;
-  /** Rows of the camera matrix for x and y relative to the axis, in units of half the image at depth 1. */
+  /** Rows of the camera matrix for x and y, in units of half the image at depth 1, with the center of the image. */
   readonly across: readonly (readonly [x: number, y: number, z: number, offset: number, center: number])[];
-  /** Fraction of the image that one unit of area covers at depth 1. */
+  /** Fraction of the image that a splat with one unit of area covers at depth 1. */
   readonly shareOfArea: number;
+  /** Whether the camera is orthographic. */
   readonly isParallel: boolean;
 }
 
-/** Sort parameters of a camera, for positions relative to an origin. */
+/** Returns the parameters for an order by depth. @param origin World position of the origin of the splat positions. */
 export function orderView(camera: Camera, origin: Vector3): OrderView {
   const { worldToCamera: m, near, far, width, height, fx, fy, cx, cy, orthographic = false } = camera;
   const axis: Vector3 = [m[8], m[9], m[10]];
@@ -37,7 +45,7 @@ export function orderView(camera: Camera, origin: Vector3): OrderView {
   };
 }
 
-/** Sort parameters of a camera for the order by distance from a point, by default from its eye. */
+/** Returns the parameters for an order by distance from a point, by default from the eye of the camera. */
 export function distanceView(camera: Camera, origin: Vector3, eye: Vector3 = eyeOf(camera.worldToCamera)): OrderView {
   return { ...orderView(camera, origin), point: subtract(eye, origin) };
 }
@@ -47,21 +55,27 @@ export const isSameView = (a: OrderView, b: OrderView): boolean =>
     ? isSamePlace(a.point, b.point)
     : a.offset === b.offset && a.near === b.near && a.far === b.far && isSamePlace(a.axis, b.axis);
 
+/** Whether two views also show the same part of the scene, so that splats cover the image equally in both. */
+export const isSameImage = (a: OrderView, b: OrderView): boolean =>
+  isSameView(a, b) &&
+  Object.is(a.shareOfArea, b.shareOfArea) &&
+  a.across.every((row, i) => row.every((value, k) => Object.is(value, b.across[i][k])));
+
 const isSamePlace = (a: Vector3 | undefined, b: Vector3 | undefined): boolean =>
   a !== undefined && b !== undefined && a.every((value, i) => value === b[i]);
 
-/** Smaller splats, as a fraction of the image, count without a test whether they are in the image. */
+/** Fraction of the image below which a splat is counted without a test whether it is in the image. */
 const SMALL_SHARE = 1 / 64;
 
-/** Values of a digit: half of a float32. */
+/** Number of values of a digit: half of the bits of a float32. */
 const DIGITS = 1 << 16;
 
 /**
- * A stable radix sort by the exact float32 depth: the bits of positive float32 numbers are monotonic. Two passes of 16
- * bits.
+ * Stable radix sort by the exact float32 depth, in two passes of 16 bits. The bits of positive float32 numbers are
+ * monotonic.
  */
 export class SplatOrder {
-  /** Total coverage of the image by the splats of the last order, from their areas. */
+  /** Coverage of the image by the splats of the last order, as a multiple of the image; computed from their areas. */
   covered = 0;
   readonly #positions: Float32Array;
   readonly #areas: Float32Array | undefined;
@@ -72,9 +86,9 @@ export class SplatOrder {
   readonly #high = new Uint32Array(DIGITS);
 
   /**
-   * @param positions [N, 3]
-   * @param areas Areas of their largest cross sections, in squared units of the positions; [N]. Without them the
-   * coverage is 0.
+   * @param positions [N, 3] positions of the splats
+   * @param areas [N] areas of the largest cross sections, in squared units of the positions; undefined for a coverage
+   * of 0.
    */
   constructor(positions: Float32Array, areas?: Float32Array) {
     this.#areas = areas;
@@ -87,12 +101,12 @@ export class SplatOrder {
 
   /**
    * Lists the splats from near to far.
-   * @param target [at least N]
+   * @param target Receives the indices; at least N elements.
    * @returns Number of listed splats.
    */
   sort(view: OrderView, target: Uint32Array): number {
     const count = view.point ? this.#findDistances(view.point) : this.#findKeys(view);
-    this.covered = this.#areas && !view.point ? this.#sumShares(view, count, this.#areas) : 0;
+    this.covered = this.#areas ? this.#sumShares(view, count, this.#areas) : 0;
     const [keys, listed, halfSorted] = [this.#keys, this.#listed, this.#halfSorted];
     startPlaces(this.#low);
     startPlaces(this.#high);
@@ -107,28 +121,35 @@ export class SplatOrder {
     return count;
   }
 
-  /** Total coverage of the image by the listed splats. */
-  #sumShares({ across, shareOfArea, isParallel }: OrderView, count: number, areas: Float32Array): number {
+  /** Returns the coverage of the image by the listed splats, as a multiple of the image. */
+  #sumShares({ axis, offset, near, far, ...view }: OrderView, count: number, areas: Float32Array): number {
+    const { across, shareOfArea, isParallel } = view;
+    const [x, y, z] = axis;
     const positions = this.#positions;
-    const depths = new Float32Array(this.#keys.buffer);
     let sum = 0;
     for (let k = 0; k < count; k++) {
       const i = this.#listed[k];
-      const depth = isParallel ? 1 : depths[i];
+      const distance = x * positions[3 * i] + y * positions[3 * i + 1] + z * positions[3 * i + 2] + offset;
+      // An order by distance also lists the splats behind the camera.
+      if (!(distance >= near && distance <= far)) continue;
+      const depth = isParallel ? 1 : distance;
       const share = (shareOfArea * areas[i]) / (depth * depth);
       if (share < SMALL_SHARE || this.#isWithin(across, positions, i, depth, share)) sum += Math.min(1, share || 0);
     }
     return sum;
   }
 
-  /** Whether the center of a splat lies in the image, or near enough that the splat may reach it. */
+  /** Whether the center of a splat is in the image, or near enough for the splat to reach the image. */
   #isWithin(across: OrderView['across'], positions: Float32Array, i: number, depth: number, share: number): boolean {
     const [p, q, r] = [positions[3 * i], positions[3 * i + 1], positions[3 * i + 2]];
     const reach = 1 + 2 * Math.sqrt(share);
     return across.every(([x, y, z, o, c]) => Math.abs((x * p + y * q + z * r + o) / depth + c) <= reach);
   }
 
-  /** Computes keys and indices of the splats within the range, and a histogram of each digit. */
+  /**
+   * Computes the keys and indices of the splats within the range of depths, and a histogram of each digit. Returns the
+   * number of these splats.
+   */
   #findKeys({ axis: [x, y, z], offset, near, far }: OrderView): number {
     const [positions, keys, listed, low, high] = [this.#positions, this.#keys, this.#listed, this.#low, this.#high];
     const depths = new Float32Array(keys.buffer);
@@ -146,7 +167,10 @@ export class SplatOrder {
     return count;
   }
 
-  /** The same with the squared distance instead of the depth. */
+  /**
+   * Computes the keys (squared distances from a point) and indices of all splats, and a histogram of each digit.
+   * Returns the number of splats.
+   */
   #findDistances([x, y, z]: Vector3): number {
     const [positions, keys, listed, low, high] = [this.#positions, this.#keys, this.#listed, this.#low, this.#high];
     const distances = new Float32Array(keys.buffer);
@@ -168,7 +192,7 @@ export class SplatOrder {
   }
 }
 
-/** Converts a histogram of digits to start indices. */
+/** Converts a histogram of digits in place to the start index of each digit. */
 function startPlaces(counts: Uint32Array): void {
   let sum = 0;
   for (let digit = 0; digit < DIGITS; digit++) {

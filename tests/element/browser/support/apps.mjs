@@ -4,7 +4,8 @@ import { fileURLToPath } from 'node:url';
 import { build } from 'esbuild';
 
 const root = fileURLToPath(new URL('../../../../', import.meta.url));
-const ELEMENT = '/packages/element/cdn/gaussian-splat.min.js';
+const ELEMENT = '/packages/element/dist/index.js';
+const SCENES = '/packages/element/dist/scenes.js';
 
 export const DEVELOPMENT_APP = `<!doctype html><html lang="en"><title>React, development build</title>
   <div id="app"></div>
@@ -13,8 +14,8 @@ export const DEVELOPMENT_APP = `<!doctype html><html lang="en"><title>React, dev
 let script;
 
 /**
- * demo/react with React's development build, in which StrictMode mounts everything twice; the demo's own is the production build, in which it
- * does nothing. The element comes from its CDN build.
+ * demo/react with React's development build, whose StrictMode mounts everything twice; the demo uses the production
+ * build, whose StrictMode does nothing. The element comes from its modules, because the app imports two of them.
  */
 export function developmentScript() {
   script ??= build({
@@ -27,8 +28,8 @@ export function developmentScript() {
     jsxDev: true,
     define: { 'process.env.NODE_ENV': '"development"' },
     conditions: ['development'],
-    alias: { '@gaussian-splat/element': ELEMENT },
-    external: [ELEMENT],
+    alias: { '@gaussian-splat/element': ELEMENT, '@gaussian-splat/element/scenes.js': SCENES },
+    external: [ELEMENT, SCENES],
   }).then(({ outputFiles }) => outputFiles[0].text);
   return script;
 }
@@ -62,7 +63,7 @@ export function frameworkScript(name) {
   return bundles.get(name);
 }
 
-/** What the apps of React and Vue do, in plain HTML around the CDN build at an address. */
+/** The app of the React and Vue tests in plain HTML around the CDN build at an address. */
 export function plainApp(address) {
   return `<!doctype html><html lang="en"><title>Plain</title>
     <script type="module" src="${address}"></script>

@@ -44,7 +44,7 @@ export const ELEMENT_ONLY = {
   ),
 };
 
-/** What axe finds in an element. */
+/** Violations that axe finds in an element. */
 export async function violationsIn(element: Element): Promise<string[]> {
   return violations(element.ownerDocument, ELEMENT_ONLY);
 }

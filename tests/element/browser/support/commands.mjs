@@ -6,7 +6,7 @@ import { setTimeout as delay } from 'node:timers/promises';
 import { promisify } from 'node:util';
 import { gpuEnvironment } from '../../../../scripts/lib/gpu-environment.mjs';
 
-/** What tests ask of the browser and cannot do from within a page: real touches, a real wheel, pictures of the screen. */
+/** Commands that tests need from the browser and that a page cannot run: real touches, a real wheel, screenshots. */
 export function pageCommands() {
   return {
     name: 'page-commands',
@@ -36,7 +36,7 @@ const ACTIONS = {
     return (await devtools(page, 'Runtime.getHeapUsage')).usedSize;
   },
 
-  /** Counters and seconds of the page's thread since it was opened: `ScriptDuration`, `RecalcStyleDuration`, `RecalcStyleCount`, `LayoutCount` and the others of DevTools. */
+  /** Counters and seconds of the main thread since it was opened: `ScriptDuration`, `RecalcStyleDuration`, `RecalcStyleCount`, `LayoutCount` and the others of DevTools. */
   'thread-metrics': async (page) => {
     await devtools(page, 'Performance.enable', { timeDomain: 'threadTicks' });
     const { metrics } = await devtools(page, 'Performance.getMetrics');
@@ -53,21 +53,21 @@ const ACTIONS = {
     return gpu !== undefined;
   },
 
-  /** The picture that the browser composes for a rectangle in CSS pixels: a PNG as base64, or `later` where it is still to come and is to be asked for again. */
+  /** The image that the browser composites for a rectangle in CSS pixels: a PNG as base64, or `later` if it is pending and must be requested again. */
   screenshot: async (page, clip) => {
-    const taken = pictures.get(page) ?? page.screenshot({ clip, timeout: 0 });
-    pictures.set(page, taken);
-    const picture = await Promise.race([taken, delay(PATIENCE_MS, 'later')]);
-    if (picture === 'later') return picture;
-    pictures.delete(page);
-    return picture.toString('base64');
+    const taken = images.get(page) ?? page.screenshot({ clip, timeout: 0 });
+    images.set(page, taken);
+    const image = await Promise.race([taken, delay(TIMEOUT_MS, 'later')]);
+    if (image === 'later') return image;
+    images.delete(page);
+    return image.toString('base64');
   },
 
-  /** Frames that `gaussian-splat video` writes with these arguments, as PNGs in base64, or `later` where they are still to come. */
+  /** Frames that `gaussian-splat video` writes with these arguments, as PNGs in base64, or `later` if they are pending. */
   'video-frames': async (page, args) => {
     const key = JSON.stringify(args);
     if (!videos.has(key)) videos.set(key, videoFrames(args));
-    return Promise.race([videos.get(key), delay(PATIENCE_MS, 'later')]);
+    return Promise.race([videos.get(key), delay(TIMEOUT_MS, 'later')]);
   },
 };
 
@@ -76,7 +76,7 @@ const videos = new Map();
 async function videoFrames(args) {
   const folder = await mkdtemp(join(tmpdir(), 'video-'));
   const command = ['packages/cli/bin/gaussian-splat.mjs', 'video', ...args, '--out', folder];
-  const env = { ...process.env, ...gpuEnvironment(), INIT_CWD: process.cwd() };
+  const env = { ...process.env, ...gpuEnvironment() };
   try {
     await promisify(execFile)(process.execPath, command, { env });
     const names = (await readdir(folder)).sort();
@@ -86,10 +86,13 @@ async function videoFrames(args) {
   }
 }
 
-/** Pages are told within this, since their commands give up after 20 s: a GPU process that draws for another page takes its time. */
-const PATIENCE_MS = 10_000;
-/** Pictures that a page waits for. */
-const pictures = new WeakMap();
+/**
+ * Pages get an answer within this time, since their commands give up after 20 s: a GPU process that draws for another
+ * page is slow.
+ */
+const TIMEOUT_MS = 10_000;
+/** Screenshots that a page waits for. */
+const images = new WeakMap();
 
 /** One DevTools session for each page. */
 const sessions = new WeakMap();

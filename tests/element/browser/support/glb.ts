@@ -26,16 +26,18 @@ function box([hx, hy, hz]: readonly number[]): { positions: number[]; normals: n
 }
 
 export interface BoxOptions {
-  /** Half of each side, metres. */
+  /** Half of each side, meters. */
   readonly half?: readonly [number, number, number];
-  /** Linear red, green, blue; it shines by itself, so that no light changes it. */
-  readonly colour?: readonly [number, number, number];
-  /** How its color is meant: it shines (the default), is its base color whatever light there is, or reflects light as a rough surface does. */
+  /** Linear red, green, blue; emissive, so that light does not change it. */
+  readonly color?: readonly [number, number, number];
+  /** How its color is used: emissive (the default), unlit base color, or a rough surface that reflects light. */
   readonly surface?: 'shining' | 'unlit' | 'rough';
-  /** It lets through what is behind it. */
+  /** Whether it is transparent. */
   readonly alpha?: number;
-  /** It moves by so much along x within a second. */
+  /** Its movement along x within a second. */
   readonly moves?: number;
+  /** Whether a bone moves it. */
+  readonly isSkinned?: boolean;
   /** Names of the mesh and its material. */
   readonly names?: readonly [mesh: string, material: string];
   /** A splat besides, at this place. */
@@ -45,10 +47,11 @@ export interface BoxOptions {
 /** A box that shines. */
 export function boxGlb({
   half = [0.5, 0.5, 0.5],
-  colour = [1, 0, 0],
+  color = [1, 0, 0],
   surface = 'shining',
   alpha = 1,
   moves,
+  isSkinned = false,
   names: [mesh, wood] = ['', ''],
   splat,
 }: BoxOptions = {}): File {
@@ -68,8 +71,18 @@ export function boxGlb({
   const floats = (values: readonly number[], type: string, more?: object): number =>
     add(Float32Array.from(values), type, more);
   const range = { min: half.map((h) => -h), max: [...half] };
+  const corners = positions.length / 3;
   const triangles = {
-    attributes: { POSITION: floats(positions, 'VEC3', range), NORMAL: floats(normals, 'VEC3') },
+    attributes: {
+      ...{ POSITION: floats(positions, 'VEC3', range), NORMAL: floats(normals, 'VEC3') },
+      ...(isSkinned && {
+        JOINTS_0: add(new Uint16Array(4 * corners), 'VEC4'),
+        WEIGHTS_0: floats(
+          Array.from({ length: 4 * corners }, (_, k) => Number(k % 4 === 0)),
+          'VEC4',
+        ),
+      }),
+    },
     indices: add(Uint16Array.from(indices), 'SCALAR'),
     material: 0,
   };
@@ -85,14 +98,15 @@ export function boxGlb({
     const extension = { kernel: 'ellipse', colorSpace: 'srgb_rec709_display' };
     primitives.push({ attributes, mode: 0, extensions: { KHR_gaussian_splatting: extension } });
   }
-  const animations = moves === undefined ? [] : [animation(moves, floats)];
+  const animations = moves === undefined ? [] : [animation(moves, isSkinned ? 1 : 0, floats)];
   const json = {
     asset: { version: '2.0' },
     scene: 0,
-    scenes: [{ nodes: [0] }],
-    nodes: [{ mesh: 0 }],
+    scenes: [{ nodes: isSkinned ? [0, 1] : [0] }],
+    nodes: isSkinned ? [{ mesh: 0, skin: 0 }, { name: 'bone' }] : [{ mesh: 0 }],
+    ...(isSkinned && { skins: [{ joints: [1] }] }),
     meshes: [{ name: mesh, primitives }],
-    materials: [{ name: wood, ...material(surface, colour, alpha) }],
+    materials: [{ name: wood, ...material(surface, color, alpha) }],
     extensionsUsed: ['KHR_materials_unlit', ...(splat ? ['KHR_gaussian_splatting'] : [])],
     ...(animations.length > 0 && { animations }),
     accessors,
@@ -102,20 +116,24 @@ export function boxGlb({
   return new File([glb(json, parts)], 'box.glb');
 }
 
-function material(surface: 'shining' | 'unlit' | 'rough', colour: readonly number[], alpha: number): object {
-  const base = surface === 'shining' ? [0, 0, 0] : colour;
+function material(surface: 'shining' | 'unlit' | 'rough', color: readonly number[], alpha: number): object {
+  const base = surface === 'shining' ? [0, 0, 0] : color;
   return {
     pbrMetallicRoughness: { baseColorFactor: [...base, alpha], metallicFactor: 0 },
     ...(alpha < 1 && { alphaMode: 'BLEND' }),
-    ...(surface === 'shining' && { emissiveFactor: colour }),
+    ...(surface === 'shining' && { emissiveFactor: color }),
     ...(surface === 'unlit' && { extensions: { KHR_materials_unlit: {} } }),
   };
 }
 
-function animation(moves: number, floats: (values: readonly number[], type: string, more?: object) => number): object {
+function animation(
+  moves: number,
+  node: number,
+  floats: (values: readonly number[], type: string, more?: object) => number,
+): object {
   const input = floats([0, 1], 'SCALAR', { min: [0], max: [1] });
   const output = floats([0, 0, 0, moves, 0, 0], 'VEC3');
-  return { channels: [{ sampler: 0, target: { node: 0, path: 'translation' } }], samplers: [{ input, output }] };
+  return { channels: [{ sampler: 0, target: { node, path: 'translation' } }], samplers: [{ input, output }] };
 }
 
 /** JSON and its bytes as one file. */

@@ -1,4 +1,4 @@
-/** What every browser test needs: elements, events, pictures, and a watch over the console and the GPU. */
+/** Utilities of every browser test: elements, events, images, and checks of the console and the GPU. */
 import type { GaussianSplatElement } from '@gaussian-splat/element';
 
 export const FIXTURES = '/tests/element/browser/fixtures/';
@@ -28,17 +28,16 @@ const pageTime = { since: 0, shown: 0, speed: 1 };
 const shownAt = (now: number): number => pageTime.shown + pageTime.speed * (now - pageTime.since);
 
 /**
- * Lets the page's clock go faster until the test ends, for tests of what comes after a while or stays away: timers, `performance.now` and the times of frames agree,
- * so that an element lives through a second in a part of one. Transitions of CSS and requests take as long as ever.
+ * Lets the page's clock go faster until the test ends, for tests of delayed events: timers, `performance.now` and the times of frames agree, so that a second of an element takes a fraction of one. Transitions of CSS and requests take as long as ever.
  */
 export function hurry(speed: number): void {
   const now = real.now();
   Object.assign(pageTime, { since: now, shown: shownAt(now), speed });
   performance.now = () => shownAt(real.now());
   Object.assign(globalThis, {
-    // Nobody waits for what comes after a minute: it is the limit of something that may hang.
+    // Tests do not wait for timers of a minute: they limit operations that may hang.
     setTimeout: (callback: () => void, ms = 0) =>
-      real.setTimeout(callback, ms < 60_000 ? ms / pageTime.speed : ms * PATIENCE),
+      real.setTimeout(callback, ms < 60_000 ? ms / pageTime.speed : ms * TIMEOUT),
     requestAnimationFrame: (callback: FrameRequestCallback) =>
       real.requestAnimationFrame((time) => callback(shownAt(time))),
   });
@@ -53,13 +52,13 @@ export async function frames(count = 2): Promise<void> {
 }
 
 /** A machine that is slow, or busy, takes several times as long: what never comes is found all the same. */
-const PATIENCE = 12;
+const TIMEOUT = 12;
 
 /** Waits until a condition holds: `limitMs` on a machine that has nothing else to do. */
 export async function until(condition: () => boolean, what: string, limitMs = 20_000): Promise<void> {
-  const end = real.now() + PATIENCE * limitMs;
+  const end = real.now() + TIMEOUT * limitMs;
   while (!condition()) {
-    assert(real.now() < end, `waited ${PATIENCE * limitMs} ms for ${what}`);
+    assert(real.now() < end, `waited ${TIMEOUT * limitMs} ms for ${what}`);
     await new Promise((resolve) => real.setTimeout(resolve, 10));
   }
 }
@@ -67,8 +66,8 @@ export async function until(condition: () => boolean, what: string, limitMs = 20
 /** The next event of a type, or a failure after a while: `limitMs` on a machine that has nothing else to do. */
 export function nextEvent<T extends Event>(target: EventTarget, type: string, limitMs = 20_000): Promise<T> {
   return new Promise((resolve, reject) => {
-    const most = PATIENCE * limitMs;
-    const timer = real.setTimeout(() => reject(new Error(`no event ${type} within ${most} ms`)), most);
+    const max = TIMEOUT * limitMs;
+    const timer = real.setTimeout(() => reject(new Error(`no event ${type} within ${max} ms`)), max);
     target.addEventListener(
       type,
       (event) => {
@@ -82,7 +81,7 @@ export function nextEvent<T extends Event>(target: EventTarget, type: string, li
 
 let gates = 0;
 
-/** A file of the fixtures, in pieces over `ms` milliseconds, whose last part comes when a test lets it: what is seen before is seen while it loads, however slow the machine is. */
+/** A file of the fixtures, in pieces over `ms` milliseconds, whose last part comes when a test releases it: earlier frames are drawn while it loads, on slow machines, too. */
 export function gated(file: string, ms = 0): { readonly src: string; open(): Promise<void> } {
   const gate = `${Math.round(performance.timeOrigin)}-${++gates}`;
   return { src: `/net/slow/${file}?ms=${ms}&gate=${gate}`, open: async () => void (await fetch(`/net/open/${gate}`)) };
@@ -100,7 +99,7 @@ export function show(
   return element;
 }
 
-/** The same, once its scene is on show. */
+/** The same, once its scene is visible. */
 export async function showLoaded(
   attributes: Readonly<Record<string, string>> = {},
   style?: string,
@@ -112,7 +111,7 @@ export async function showLoaded(
 }
 
 /**
- * Waits until an element shows its true image and the page has drawn nothing for a while, and for a few of its frames: a single frame that says so may still be
+ * Waits until an element shows its full frame and the page has not drawn for a while, and for a few of its frames: a single frame that says so may still be
  * followed by one of a motion that has just begun, and a machine that stands still for a while has no frames in it.
  */
 export async function atRest(element: GaussianSplatElement, quietMs = 400, limitMs = 30_000): Promise<void> {

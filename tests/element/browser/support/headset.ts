@@ -11,7 +11,7 @@ interface Layer {
 
 export interface Headset {
   readonly device: XRDevice;
-  /** Of the last layer. */
+  /** Eyes of the last layer. */
   layer: Layer | undefined;
   /** Bytes of an eye in the last layer, from its upper row on. */
   pixels(eye: 'left' | 'right'): Uint8Array;

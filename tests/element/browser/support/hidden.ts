@@ -1,4 +1,4 @@
-/** Runs work with the page hidden, as far as scripts can tell. */
+/** Runs work with the page hidden, as scripts see it. */
 export async function whileHidden(work: () => Promise<void>): Promise<void> {
   Object.defineProperty(document, 'visibilityState', { configurable: true, get: () => 'hidden' });
   document.dispatchEvent(new Event('visibilitychange'));

@@ -31,7 +31,7 @@ for (const type of [GPUBuffer, GPUTexture]) {
   };
 }
 
-/** What lives now. */
+/** The live resources. */
 export interface Holdings {
   readonly objects: number;
   readonly bytes: number;

@@ -1,10 +1,10 @@
-/** Pictures of what the browser really shows, compositing included, and input as a person gives it. */
+/** Screenshots of the browser with compositing, and input as a person gives it. */
 import { executeServerCommand } from '@web/test-runner-commands';
 import { frames } from './harness.js';
 
 export type Rgb = readonly [red: number, green: number, blue: number];
 
-/** The colours that an element shows. */
+/** The colors that an element shows. */
 export class Screen {
   readonly #data: ImageData;
   readonly #scale: number;
@@ -14,7 +14,7 @@ export class Screen {
     this.#scale = data.width / cssWidth;
   }
 
-  /** Colour at a point in the element's CSS pixels. */
+  /** Color at a point in the element's CSS pixels. */
   at(x: number, y: number): Rgb {
     const i = 4 * (Math.floor(y * this.#scale) * this.#data.width + Math.floor(x * this.#scale));
     const [red, green, blue] = this.#data.data.subarray(i, i + 3);
@@ -34,7 +34,7 @@ export class Screen {
     return count === 0 ? null : { x: x / count / this.#scale, y: y / count / this.#scale, count };
   }
 
-  /** Number of colour values, 0..255, that differ from another picture of the same size by more than a tolerance. */
+  /** Number of color values, 0..255, that differ from another image of the same size by more than a tolerance. */
   differences(other: Screen, tolerance = 0): number {
     const [a, b] = [this.#data.data, other.#data.data];
     return a.length !== b.length
@@ -46,7 +46,7 @@ export class Screen {
 export async function screenOf(element: Element): Promise<Screen> {
   await frames();
   const { x, y, width, height } = element.getBoundingClientRect();
-  // A page whose thread is busy for 20 s hears the answer after it has given up.
+  // A page whose thread is busy for 20 s gets the answer after its timeout.
   let tries = 10;
   const take = (): Promise<string> =>
     executeServerCommand<string, object>('screenshot', { x, y, width, height }).catch((error: unknown) => {
@@ -63,7 +63,7 @@ export async function screenOf(element: Element): Promise<Screen> {
   return new Screen(context.getImageData(0, 0, image.width, image.height), width);
 }
 
-/** Whether an element comes to show something: a picture is decoded, and a frame composed, in its own time. */
+/** Waits until an element shows content: images are decoded, and frames composited, asynchronously. */
 export async function comesToShow(
   element: Element,
   isShown: (screen: Screen) => boolean,

@@ -50,7 +50,7 @@ const HASHED = /-[\w-]{8}\.js$/;
 /** The end of a path whose answer waits. */
 let held = { file: '', ms: 0 };
 
-/** By name: what files wait for. */
+/** Gates that files wait for, by name. */
 const gates = new Map();
 
 function gateOf(name) {
@@ -66,19 +66,19 @@ function gateOf(name) {
   return gates.get(name);
 }
 
-/** Bytes of what comes through a closed gate at a time. */
+/** Bytes of each piece that passes a closed gate. */
 const DROP = 16_384;
 
-/** By folder: what tests have put there, and what was asked for. */
+/** Files that tests have put on the server, and their requests, by folder. */
 const kept = new Map();
 const stuck = new Map();
 
 /** Bytes a second of the link behind `/net/metered/`: 20 Mbit. */
 const METERED_RATE = 2.5e6;
-/** By the name of a link: bytes that have gone through it, and the time, ms, at which it is free. */
+/** Links by name: bytes that have passed, and the time in ms from which the link is free. */
 const links = new Map();
 
-/** Lets bytes through a link, one piece after the other whoever asks for them. */
+/** Sends bytes through a link, one piece after the other for all requests. */
 async function* throughLink(link, bytes) {
   for (let at = 0; at < bytes.length; at += 16_384) {
     const piece = bytes.subarray(at, at + 16_384);
@@ -140,13 +140,13 @@ const ANSWERS = {
     );
   },
 
-  /** A PLY of 200,000 splats, of which a part is missing. */
+  /** A PLY of 200,000 splats, with a part missing. */
   'short-ply'(context) {
     const { header, block } = largePly(200_000);
     context.body = Buffer.concat([header, ...Array.from({ length: 9 }, () => block)]);
   },
 
-  /** Files that cost more than they weigh, where they are there. */
+  /** Files that cost more than their size, if they are available. */
   attack(context, name) {
     const path = join(attackCases, normalize(`/${name}`));
     context.status = existsSync(path) ? 200 : 404;
@@ -190,7 +190,7 @@ const ANSWERS = {
   /** A red ball of `n` splats, 4,000 unless said, of a `size` that hardly covers it unless said, in twelve pieces over `ms` milliseconds. */
   ball(context) {
     const { n = 4_000, size } = context.query;
-    const bytes = ball(Number(n), COLOURS[0], size && Number(size));
+    const bytes = ball(Number(n), COLORS[0], size && Number(size));
     const pause = Number(context.query.ms ?? 0) / 12;
     context.set('Content-Length', String(bytes.length));
     context.body = Readable.from(
@@ -204,7 +204,7 @@ const ANSWERS = {
     );
   },
 
-  /** A sequence: its manifest, and frames that are balls of other colours, each larger than the one before. `ms` delays frames, `lost` is one that is not there. */
+  /** A sequence: its manifest, and frames that are balls of other colors, each larger than the one before. `ms` delays frames, `lost` is one that is not there. */
   async sequence(context, name) {
     const { count = '12', fps = '10', ms = '0', lost } = context.query;
     if (name.endsWith('.json')) {
@@ -217,10 +217,10 @@ const ANSWERS = {
     askedFrames.push(frame);
     if (frame > 0) await delay(Number(ms));
     if (String(frame) === lost) return void (context.status = 404);
-    context.body = ball(200 + 20 * (frame % 12), COLOURS[frame % 3]);
+    context.body = ball(200 + 20 * (frame % 12), COLORS[frame % 3]);
   },
 
-  /** A sequence of one ball that changes its colour and place: its first frame, and files of motion of four frames each. `lost` is one that is not there. */
+  /** A sequence of one ball that changes its color and place: its first frame, and files of motion of four frames each. `lost` is one that is not there. */
   async moving(context, name) {
     const { count = '12', lost } = context.query;
     const manifest = { gaussianSplatSequence: 2, framesPerSecond: 10, count: Number(count), framesPerFile: 4 };
@@ -232,15 +232,15 @@ const ANSWERS = {
       });
       return;
     }
-    if (name === 'ball.splat') return void (context.body = ball(200, COLOURS[0]));
+    if (name === 'ball.splat') return void (context.body = ball(200, COLORS[0]));
     const file = Number.parseInt(name, 10);
     if (String(file) === lost) return void (context.status = 404);
     context.body = Buffer.from(await motionOf(1 + 4 * file, Math.min(4, Number(count) - 1 - 4 * file)));
   },
 
   /**
-   * A clip of one ball that changes its colour and place, with a splat that is in every other frame alone; groups of four frames, ten a second. `whole`: without byte ranges; `slow`: each answer comes so many milliseconds later, and as late as `mbps` and at least `padded` bytes make it;
-   * `gate`: what follows the first group comes once it is opened; `lost`: a group that is not there.
+   * A clip of one ball that changes its color and place, with a splat that is in every other frame alone; groups of four frames, ten a second. `whole`: without byte ranges; `slow`: each answer is delayed by a number of milliseconds, and as late as `mbps` and at least `padded` bytes make it;
+   * `gate`: data after the first group comes once it is opened; `lost`: a missing group.
    */
   async clip(context) {
     const { frames = '12', whole, slow = '0', mbps = '0', padded = '0', lost, gate } = context.query;
@@ -263,12 +263,12 @@ const ANSWERS = {
     context.body = Buffer.from(bytes.subarray(Number(first), end));
   },
 
-  /** A sequence of two frames for whoever has a token, red, or a signature, blue; for nobody else. */
+  /** A sequence of two frames for requests with a token, red, or a signature, blue. Other requests fail. */
   signed(context, name) {
-    const colour = { 'token=a': COLOURS[0], 'signed=b': COLOURS[2] }[context.querystring];
-    if (colour === undefined) return void (context.status = 403);
+    const color = { 'token=a': COLORS[0], 'signed=b': COLORS[2] }[context.querystring];
+    if (color === undefined) return void (context.status = 403);
     const manifest = { gaussianSplatSequence: 1, framesPerSecond: 10, frames: '{0}.splat', count: 2 };
-    context.body = name.endsWith('.json') ? JSON.stringify(manifest) : ball(200, colour);
+    context.body = name.endsWith('.json') ? JSON.stringify(manifest) : ball(200, color);
   },
 
   /** Half of the file, then the connection breaks. */
@@ -329,7 +329,7 @@ const ANSWERS = {
     context.body = readFileSync(join(generators, name));
   },
 
-  /** Files of onnxruntime-web as servers send them that compress: their length is not told. */
+  /** Files of onnxruntime-web as compressing servers send them: without their length. */
   compressed(context, path) {
     const bytes = readFileSync(join(root, 'node_modules', normalize(`/${path}`)));
     context.type = TYPES[extname(path)];
@@ -342,14 +342,14 @@ const ANSWERS = {
     context.body = createReadStream(join(fixtures, name));
   },
 
-  /** The scenes beside the checkout, where there are any. */
+  /** The scenes beside the checkout, if there are any. */
   shared(context, name) {
     const path = join(sharedData, normalize(`/${name}`));
     context.status = existsSync(path) && statSync(path).isFile() ? 200 : 404;
     context.body = context.status === 200 ? createReadStream(path) : 'absent';
   },
 
-  /** The same through a link of 20 Mbit/s that a test names: `/net/metered/LINK/PATH`. `sent` tells the bytes that have gone through it. */
+  /** The same through a link of 20 Mbit/s that a test names: `/net/metered/LINK/PATH`. `sent` returns the bytes that have gone through it. */
   metered(context, path) {
     const [name, ...rest] = path.split('/');
     const link = links.get(name) ?? links.set(name, { sent: 0, freeAt: 0 }).get(name);
@@ -361,7 +361,10 @@ const ANSWERS = {
     context.body = Readable.from(throughLink(link, readFileSync(file)));
   },
 
-  /** Files that a test has put there with PUT; DELETE takes one away. `log` tells the paths that were asked for, in order. */
+  /**
+   * Files that a test has put there with PUT; DELETE takes one away. `log` returns the requested paths, in order. With a
+   * `gate`, all requests after the first `passing` wait until it is opened.
+   */
   async kept(context, path) {
     const [folder, ...rest] = path.split('/');
     const { files, log } = kept.get(folder) ?? kept.set(folder, { files: new Map(), log: [] }).get(folder);
@@ -378,12 +381,14 @@ const ANSWERS = {
       context.body = JSON.stringify(log);
     } else {
       log.push(name);
+      const { gate, passing } = context.query;
+      if (gate && log.length > Number(passing)) await gateOf(gate).opened;
       context.status = files.has(name) ? 200 : 404;
       context.body = files.get(name) ?? 'absent';
     }
   },
 
-  /** Sends a byte and nothing more. `NAME/open` tells how many connections for a name are open. */
+  /** Sends a byte and nothing more. `NAME/open` returns the number of open connections for a name. */
   stuck(context, path) {
     const [name, ...rest] = path.split('/');
     if (rest.join() === 'open') return void (context.body = String(stuck.get(name) ?? 0));
@@ -457,7 +462,7 @@ const ANSWERS = {
     context.body = name === 'app.js' ? await developmentScript() : DEVELOPMENT_APP;
   },
 
-  /** Modules of frameworks with what they import. */
+  /** Modules of frameworks with their imports. */
   async 'framework-scenes'(context, name) {
     context.type = 'text/javascript';
     context.body = await frameworkScript(name);
@@ -481,7 +486,7 @@ const ANSWERS = {
       const mesh = document.querySelector('splat-mesh');
       const workers = performance.getEntriesByType('resource').filter(({ name }) => name.endsWith('/scene-worker.js')).length;
       parent.postMessage({ ...seen, loaded: element.loaded, error: element.error?.message, workers, mesh: mesh && [mesh.loaded, mesh.error?.message ?? null],
-        prompt: element.shadowRoot.querySelector('[part=prompt]') !== null }, '*');`;
+        prompt: element.shadowRoot.querySelector('[part=interaction-prompt]') !== null }, '*');`;
   },
 };
 
@@ -525,14 +530,14 @@ export async function startOtherOrigin() {
 }
 
 /** Red, green, blue. */
-const COLOURS = [
+const COLORS = [
   [230, 30, 30],
   [30, 230, 30],
   [30, 30, 230],
 ];
 
 /** A .splat file: splats in no order on a ball of radius 1. */
-function ball(count, colour, size = Math.max(0.05, 2 / Math.sqrt(count))) {
+function ball(count, color, size = Math.max(0.05, 2 / Math.sqrt(count))) {
   const bytes = Buffer.alloc(32 * count);
   for (let i = 0; i < count; i++) {
     const height = 1 - (2 * (i + 0.5)) / count;
@@ -543,7 +548,7 @@ function ball(count, colour, size = Math.max(0.05, 2 / Math.sqrt(count))) {
     [ring * Math.cos(angle), height, ring * Math.sin(angle), size, size, size].forEach((value, k) =>
       bytes.writeFloatLE(value, at + 4 * k),
     );
-    bytes.set([...colour, 220, 255, 128, 128, 128], at + 24);
+    bytes.set([...color, 220, 255, 128, 128, 128], at + 24);
   }
   return bytes;
 }
@@ -552,10 +557,10 @@ function ball(count, colour, size = Math.max(0.05, 2 / Math.sqrt(count))) {
 async function motionOf(begin, count) {
   const { writeMotion } = await import('@gaussian-splat/economise');
   const { readScene } = await import('@gaussian-splat/formats');
-  const first = await readScene(ball(200, COLOURS[0]), { name: 'ball.splat' });
+  const first = await readScene(ball(200, COLORS[0]), { name: 'ball.splat' });
   const frames = Array.from({ length: count }, (_, k) => {
     const frame = begin + k;
-    const color = COLOURS[frame % 3].map((value) => (value / 255 - 0.5) / 0.28209479177387814);
+    const color = COLORS[frame % 3].map((value) => (value / 255 - 0.5) / 0.28209479177387814);
     const positions = first.positions.map((value, i) => value + (i % 3 === 0 ? 0.02 * frame : 0));
     return { ...first, positions, sh: first.sh.map((_, i) => color[i % 3]) };
   });
@@ -566,7 +571,7 @@ async function motionOf(begin, count) {
 
 const clips = new Map();
 
-/** The clip of so many frames, and the first byte of each of its groups. */
+/** The clip with a number of frames, and the first byte of each of its groups. */
 async function clipOf(frameCount) {
   const made = clips.get(frameCount) ?? makeClip(frameCount);
   clips.set(frameCount, made);
@@ -576,9 +581,9 @@ async function clipOf(frameCount) {
 async function makeClip(frameCount) {
   const { codeClip, encodingsFor } = await import('@gaussian-splat/economise');
   const { readScene, parseClip } = await import('@gaussian-splat/formats');
-  const first = await readScene(ball(200, COLOURS[0]), { name: 'ball.splat' });
+  const first = await readScene(ball(200, COLORS[0]), { name: 'ball.splat' });
   const frameOf = (frame) => {
-    const color = COLOURS[frame % 3].map((value) => (value / 255 - 0.5) / 0.28209479177387814);
+    const color = COLORS[frame % 3].map((value) => (value / 255 - 0.5) / 0.28209479177387814);
     const count = 200 - (frame % 2);
     return {
       ...first,
@@ -591,7 +596,7 @@ async function makeClip(frameCount) {
     };
   };
   const { bytes } = await codeClip({
-    ...{ frameCount, framesPerSecond: 10, framesPerGroup: 4, minDecibels: 45 },
+    ...{ frameCount, framesPerSecond: 10, framesPerGroup: 4, minPsnr: 45 },
     openFrame: async (frame) => frameOf(frame),
     deflate: (data) => deflateRawSync(data, { finishFlush: constants.Z_SYNC_FLUSH }),
     rounding: {

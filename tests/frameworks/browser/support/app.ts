@@ -1,4 +1,4 @@
-/** The same app, in whatever it is made with, driven as a person would. */
+/** The same app in any framework, driven as a person would. */
 import { executeServerCommand } from '@web/test-runner-commands';
 import { assert, assertEqual, COMPASS, delay, nextEvent, until } from '../../../element/browser/support/harness.js';
 
@@ -47,13 +47,13 @@ class App {
 /** Elements that may still be held: React keeps the trees of its last two renderings, and a stack or a frame has another. A leak holds all of them. */
 const MAX_HELD = 4;
 
-/** An app and what is known of it. */
+/** An app and its known properties. */
 export interface AppUnderTest {
   /** Its address. */
   readonly page: string;
   /** How often it is mounted in the test of leaks. */
   readonly mounts: number;
-  /** How often React calls the effects of one mount, where it is React's. */
+  /** How often React calls the effects of one mount, in a React app. */
   readonly effects?: number;
 }
 
@@ -71,7 +71,7 @@ async function open(page: string): Promise<App> {
   return new App(frame);
 }
 
-/** What an app with the element does when a person drives it, whatever it is made with. */
+/** Actions of an app with the element when a person drives it, in any framework. */
 export function describeApp(name: string, { page, mounts, effects }: AppUnderTest): void {
   describe(`an app of ${name}`, () => {
     it('shows a scene once: properties by reference, events, a ref, children in slots', async () => {

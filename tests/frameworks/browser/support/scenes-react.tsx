@@ -6,7 +6,7 @@ import type { Child, Rendering } from './scenes.js';
 
 export { GaussianSplatElement } from '@gaussian-splat/element';
 
-export function mount(place: HTMLElement, attributes: object, told: (name: string, what: string) => void): Rendering {
+export function mount(place: HTMLElement, attributes: object, report: (name: string, what: string) => void): Rendering {
   const root = createRoot(place);
   const childOf = ({ name, kind, ...properties }: Child) => {
     const Tag = kind === 'mesh' ? SplatMesh : SplatScene;
@@ -15,8 +15,8 @@ export function mount(place: HTMLElement, attributes: object, told: (name: strin
         key={name}
         id={name}
         {...properties}
-        onLoad={() => told(name, 'load')}
-        onError={({ detail }) => told(name, detail.code === 'network' ? detail.reason : detail.message)}
+        onLoad={() => report(name, 'load')}
+        onError={({ detail }) => report(name, detail.code === 'network' ? detail.reason : detail.message)}
       />
     );
   };

@@ -5,7 +5,7 @@ import type { Child, Rendering } from './scenes.js';
 
 export { GaussianSplatElement } from '@gaussian-splat/element';
 
-export function mount(place: HTMLElement, attributes: object, told: (name: string, what: string) => void): Rendering {
+export function mount(place: HTMLElement, attributes: object, report: (name: string, what: string) => void): Rendering {
   const children = shallowRef<readonly Child[]>([]);
   const app = createApp(() =>
     h(
@@ -14,9 +14,9 @@ export function mount(place: HTMLElement, attributes: object, told: (name: strin
       children.value.map(({ name, kind, ...properties }) =>
         h(kind === 'mesh' ? 'splat-mesh' : 'splat-scene', {
           ...{ key: name, id: name, ...properties },
-          onLoad: () => told(name, 'load'),
+          onLoad: () => report(name, 'load'),
           onError: ({ detail }: CustomEvent<{ code: string; reason: string; message: string }>) =>
-            told(name, detail.code === 'network' ? detail.reason : detail.message),
+            report(name, detail.code === 'network' ? detail.reason : detail.message),
         }),
       ),
     ),

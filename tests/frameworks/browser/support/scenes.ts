@@ -1,4 +1,4 @@
-/** What a framework does with the children of an element. */
+/** Changes that a framework makes to the children of an element. */
 import { boxGlb } from '../../../element/browser/support/glb.js';
 import { assert, assertEqual, COMPASS, FIXTURES, frames, until } from '../../../element/browser/support/harness.js';
 import { isGreen, isRed, screenOf } from '../../../element/browser/support/screen.js';
@@ -18,7 +18,7 @@ export interface Rendering {
 
 interface App {
   readonly GaussianSplatElement: { workerLocation: string | null };
-  mount(place: HTMLElement, attributes: object, told: (name: string, what: string) => void): Rendering;
+  mount(place: HTMLElement, attributes: object, report: (name: string, what: string) => void): Rendering;
 }
 
 const GREEN = `${FIXTURES}green.splat`;
@@ -31,15 +31,15 @@ export function describeScenes(name: string, script: string, toAttributes: (prop
       GaussianSplatElement.workerLocation = '/packages/element/dist/loading/scene-worker.js';
       const place = document.createElement('div');
       document.body.append(place);
-      const told: string[] = [];
+      const reported: string[] = [];
       const view = { cameraOrbit: '0deg 90deg 10m', cameraTarget: '0 0 0', fieldOfView: '45deg', loading: 'eager' };
       const attributes = toAttributes({ ...view, style: { display: 'block', width: '120px', height: '100px' } });
-      const app = mount(place, attributes, (child, what) => told.push(`${child} ${what}`));
+      const app = mount(place, attributes, (child, what) => reported.push(`${child} ${what}`));
       const green: Child = { name: 'green', kind: 'scene', src: GREEN, position: [-2, 0, 0] };
       const box: Child = { name: 'box', kind: 'mesh', src: boxGlb(), position: [2, 0, 0] };
       await app.render([green, box]);
-      await until(() => told.length === 2, 'both');
-      assertEqual([...told].sort(), ['box load', 'green load'], 'events');
+      await until(() => reported.length === 2, 'both');
+      assertEqual([...reported].sort(), ['box load', 'green load'], 'events');
       const at = async (isPicked: typeof isRed): Promise<number | null> => {
         await frames(3);
         const middle = (await screenOf(place.firstElementChild!)).middleOf(isPicked);
@@ -49,7 +49,7 @@ export function describeScenes(name: string, script: string, toAttributes: (prop
       const move = (child: Child, x: number): Child => ({ ...child, position: [x, 0, 0] });
       await app.render([move(box, -2), move(green, 1)]);
       assertEqual([await at(isGreen), await at(isRed)], [1, -2], 'moved and reordered');
-      assertEqual(told.length, 2, 'nothing is loaded again');
+      assertEqual(reported.length, 2, 'nothing is loaded again');
       await app.render([{ ...box, hidden: true }, green]);
       assertEqual([await at(isGreen), await at(isRed)], [-2, null], 'hidden');
       await app.render([
@@ -57,8 +57,8 @@ export function describeScenes(name: string, script: string, toAttributes: (prop
         { ...green, src: COMPASS },
         { name: 'missing', kind: 'scene', src: '/net/missing.splat' },
       ]);
-      await until(() => told.includes('missing network/status') && told.length === 4, 'what was swapped');
-      assertEqual(told.slice(2).sort(), ['green load', 'missing network/status'], 'events of the swap');
+      await until(() => reported.includes('missing network/status') && reported.length === 4, 'what was swapped');
+      assertEqual(reported.slice(2).sort(), ['green load', 'missing network/status'], 'events of the swap');
       await app.render([box]);
       assertEqual([await at(isGreen), await at(isRed)], [null, 2], 'removed');
       app.unmount();

@@ -1,6 +1,6 @@
 /**
- * The feed-forward example on its page: it waits for a click, shows what it is given, and says what it costs. At 256 x 256 pixels SwiftShader takes
- * minutes for a run, so the network itself runs in tests/generator/examples.alone.test.ts (the CPU, against a held-out picture) and, small, in families.lab.test.ts
+ * The feed-forward example on its page: it waits for a click, shows its inputs, and reports its cost. At 256 x 256 pixels SwiftShader takes
+ * minutes for a run, so the network itself runs in tests/generator/examples.alone.test.ts (the CPU, against a held-out image) and, small, in families.lab.test.ts
  * (the GPU).
  */
 import { assert, assertEqual, until } from '../../../element/browser/support/harness.js';
@@ -9,13 +9,13 @@ import { openCard } from './support.js';
 describe('the page of trained examples', () => {
   it('the statue waits for a click, with two pictures and what their cameras have to do with one another', async () => {
     const { page, card, element } = await openCard('statue');
-    const pictures = [...card.querySelectorAll<HTMLImageElement>('.given img')];
-    await until(() => pictures.every(({ complete, naturalWidth }) => complete && naturalWidth === 256), 'pictures');
+    const images = [...card.querySelectorAll<HTMLImageElement>('.given img')];
+    await until(() => images.every(({ complete, naturalWidth }) => complete && naturalWidth === 256), 'pictures');
     const given = element.inputValues as Record<string, string | number[]>;
     assertEqual(Object.keys(given).sort(), ['focal_length', 'image', 'image_2', 'principal_point', 'relative_pose']);
     assertEqual(
       [given.image, given.image_2],
-      pictures.map(({ src }) => src),
+      images.map(({ src }) => src),
     );
     assertEqual((given.relative_pose as number[]).length, 16);
     const [statue, angel] = card.querySelectorAll<HTMLButtonElement>('[data-pair]');

@@ -3,7 +3,7 @@ import type { GaussianSplatElement } from '@gaussian-splat/element';
 import { assert, assertEqual, nextEvent, until } from '../../../element/browser/support/harness.js';
 import { screenOf } from '../../../element/browser/support/screen.js';
 
-const PATIENCE_MS = 200_000;
+const TIMEOUT_MS = 200_000;
 
 async function openPage(): Promise<Document> {
   const frame = document.createElement('iframe');
@@ -15,7 +15,7 @@ async function openPage(): Promise<Document> {
   return frame.contentDocument!;
 }
 
-/** An example that is on show, and why it could not run on the GPU, if so. */
+/** A visible example, and the reason if it could not run on the GPU. */
 export interface OpenExample {
   readonly page: Document;
   readonly card: HTMLElement;
@@ -23,7 +23,7 @@ export interface OpenExample {
   readonly fallbacks: readonly string[];
 }
 
-/** Opens the page, and waits until an example says what it costs. */
+/** Opens the page, and waits until an example reports its cost. */
 export async function openCard(name: string): Promise<Omit<OpenExample, 'fallbacks'>> {
   const page = await openPage();
   const card = page.querySelector<HTMLElement>(`[data-example="${name}"]`)!;
@@ -32,7 +32,7 @@ export async function openCard(name: string): Promise<Omit<OpenExample, 'fallbac
   return { page, card, element };
 }
 
-/** Opens the page, brings an example into sight, and waits until it is on show. */
+/** Opens the page, scrolls to an example, and waits until it is visible. */
 export async function open(name: string): Promise<OpenExample> {
   const { page, card, element } = await openCard(name);
   const fallbacks: string[] = [];
@@ -40,7 +40,7 @@ export async function open(name: string): Promise<OpenExample> {
     fallbacks.push(String((event as CustomEvent).detail.reason)),
   );
   element.scrollIntoView({ block: 'center' });
-  await until(() => element.loaded || element.error !== null, `${name} on show`, PATIENCE_MS);
+  await until(() => element.loaded || element.error !== null, `${name} on show`, TIMEOUT_MS);
   assertEqual(element.error?.message, undefined, name);
   await until(() => card.querySelector('.cost')!.childElementCount > 0, `${name}: its cost`);
   // Cards above may have grown meanwhile.
@@ -48,11 +48,11 @@ export async function open(name: string): Promise<OpenExample> {
   return { page, card, element, fallbacks };
 }
 
-/** Waits until another picture is on show. The page lies in the window's corner: places in both are the same. */
+/** Waits until another frame is visible. The page is at the window's corner: positions in both are the same. */
 export async function changes(element: GaussianSplatElement, act: () => void, what: string): Promise<void> {
   const before = await screenOf(element);
   act();
-  const deadline = performance.now() + PATIENCE_MS;
+  const deadline = performance.now() + TIMEOUT_MS;
   while ((await screenOf(element)).differences(before, 10) < 100) {
     assert(performance.now() < deadline, `${what}: the picture is still the same`);
     await new Promise((resolve) => setTimeout(resolve, 200));
@@ -65,7 +65,7 @@ export const slide = (card: HTMLElement, selector: string, value: number): void 
   slider.dispatchEvent(new Event('input', { bubbles: true }));
 };
 
-/** Runs on the GPU, is drawn, and tells what it costs. */
+/** Runs on the GPU, is drawn, and reports its cost. */
 export async function assertShown({ card, element, fallbacks }: OpenExample, gaussians: number): Promise<void> {
   assertEqual([element.stats?.splats, fallbacks], [gaussians, []]);
   // The page behind is lighter than that.

@@ -1,1 +1,1 @@
-"""Readers of what trainers leave behind. They read data and never run what a file holds."""
+"""Readers of the files of trainers. They read data and never execute code of a file."""

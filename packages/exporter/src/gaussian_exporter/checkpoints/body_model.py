@@ -15,7 +15,7 @@ from ..families.classic import Cloud, usable
 from .clouds import read_cloud
 from .files import existing
 
-# Of the arrays of a model, those that place its vertices. Files of SMPL-X hold objects besides, which are not opened.
+# Arrays of a model that place its vertices. Files of SMPL-X also hold pickled objects, which are not opened.
 _NEEDED = ("v_template", "shapedirs", "posedirs", "J_regressor", "weights", "kintree_table")
 # SMPL-X has 300 directions of shape, then 100 of expressions; in its first files 10 and 10.
 _SHAPES_BEFORE_EXPRESSIONS = {400: 300, 20: 10}
@@ -121,7 +121,7 @@ def read_body(path: Path) -> dict[str, Doubles]:
 
 
 def nearest_rows(points: AnyArray, table: AnyArray) -> AnyArray:
-    """Of each point (N,3) the row of a table (V,3) that lies nearest."""
+    """For each point (N,3), the index of the nearest row of a table (V,3)."""
     table = np.asarray(table, np.float64)
     squares = (table**2).sum(1)
     parts = [

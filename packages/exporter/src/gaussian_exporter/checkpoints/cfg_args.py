@@ -13,7 +13,7 @@ def find_cfg_args(folder: Path) -> Path | None:
 
 
 def require_cfg_args(folder: Path, why: str) -> dict[str, object]:
-    """Names and values. Raises checkpoint/incomplete where there is no file."""
+    """Names and values of the settings. Raises checkpoint/incomplete if the file is missing."""
     path = find_cfg_args(folder)
     if path is None:
         raise ExportError(

@@ -15,12 +15,12 @@ from ..errors import ExportError, listed
 from ..families.classic import Cloud, cloud_of_vertices, usable_degree
 from .cfg_args import find_cfg_args, read_cfg_args
 from .files import existing, latest_iteration
-from .kinds import other_family, refuse_neighbours, refuse_other_properties
+from .kinds import other_family, refuse_neighbors, refuse_other_properties
 from .ply import read_ply
 from .torch_file import read_torch
 from .unread import refuse_settings, refuse_unread
 
-# Of harmonics of degree 0.
+# Constant of the spherical harmonic of degree 0: 1 / (2 sqrt(pi)).
 _C0 = 0.28209479177387814
 _GSPLAT = ("means", "scales", "quats", "opacities", "sh0", "shN")
 _NERFSTUDIO = ("means", "scales", "quats", "opacities", "features_dc", "features_rest")
@@ -33,7 +33,7 @@ _NERFSTUDIO_KEYS = (
 # gsplat's trainer of 3D Gaussians writes the rank into the name of a file, that of 2D Gaussians does not.
 _GSPLAT_3D = re.compile(r".*_rank\d+\.pt")
 _OWN = "export the model as a module of your own: gaussian_exporter.export_module"
-# Entries of what INRIA's `capture` gives, the optimizer's state among them; fudan's 4DGS has more.
+# Lengths of the tuple of INRIA's `capture`, including the optimizer's state; fudan's 4DGS has more entries.
 _CAPTURED, _CAPTURED_4D = 12, 19
 
 
@@ -44,7 +44,7 @@ def read_cloud(path: Path, ignored: Sequence[str] = ()) -> Cloud:
     path = newest_in(existing(path, "a PLY file, a checkpoint, or the folder of a training"))
     with path.open("rb") as file:
         is_archive = file.read(2) == b"PK"
-    refuse_neighbours(path)
+    refuse_neighbors(path)
     kernel = refused_settings(path, ignored)
     if is_archive:
         if kernel is not None:
@@ -59,7 +59,7 @@ def read_cloud(path: Path, ignored: Sequence[str] = ()) -> Cloud:
 
 
 def refused_settings(path: Path, ignored: Sequence[str]) -> float | None:
-    """Mip-Splatting's kernel_size of the cfg_args around a file; raises for other settings that nobody knows."""
+    """Mip-Splatting's kernel_size of the cfg_args around a file; raises for unknown settings."""
     beside = find_cfg_args(path.parent)
     settings = {} if beside is None else read_cfg_args(beside)
     mip = (
@@ -107,7 +107,7 @@ def cloud_of_checkpoint(path: Path, ignored: Sequence[str] = ()) -> Cloud:
 
 
 def captured_of(content: object) -> Sequence[Any] | None:
-    """What `GaussianModel.capture` gave, of a file (captured, iteration)."""
+    """The tuple of `GaussianModel.capture`, if the content of a file is (captured, iteration)."""
     is_pair = isinstance(content, (list, tuple)) and len(content) == 2 and isinstance(content[0], (list, tuple))
     return content[0] if is_pair else None  # type: ignore[index]
 
@@ -155,7 +155,7 @@ def gsplat(path: Path, content: Mapping[str, Any], ignored: Sequence[str] = ()) 
         ranks.append(more)
     files = [content["splats"], *(read_torch(more)["splats"] for more in ranks[1:])]  # type: ignore[index]
     if "features" in files[0]:
-        remedy = "train without app_opt: its colours come from a network that knows the training images"
+        remedy = "train without app_opt: its colors come from a network that knows the training images"
         raise other_family(path, "gsplat with appearance optimisation", "features in place of harmonics", remedy)
     refuse_unread(path, "entries", map(str, content), (), ignored=ignored, harmless=_GSPLAT_KEYS, family="gsplat")
     for file in files:
@@ -174,7 +174,7 @@ def gsplat(path: Path, content: Mapping[str, Any], ignored: Sequence[str] = ()) 
 
 
 def nerfstudio(path: Path, pipeline: Mapping[str, Any], ignored: Sequence[str] = ()) -> Cloud:
-    """nerfstudio's splatfacto: the state of its pipeline. Without harmonics its colours go through a sigmoid."""
+    """nerfstudio's splatfacto: the state of its pipeline. Without harmonics its colors go through a sigmoid."""
     prefix = next((p for p in ("_model.gauss_params.", "_model.") if f"{p}means" in pipeline), None)
     if prefix is None:
         raise unknown(path, pipeline)
@@ -212,6 +212,6 @@ def table(path: Path, tensors: Mapping[str, Any], name: str) -> Floats:
 
 
 def degrees(path: Path, sh: AnyArray) -> Floats:
-    """Harmonics (N,K,3), refused where K is of no degree up to 3."""
+    """Harmonics (N,K,3), refused if K fits no degree up to 3."""
     usable_degree(sh.shape[1] - 1, path)
     return np.asarray(sh, np.float32)

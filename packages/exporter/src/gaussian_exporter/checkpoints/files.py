@@ -21,7 +21,7 @@ def existing(path: Path, what: str) -> Path:
 
 
 def latest_iteration(folder: Path, inside: str = "point_cloud") -> Path:
-    """The folder `inside`/iteration_N with the largest N, or `folder` itself where there is no such folder."""
+    """The folder `inside`/iteration_N with the largest N, or `folder` itself without such a folder."""
     found = [(int(match[1]), path) for path in folder.glob(f"{inside}/iteration_*") if (match := _number(path))]
     return max(found)[1] if found else folder
 

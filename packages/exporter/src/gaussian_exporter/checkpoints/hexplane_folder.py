@@ -16,7 +16,7 @@ from .kinds import refuse_other_properties, unfiltered
 from .ply import read_ply
 from .torch_file import Weights, read_weights
 
-# The trainer's own defaults, which hold where a cfg_args does not say otherwise.
+# The trainer's own defaults, which apply unless a cfg_args overrides them.
 _DEFAULTS = {"no_dx": False, "no_ds": False, "no_dr": False, "no_do": True, "no_dshs": True}
 _REFUSED = {
     "no_grid": "without its planes",

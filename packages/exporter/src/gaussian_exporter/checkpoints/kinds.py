@@ -12,11 +12,11 @@ from .unread import refuse_unread
 
 # Properties of vertices that INRIA's layout has, or that say nothing about Gaussians.
 _PLAIN = r"x|y|z|nx|ny|nz|f_dc_[0-2]|f_rest_\d+|opacity|scale_[0-2]|rot_[0-3]|filter_3D|red|green|blue"
-# A property that only one family writes: its name, and what to do.
+# A property that only one family writes: its name, and the remedy.
 _BY_PROPERTY = {
     "f_t_0": (
         "SpacetimeGaussians, full",
-        "its features become colours in a network of each pixel: train its lite model",
+        "its features become colors in a network of each pixel: train its lite model",
     ),
     "trbf_center": ("SpacetimeGaussians", "run gaussian-export spacetime"),
     "binding_0": (
@@ -28,7 +28,7 @@ _BY_PROPERTY = {
     "f_offset_0": ("Scaffold-GS or Octree-GS", "run gaussian-export scaffold"),
 }
 # A file or folder beside point_cloud.ply, or beside the folder point_cloud, that only one family leaves.
-_BY_NEIGHBOUR = {
+_BY_NEIGHBOR = {
     "deformation.pth": ("4DGaussians", "run gaussian-export hexplane"),
     "deform": ("Deformable-3D-Gaussians", "run gaussian-export deformable"),
     "mlp_ckpt": ("GauHuman", "its network moves SMPL: export a module of it (gaussian_exporter.export_module)"),
@@ -56,12 +56,12 @@ def unfiltered(cloud: Cloud, where: Path) -> Cloud:
     return cloud
 
 
-def refuse_neighbours(point_cloud: Path) -> None:
-    """Raises checkpoint/other-family where what lies beside a point cloud makes it more than that."""
+def refuse_neighbors(point_cloud: Path) -> None:
+    """Raises checkpoint/other-family if files beside a point cloud show that it is only a part of a model."""
     # OUT/point_cloud/iteration_N/point_cloud.ply: beside the file, or beside the folder point_cloud.
     for folder in (point_cloud.parent, point_cloud.parent.parent.parent):
         is_training = folder == point_cloud.parent or (folder / "point_cloud").is_dir()
-        for name, (family, remedy) in _BY_NEIGHBOUR.items():
+        for name, (family, remedy) in _BY_NEIGHBOR.items():
             if is_training and (folder / name).exists():
                 raise other_family(point_cloud, family, f"{name} in {folder}", remedy)
 

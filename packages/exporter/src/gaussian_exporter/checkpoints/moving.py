@@ -38,14 +38,14 @@ def read_spacetime(path: Path, ignored: Sequence[str] = ()) -> Spacetime:
 
     model = Spacetime(
         positions=vertices.columns("x", "y", "z"),
-        centres=vertices.columns("trbf_center"),
+        centers=vertices.columns("trbf_center"),
         widths=vertices.columns("trbf_scale"),
         motion=numbered("motion", 9),
         rotations=numbered("rot", 4),
         turns=numbered("omega", 4),
         log_scales=numbered("scale", 3),
         opacity_logits=vertices.columns("opacity"),
-        colours=numbered("f_dc", 3),
+        colors=numbered("f_dc", 3),
     )
     vertices.refuse_unread(ignored)
     return model
@@ -138,7 +138,7 @@ def _seconds(path: Path, settings: dict[str, object], given: Sequence[float] | N
 def gaussian4d_of(
     path: Path, captured: Sequence[Any], settings: dict[str, Any], rotation: Rotation4D = "reversed"
 ) -> Gaussian4D:
-    """What `GaussianModel.capture` gave of Gaussians of four dimensions; settings: time_duration and prefilter_var."""
+    """Reads the tuple of `GaussianModel.capture` of 4D Gaussians; settings: time_duration and prefilter_var."""
     degree, positions, dc, rest, log_scales, rotations, opacity_logits = captured[:7]
     times, log_scales_t, rotations_r, is_turned, environment, degree_t = captured[13:]
     duration = settings["time_duration"]

@@ -59,12 +59,12 @@ def read_image_filter(folder: Path, ignored: Sequence[str] = ()) -> tuple[ImageF
 
 
 def numbers(weights: Weights, name: str) -> list[int]:
-    """The numbers of the layers NAME.0, NAME.1, ... that are there."""
+    """The indices of the layers NAME.0, NAME.1, ... in the file, ascending."""
     return sorted({int(key.split(".")[1]) for key in weights.tensors if key.startswith(f"{name}.")})
 
 
 def convolution(weights: Weights) -> Convolution:
-    """weight, bias and, if they are there, norm.weight and norm.bias."""
+    """Reads weight, bias and, if the file has them, norm.weight and norm.bias."""
     norm = (weights.get("norm.weight"), weights.get("norm.bias")) if "norm.weight" in weights else None
     return Convolution(weights.get("weight"), weights.get("bias"), norm)
 
@@ -73,7 +73,7 @@ def read_network(folder: Path, kind: str, keys: tuple[str, ...]) -> tuple[dict[s
     """The two files of a network."""
     path = existing(folder / "config.json", f"the config.json of a {kind} network")
     try:
-        config = json.loads(path.read_text())
+        config = json.loads(path.read_text(encoding="utf-8"))
     except ValueError as error:
         raise _broken(path, "JSON", str(error)) from error
     missing = [key for key in keys if key not in config] if isinstance(config, dict) else list(keys)

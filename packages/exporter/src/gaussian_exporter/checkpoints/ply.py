@@ -52,12 +52,12 @@ class Vertices:
         return np.stack([self.rows[name].astype(np.float32) for name in names], 1)
 
     def refuse_unread(self, ignored: Sequence[str] = (), harmless: str = "(?!)") -> None:
-        """Raises checkpoint/other-family for properties that nobody asked for; normals change nothing."""
+        """Raises checkpoint/other-family for properties that the reader did not use; normals change nothing."""
         known = f"n[xyz]|{harmless}"
         refuse_unread(self.path, "properties", self.names, self._read, ignored=ignored, harmless=known)
 
     def numbered(self, prefix: str) -> Floats:
-        """Properties prefix0, prefix1, ... as columns in the order of their numbers; (N,0) where there is none."""
+        """Properties prefix0, prefix1, ... as columns in the order of their numbers; (N,0) without any."""
         rest = [name.removeprefix(prefix) for name in self.names if name.startswith(prefix)]
         numbers = sorted(int(number) for number in rest if number.isdigit())
         return self.columns(*(f"{prefix}{n}" for n in numbers)) if numbers else np.zeros((len(self), 0), np.float32)

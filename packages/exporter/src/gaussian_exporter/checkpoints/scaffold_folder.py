@@ -17,14 +17,14 @@ from .ply import Vertices, read_ply
 from .torch_file import Weights, read_weights
 from .unread import refuse_unread
 
-_REQUIRED = {"opacity": "opacity_mlp", "colour": "color_mlp", "covariance": "cov_mlp"}
+_REQUIRED = {"opacity": "opacity_mlp", "color": "color_mlp", "covariance": "cov_mlp"}
 _NETWORKS = {**_REQUIRED, "feature_bank": "feature_bank_mlp"}
 # The name in files of Scaffold-GS before 2024.
 _OLD_FEATURE_BANK = "mlp_feature_bank"
 
 
 def read_scaffold(folder: Path, appearance: int = 0, ignored: Sequence[str] = ()) -> Scaffold:
-    """Reads the latest iteration. `appearance`: which training image's code to bake in, where the model has any."""
+    """Reads the latest iteration. `appearance`: which training image's code to bake in, if the model has any."""
     point_cloud = latest_iteration(existing(folder, "the folder of a Scaffold-GS or Octree-GS training"))
     vertices = read_ply(point_cloud / "point_cloud.ply")
     networks = read_networks(point_cloud, ignored)
@@ -35,18 +35,18 @@ def read_scaffold(folder: Path, appearance: int = 0, ignored: Sequence[str] = ()
     model = Scaffold(
         **anchors,
         opacity=networks["opacity"].linears(),
-        colour=networks["colour"].linears(),
+        color=networks["color"].linears(),
         covariance=networks["covariance"].linears(),
         feature_bank=networks["feature_bank"].linears() if "feature_bank" in networks else None,
         uses_distance=tuple(
             name
-            for name, word in (("opacity", "opacity"), ("covariance", "cov"), ("colour", "color"))
+            for name, word in (("opacity", "opacity"), ("covariance", "cov"), ("color", "color"))
             if settings.get(f"add_{word}_dist", _takes_distance(networks[name], anchors["features"], name, code))
         ),
         appearance=code,
         levels=levels,
     )
-    # What INRIA's layout asks for, and anchors do not use.
+    # INRIA's layout requires these properties, but anchors do not use them.
     vertices.refuse_unread(ignored, r"opacity|rot_[0-3]")
     for weights in networks.values():
         weights.refuse_unread(ignored)
@@ -56,7 +56,7 @@ def read_scaffold(folder: Path, appearance: int = 0, ignored: Sequence[str] = ()
 def _takes_distance(network: Weights, features: Floats, name: str, appearance: Floats | None) -> bool:
     """Whether a network of Scaffold-GS has an input more than features, direction and the code of an appearance. The
     first versions always have it, and no setting for it."""
-    extra = len(appearance) if name == "colour" and appearance is not None else 0
+    extra = len(appearance) if name == "color" and appearance is not None else 0
     return bool(network.linears()[0].inputs == features.shape[1] + 4 + extra)
 
 
@@ -132,7 +132,7 @@ def read_levels(vertices: Vertices, settings: dict[str, object]) -> Levels | Non
 
 
 def read_appearance(weights: Weights | None, index: int) -> Floats | None:
-    """One row of the embedding, or None where the model has none."""
+    """One row of the embedding, or None if the model has none."""
     if weights is None:
         return None
     name = next((name for name in weights.tensors if name.endswith("weight")), "weight")

@@ -38,10 +38,10 @@ _STORAGES = {
 
 
 class Record:
-    """An object of a class that is not known here: its state, or what it would have been called with."""
+    """An object of an unknown class: its state, or the arguments of its constructor."""
 
     def __init__(self, *arguments: object):
-        """Keeps the arguments of whatever was to be built."""
+        """Keeps the arguments of the constructor that the pickle calls."""
         self.arguments = arguments
         self.state: dict[str, object] = {}
 
@@ -103,7 +103,7 @@ class _Reader(pickle.Unpickler):
 
 
 def read_torch(path: Path) -> object:
-    """Whatever lies in the file: tensors as arrays, dicts and lists as such, other objects as Record."""
+    """Reads all content of the file: tensors as arrays, dicts and lists as such, other objects as Record."""
     try:
         with zipfile.ZipFile(existing(path, "a file of torch.save or torch.jit.save")) as archive:
             prefix = next((name[: -len("data.pkl")] for name in archive.namelist() if name.endswith("data.pkl")), None)
@@ -169,7 +169,7 @@ class Weights:
         return np.asarray(self.tensors[name], np.float32)
 
     def refuse_unread(self, ignored: Sequence[str] = (), harmless: str = "(?!)") -> None:
-        """Raises checkpoint/other-family for tensors that nobody asked for."""
+        """Raises checkpoint/other-family for tensors that the reader did not use."""
         names = [self._prefix + name for name in self.tensors]
         refuse_unread(self.where, "tensors", names, self._read, ignored=ignored, harmless=harmless)
 

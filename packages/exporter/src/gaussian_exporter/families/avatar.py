@@ -65,8 +65,8 @@ def export_avatar(
 ) -> onnx.ModelProto:
     """A generator of N Gaussians from a pose (and a shape, an expression, a translation).
 
-    With harmonics above degree 0 the camera's position is an input too: colours are looked up in the direction that the
-    camera has from the limb's own frame. `bounds` are those of the rest pose.
+    With harmonics above degree 0, the camera's position is also an input: colors depend on the direction to the camera
+    in the limb's own frame. `bounds` are those of the rest pose.
     """
     check(avatar)
     options = options or Options()
@@ -133,7 +133,7 @@ def blended(avatar: Avatar, graph: Graph, products: Tensor, inputs: list[Input])
         joints = along(body, avatar.joint_directions, joints, "joint_directions")
     if avatar.expression_directions is not None:
         count = avatar.expression_directions.shape[2]
-        # The role `shape` is there once only, so that a page knows which coefficients are the body's.
+        # Only one input has the role `shape`, so that a page knows which coefficients are the body's.
         inputs.append(control("expression", 0.0, -3.0, 3.0))
         face = row_of(graph, "expression", count)
         points = along(face, avatar.expression_directions, points, "expression_directions")
@@ -192,14 +192,14 @@ def skinned(
         direction, _ = direction_and_distance(placed, camera)
         # Transposed, the blend turns the direction back into the frame that the harmonics were trained in.
         own = (carried * direction.reshape(*direction.shape, 1)).sum(-2).part(0, 3)
-        colours = harmonics.colour(own / (own.length(-1, keep=True) + 1e-10), sh)
+        colors = harmonics.color(own / (own.length(-1, keep=True) + 1e-10), sh)
     else:
-        colours = graph.constant(np.maximum(avatar.sh[:, 0] * np.float64(0.28209479177387814) + 0.5, 0), "colors")
+        colors = graph.constant(np.maximum(avatar.sh[:, 0] * np.float64(0.28209479177387814) + 0.5, 0), "colors")
     return Gaussians(
         positions=placed,
         covariances=covariance_of_half(stretched),
         opacities=graph.constant(avatar.opacities, "opacities"),
-        colors=colours,
+        colors=colors,
     )
 
 

@@ -1,6 +1,6 @@
 """Classic 3DGS: every Gaussian as trained.
 
-Written with its harmonics the file is constant: a page runs it once. With `colours="view"` the harmonics are evaluated
+Written with its harmonics the file is constant: a page runs it once. With `colors="view"` the harmonics are evaluated
 in the graph from the camera's position, which makes the output 13 numbers a Gaussian instead of up to 58.
 """
 
@@ -20,7 +20,7 @@ from ..outputs import Gaussians, Options, finish
 from ..pieces import harmonics
 from ..pieces.view import direction_and_distance
 
-Colours = Literal["sh", "view"]
+Colors = Literal["sh", "view"]
 
 
 @dataclass(frozen=True)
@@ -94,7 +94,7 @@ def usable(cloud: Cloud) -> Cloud:
 
 
 def export_classic(
-    cloud: Cloud, facts: Facts, options: Options | None = None, colours: Colours = "sh"
+    cloud: Cloud, facts: Facts, options: Options | None = None, colors: Colors = "sh"
 ) -> onnx.ModelProto:
     """A generator of the cloud's Gaussians, activated: opacities 0..1, covariances in world units squared."""
     options = options or Options()
@@ -106,10 +106,10 @@ def export_classic(
     sh = graph.constant(cloud.sh, "sh")
     inputs = []
     seen = None
-    if colours == "view":
+    if colors == "view":
         camera = graph.input("camera_position", 3)
         inputs.append(camera_position())
-        seen = harmonics.colour(direction_and_distance(positions, camera)[0], sh)
+        seen = harmonics.color(direction_and_distance(positions, camera)[0], sh)
     scales = np.exp(np.float64(cloud.log_scales))
     turns = cloud.rotations / np.linalg.norm(cloud.rotations, axis=1, keepdims=True)
     axes = options.wants_axes
@@ -124,6 +124,6 @@ def export_classic(
     )
     bounds = cloud.positions.min(0), cloud.positions.max(0)
     if options.layout is None and not axes:
-        # Most columns never change: one operator copies them beside the colours.
+        # Most columns never change: one operator copies them beside the colors.
         options = replace(options, layout="packed")
     return finish(graph, gaussians, inputs, bounds, facts, options)

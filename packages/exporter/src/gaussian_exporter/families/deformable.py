@@ -65,7 +65,7 @@ def export_deformable(cloud: Cloud, deform: Deform, facts: Facts, options: Optio
     return finish(graph, gaussians, [normalized_time()], reach(cloud, deform), facts, options)
 
 
-# The same products as of a rotation of any length, but for the diagonal: 1 - 2(yy + zz) in place of ww + xx - yy - zz.
+# PRODUCTS for quaternions of any length, except for the diagonal: 1 - 2(yy + zz) instead of ww + xx - yy - zz.
 UNNORMED: Floats = PRODUCTS.copy()
 for _row in range(4):
     for _entry in (0, 4, 8):
@@ -92,8 +92,8 @@ def time_code(deform: Deform, time: Tensor) -> Tensor:
 
 
 def trunk(deform: Deform, places: Tensor, time: Tensor) -> Tensor:
-    """What the heads are given (N,W). Columns of the codes and of what came before are multiplied apart: the time's
-    are one row for all Gaussians."""
+    """Input of the heads (N,W). Columns of time, position and the previous layer are multiplied separately, because the
+    code of the time is one row for all Gaussians."""
     hidden: Tensor | None = None
     width, moments = places.shape[1], time.shape[1]
     for index, layer in enumerate(deform.layers):
@@ -111,7 +111,7 @@ def trunk(deform: Deform, places: Tensor, time: Tensor) -> Tensor:
 
 
 def check(deform: Deform, places: int) -> None:
-    """Raises checkpoint/mismatch where the layers do not fit."""
+    """Raises checkpoint/mismatch if the layers do not fit."""
     moments = deform.time_network[-1].outputs if deform.time_network else 2 * deform.time_octaves + 1
     first, after = deform.layers[0], deform.layers[deform.skip + 1]
     expected = (places + moments, places + moments + first.outputs)
@@ -141,7 +141,7 @@ def deformed(cloud: Cloud, deform: Deform, time: float) -> Doubles:
 
 
 def reach(cloud: Cloud, deform: Deform) -> tuple[Doubles, Doubles]:
-    """Corners around all centres at nine times, and a twentieth more for what moves between."""
+    """Corners around all centers at nine times, and a twentieth more for what moves between."""
     all_of_it = [deformed(cloud, deform, time) for time in np.linspace(0, 1, 9)]
     low, high = np.min([at.min(0) for at in all_of_it], 0), np.max([at.max(0) for at in all_of_it], 0)
     slack = 0.05 * (high - low)

@@ -1,9 +1,9 @@
-"""Single-shot generators: one or two pictures in, a Gaussian for every pixel out, in the first camera's frame.
+"""Single-shot generators: from one or two images, one Gaussian per pixel in the coordinates of the first camera.
 
-The way of pixelSplat and MVSplat, small enough for a page. With two pictures the depth of each pixel comes from a plane
-sweep: features of the other picture are looked up at candidate depths and compared. With one picture the network
-guesses. Either way a depth is an average of inverse depths, weighted by a softmax; a head adds what makes it a
-Gaussian.
+The method is that of pixelSplat and MVSplat, with a network small enough for a page. With two images, a plane sweep
+finds the depth of each pixel: it samples features of the other image at candidate depths and compares them. With one
+image, the network predicts the depth. In both cases the depth is an average of inverse depths, weighted by a softmax.
+A head adds opacity, scale, rotation and color.
 """
 
 from __future__ import annotations
@@ -23,17 +23,17 @@ from ..outputs import Gaussians, Options, finish
 from ..pieces.convolution import Convolution, convolve, enlarge, rows_of
 from ..pieces.covariance import covariance_of_half, rotation_matrix
 
-# The encoder's first strides, all others are 1; features are a quarter of the picture's size.
+# The encoder's first strides; all others are 1. Features have a quarter of the image's width and height.
 STRIDES = (1, 2, 2)
 REDUCTION = 4
-# The head's channels: inverse depth, opacity, scales, quaternion, colour.
+# The head's channels: inverse depth, opacity, scales, quaternion, color.
 HEAD = (1, 1, 3, 4, 3)
 # How far the head may move an inverse depth (as a power of e), and the range of a Gaussian's size in pixels.
 REFINEMENT = 0.2
 SMALLEST, LARGEST = 0.2, 4.2
-# The heat equation, backwards: half of the variance times the colours' second derivative.
+# The heat equation, backwards: half of the variance times the colors' second derivative.
 SHARPENING = 0.5
-# What renderers add to variances on the screen, in squared pixels.
+# Variance that renderers add on the screen, in squared pixels.
 DILATION = 0.3
 # Added to the variance of a pixel's features before it is divided out.
 EPSILON = 1e-5
@@ -43,13 +43,13 @@ NEAREST = 1e-3
 
 @dataclass(frozen=True)
 class FeedForward:
-    """A trained network for `views` (1 or 2) pictures of one size, multiples of 4. encoder: three layers or more;
+    """A trained network for `views` (1 or 2) images of one size, multiples of 4. encoder: three layers or more;
     depth: the last with a channel for each of `depths` candidates, spaced evenly in inverse depth from near to far
     (world units); head: ending in 12 channels.
 
-    widened: squared pixels of the given pictures that every Gaussian's variance is raised by. A network learns what it
-    draws at the size of its pictures, where a renderer's own 0.3 closes the gaps between pixels; seen larger, gaps
-    show. Opacities go down by as much as areas grow, and colours are sharpened by as much as that blurs them.
+    widened: variance added to every Gaussian, in squared pixels of the input images. A network is trained at the size
+    of its images, at which the renderer's own 0.3 closes the gaps between pixels; a larger frame shows the gaps.
+    Opacities decrease as areas grow, and colors are sharpened to compensate for the blur.
     """
 
     width: int
@@ -71,7 +71,7 @@ class FeedForward:
 
 @dataclass(frozen=True)
 class Camera:
-    """Intrinsics as numbers (1), shares of the picture's width and height."""
+    """Intrinsics as tensors (1), in fractions of the image's width and height."""
 
     fx: Tensor
     fy: Tensor
@@ -92,10 +92,10 @@ class Pose:
 
 
 def export_feed_forward(model: FeedForward, facts: Facts, options: Options | None = None) -> onnx.ModelProto:
-    """A generator of views * height * width Gaussians, row by row of the first picture, then of the second.
+    """A generator of views * height * width Gaussians, row by row of the first image, then of the second.
 
-    Inputs: `image` (and `image_2`), `focal_length` and `principal_point` ([2] each, as shares of width and height; the
-    same for every picture), and with two pictures `relative_pose`, the 4x4 matrix from the first camera's frame (OpenCV
+    Inputs: `image` (and `image_2`), `focal_length` and `principal_point` ([2] each, as fractions of width and height;
+    the same for every image), and with two images `relative_pose`, the 4x4 matrix from the first camera's frame (OpenCV
     axes) to the second's.
     """
     check(model)
@@ -112,7 +112,7 @@ def export_feed_forward(model: FeedForward, facts: Facts, options: Options | Non
 
 
 def check(model: FeedForward) -> None:
-    """Raises checkpoint/mismatch where the layers do not make this network."""
+    """Raises checkpoint/mismatch if the layers do not form this network."""
     features = model.encoder[-1].weight.shape[0]
     sweep = features + (model.depths if model.views == 2 else 0)
     head = features + model.encoder[0].weight.shape[0] + 3 + 1
@@ -140,7 +140,7 @@ def check(model: FeedForward) -> None:
 def gaussians(
     model: FeedForward, graph: Graph, pictures: list[Tensor], camera: Camera, inputs: list[Input]
 ) -> Gaussians:
-    """The Gaussians of every picture, one after the other."""
+    """The Gaussians of all images, in their order."""
     encoded = [encode(model, picture) for picture in pictures]
     if model.views == 1:
         return placed(model, pictures[0], encoded[0], None, camera, None)
@@ -160,7 +160,7 @@ def gaussians(
 def joined(graph: Graph, first: Gaussians, second: Gaussians) -> Gaussians:
     """Two lists as one."""
     if first.colors is None or second.colors is None:
-        raise ValueError("pixel-aligned Gaussians have plain colours")
+        raise ValueError("pixel-aligned Gaussians have plain colors")
     return Gaussians(
         positions=graph.concat([first.positions, second.positions], 0),
         covariances=graph.concat([first.covariance(), second.covariance()], 0),
@@ -181,7 +181,7 @@ def encode(model: FeedForward, picture: Tensor) -> tuple[Tensor, Tensor]:
 
 
 def rays(graph: Graph, width: int, height: int, camera: Camera) -> Tensor:
-    """Directions with z = 1 through all pixel centres (height*width,3), row by row."""
+    """Directions with z = 1 through all pixel centers (height*width,3), row by row."""
     v, u = np.meshgrid((np.arange(height) + 0.5) / height, (np.arange(width) + 0.5) / width, indexing="ij")
     x = (graph.constant(u.reshape(-1, 1), "u") - camera.cx) / camera.fx
     y = (graph.constant(v.reshape(-1, 1), "v") - camera.cy) / camera.fy
@@ -189,13 +189,13 @@ def rays(graph: Graph, width: int, height: int, camera: Camera) -> Tensor:
 
 
 def evened(features: Tensor) -> Tensor:
-    """Features of every pixel with mean 0 and variance 1: what a sweep then finds is how far they go together."""
-    centred = features - features.mean([1], keep=True)
-    return centred / ((centred * centred).mean([1], keep=True) + EPSILON).unary("Sqrt")
+    """Features of every pixel with mean 0 and variance 1, so that a sweep measures their correlation."""
+    centerd = features - features.mean([1], keep=True)
+    return centerd / ((centerd * centerd).mean([1], keep=True) + EPSILON).unary("Sqrt")
 
 
 def sweep(model: FeedForward, own: Tensor, other: Tensor, camera: Camera, pose: Pose) -> Tensor:
-    """How alike own features (1,F,h,w) and the other picture's are at each candidate depth (1,D,h,w)."""
+    """Similarity (1,D,h,w) of own features (1,F,h,w) and those of the other image, at each candidate depth."""
     graph = own.graph
     channels, height, width = own.shape[1:]
     count, pixels = model.depths, height * width
@@ -233,7 +233,7 @@ def placed(
     camera: Camera,
     pose: Pose | None,
 ) -> Gaussians:
-    """One picture's Gaussians; `pose` leads from its camera to the first one's, None for the first."""
+    """The Gaussians of one image; `pose` maps from its camera to the first camera, None for the first."""
     graph, (fine, coarse) = picture.graph, encoded
     guess = enlarge(inverse_depth(model, coarse, cost), REDUCTION, smooth=True)
     x = graph.concat([enlarge(coarse, REDUCTION, smooth=True), fine, picture, guess], 1)
@@ -248,7 +248,7 @@ def placed(
     solid = opacity.unary("Sigmoid")
     if model.widened > 0:
         variances = pixels * pixels
-        # As much paint as before, on the larger area that it has at the pictures' own size.
+        # Keeps opacity times area at the size of the input images, although the area grows.
         drawn = variances.mean([1], keep=True) + DILATION
         solid = solid * (drawn / (drawn + model.widened))
         pixels = (variances + model.widened).unary("Sqrt")
@@ -268,7 +268,7 @@ def placed(
 
 
 def sharpened(colors: Tensor, widened: float) -> Tensor:
-    """Colours (1,3,H,W) that a blur of this variance, in squared pixels, turns into those given, nearly."""
+    """Colors (1,3,H,W) that a blur of this variance, in squared pixels, turns into those given, nearly."""
     if widened == 0:
         return colors
     graph, (_, channels, height, width) = colors.graph, colors.shape
@@ -277,7 +277,7 @@ def sharpened(colors: Tensor, widened: float) -> Tensor:
     for channel in range(channels):
         kernel[channel, channel] = -around
         kernel[channel, channel, 1, 1] += 1
-    # Beyond the border the picture goes on as it ends: what zeros there have added is taken back.
+    # Replicates the border pixels: subtracts the error of the convolution's zero padding.
     lines = []
     for size, shape in ((height, (1, 1, height, 1)), (width, (1, 1, 1, width))):
         line = np.zeros(size, np.float32)

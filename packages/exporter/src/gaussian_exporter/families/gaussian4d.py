@@ -1,6 +1,6 @@
 """4D Gaussian Splatting: Gaussians of space and time, cut at the time that is shown.
 
-A cut through a Gaussian of four dimensions is one of three: its covariance never changes, its centre moves evenly, and
+A cut through a Gaussian of four dimensions is one of three: its covariance never changes, its center moves evenly, and
 its opacity falls with the distance in time. So all of it is baked but one product and one exponential a Gaussian; and,
 where harmonics change with time, their sum.
 """
@@ -22,7 +22,7 @@ from ..outputs import Gaussians, Options, finish
 from ..pieces.covariance import UPPER
 
 Rotation4D = Literal["reversed", "straight"]
-# A Gaussian is not drawn where it has fallen below this share of itself.
+# A Gaussian is drawn while its factor of time (0..1) is above this.
 _LEAST = 0.05
 
 
@@ -58,7 +58,7 @@ def export_gaussian4d(model: Gaussian4D, facts: Facts, options: Options | None =
     now = time * float(model.end - model.start) + float(model.start)
     since = now.reshape(1, 1) - graph.constant(model.times, "times", "none")
     share = ((since * since) * graph.constant(-0.5 / cut.variances, "shortness")).unary("Exp")
-    # What is not drawn has opacity 0, without a jump in the rows.
+    # Gaussians that are not drawn get opacity 0, so that every Gaussian keeps its row.
     seen = graph.node("Greater", [share, graph.scalar(_LEAST)], share.shape)
     share = graph.node("Where", [seen, share, graph.scalar(0.0)], share.shape)
     gaussians = Gaussians(
@@ -91,7 +91,7 @@ def harmonics(model: Gaussian4D, graph: Graph, since: Tensor) -> Tensor:
 
 @dataclass(frozen=True)
 class Cuts:
-    """covariances (N,6) of any cut; velocities (N,3) of its centre; variances (N,1) in time."""
+    """covariances (N,6) of any cut; velocities (N,3) of its center; variances (N,1) in time."""
 
     covariances: Doubles
     velocities: Doubles
@@ -125,7 +125,7 @@ def rotations_4d(left: Floats, right: Floats) -> Doubles:
 
 
 def reach(model: Gaussian4D, cut: Cuts) -> tuple[Doubles, Doubles]:
-    """Corners around all centres while they are seen: they move evenly, so its ends are enough."""
+    """Corners around all centers while they are seen: they move evenly, so its ends are enough."""
     lives = np.sqrt(-2 * np.log(_LEAST) * cut.variances)
     ends = [np.clip(model.times + sign * lives, model.start, model.end) - model.times for sign in (-1, 1)]
     places = np.concatenate([model.positions + end * cut.velocities for end in ends])

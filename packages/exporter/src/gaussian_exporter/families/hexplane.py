@@ -1,8 +1,8 @@
 """4DGS: Gaussians that move, by six feature planes over space and time (HexPlane) and a small network.
 
-Gaussians are looked up at their resting positions, so the three planes of space never change: their product is baked
-into the file, and only the three planes that hold time are sampled in a frame. Exactly the Gaussians of the checkpoint
-are written, without padding.
+The planes are sampled at the resting positions of the Gaussians, so the three planes of space never change. Their
+product is baked into the file, and a frame samples only the three planes with a time axis. The file contains exactly
+the Gaussians of the checkpoint, without padding.
 """
 
 from __future__ import annotations
@@ -65,7 +65,7 @@ def export_hexplane(
 
 
 def check(cloud: Cloud, deformation: Deformation) -> None:
-    """Raises checkpoint/mismatch where planes, network and Gaussians do not fit."""
+    """Raises checkpoint/mismatch if planes, network and Gaussians do not fit."""
     channels = sum(planes[0].shape[0] for planes in deformation.resolutions)
     wanted = {"planes and trunk": (channels, deformation.trunk[0].inputs)}
     heads = {"position": 3, "scale": 3, "rotation": 4, "opacity": 1, "sh": cloud.sh[0].size, "mask": 1}
@@ -93,7 +93,7 @@ def plane_coordinates(cloud: Cloud, deformation: Deformation) -> Doubles:
 
 
 def reach(cloud: Cloud, deformation: Deformation) -> tuple[Doubles, Doubles]:
-    """Corners around all centres at all times: at the planes' own times, between which features run straight, and a
+    """Corners around all centers at all times: at the planes' own times, between which features run straight, and a
     hundredth of the scene wider for what the network bends on the way."""
     low, high = cloud.positions.min(0).astype(np.float64), cloud.positions.max(0).astype(np.float64)
     if deformation.position is None:
@@ -120,7 +120,7 @@ def reach(cloud: Cloud, deformation: Deformation) -> tuple[Doubles, Doubles]:
 
 
 def applied(layers: Sequence[Linear], x: Doubles) -> Doubles:
-    """What the graph's `mlp` computes, on numbers."""
+    """Computes the graph's `mlp` in NumPy, to find the bounds."""
     for index, layer in enumerate(layers):
         x = (np.maximum(x, 0) if index else x) @ layer.weight.T.astype(np.float64) + layer.bias
     return x
@@ -146,7 +146,7 @@ def features(cloud: Cloud, deformation: Deformation, graph: Graph, time: Tensor)
 def sampled_in_time(graph: Graph, planes: Sequence[Floats], at: Doubles, time: Tensor, level: int) -> Tensor:
     """The product (C, rows) of the planes of x, y and z with time, in one sampling of all three."""
     height, width = (max(plane.shape[axis] for plane in planes) for axis in (1, 2))
-    # Smaller planes go on with their border, which is what lies beyond them.
+    # Pads smaller planes with their border, as border padding would sample them.
     whole = [np.pad(p, ((0, 0), (0, height - p.shape[1]), (0, width - p.shape[2])), "edge") for p in planes]
     across = [(np.clip(at[:, i], -1, 1) + 1) * share(p.shape[2], width) - 1 for i, p in enumerate(planes)]
     down = [share(plane.shape[1], height) for plane in planes]
@@ -178,7 +178,7 @@ def share(size: int, of: int) -> float:
 
 
 def move(cloud: Cloud, deformation: Deformation, hidden: Tensor) -> Gaussians:
-    """The Gaussians where the heads put them. hidden (1, W, rows, 1), after its ReLU."""
+    """The Gaussians with the changes of the heads. hidden (1, W, rows, 1), after its ReLU."""
     graph, count = hidden.graph, len(cloud.positions)
     at_rest = {
         "position": graph.constant(cloud.positions, "positions", errors="even"),
@@ -208,7 +208,7 @@ def moved(
     heads: dict[str, Sequence[Linear]],
     at_rest: dict[str, Tensor],
 ) -> dict[str, Tensor]:
-    """What has a head, where it puts it. Heads run as one network of the same depth: few dispatches, whole tiles."""
+    """Attributes that a head changes, at the current time. Heads of one depth run as one network: few dispatches."""
     if not heads:
         return {}
     sizes = {name: layers[-1].outputs for name, layers in heads.items()}
@@ -218,7 +218,7 @@ def moved(
         changes = together(hidden, list(heads.values())).reshape(*graph.lead, count, total)
         if deformation.mask is not None:
             mask = mlp(rows_of(hidden), deformation.mask, "mask").reshape(*graph.lead, count, 1)
-            # What turns is never masked.
+            # The mask does not apply to rotations.
             free = np.concatenate([np.full(size, name == "rotation", np.float32) for name, size in sizes.items()])
             rest = rest * (mask * graph.constant(1 - free, "masked") + graph.constant(free, "free"))
         changes = changes + rest

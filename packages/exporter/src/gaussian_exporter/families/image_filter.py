@@ -1,7 +1,7 @@
-"""Post-processors: the rendered picture in, another one out. Style transfer and denoising with a small network.
+"""Post-processors: a small network maps the rendered frame to another image, for style transfer or denoising.
 
-A stem, some halvings, residual blocks, as many doublings, and a last convolution: the shape of the fast style networks
-of Johnson et al., with few channels, because it runs once for every frame on top of everything else.
+The network has a stem, downsampling layers, residual blocks, as many upsampling layers, and a last convolution, as the
+fast style networks of Johnson et al. It has few channels, because it runs in every frame after rendering.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ class ImageFilter:
 
 
 def export_image_filter(model: ImageFilter, width: int, height: int, facts: Facts) -> onnx.ModelProto:
-    """A post-processor for pictures of one size: `image` [1,3,H,W] in 0..1 to `processed`, mixed by the control
+    """A post-processor for frames of one size: `image` [1,3,H,W] in 0..1 to `processed`, mixed by the control
     `strength`, 0 to 1."""
     step = 2 ** len(model.down)
     if len(model.up) != len(model.down) or width % step or height % step or min(width, height) < step:
@@ -55,7 +55,7 @@ def export_image_filter(model: ImageFilter, width: int, height: int, facts: Fact
 
 
 def transform(model: ImageFilter, picture: Tensor) -> Tensor:
-    """The network's picture at full strength."""
+    """The network's output [1,3,H,W] at full strength."""
     x = convolve(picture, model.stem, "stem").unary("Relu")
     for index, layer in enumerate(model.down):
         x = convolve(x, layer, f"down_{index}", stride=2).unary("Relu")

@@ -1,8 +1,8 @@
-"""Scaffold-GS and Octree-GS: anchors that a few small networks turn into Gaussians, anew for every camera.
+"""Scaffold-GS and Octree-GS: small networks compute Gaussians from anchors, again for every camera.
 
-Every anchor makes its k Gaussians in every frame, in the same rows: a Gaussian that the networks switch off, or whose
-level of detail is not wanted from here, gets opacity 0. Listing the living ones (Compress, NonZero) would stop the GPU
-in every frame to ask the CPU.
+Every anchor writes its k Gaussians in every frame, in the same rows. A Gaussian that the networks switch off, or whose
+level of detail this camera does not need, gets opacity 0. Compaction (Compress, NonZero) would make the GPU wait for
+the CPU in every frame.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ DistanceToLevel = Literal["floor", "round", "ceil", "progressive"]
 
 @dataclass(frozen=True)
 class Levels:
-    """What Octree-GS adds. levels and extra_levels (M,1); voxel_size and standard_distance in world units; an anchor of
-    level l is shown where l is at most log_fork(standard_distance / distance) + extra level, rounded as `rule` says."""
+    """Octree-GS's levels of detail. levels and extra_levels (M,1); voxel_size and standard_distance in world units. An
+    anchor is shown if its level is at most log_fork(standard_distance / distance) + extra level, rounded by `rule`."""
 
     levels: Floats
     extra_levels: Floats
@@ -51,7 +51,7 @@ class Scaffold:
     features: Floats
     scales: Floats
     opacity: Sequence[Linear]
-    colour: Sequence[Linear]
+    color: Sequence[Linear]
     covariance: Sequence[Linear]
     feature_bank: Sequence[Linear] | None = None
     uses_distance: tuple[str, ...] = ()
@@ -85,13 +85,13 @@ def export_scaffold(model: Scaffold, facts: Facts, options: Options | None = Non
 
 
 def check(model: Scaffold) -> None:
-    """Raises checkpoint/mismatch where a network does not fit the anchors."""
+    """Raises checkpoint/mismatch if a network does not fit the anchors."""
     k = model.gaussians_per_anchor
     level = int(model.levels is not None and model.levels.fed_to_networks)
-    wanted = {"opacity": k, "colour": 3 * k, "covariance": 7 * k}
+    wanted = {"opacity": k, "color": 3 * k, "covariance": 7 * k}
     for name, outputs in wanted.items():
         layers: Sequence[Linear] = getattr(model, name)
-        extra = len(model.appearance) if name == "colour" and model.appearance is not None else 0
+        extra = len(model.appearance) if name == "color" and model.appearance is not None else 0
         inputs = model.features.shape[1] + 3 + (name in model.uses_distance) + level + extra
         if (layers[0].inputs, layers[-1].outputs) != (inputs, outputs):
             raise ExportError(
@@ -112,7 +112,7 @@ def check(model: Scaffold) -> None:
 
 
 def check_bank(model: Scaffold) -> None:
-    """Raises checkpoint/mismatch where a feature bank takes other numbers than the trainers feed it."""
+    """Raises checkpoint/mismatch if a feature bank takes other inputs than the trainers feed it."""
     if model.feature_bank is None:
         return
     expected = 4 if model.levels is None else 3 + model.levels.fed_to_networks
@@ -128,7 +128,7 @@ def check_bank(model: Scaffold) -> None:
 
 
 def decode(model: Scaffold, graph: Graph, seen: Tensor) -> dict[str, Tensor]:
-    """The networks' outputs (M, ...), without their activations: opacity, colour, and of the covariance its scales and
+    """The networks' outputs (M, ...), without their activations: opacity, color, and of the covariance its scales and
     rotations apart. seen (M,4): direction and distance."""
     known = [graph.constant(model.features, "features")]
     levels = model.levels
@@ -140,7 +140,7 @@ def decode(model: Scaffold, graph: Graph, seen: Tensor) -> dict[str, Tensor]:
         weight = in_order(first.weight, 0, levels is None)
         weights = mlp(graph.concat([*known[1:], seen], 1), [Linear(weight, first.bias), *rest], "bank", "Softmax")
         known = [view_dependent(known[0], weights), *known[1:]]
-    networks = {"opacity": model.opacity, "colour": without_appearance(model), "covariance": model.covariance}
+    networks = {"opacity": model.opacity, "color": without_appearance(model), "covariance": model.covariance}
     inner = {name: hidden(model, graph, known, seen, name, layers) for name, layers in networks.items()}
     ends = {name: layers[-1] for name, layers in networks.items()}
     scales, rotations = parts_of_covariance(ends.pop("covariance"))
@@ -154,10 +154,10 @@ def decode(model: Scaffold, graph: Graph, seen: Tensor) -> dict[str, Tensor]:
 def hidden(
     model: Scaffold, graph: Graph, known: Sequence[Tensor], seen: Tensor, name: str, layers: Sequence[Linear]
 ) -> Tensor:
-    """What the last layer of a network is given (M,H).
+    """Input of a network's last layer (M,H).
 
-    Features that no view changes are multiplied once, when the session is made; a run multiplies direction and distance
-    alone, and adds.
+    Features that do not depend on the view are multiplied once, when the session is created. A run multiplies only
+    direction and distance, and adds the two products.
     """
     first, *rest = layers[:-1]
     weight = in_order(first.weight, model.features.shape[1], name in model.uses_distance)
@@ -191,12 +191,12 @@ def parts_of_covariance(end: Linear) -> tuple[Linear, Linear]:
 
 
 def without_appearance(model: Scaffold) -> Sequence[Linear]:
-    """The colour network with one image's appearance code folded into its first bias."""
+    """The color network with one image's appearance code folded into its first bias."""
     if model.appearance is None:
-        return model.colour
-    first, own = model.colour[0], len(model.appearance)
+        return model.color
+    first, own = model.color[0], len(model.appearance)
     code = first.weight[:, -own:].astype(np.float64) @ model.appearance.astype(np.float64)
-    return [Linear(first.weight[:, :-own], (first.bias + code).astype(np.float32)), *model.colour[1:]]
+    return [Linear(first.weight[:, :-own], (first.bias + code).astype(np.float32)), *model.color[1:]]
 
 
 def view_dependent(features: Tensor, weights: Tensor) -> Tensor:
@@ -211,8 +211,8 @@ def view_dependent(features: Tensor, weights: Tensor) -> Tensor:
 def presence(levels: Levels, anchors: Tensor, camera: Tensor, resolution: Tensor) -> Tensor:
     """How present each anchor is from here (M,1): 1, 0, or, with the rule `progressive`, between."""
     graph = anchors.graph
-    centre = levels.voxel_size / 2 / np.float64(levels.fork) ** levels.levels
-    distance = distance_to(anchors + graph.constant(centre, "half_voxels"), camera)
+    center = levels.voxel_size / 2 / np.float64(levels.fork) ** levels.levels
+    distance = distance_to(anchors + graph.constant(center, "half_voxels"), camera)
     nearness = (distance * resolution).unary("Log") * (-1 / log(levels.fork))
     wanted = nearness + graph.constant(levels.extra_levels + log(levels.standard_distance, levels.fork), "extra_levels")
     own = graph.constant(levels.levels, "levels")
@@ -240,11 +240,11 @@ def place(model: Scaffold, graph: Graph, anchors: Tensor, opacity: Tensor, decod
         scales=decoded["scales"].reshape(total, 3).unary("Sigmoid") * widest,
         rotations=decoded["rotations"].reshape(total, 4),
         opacities=opacity.reshape(total, 1).unary("Relu"),
-        colors=decoded["colour"].reshape(total, 3).unary("Sigmoid"),
+        colors=decoded["color"].reshape(total, 3).unary("Sigmoid"),
     )
 
 
 def reach(model: Scaffold) -> tuple[Floats, Floats]:
-    """Corners around all centres, which no camera moves."""
-    centres = (model.anchors[:, None] + model.offsets * model.scales[:, None, :3]).reshape(-1, 3)
-    return centres.min(0), centres.max(0)
+    """Corners around all centers, which no camera moves."""
+    centers = (model.anchors[:, None] + model.offsets * model.scales[:, None, :3]).reshape(-1, 3)
+    return centers.min(0), centers.max(0)

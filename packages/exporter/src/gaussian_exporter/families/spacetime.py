@@ -15,19 +15,19 @@ from ..outputs import Gaussians, Options, finish
 
 @dataclass(frozen=True)
 class Spacetime:
-    """positions (N,3) at the time of each, centres (N,1) of it, 0 to 1; widths (N,1): how long it lives, a logarithm;
+    """positions (N,3) at the time of each, centers (N,1) of it, 0 to 1; widths (N,1): how long it lives, a logarithm;
     motion (N,9): velocity, and the factors of the square and the cube; rotations (N,4) w x y z with turns (N,4) added
-    in a unit of time; log_scales (N,3); opacity_logits (N,1); colours (N,3), plain."""
+    in a unit of time; log_scales (N,3); opacity_logits (N,1); colors (N,3), plain."""
 
     positions: Floats
-    centres: Floats
+    centers: Floats
     widths: Floats
     motion: Floats
     rotations: Floats
     turns: Floats
     log_scales: Floats
     opacity_logits: Floats
-    colours: Floats
+    colors: Floats
 
 
 def export_spacetime(model: Spacetime, facts: Facts, options: Options | None = None) -> onnx.ModelProto:
@@ -36,7 +36,7 @@ def export_spacetime(model: Spacetime, facts: Facts, options: Options | None = N
     graph = Graph("spacetime", options.weights, options.instances is not None)
     count = len(model.positions)
     time = graph.input("time", *graph.lead, 1)
-    since = time.reshape(*graph.lead, 1, 1) - graph.constant(model.centres, "centres", "none")
+    since = time.reshape(*graph.lead, 1, 1) - graph.constant(model.centers, "centers", "none")
     velocity, squares, cubes = (
         graph.constant(model.motion[:, i : i + 3], name) for i, name in ((0, "velocity"), (3, "squares"), (6, "cubes"))
     )
@@ -48,19 +48,19 @@ def export_spacetime(model: Spacetime, facts: Facts, options: Options | None = N
         scales=graph.constant(np.exp(np.float64(model.log_scales)), "scales"),
         rotations=since * graph.constant(model.turns, "turns") + graph.constant(model.rotations, "rotations"),
         opacities=opacities.reshape(*graph.lead, count, 1),
-        colors=graph.constant(model.colours, "colours"),
+        colors=graph.constant(model.colors, "colors"),
     )
     return finish(graph, gaussians, [normalized_time()], reach(model), facts, options)
 
 
 def reach(model: Spacetime) -> tuple[Doubles, Doubles]:
-    """Corners around all centres at 65 times, as far as they are seen then, and a hundredth more."""
+    """Corners around all centers at 65 times, as far as they are seen then, and a hundredth more."""
     low, high = np.full(3, np.inf), np.full(3, -np.inf)
     for time in np.linspace(0, 1, 65):
-        t = time - np.float64(model.centres)
+        t = time - np.float64(model.centers)
         seen = np.exp(-((t * np.exp(-np.float64(model.widths))) ** 2))[:, 0] > 1 / 255
         at = model.positions + t * (model.motion[:, :3] + t * (model.motion[:, 3:6] + t * model.motion[:, 6:9]))
-        # A Gaussian that nobody sees then may be anywhere; at its own time all are seen.
+        # Positions of invisible Gaussians do not count; each Gaussian is visible at its own time.
         if seen.any():
             low, high = np.minimum(low, at[seen].min(0)), np.maximum(high, at[seen].max(0))
     low, high = np.minimum(low, model.positions.min(0)), np.maximum(high, model.positions.max(0))

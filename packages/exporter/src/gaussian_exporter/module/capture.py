@@ -4,21 +4,24 @@ from __future__ import annotations
 
 import contextlib
 import copy
+import functools
 import io
 import logging
 import re
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, cast
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Any, TypeVar, cast
 
 import onnx
 
 from ..placement import RULES
 from .roles import Role
 
-# What TorchScript's exporter writes best, and what PyTorch's own writes and still has all kernels.
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+# Opset of each exporter: 17 suits TorchScript best; that of PyTorch's own keeps all WebGPU kernels.
 OPSETS = {"dynamo": RULES["exportOpset"], "TorchScript": 17}
-# What an exporter says of an operator that it lacks: what a module can be written with instead.
+# Pattern in the error of an exporter that lacks an operator, and a replacement for the module's author.
 _INSTEAD = {
     "diag_embed": "write torch.diag_embed(s) as s[..., None] * torch.eye(n)",
     "linalg_inv|inverse": "matrices of up to 4 rows are inverted by torch.linalg.inv; larger ones need a closed form",
@@ -36,9 +39,9 @@ def captured(
     """The module as one exporter writes it."""
     args = tuple(torch.from_numpy(role.default.copy()) for role in inputs.values())
     names = {"input_names": list(inputs), "output_names": list(outputs), "opset_version": OPSETS[exporter]}
-    # What an exporter has to say of its failures is said in their errors.
-    logging.getLogger("torch").setLevel(logging.CRITICAL)
     with contextlib.ExitStack() as stack:
+        # The raised errors contain the exporter's failures.
+        stack.enter_context(silenced("torch"))
         stack.enter_context(warnings.catch_warnings())
         stack.enter_context(contextlib.redirect_stderr(io.StringIO()))
         stack.enter_context(contextlib.redirect_stdout(io.StringIO()))
@@ -61,21 +64,45 @@ def folded(model: Any) -> onnx.ModelProto:
 
     passes.InlinePass()(model)
     optimizer.fold_constants(model, onnx_shape_inference=True)
-    quiet = logging.getLogger("onnx_ir")
-    level = quiet.level
-    quiet.setLevel(logging.CRITICAL)
-    ir.passes.Sequential(
-        passes.RemoveUnusedNodesPass(),
-        passes.RemoveUnusedFunctionsPass(),  # type: ignore[no-untyped-call]
-        passes.RemoveUnusedOpsetsPass(),
-        passes.LiftConstantsToInitializersPass(lift_all_constants=True, size_limit=0),
-        passes.DeduplicateInitializersPass(),
-        passes.CommonSubexpressionEliminationPass(),
-        passes.OutputFixPass(),
-        passes.NameFixPass(),
-    )(model)
-    quiet.setLevel(level)
+    with silenced("onnx_ir"):
+        ir.passes.Sequential(
+            passes.RemoveUnusedNodesPass(),
+            passes.RemoveUnusedFunctionsPass(),  # type: ignore[no-untyped-call]
+            passes.RemoveUnusedOpsetsPass(),
+            passes.LiftConstantsToInitializersPass(lift_all_constants=True, size_limit=0),
+            passes.DeduplicateInitializersPass(),
+            passes.CommonSubexpressionEliminationPass(),
+            passes.OutputFixPass(),
+            passes.NameFixPass(),
+        )(model)
     return cast(onnx.ModelProto, onnx.ModelProto.FromString(ir.serde.serialize_model(model).SerializeToString()))
+
+
+@contextlib.contextmanager
+def silenced(name: str) -> Iterator[None]:
+    """Without the log of a package."""
+    log = logging.getLogger(name)
+    level = log.level
+    log.setLevel(logging.CRITICAL)
+    try:
+        yield
+    finally:
+        log.setLevel(level)
+
+
+def keeping_modes(export: Function) -> Function:
+    """Returns a function of a module that leaves each part of it in its mode, training or evaluation."""
+
+    @functools.wraps(export)
+    def keeping(module: Any, *given: Any, **named: Any) -> Any:
+        modes = [(part, part.training) for part in module.modules()] if hasattr(module, "modules") else []
+        try:
+            return export(module, *given, **named)
+        finally:
+            for part, mode in modes:
+                part.training = mode
+
+    return cast(Function, keeping)
 
 
 @contextlib.contextmanager
@@ -114,19 +141,18 @@ def _minor(entries: list[list[Any]], row: int, column: int) -> Any:
 
 
 def widened(module: Any, torch: Any) -> tuple[Any, list[str]]:
-    """The module in float32, a copy if it has weights in 16 bits, and their names: pages have no kernels for bfloat16,
-    and float16 only on some devices."""
-    narrow = [
-        name
-        for weights in (module.named_parameters(), module.named_buffers())
-        for name, tensor in weights
-        if tensor.dtype in (torch.bfloat16, torch.float16)
-    ]
-    return (copy.deepcopy(module).float(), narrow) if narrow else (module, narrow)
+    """The module in float32 on the CPU, a copy if it has weights in 16 bits or elsewhere, and the names of those in 16
+    bits: pages have no kernels for bfloat16, and float16 only on some devices."""
+    weights = [*module.named_parameters(), *module.named_buffers()]
+    narrow = [name for name, tensor in weights if tensor.dtype in (torch.bfloat16, torch.float16)]
+    if not narrow and all(tensor.device.type == "cpu" for _, tensor in weights):
+        return module, narrow
+    own = copy.deepcopy(module).cpu()
+    return (own.float() if narrow else own), narrow
 
 
 def cause(error: BaseException) -> str:
-    """What an exporter stumbled over, in a line: its own error wraps that in advice and colors of a terminal."""
+    """The cause of an exporter's failure in one line, without the advice and terminal colors of its own error."""
     whole = str(error)
     while error.__cause__ is not None:
         error = error.__cause__

@@ -15,22 +15,23 @@ import onnx
 from ..arrays import AnyArray
 from ..conformance import SHARES, check_outputs
 from ..contract import Coordinates, Filter, Json, metadata
-from ..errors import ExportError, listed
+from ..errors import ExportError, listed, require_package
+from ..outputs import refuse_place, save
 from ..placement import Finding, gpu_findings, told
 from ..written import box_of, read
-from .capture import OPSETS, captured, cause, widened
+from .capture import OPSETS, captured, cause, keeping_modes, widened
 from .finish import finish_graph
 from .layouts import Layout, split, with_state
 from .roles import Role
 from .trial import difference, in_torch, said, told_difference, tried, weights_of, wrapped_module
 
-# Largest difference to PyTorch, as a share of the largest number of an output.
+# Largest allowed difference to PyTorch, as a fraction of the largest number of an output.
 _ALLOWED = 1e-3
 
 
 @dataclass(frozen=True)
 class ExportReport:
-    """What was written: by which exporter, how far from PyTorch each output is, and what would leave the GPU."""
+    """Result of an export: the exporter, differences of the outputs to PyTorch, and nodes that would leave the GPU."""
 
     path: Path
     exporter: str
@@ -67,6 +68,7 @@ class ExportReport:
         return f"<gaussian-splat {' '.join(words)}></gaussian-splat>"
 
 
+@keeping_modes
 def export_module(
     module: Any,
     inputs: Mapping[str, Role],
@@ -84,17 +86,19 @@ def export_module(
     batched: bool = False,
     quiet: bool = False,
 ) -> ExportReport:
-    """Writes a torch.nn.Module as a generator with its contract, compares it with PyTorch, and prints what came of it.
+    """Writes a torch.nn.Module as a generator with its contract, compares it with PyTorch, and prints the result.
 
     `inputs`: a role for each argument of `forward`, in its order: {"t": time(), "twist": control(-1, 1)}. `outputs`:
-    what it returns, split() by default: positions, scales, rotations, colors, opacities. Both of PyTorch's exporters
-    are tried; the first whose file computes what the module computes is kept. `batched`: the module takes a batch
-    before every input, [1,72] where the role says [72], and [1,1] for a time or a control; pictures have one anyway.
-    `coordinates`: which axis is up, {"up": "+y"}; -y without it. Raises graph/invalid where neither exporter does,
-    contract/violation where its outputs have another shape than split() says, or numbers out of order.
+    the tensors that it returns, split() by default: positions, scales, rotations, colors, opacities. Both of PyTorch's
+    exporters are tried, and the first whose file computes the same as the module is kept. `batched`: the module takes
+    a batch before every input, [1,72] if the role has [72], and [1,1] for a time or a control; images have one anyway.
+    `coordinates`: which axis is up, {"up": "+y"}; -y without it. Raises graph/invalid if neither exporter succeeds, and
+    contract/violation if its outputs have another shape than split() declares, or numbers out of range.
     """
+    require_package("onnxruntime", "module")
     import torch
 
+    refuse_place(Path(out))
     layout, path = with_state(outputs or split(), inputs), Path(out)
     module = module if isinstance(module, torch.nn.Module) else _module_of(module, torch)
     module, narrow = widened(module.eval(), torch)
@@ -128,10 +132,10 @@ def export_module(
         try:
             check_outputs(model, {n: x for n, x in tries[0].items() if n in contract["inputs"]})  # type: ignore[operator]
         except ExportError as error:
-            # The other exporter may not lose what this one has lost.
+            # The other exporter may write a file that keeps the contract.
             refusals.append(f"{exporter}: {error}")
             continue
-        path.write_bytes(model.SerializeToString())
+        save(model, path)
         unused = [f"input {each} is not used: the file has none" for each in inputs if each not in contract["inputs"]]  # type: ignore[operator]
         doubles = [name for _, name, each in weights_of(module) if each.dtype == torch.float64]
         narrowed = [f"weights of 16 bits became float32: {listed(narrow)}"] if narrow else []
@@ -167,7 +171,7 @@ def generator(inputs: Mapping[str, Role], outputs: Layout | None = None, **facts
 
 
 def refuse_other_arguments(module: Any, inputs: Mapping[str, Role]) -> None:
-    """Raises argument/value where `forward` takes more or fewer arguments than there are roles."""
+    """Raises argument/value if `forward` takes more or fewer arguments than there are roles."""
     try:
         inspect.signature(module.forward).bind(*inputs)
     except TypeError as error:
@@ -210,7 +214,7 @@ def _facts(
 
 
 def _bounds(wrapped: Any, inputs: Mapping[str, Role], layout: Layout, torch: Any) -> Json:
-    """A box around the centres at defaults, at 24 times where the module knows the time, and a tenth more."""
+    """A box around the centers at defaults, at 24 times if the module knows the time, enlarged by a tenth."""
     if layout.kind == "image":
         return {}
     rest = {name: role.default for name, role in inputs.items()}
@@ -221,7 +225,8 @@ def _bounds(wrapped: Any, inputs: Mapping[str, Role], layout: Layout, torch: Any
         tensors = in_torch(wrapped, rest | moment, torch)
         box = box_of(read(layout.json(), dict(zip(layout.outputs, tensors, strict=True)))[1])
         boxes += [] if box is None else [box]
-    if not boxes or any(role.binding["role"] == "image" for role in inputs.values()):
+    # Images, frames and what was written before may move the centers anywhere.
+    if not boxes or any(role.binding["role"] in ("image", "frame", "state") for role in inputs.values()):
         return {}
     low, high = np.min([box[0] for box in boxes], 0), np.max([box[1] for box in boxes], 0)
     slack = 0.1 * (high - low) + 1e-6
@@ -252,8 +257,8 @@ def _errors(
     expected: Sequence[Sequence[AnyArray]],
     layout: Layout,
 ) -> tuple[dict[str, float], str]:
-    """Largest difference of each output to PyTorch's, as a share of the largest number in it; where it is largest, in
-    words."""
+    """Largest difference of each output to PyTorch's, as a fraction of the largest number in it, and a sentence on the
+    output with the largest one."""
     import onnxruntime as ort
 
     options = ort.SessionOptions()

@@ -1,4 +1,4 @@
-"""What an exporter of PyTorch leaves to be done: names, shapes, and outputs that a kernel writes."""
+"""Finishes the graph of a PyTorch exporter: names, shapes, and outputs that a kernel writes."""
 
 from __future__ import annotations
 
@@ -69,12 +69,14 @@ def _name_output(graph: onnx.GraphProto, value: onnx.ValueInfoProto, wanted: str
 def _declare(value: onnx.ValueInfoProto, seen: Sequence[AnyArray], layout: Layout) -> None:
     """The shape that the output had in PyTorch; where the number of rows differs, or the file says that it may, N."""
     shape = value.type.tensor_type.shape
-    is_state = layout.state is not None and value.name == layout.outputs[-1]
-    is_open = len({len(tensor) for tensor in seen}) > 1 or (
-        not is_state and len(shape.dim) > 0 and not shape.dim[0].HasField("dim_value") and layout.kind != "image"
+    dims: list[int | str] = [*seen[0].shape]
+    # A state and a count have no rows; a state may be a single number.
+    has_rows = not (layout.state is not None and value.name == layout.outputs[-1]) and value.name != "count"
+    is_open = len({tensor.shape[:1] for tensor in seen}) > 1 or (
+        len(shape.dim) > 0 and not shape.dim[0].HasField("dim_value") and layout.kind != "image"
     )
-    first = ["N"] if is_open and value.name != "count" else [seen[0].shape[0]]
-    dims = [*first, *seen[0].shape[1:]]
+    if has_rows and is_open:
+        dims[0] = "N"
     kind = value.type.tensor_type.elem_type or helper.np_dtype_to_tensor_dtype(seen[0].dtype)
     value.CopyFrom(helper.make_tensor_value_info(value.name, kind, dims))
 

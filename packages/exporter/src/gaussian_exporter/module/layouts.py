@@ -1,4 +1,4 @@
-"""How a module's outputs are read: which tensor is what, and how its numbers are meant."""
+"""How a module's outputs are read: the meaning of each tensor and of its numbers."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class Layout:
     words: Json
     # The input that takes an output behind all others in the next run.
     state: str | None = None
-    # Keys of the dict that the module returns, where they are not the names.
+    # Keys of the dict that the module returns, if they differ from the names.
     keys: Mapping[str, str] | None = None
     # Whether its colors are linear light.
     is_linear: bool = False
@@ -74,7 +74,7 @@ def split(
 def packed(
     color: Literal["rgb", "sh"] = "rgb", opacities: Literal["linear", "logit"] = "linear", count: bool = False
 ) -> Layout:
-    """One tensor [N,D]: position 3, covariance 6, colour 3 or harmonics, opacity 1."""
+    """One tensor [N,D]: position 3, covariance 6, color 3 or harmonics, opacity 1."""
     words: Json = {"color": color, "opacityActivation": opacities}
     if color == "sh":
         words["shOrder"] = "coefficient-major"
@@ -117,7 +117,7 @@ def tensors_of(result: Any, layout: Layout) -> list[Any]:
 
 def fitted(name: str, tensor: Any, layout: Layout, torch: Any) -> Any:
     """The tensor in the contract's shape, where that is the same Gaussians: a leading 1 dropped, covariances as their
-    upper triangle, rotation matrices as quaternions, one scale a splat three times, colours without their alpha."""
+    upper triangle, rotation matrices as quaternions, one scale a splat three times, colors without their alpha."""
     if layout.state is not None and name == layout.outputs[-1]:
         return tensor
     if name == "count":

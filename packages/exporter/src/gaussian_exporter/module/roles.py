@@ -1,4 +1,4 @@
-"""What an input of a module means: its role in the contract, its shape, and values to try it with."""
+"""Roles of a module's inputs: the binding in the contract, the shape, and values to test the module with."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from ..contract import Json
 
 @dataclass(frozen=True)
 class Role:
-    """How a page feeds an input. `samples[0]` is its default; the others reach the ends of what it may be given."""
+    """How a page feeds an input. `samples[0]` is its default; the others reach the ends of its range."""
 
     binding: Json
     shape: tuple[int, ...]
     samples: Sequence[AnyArray]
-    # Where lengths and differences of it vanish, if a page can give that.
+    # A value at which lengths and differences are 0, if a page can give one. It reveals a dropped small addend.
     zero: AnyArray | None = None
 
     @property
     def default(self) -> AnyArray:
-        """What the page gives until it says otherwise."""
+        """The value that the page gives before it sets another."""
         return self.samples[0]
 
 
@@ -32,13 +32,13 @@ def _floats(shape: tuple[int, ...], *values: object) -> list[AnyArray]:
     return [np.broadcast_to(np.asarray(value, np.float32), shape).copy() for value in values]
 
 
-# No simple shares of a period: a loop would be tried in the same state again and again.
+# Fractions of the duration. Simple ones would test a looping motion in the same state each time.
 _SHARES = (0.0, 0.131, 0.367, 0.5, 0.618, 0.887, 1.0)
 
 
 def time(duration: float | None = None, normalized: bool = False, shape: Sequence[int] = (1,)) -> Role:
-    """Seconds or, with `normalized`, a share 0..1 of the duration, which must then be given. The model's own length of
-    time, if it has one, is the page's `duration`."""
+    """Seconds or, with `normalized`, a fraction 0..1 of the duration, which is then required. `duration` is the model's
+    own length in seconds, if it has one, and becomes the page's."""
     if normalized and duration is None:
         raise ValueError("time(normalized=True) needs duration=SECONDS")
     unit = "normalized" if normalized else "seconds"
@@ -146,7 +146,7 @@ def camera_to_world(axes: str = "RDF") -> Role:
 
 
 def intrinsics(normalized: bool = False) -> Role:
-    """[3,3]: fx 0 cx, 0 fy cy, 0 0 1, in pixels or as shares of the picture's width and height."""
+    """[3,3]: fx 0 cx, 0 fy cy, 0 0 1, in pixels or as fractions of the image's width and height."""
     unit = "normalized" if normalized else "pixels"
     sides = [(1.0, 1.0)] if normalized else [(640.0, 480.0), (1920.0, 1080.0)]
     found = [[[0.8 * w, 0, w / 2], [0, 0.8 * w, h / 2], [0, 0, 1]] for w, h in sides]
@@ -154,7 +154,7 @@ def intrinsics(normalized: bool = False) -> Role:
 
 
 def state(shape: Sequence[int], default: float = 0.0) -> Role:
-    """What the module itself returned in the run before, under the name that split(state=...) gives it."""
+    """Output of the module in the previous run, under the name that split(state=...) gives it."""
     sizes = tuple(shape)
     rng = np.random.default_rng(0)
     binding: Json = {"role": "state", "default": default}

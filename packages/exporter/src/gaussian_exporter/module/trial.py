@@ -18,7 +18,7 @@ Values = Mapping[str, AnyArray]
 
 
 def wrapped_module(module: Any, inputs: Mapping[str, Role], layout: Layout, batched: bool, torch: Any) -> Any:
-    """The module with outputs as the contract has them, and a batch before its inputs where it takes one."""
+    """The module with outputs as the contract has them, and a batch before its inputs if it takes one."""
     stays = [role.binding["role"] in ("image", "depth", "state") or not batched for role in inputs.values()]
 
     class Named(torch.nn.Module):  # type: ignore[misc]
@@ -35,7 +35,7 @@ def wrapped_module(module: Any, inputs: Mapping[str, Role], layout: Layout, batc
 
 
 def in_torch(wrapped: Any, values: Values, torch: Any) -> list[AnyArray]:
-    """What the module writes."""
+    """Runs the module in PyTorch and returns its outputs."""
     with torch.no_grad():
         return [tensor.cpu().numpy() for tensor in wrapped(*(torch.from_numpy(np.array(x)) for x in values.values()))]
 
@@ -122,7 +122,7 @@ def tried(
 
 
 def difference(mine: AnyArray, theirs: AnyArray) -> float:
-    """The largest, as a share of the largest number in `theirs`."""
+    """The largest difference, as a fraction of the largest finite number in `theirs`; inf if shapes differ."""
     mine, theirs = np.asarray(mine, np.float64), np.asarray(theirs, np.float64)
     if mine.shape != theirs.shape:
         return float("inf")
@@ -134,7 +134,7 @@ def difference(mine: AnyArray, theirs: AnyArray) -> float:
 
 
 def told_difference(mine: AnyArray, theirs: AnyArray) -> str:
-    """What is found where it is too large, for people."""
+    """Describes a difference that is too large, as the predicate of an error's sentence."""
     if mine.shape != theirs.shape:
         found = f"is {list(mine.shape)} where the module writes {list(theirs.shape)}"
         return f"{found}: a number of rows was baked in, by .item() or int(); keep every row, and write opacity 0"
@@ -145,7 +145,7 @@ def told_difference(mine: AnyArray, theirs: AnyArray) -> str:
 
 
 def _remedies(module: Any, inputs: Mapping[str, Role], layout: Layout, batched: bool, torch: Any) -> Iterator[str]:
-    """What it does run with, the smallest change first; else what may be wrong with its weights."""
+    """Remedies: forms of the inputs that the module accepts, the smallest change first, and faults of its weights."""
     forms: list[tuple[str, bool] | None] = [None]
     if any(role.binding["role"] == "pose" for role in inputs.values()):
         forms += itertools.product(("matrix", "quaternion", "axis-angle"), (False, True))

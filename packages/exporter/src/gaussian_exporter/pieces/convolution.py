@@ -1,4 +1,4 @@
-"""Convolutions and what goes with them, on images (1,C,H,W)."""
+"""Convolutions and related layers, on images (1,C,H,W)."""
 
 from dataclasses import dataclass
 
@@ -54,7 +54,7 @@ def convolve(x: Tensor, layer: Convolution, name: str, stride: int = 1) -> Tenso
 
 
 def enlarge(x: Tensor, factor: int, smooth: bool) -> Tensor:
-    """Each pixel `factor` times as wide and high; with `smooth`, bilinear between pixel centres."""
+    """Each pixel `factor` times as wide and high; with `smooth`, bilinear between pixel centers."""
     graph = x.graph
     shape = (*x.shape[:2], x.shape[2] * factor, x.shape[3] * factor)
     scales = graph.constant(np.array([1, 1, factor, factor]), "scales")

@@ -28,8 +28,8 @@ def basis(directions: Tensor, degree: int) -> Tensor:
     return graph.concat(columns, -1)
 
 
-def colour(directions: Tensor, sh: Tensor) -> Tensor:
-    """Colours (...,N,3), not negative, of harmonics (N,(d+1)^2,3) seen along unit directions (...,N,3)."""
+def color(directions: Tensor, sh: Tensor) -> Tensor:
+    """Colors (...,N,3), not negative, of harmonics (N,(d+1)^2,3) seen along unit directions (...,N,3)."""
     terms = sh.shape[1]
     degree = {1: 0, 4: 1, 9: 2, 16: 3}[terms]
     values = basis(directions, degree).reshape(*directions.shape[:-1], terms, 1) * sh

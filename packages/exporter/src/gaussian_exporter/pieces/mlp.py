@@ -33,7 +33,7 @@ def linear(x: Tensor, layer: Linear, name: str, plus: Tensor | None = None) -> T
     graph = x.graph
     if x.shape[-1] != layer.inputs:
         raise wrong_shape("Gemm", f"{layer.inputs} columns", str(x.shape))
-    # As PyTorch stores it: the provider then reads four numbers at once whatever the number of outputs.
+    # The weight stays transposed, as in PyTorch: the provider then reads vec4 for any number of outputs.
     weight = graph.constant(layer.weight, f"{name}_weight")
     added = graph.constant(layer.bias, f"{name}_bias") if plus is None else plus
     rows = x.reshape(prod(x.shape[:-1]), layer.inputs)

@@ -1,4 +1,4 @@
-"""Poses of a skeleton: rotations of joints, and what they do to points at rest."""
+"""Poses of a skeleton: rotations of joints, and the transforms of points at rest."""
 
 from collections.abc import Sequence
 
@@ -29,7 +29,7 @@ def unit_quaternions(quaternions: Tensor) -> Tensor:
 
 
 def products_of_parts(quaternions: Tensor) -> Tensor:
-    """All products of two parts (...,J,16): what every entry of a rotation matrix is a sum of."""
+    """All products of two components (...,J,16); every entry of a rotation matrix is a sum of these."""
     each = quaternions.shape[:-1]
     return (quaternions.reshape(*each, 4, 1) * quaternions.reshape(*each, 1, 4)).reshape(*each, 16)
 
@@ -40,13 +40,13 @@ def rotation_entries(products: Tensor) -> Tensor:
 
 
 def skinning_matrices(products: Tensor, joints: Tensor, parents: Sequence[int]) -> Tensor:
-    """What each joint does to a point at rest (...,R,12): rows of a 3x4 matrix. R is the number of joints and as many
-    rows more as fill a multiple of 4, which say nothing. products (...,J,16) of unit quaternions relative to the
-    parent; joints (J,3) or (...,J,3) at rest.
+    """Transforms (...,R,12) of points at rest by each joint: rows of a 3x4 matrix. R is the least multiple of 4
+    above the number of joints; the rows beyond the joints are unused. products (...,J,16) of unit quaternions relative
+    to the parent; joints (J,3) or (...,J,3) at rest.
 
-    A joint turns space around where it is at rest, then its parent turns all that around its own place, and so on: a
-    product of matrices along the way to the root. Each step doubles how far every joint has come, so that a tree of
-    depth 15 takes 4 products of all joints and not 15.
+    A joint rotates points around its rest position, then its parent rotates the result around its own, up to the root:
+    a product of matrices along the path. Each step doubles the length of the path that a matrix covers, so a tree of
+    depth 15 takes 4 products of all joints instead of 15.
     """
     graph, count = products.graph, len(parents)
     rows = -(-(count + 1) // _AT_ONCE) * _AT_ONCE
@@ -59,7 +59,7 @@ def skinning_matrices(products: Tensor, joints: Tensor, parents: Sequence[int]) 
     for _ in range(_doublings(parents) - 1):
         moved = moved.take(above, -3) @ moved
         above = [above[joint] for joint in above]
-    # Of the last product the lowest row is known: 0 0 0 1.
+    # The last product needs no lowest row, because it is always 0 0 0 1.
     upper = [4 * joint + row for joint in above for row in range(3)]
     first = moved.reshape(*lead, rows * 4, 4).take(upper, -2).reshape(*lead, rows, 3, 4)
     return (first @ moved).reshape(*lead, rows, 12)

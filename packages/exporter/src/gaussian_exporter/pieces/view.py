@@ -1,4 +1,4 @@
-"""Where the camera is, seen from each point."""
+"""Direction and distance between the camera and each point."""
 
 from ..graph import Tensor
 

@@ -1,0 +1,248 @@
+import { Lazy, type Vector3 } from '@gaussian-splat/core';
+import type { ReactiveControllerHost } from 'lit';
+import type { Attributes } from './attributes.js';
+import type { CameraAction } from './camera/gestures.js';
+import { viewName, type ViewName } from './camera/spoken.js';
+import type { A11yStrings } from './strings.js';
+import type { AnnouncerController, AnnouncerHost } from './controllers/announcer-controller.js';
+import type { AutoRotateHost } from './controllers/auto-rotate-controller.js';
+import type { CameraController } from './controllers/camera-controller.js';
+import type { FlyHost } from './controllers/fly-controller.js';
+import type { InputOptions } from './controllers/input-controller.js';
+import type { MotionController, MotionHost } from './controllers/motion-controller.js';
+import { prefersReducedMotion, reducedMotion, type Mover } from './controllers/motion.js';
+import type { PromptController, PromptHost } from './controllers/prompt-controller.js';
+
+/** The part of the element that {@link Behaviors} uses. */
+export interface BehaviorHost extends Omit<MotionHost, 'startTurning'> {
+  readonly attributes: Attributes;
+  readonly camera: CameraController;
+  readonly input: InputOptions;
+  readonly strings: A11yStrings;
+  readonly surface: HTMLElement | null;
+  /** The walk controller; its `value` is undefined until its code is loaded. */
+  readonly walk: { readonly value: { readonly isRefused: boolean; ahead(meters: number): void } | undefined };
+  requestFrame(): void;
+  warn(sentence: string): void;
+}
+
+/**
+ * Camera behaviors besides direct input: auto-rotation, prompt, flight by keyboard, and announcements for screen
+ * readers.
+ */
+export class Behaviors implements AutoRotateHost, PromptHost, FlyHost, AnnouncerHost, MotionHost {
+  /** The interaction prompt; undefined until the code of the camera controls is loaded. */
+  prompt: PromptController | undefined;
+  readonly camera: CameraController;
+  readonly #host: BehaviorHost;
+  readonly #element: ReactiveControllerHost;
+  readonly #movers: Mover[] = [];
+
+  // The following code is loaded on demand, because few pages need it.
+
+  /** Announces the view to screen readers. */
+  readonly announcer: Lazy<AnnouncerController>;
+  /** The button with which a visitor pauses automatic motion. */
+  readonly motion: Lazy<MotionController>;
+  readonly #autoRotate = new Lazy('the code that turns the camera', async () => {
+    const { AutoRotateController } = await import('./controllers/auto-rotate-controller.js');
+    return this.#added(new AutoRotateController(this.#element, this));
+  });
+  readonly #fly = new Lazy('the code that flies by keyboard', async () => {
+    const { FlyController } = await import('./controllers/fly-controller.js');
+    return this.#added(new FlyController(this.#element, this));
+  });
+
+  constructor(element: ReactiveControllerHost & HTMLElement, host: BehaviorHost) {
+    this.#host = host;
+    this.camera = host.camera;
+    this.#element = element;
+    this.motion = new Lazy(
+      'the code of the switch for motion',
+      async () => {
+        const { MotionController } = await import('./controllers/motion-controller.js');
+        return new MotionController(element, this);
+      },
+      () => element.requestUpdate(),
+    );
+    this.announcer = new Lazy('the code that speaks of the view', async () => {
+      const { AnnouncerController } = await import('./controllers/input-controller.js');
+      return new AnnouncerController(element, this);
+    });
+    let motion: MediaQueryList | undefined;
+    const onMotion = (): void => element.requestUpdate();
+    element.addController({
+      hostUpdated: () => {
+        this.camera.pivot = this.#flies ? 'eye' : 'target';
+        if (this.mayFly) this.#fly.want(this.#warnOf);
+        if (this.attributes.autoRotate) this.#autoRotate.want(this.#warnOf);
+        if (this.attributes.autoRotate || this.player) this.motion.want(this.#warnOf);
+      },
+      hostConnected: () => {
+        // `focusout` is fired also when the focus moves from the frame to a button in the shadow tree.
+        element.shadowRoot?.addEventListener('focusout', this.#onBlur);
+        motion = reducedMotion();
+        motion.addEventListener('change', onMotion);
+      },
+      hostDisconnected: () => {
+        element.shadowRoot?.removeEventListener('focusout', this.#onBlur);
+        motion?.removeEventListener('change', onMotion);
+      },
+    });
+  }
+
+  get attributes(): Attributes {
+    return this.#host.attributes;
+  }
+
+  get surface(): HTMLElement | null {
+    return this.#host.surface;
+  }
+
+  get strings(): A11yStrings {
+    return this.#host.strings;
+  }
+
+  get player(): MotionHost['player'] {
+    return this.#host.player;
+  }
+
+  get isOnShow(): boolean {
+    return this.#host.isOnShow;
+  }
+
+  get viewName(): ViewName {
+    const { theta, phi } = this.camera.orbit;
+    return viewName(theta, phi);
+  }
+
+  /**
+   * Whether the frame has the focus and an announcement may name the side of the view; false in flight, which has no
+   * sides.
+   */
+  get isFocused(): boolean {
+    return !this.#flies && (this.surface?.matches(':focus') ?? false);
+  }
+
+  get mayTurn(): boolean {
+    const mayMove = this.isOnShow && !prefersReducedMotion() && !this.motion.value?.isHeld;
+    return this.attributes.autoRotate && mayMove && !hasKeyboard(this.surface);
+  }
+
+  get mayPrompt(): boolean {
+    return this.#host.input.enabled && this.attributes.interactionPrompt === 'auto' && this.isOnShow;
+  }
+
+  get mayFly(): boolean {
+    return this.#host.input.enabled && this.#flies && !this.#walks;
+  }
+
+  requestFrame(): void {
+    this.#host.requestFrame();
+  }
+
+  startTurning(): void {
+    this.#autoRotate.value?.start();
+  }
+
+  flyBy(right: number, up: number, forward: number): void {
+    this.#touched();
+    this.camera.moveBy(right, up, forward);
+  }
+
+  /**
+   * Whether the prompt swings the camera: only if the page selects it and the visitor does not prefer reduced motion.
+   */
+  get promptWiggles(): boolean {
+    return this.attributes.interactionPromptStyle === 'wiggle' && !prefersReducedMotion();
+  }
+
+  /**
+   * Whether the camera walks on the floor. It does not move until a floor is found, and it flies if the scene has none.
+   */
+  get #walks(): boolean {
+    return this.attributes.navigation === 'walk' && !this.#host.walk.value?.isRefused;
+  }
+
+  get #flies(): boolean {
+    return this.attributes.navigation !== 'orbit';
+  }
+
+  promptBy(prompt: PromptController): void {
+    this.prompt = this.#added(prompt);
+  }
+
+  /** Adds an automatic motion of the camera, which {@link advance} then advances in each frame. */
+  add(mover: Mover): void {
+    this.#movers.push(mover);
+  }
+
+  #added<T extends Mover>(mover: T): T {
+    this.add(mover);
+    this.#element.requestUpdate();
+    return mover;
+  }
+
+  readonly #warnOf = ({ message }: Error): void => this.#host.warn(message);
+
+  /** Restarts the delay after which auto-rotation begins. */
+  rest(): void {
+    this.#autoRotate.value?.rest();
+  }
+
+  /** Advances all automatic motions to the time of a frame, `now` in milliseconds. */
+  advance(now: number): void {
+    for (const mover of this.#movers) if (mover.advance(now)) this.requestFrame();
+  }
+
+  /** Applies a visitor's gesture or key. @returns Whether it has an effect; false only for a zoom beyond its limit. */
+  act(action: CameraAction): boolean {
+    const camera = this.camera;
+    const { isTouched } = camera;
+    this.#touched();
+    let moves = true;
+    if (action.type === 'reset') camera.reset('user-interaction');
+    else if (action.type === 'pan') {
+      if (!this.#walks) camera.panBy(action.right, action.up);
+    } else if (this.#flies) this.#flyWith(action);
+    else if (action.type === 'orbit') camera.orbitBy(action.theta, action.phi);
+    else moves = camera.zoomBy(action.factor);
+    // The reset button is shown only after the camera was touched.
+    if (camera.isTouched !== isTouched) this.#element.requestUpdate();
+    return moves;
+  }
+
+  /** Sets the orbit target that a visitor picks, in viewer space. */
+  aimAt(point: Vector3): void {
+    this.#touched();
+    this.camera.aimAt(point);
+  }
+
+  /**
+   * Rotates or moves the camera in flight. A drag by the height of the frame rotates by the field of view, so that the
+   * scene follows the pointer.
+   */
+  #flyWith(action: Extract<CameraAction, { type: 'orbit' | 'zoom' }>): void {
+    const camera = this.camera;
+    if (action.type === 'zoom') {
+      const ahead = -Math.log(action.factor);
+      if (this.#walks) return this.#host.walk.value?.ahead(WHEEL_METERS * ahead);
+      return camera.moveBy(0, 0, ahead * camera.bounds.radius);
+    }
+    const share = camera.fieldOfView.radians / (2 * Math.PI);
+    camera.lookBy(-share * action.theta, -share * action.phi);
+  }
+
+  #touched(): void {
+    this.prompt?.dismiss();
+    this.rest();
+  }
+
+  readonly #onBlur = (): void => this.rest();
+}
+
+/** Meters that a zoom by the factor e moves a walking camera. */
+const WHEEL_METERS = 2;
+
+/** Whether the frame has keyboard focus. Automatic motion is not allowed while it has. */
+const hasKeyboard = (surface: HTMLElement | null): boolean => surface?.matches(':focus-visible') ?? false;

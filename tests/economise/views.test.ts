@@ -1,0 +1,32 @@
+/** Views that measure a scene without cameras. */
+import assert from 'node:assert/strict';
+import { test } from 'node:test';
+import { eyeOf, type Vector3 } from '@gaussian-splat/core';
+import { dealtViewsOfVisitors, economiseWithin, type EconomiseOptions } from '@gaussian-splat/economise';
+import { smallCloud } from '../formats/support/small-cloud.js';
+
+test('visitors stand upright in a scene that names its direction up', () => {
+  const bounds = { min: [1, 1, 1], max: [3, 5, 7], center: [2, 3, 4], radius: 2 } as const;
+  for (const up of [undefined, [0, -1, 0], [0, 0, 1], [0.6, 0.8, 0]] as const) {
+    const { scored, searched, heldOut } = dealtViewsOfVisitors(bounds, 40, up);
+    const along = ([x, y, z]: Vector3, [a, b, c]: Vector3 = up ?? [0, -1, 0]): number => a * x + b * y + c * z;
+    const heights = [...scored, ...searched, ...heldOut].map(({ worldToCamera: m }) => {
+      assert.ok(along([m[4], m[5], m[6]]) < 0, 'the picture stands on its feet');
+      const eye = eyeOf(m).map((value, axis) => value - bounds.center[axis]) as unknown as Vector3;
+      return along(eye) / Math.hypot(...eye);
+    });
+    const max = Math.max(...heights.map(Math.abs));
+    assert.ok(max > 0.8 && max < Math.sin(1.171), `${up?.join()}: sine of the elevation ${max}`);
+  }
+});
+
+test('a size is not blamed for views that show nothing', async () => {
+  const cloud = smallCloud(20, 0);
+  const figures = { errors: [], degrees: [20, 0, 0, 0] };
+  const evaluator = {
+    rank: () => Promise.resolve({ contribution: new Float32Array(20).fill(1), removalError: new Float32Array(20) }),
+    cut: () => Promise.resolve(figures),
+    compare: () => Promise.resolve([]),
+  } as unknown as EconomiseOptions['evaluator'];
+  await assert.rejects(economiseWithin(cloud, 1e9, { name: 'a.ply', evaluator }), /views that show some of the scene/);
+});

@@ -1,0 +1,65 @@
+/** The parts of walking that need no page: a body that is put down, and the sticks of gamepads. */
+import assert from 'node:assert/strict';
+import { test } from 'node:test';
+import { Gamepads } from '../../packages/element/src/walk/gamepads.js';
+import { Walker } from '../../packages/element/src/walk/walker.js';
+
+/** Two floors of 4 x 4 m around the origin, at 0 m and, in its half with positive x, at 2 m. */
+const side = 80;
+const map = {
+  ...{ cell: 0.05, corner: [-2, -2] as const, width: side, depth: side, step: 0.3, area: 16 },
+  layers: [
+    new Float32Array(side * side),
+    Float32Array.from({ length: side * side }, (_, i) => (i % side < side / 2 ? NaN : 2)),
+  ],
+  start: [0.5, 0, 0.5] as const,
+};
+
+test('a body is put on the highest floor below a point, and stays where there is none', () => {
+  const walker = new Walker(map, [-1, 1.6, -1]);
+  assert.deepEqual([walker.at, walker.eyeFloor], [[-1, 0, -1], 0]);
+  assert.equal(walker.goTo([-1, 0, 1]), true);
+  walker.land([1, 3.6, 1]);
+  assert.deepEqual([walker.at, walker.eyeFloor, walker.isMoving], [[1, 2, 1], 2, false]);
+  walker.land([9, 1.6, 0]);
+  assert.deepEqual(walker.at, [1, 2, 1]);
+  assert.deepEqual(new Walker(map, [9, 1.6, 0]).at, map.start);
+});
+
+interface Pad {
+  readonly axes: readonly number[];
+  readonly mapping: string;
+}
+
+function sticksOf(pads: readonly (Pad | null)[]): { gamepads: Gamepads; frame(): boolean } {
+  const view = Object.assign(new EventTarget(), {
+    navigator: { getGamepads: () => pads },
+    frames: [] as (() => void)[],
+    requestAnimationFrame: (callback: () => void) => view.frames.push(callback),
+  });
+  let isDeflected = false;
+  const gamepads = new Gamepads(view as never, () => (isDeflected = true));
+  gamepads.listen(new AbortController().signal);
+  return {
+    gamepads,
+    frame() {
+      isDeflected = false;
+      for (const callback of view.frames.splice(0)) callback();
+      return isDeflected;
+    },
+  };
+}
+
+test('the left stick walks and the right one turns; sticks at rest, triggers and missing axes do neither', () => {
+  const standard = sticksOf([null, { axes: [0.5, -1, 0.7, 0.05], mapping: 'standard' }]);
+  assert.equal(standard.frame(), true);
+  assert.deepEqual(standard.gamepads.deflection, [0.5, 1, -0.7]);
+  const still = sticksOf([
+    { axes: [0.1, -0.1, 0.14, 0], mapping: 'standard' },
+    { axes: [], mapping: '' },
+  ]);
+  assert.equal(still.frame(), false);
+  assert.deepEqual(still.gamepads.deflection, [0, 0, 0]);
+  // Axis 2 of many pads without the standard mapping is a trigger at rest.
+  assert.equal(sticksOf([{ axes: [0, 0, -1, 0, 0, -1], mapping: '' }]).frame(), false);
+});
