@@ -281,8 +281,8 @@ describe('several scenes in one element', () => {
     const seeked = nextEvent(element, 'seeked');
     element.currentTime = 0.15;
     await seeked;
-    const isLeft = (place: readonly number[] | null): boolean => place !== null && place[0] < -1.4;
-    for (let i = 0; i < 100 && !isLeft(await placeOf(element, isGreen)); i++) await frames();
+    const isLeft = async (): Promise<boolean> => ((await placeOf(element, isGreen))?.[0] ?? 0) < -1.4;
+    await until(isLeft, 'the frame of that time');
     assertNear(await placeOf(element, isGreen), [-2, 0], 'the frame of that time', 0.6);
     const third = await placeLoaded(`<gaussian-splat autoplay loop ${VIEW}><splat-scene src="${GREEN}"></splat-scene>
       <splat-scene src="${movie}"></splat-scene></gaussian-splat>`);

@@ -100,11 +100,7 @@ describe('generators among other scenes', () => {
       }
       await element.ready;
       const isBack = async (): Promise<boolean> => (await screenOf(element)).differences(still, 3) === 0;
-      let same = false;
-      await until(() => {
-        void isBack().then((is) => (same ||= is));
-        return same;
-      }, 'the picture of the beginning');
+      await until(isBack, 'the picture of the beginning');
       element.append(scene(`${SCENES}green.splat`, '0 -2 0'));
       await element.ready;
       assertEqual(element.stats?.scenes.length, 6, 'the own scene and five children');

@@ -55,9 +55,13 @@ export async function frames(count = 2): Promise<void> {
 const TIMEOUT = 12;
 
 /** Waits until a condition holds: `limitMs` on a machine that has nothing else to do. */
-export async function until(condition: () => boolean, what: string, limitMs = 20_000): Promise<void> {
+export async function until(
+  condition: () => boolean | Promise<boolean>,
+  what: string,
+  limitMs = 20_000,
+): Promise<void> {
   const end = real.now() + TIMEOUT * limitMs;
-  while (!condition()) {
+  while (!(await condition())) {
     assert(real.now() < end, `waited ${TIMEOUT * limitMs} ms for ${what}`);
     await new Promise((resolve) => real.setTimeout(resolve, 10));
   }

@@ -26,7 +26,7 @@ describe('the page of trained examples', () => {
     assert(other.relative_pose.toString() !== given.relative_pose.toString(), 'another pose');
     assertEqual(statue.getAttribute('aria-pressed'), 'false');
     const words = card.querySelector('.cost')!.textContent!;
-    for (const part of [' MB', '131,072', ' dB', 'a scene that it never saw', 'NVIDIA H200', 'Licence']) {
+    for (const part of [' MB', '131,072', ' dB', 'a scene that it never saw', 'NVIDIA H200', 'License']) {
       assert(words.includes(part), `${part} in ${words}`);
     }
     element.scrollIntoView({ block: 'center' });

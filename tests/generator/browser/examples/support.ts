@@ -73,7 +73,7 @@ export async function assertShown({ card, element, fallbacks }: OpenExample, gau
   const covered = dark / (element.clientWidth * element.clientHeight);
   assert(covered > 0.01 && covered < 0.9, `${covered} of the pixels are covered`);
   const words = card.querySelector('.cost')!.textContent!;
-  for (const part of [' MB', gaussians.toLocaleString('en'), ' dB', 'NVIDIA H200', 'Licence']) {
+  for (const part of [' MB', gaussians.toLocaleString('en'), ' dB', 'NVIDIA H200', 'License']) {
     assert(words.includes(part), `${part} in ${words}`);
   }
 }
