@@ -1,5 +1,5 @@
 /** Files of scenes for measurements of bytes: how they are made, and read. */
-import { spawnSync } from 'node:child_process';
+import { spawn } from 'node:child_process';
 import { existsSync, readFileSync, statSync } from 'node:fs';
 import { basename, join } from 'node:path';
 import { readScene } from '@gaussian-splat/formats';
@@ -9,16 +9,23 @@ import { root } from '../lib/run.mjs';
 /** The tool of others that writes their formats, by npx. */
 export const TRANSFORM = '@playcanvas/splat-transform@3.7.0';
 
+/** Whether a file exists, or a folder of pages with its manifest, which is written last. */
+const isMade = (path) => existsSync(path) && (!statSync(path).isDirectory() || existsSync(join(path, 'detail.json')));
+
 /**
- * Runs a command that makes a file, unless the file exists. Returns false if the command fails.
+ * Runs a command that makes a file or a folder of pages, unless it exists. Resolves to false if the command fails.
  * @param isKept whether only existing files are used
  */
-export function make(path, command, args, isKept = false) {
-  if (existsSync(path) || isKept) return existsSync(path);
+export async function make(path, command, args, isKept = false) {
+  if (isMade(path) || isKept) return isMade(path);
   console.log(`  ${basename(path)} ...`);
-  const { status, stderr } = spawnSync(command, args, { encoding: 'utf8', cwd: root });
+  const child = spawn(command, args, { cwd: root, stdio: ['ignore', 'ignore', 'pipe'] });
+  let errors = '';
+  child.stderr.setEncoding('utf8').on('data', (text) => (errors += text));
+  const status = await new Promise((done) => child.on('error', done).on('close', done));
   if (status === 0) return true;
-  console.log(`  not made: ${(stderr ?? '').trim().split('\n').at(-1)}`);
+  const reason = status instanceof Error ? status.message : errors.trim().split('\n').at(-1);
+  console.log(`  ${basename(path)} not made: ${reason}`);
   return false;
 }
 

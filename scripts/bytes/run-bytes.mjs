@@ -55,7 +55,7 @@ const { values } = parseArgs({
     out: text(join(root, 'docs/frontier')),
     scenes: text(Object.keys(SCENES).join(',')),
     views: text('8'),
-    scored: text('24'),
+    'score-views': text('24'),
     kept: { type: 'boolean' },
     help: { type: 'boolean' },
   },
@@ -99,7 +99,7 @@ async function measure(scene, { source, files }, device) {
   for (const [name, extension] of Object.entries(TRANSFORMED)) {
     if (Object.keys(files).some((other) => other.startsWith(name))) continue;
     const args = ['--yes', TRANSFORM, '-q', '-w', '-g', 'cpu', path(source), made(extension)];
-    if (make(made(extension), 'npx', args, values.kept))
+    if (await make(made(extension), 'npx', args, values.kept))
       await file(name, false, made(extension), extension === 'spz' ? halfTurned : undefined);
   }
   writeFileSync(made('splat'), writeSplat(cloud));
@@ -113,7 +113,7 @@ async function measure(scene, { source, files }, device) {
   for (const dB of DECIBELS) {
     const folder = made(`pages-${dB}`);
     if (
-      make(
+      await make(
         folder,
         process.execPath,
         own('detail', path(source), '--out', folder, '--min-psnr', String(dB), '--score-views', values['score-views']),
@@ -125,7 +125,7 @@ async function measure(scene, { source, files }, device) {
     }
     const smaller = made(`own-${dB}.sog`);
     const options = ['--min-psnr', String(dB), '--score-views', values['score-views'], '--out', smaller];
-    if (make(smaller, process.execPath, own('economise', path(source), ...options), values.kept))
+    if (await make(smaller, process.execPath, own('economise', path(source), ...options), values.kept))
       await file(`SOG, ours, ${dB} dB`, true, smaller);
   }
   evaluator.destroy();

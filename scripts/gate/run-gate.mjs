@@ -2,7 +2,7 @@
  * `npm run lab:gate`: which files of a trained scene lose nothing that its photographs show. Each file is read, drawn as the cameras of the photographs saw the scene, and held against them; what
  * the trained PLY itself has there is the measure. What takes long to make is kept in --work and taken from there the next time.
  */
-import { existsSync, mkdirSync, statSync, writeFileSync } from 'node:fs';
+import { existsSync, mkdirSync, readFileSync, statSync, writeFileSync } from 'node:fs';
 import { join, resolve } from 'node:path';
 import { parseArgs } from 'node:util';
 import { encodingsFor } from '@gaussian-splat/economise';
@@ -16,6 +16,9 @@ import { root } from '../lib/run.mjs';
 const USAGE = `usage: npm run lab:gate -- [options]
 
   --data FOLDER    the captured scenes and their photographs (default ../shared/data)
+  --scene NAME=PLY,CAMERAS,IMAGES  another scene: its trained file, cameras.json of the training, and the folder of its
+                   photographs, with paths relative to --data. Repeatable. Scenes that are not in --data keep their figures
+  --jobs N         how many files are made at a time (default 1)
   --work FOLDER    where files that are made are kept (default bench-results/gate)
   --out FILE       the figures (default docs/frontier/gate.json)
   --every N        every so many-th photograph is compared, those that trainers hold out (default 8)
@@ -40,6 +43,8 @@ const { values } = parseArgs({
     data: text(join(root, '../shared/data')),
     work: text(join(root, 'bench-results/gate')),
     out: text(join(root, 'docs/frontier/gate.json')),
+    scene: { type: 'string', multiple: true, default: [] },
+    jobs: text('1'),
     every: text('8'),
     db: text('40,42,44,46,48,50'),
     python: text('python3'),
@@ -53,45 +58,71 @@ if (values.help) {
 }
 for (const key of ['data', 'work', 'out']) values[key] = resolve(process.env.INIT_CWD ?? process.cwd(), values[key]);
 mkdirSync(values.work, { recursive: true });
+for (const given of values.scene) {
+  const [, name, source, cameras, images] = /^([\w-]+)=([^,]+),([^,]+),([^,]+)$/.exec(given) ?? [];
+  if (name === undefined) {
+    console.error(`--scene: expected NAME=PLY,CAMERAS,IMAGES, found "${given}"\n\n${USAGE}`);
+    process.exit(2);
+  }
+  SCENES[name] = { source, cameras, images, leftOut: [] };
+}
 
-/** The files of a scene: name, bytes, and how they are read. */
-async function* filesOf(scene, source, cloud, views) {
+/**
+ * Makes the files of a scene, --jobs at a time. Returns those that could be made, the trained PLY first: name, bytes, and
+ * how they are read.
+ */
+async function filesOf(scene, source, cloud, views) {
   const made = (file) => join(values.work, `${scene}.${file}`);
   const file = (name, at, turn = (found) => found) => ({
     ...{ name, bytes: statSync(at).size },
     read: async () => turn(await read(at)),
   });
-  yield file('PLY, float32', source);
   const whole = { cloud, degrees: new Uint8Array(cloud.count).fill(cloud.shDegree) };
+  const makers = [async () => file('PLY, float32', source)];
   for (const encoding of encodingsFor('a.spz', cloud).toReversed()) {
     const bits = /(\d+) bits/.exec(encoding.title)[1];
-    writeFileSync(made(`${bits}.spz`), await encoding.write(whole));
-    yield file(`SPZ, ours, harmonics of ${bits} bits`, made(`${bits}.spz`));
+    makers.push(async () => {
+      writeFileSync(made(`${bits}.spz`), await encoding.write(whole));
+      return file(`SPZ, ours, harmonics of ${bits} bits`, made(`${bits}.spz`));
+    });
   }
   for (const [name, extension] of [
     ['SPZ of splat-transform', 'transform.spz'],
     ['SOG of splat-transform', 'transform.sog'],
   ]) {
     const args = ['--yes', TRANSFORM, '-q', '-w', '-g', 'cpu', source, made(extension)];
-    if (make(made(extension), 'npx', args, values.kept))
-      yield file(name, made(extension), extension.endsWith('spz') ? halfTurned : undefined);
+    makers.push(async () => {
+      if (!(await make(made(extension), 'npx', args, values.kept))) return undefined;
+      return file(name, made(extension), extension.endsWith('spz') ? halfTurned : undefined);
+    });
   }
   for (const decibels of values.db.split(',')) {
     const sog = made(`own-${decibels}.sog`);
     const options = ['--min-psnr', decibels, '--views', views, '--out', sog];
-    if (make(sog, process.execPath, own('economise', source, ...options), values.kept))
-      yield file(`SOG, ours, ${decibels} dB`, sog);
+    makers.push(async () => {
+      if (!(await make(sog, process.execPath, own('economise', source, ...options), values.kept))) return undefined;
+      return file(`SOG, ours, ${decibels} dB`, sog);
+    });
     const folder = made(`pages-${decibels}`);
     const asked = ['--out', folder, '--min-psnr', decibels];
-    if (make(folder, process.execPath, own('detail', source, ...asked), values.kept)) {
+    makers.push(async () => {
+      if (!(await make(folder, process.execPath, own('detail', source, ...asked), values.kept))) return undefined;
       const { bytes } = await readFolder(folder);
-      yield { name: `pages, ours, ${decibels} dB`, bytes, read: async () => (await readFolder(folder)).cloud };
-    }
+      return { name: `pages, ours, ${decibels} dB`, bytes, read: async () => (await readFolder(folder)).cloud };
+    });
   }
+  const files = [];
+  const waiting = makers.entries();
+  // Each worker takes the next file from the same iterator.
+  const work = async () => {
+    for (const [k, maker] of waiting) files[k] = await maker();
+  };
+  await Promise.all(Array.from({ length: Math.max(1, Number(values.jobs)) }, work));
+  return files.filter(Boolean);
 }
 
 async function judge(scene, { source, cameras, images, leftOut }, device) {
-  const path = (file) => join(values.data, file);
+  const path = (file) => resolve(values.data, file);
   const photographs = readPhotographs(path(cameras), path(images), leftOut);
   const { judging, others } = holdOut(photographs, Number(values.every));
   // Files are made without the views that judge them.
@@ -101,7 +132,7 @@ async function judge(scene, { source, cameras, images, leftOut }, device) {
   const folder = join(values.work, 'images', scene);
   const gate = new Gate(device, { photographs: judging, python: values.python, folder });
   const rows = [];
-  for await (const { name, bytes, read } of filesOf(scene, path(source), cloud, views)) {
+  for (const { name, bytes, read } of await filesOf(scene, path(source), cloud, views)) {
     const [decodeMs, found] = await timed(read);
     const { figures, lost, passes, description } = await gate.judge(found, name);
     const smaller = (rows[0]?.bytes ?? bytes) / bytes;
@@ -117,17 +148,18 @@ if (withoutLpips) console.log(`LPIPS is not measured: ${withoutLpips}`);
 const adapter = await requestNodeAdapter({ isTrusted: true });
 const device = await adapter.requestDevice(deviceDescriptor(adapter));
 await pickInitialVariants(device, { format: 'rgba8unorm' });
-const scenes = [];
+const scenes = existsSync(values.out) ? JSON.parse(readFileSync(values.out, 'utf8')).scenes : [];
 for (const [name, scene] of Object.entries(SCENES)) {
-  if (!existsSync(join(values.data, scene.source))) console.log(`${name}: not in ${values.data}`);
-  else {
-    console.log(name);
-    scenes.push(await judge(name, scene, device));
+  if (!existsSync(resolve(values.data, scene.source))) {
+    console.log(`${name}: not in ${values.data}`);
+    continue;
   }
+  console.log(name);
+  const judged = await judge(name, scene, device);
+  const k = scenes.findIndex((other) => other.name === name);
+  scenes.splice(k < 0 ? scenes.length : k, k < 0 ? 0 : 1, judged);
+  const report = { kind: 'gate', date: new Date().toISOString(), limits: LIMITS, scenes };
+  writeFileSync(values.out, `${JSON.stringify(report, null, 2)}\n`);
 }
-writeFileSync(
-  values.out,
-  `${JSON.stringify({ kind: 'gate', date: new Date().toISOString(), limits: LIMITS, scenes }, null, 2)}\n`,
-);
 console.log(values.out);
 process.exit(0);
