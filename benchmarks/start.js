@@ -83,13 +83,15 @@ async function untilKept(keys, longest) {
 }
 
 /**
- * What a visit's page noted of the choice: milliseconds of trying the likely variants before its first picture, and of the search, without its pauses;
- * undefined for what was not done.
+ * What a visit's page noted of the choice: milliseconds of trying the likely variants before its first picture, of the first self-test without the
+ * compilation of pipelines, and of the search, without its pauses; undefined for what was not done.
  */
 function choiceTimes({ contentWindow: { performance } }) {
   const [start] = performance.getEntriesByName('gaussian-splat.start');
+  const [test] = performance.getEntriesByName('gaussian-splat.self-test');
   const [search] = performance.getEntriesByName('gaussian-splat.search');
-  return { startMs: start?.duration, searchMs: search && search.duration - search.detail.paused };
+  const without = (measure, name) => measure && measure.duration - measure.detail[name];
+  return { startMs: start?.duration, testMs: without(test, 'compiling'), searchMs: without(search, 'paused') };
 }
 
 /** Longest that this page, whose thread the frames share, waits for one of the display's frames until `ended` settles, ms. */
@@ -152,14 +154,15 @@ function show(visits) {
   const ms = (value) => (value === undefined ? '' : Math.round(value).toLocaleString('en'));
   const kindOf = ({ isCompared }, i) => (i === 0 ? 'first' : isCompared ? 'later, compared' : 'later');
   const rows = visits.map((visited, i) => {
-    const { previewMs, shownMs, chosenMs, startMs, searchMs } = visited;
-    return cells('td', [kindOf(visited, i), ...[previewMs, shownMs, startMs, chosenMs, searchMs].map(ms)]);
+    const { previewMs, shownMs, chosenMs, startMs, testMs, searchMs } = visited;
+    return cells('td', [kindOf(visited, i), ...[previewMs, shownMs, startMs, testMs, chosenMs, searchMs].map(ms)]);
   });
   const head = cells('th', [
     'visit',
     'first preview, ms',
     'whole picture, ms',
     'of it trial of what is likely, ms',
+    'of it self-test, ms',
     'then until the choice is made, ms',
     'of it search without pauses, ms',
   ]);

@@ -51,7 +51,7 @@ export function showResults(results, report) {
   byId('results').replaceChildren(element('table', {}, [element('thead', {}, [head]), element('tbody', {}, rows)]));
   if (!report) return;
   byId('status').textContent = `Done on ${adapterName(report.environment.adapter)}. Times in milliseconds.`;
-  byId('json').textContent = JSON.stringify(report, null, 2);
+  byId('json').textContent = JSON.stringify(report, (name, value) => (name === 'images' ? undefined : value), 2);
   byId('raw').hidden = false;
 }
 

@@ -4,7 +4,8 @@
  * A configuration's fields, all optional: `name`; `scene` (URL), `splats` (0: as the file has), `layout` (ground,
  * overhead), `visible` (splats on the ground if overhead), `mode` (scene, classic, antialiased); `width`, `height`, `path`,
  * `distance` (of the path from the scene, 1: usual), `resolutionScale`; `options` (of the Renderer) and `pack` (of
- * packGaussians); `peer` (playcanvas, spark) and `parity` instead of the last two.
+ * packGaussians); `peer` (playcanvas, spark) and `parity` instead of the last two; `peer` ours and `build` (URL of the
+ * folder of bench pages of another build) for the same configuration in another build.
  */
 
 import { PATH_NAMES } from '../scene/paths.js';
@@ -33,6 +34,7 @@ export const DEFAULTS = Object.freeze({
   options: {},
   pack: {},
   peer: '',
+  build: '',
   parity: false,
 });
 

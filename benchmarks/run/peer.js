@@ -1,19 +1,20 @@
-/** Another renderer as a subject (see measure.js): it runs in a frame of its own, where its page has a function `openSubject`. */
+/** Another renderer, or another build of ours, as a subject (see measure.js): it runs in a frame of its own, where its page has a function `openSubject`. */
 
-const TITLES = { playcanvas: 'PlayCanvas', spark: 'Spark' };
-export const PEERS = Object.keys(TITLES);
+export const PEERS = ['playcanvas', 'spark', 'ours'];
 
 /**
  * Opens a peer on a scene.
- * @param ply {Blob} the scene as an INRIA PLY file.
+ * @param configuration {object} `build` is the URL of the folder of bench pages that has the peer's page; '' for this one.
+ * @param scene {BenchScene} the scene: other renderers read it as a PLY file, our builds load it themselves.
  */
-export async function openPeer({ peer, parity, antialiased, width, height }, ply) {
+export async function openPeer(configuration, scene) {
+  const { peer, build, width, height } = configuration;
   if (!PEERS.includes(peer)) throw new RangeError(`peer: expected ${PEERS.join(' or ')}, found "${peer}"`);
   const frame = document.createElement('iframe');
   frame.className = 'peer';
   frame.width = width;
   frame.height = height;
-  frame.src = new URL(`peers/${peer}.html`, location.href).href;
+  frame.src = new URL(`peers/${peer}.html`, new URL(build, location.href)).href;
   document.body.append(frame);
   try {
     await new Promise((resolve, reject) => {
@@ -22,13 +23,11 @@ export async function openPeer({ peer, parity, antialiased, width, height }, ply
     });
     const { openSubject } = frame.contentWindow;
     if (!openSubject) throw new Error(`${frame.src}: its script did not run; build the demo first (npm run build)`);
-    const subject = await openSubject({ ply, parity, antialiased, width, height });
+    const source = peer === 'ours' ? { scene: new URL(configuration.scene, location.href).href } : { ply: scene.ply() };
+    const subject = await openSubject({ ...configuration, ...source, antialiased: scene.antialiased });
     return Object.assign(subject, { close: () => {}, dispose: () => frame.remove() });
   } catch (error) {
     frame.remove();
     throw error;
   }
 }
-
-/** The name of a peer as its makers write it, with its version. */
-export const peerTitle = (peer, versions) => `${TITLES[peer] ?? peer} ${versions[peer] ?? ''}`.trim();

@@ -22,12 +22,9 @@ export class Subjects {
   }
 
   async #openPeer(configuration) {
-    const { peer, parity, width, height } = configuration;
-    const key = JSON.stringify([peer, parity, width, height]);
-    if (!this.#peers.has(key)) {
-      const antialiased = this.#scene.antialiased;
-      this.#peers.set(key, await openPeer({ peer, parity, antialiased, width, height }, this.#scene.ply()));
-    }
+    const { peer, build, parity, width, height, resolutionScale, options, pack } = configuration;
+    const key = JSON.stringify([peer, build, parity, width, height, resolutionScale, options, pack]);
+    if (!this.#peers.has(key)) this.#peers.set(key, await openPeer(configuration, this.#scene));
     return this.#peers.get(key);
   }
 

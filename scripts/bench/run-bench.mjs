@@ -1,6 +1,6 @@
 /** The work behind `npm run lab:bench`. */
 import { readFileSync, writeFileSync } from 'node:fs';
-import { resolve } from 'node:path';
+import { join, resolve } from 'node:path';
 import { parseArgs } from 'node:util';
 import { runPage } from '../lib/browser-page.mjs';
 import { benchTable } from './table.mjs';
@@ -15,6 +15,7 @@ const USAGE = `usage: npm run lab:bench -- [options]
   --scene FILE      a scene of yours instead of the one that ships
   --list FILE       JSON array of configurations to compare; default: ours, PlayCanvas and Spark
   --no-peers        ours alone
+  --beside FOLDER   another checkout, built, whose renderer is measured in turns with this one
   --query TEXT      anything else for the page's address, for example "layout=overhead&phases=wall"
   --out FILE        where to write everything as JSON
 
@@ -23,6 +24,11 @@ SwiftShader draws, on the CPU; GAUSSIAN_SPLAT_GPU=system takes the GPU of this m
 
 /** The comparison's default list. */
 const OURS = [{ name: 'ours' }];
+/** Both builds in frames of their own, so that neither has an advantage. */
+const BUILDS = [
+  { name: 'this build', peer: 'ours' },
+  { name: 'the other build', peer: 'ours', build: '/beside/bench/' },
+];
 const PEERS = [
   { name: 'PlayCanvas', peer: 'playcanvas' },
   { name: 'PlayCanvas, parity', peer: 'playcanvas', parity: true },
@@ -45,6 +51,7 @@ function readOptions() {
       scene: { type: 'string' },
       list: { type: 'string' },
       peers: { type: 'boolean', default: true },
+      beside: { type: 'string' },
       query: text(''),
       out: { type: 'string' },
       help: { type: 'boolean' },
@@ -59,7 +66,7 @@ async function main() {
   const { splats, size, path, frames, rounds } = options;
   const list = options.list
     ? readFileSync(resolve(from, options.list), 'utf8')
-    : JSON.stringify([...OURS, ...(options.peers ? PEERS : [])]);
+    : JSON.stringify([...(options.beside ? BUILDS : OURS), ...(options.peers ? PEERS : [])]);
   const query = { list, splats, sizes: size, paths: path, frames, rounds, warmup: '3' };
   const more = Object.fromEntries(new URLSearchParams(options.query));
   const report = await runPage(
@@ -67,6 +74,7 @@ async function main() {
     { ...query, ...more },
     {
       scene: options.scene && resolve(from, options.scene),
+      mounts: options.beside && { '/beside/': join(resolve(from, options.beside), 'demo/dist') },
       onProgress: (line) => console.error(line),
     },
   );

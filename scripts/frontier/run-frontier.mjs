@@ -23,7 +23,7 @@ const USAGE = `usage: npm run lab:frontier -- [options]
   --scene FILE      a scene of yours instead of the one that ships
   --query TEXT      anything else for the page's address, for example "reference=renderer"
   --python FILE     measures LPIPS, too, with a Python that has packages/cli/src/lib/gate/requirements.txt
-  --from FILE       draws a report that the page posted on another machine; measures nothing
+  --from FILE       draws a report that the page posted on another machine; with images=1 in the page's address, LPIPS too
   --adapter NAME    the GPU's name, where the browser tells no more than its vendor
   --out FOLDER      where frontier-ADAPTER.json and .svg go (default docs/frontier)
 
@@ -150,6 +150,8 @@ async function main() {
   if (report.kind !== 'frontier')
     throw new Error(`expected the report of bench/frontier.html, found kind "${report.kind}"`);
   if (report.error) throw new Error(report.error);
+  if (report.reference.images && !options.python)
+    throw new Error('--python: expected a Python that measures LPIPS, because the report has images, found none');
   if (report.reference.images) measureLpips(report, options.python);
   if (options.adapter) report.environment.adapter.description = options.adapter;
   const folder = resolve(from, options.out);

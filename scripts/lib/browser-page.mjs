@@ -11,10 +11,11 @@ const MEASURING_FLAGS = ['--disable-dawn-features=timestamp_quantization'];
  * @param page path in demo/dist, for example `bench/index.html`.
  * @param query {Record<string, string>} of its address.
  * @param scene {string | undefined} a scene file on disk that takes the place of the one that ships.
+ * @param mounts {Record<string, string> | undefined} further folders by the prefix of their addresses.
  * @returns the report; throws the error that the page reports, or after `minutes`.
  */
-export async function runPage(page, query, { scene, minutes = 30, onProgress = () => {} } = {}) {
-  const mounts = { '/': `${root}demo/dist` };
+export async function runPage(page, query, { scene, mounts: others, minutes = 30, onProgress = () => {} } = {}) {
+  const mounts = { '/': `${root}demo/dist`, ...others };
   if (scene) mounts['/local/'] = dirname(resolve(scene)) + sep;
   const server = await serve(mounts);
   const browser = await chromium.launch({ executablePath: findChromium(), args: [...gpuFlags(), ...MEASURING_FLAGS] });

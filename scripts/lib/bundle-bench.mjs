@@ -16,6 +16,7 @@ const ENTRIES = [
   'start',
   'world',
   'quality/oracle-worker',
+  'peers/ours',
   'peers/playcanvas',
   'peers/spark',
 ];

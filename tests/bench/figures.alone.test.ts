@@ -1,5 +1,9 @@
 /** From samples to figures, from figures to the chart. */
 import assert from 'node:assert/strict';
+import { spawnSync } from 'node:child_process';
+import { mkdtempSync, rmSync, writeFileSync } from 'node:fs';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
 import { test } from 'node:test';
 import fc from 'fast-check';
 import { benchModule, scriptModule } from './load.js';
@@ -262,4 +266,32 @@ test('points that lie on one another share a label, and no label covers another'
   for (const [i, a] of boxes.entries())
     for (const b of boxes.slice(i + 1))
       assert.ok(a.x >= b.x + b.width || b.x >= a.x + a.width || a.y >= b.y + b.height || b.y >= a.y + a.height);
+});
+
+test('a report with images from another machine requires a Python that measures LPIPS', () => {
+  const folder = mkdtempSync(join(tmpdir(), 'frontier-'));
+  try {
+    const report = join(folder, 'report.json');
+    writeFileSync(report, JSON.stringify({ kind: 'frontier', reference: { images: ['data:,'] }, results: [] }));
+    const { status, stderr } = spawnSync(
+      process.execPath,
+      ['scripts/frontier/run-frontier.mjs', '--from', report, '--out', folder],
+      { encoding: 'utf8' },
+    );
+    assert.equal(status, 1);
+    assert.match(stderr, /--python: expected a Python that measures LPIPS/);
+  } finally {
+    rmSync(folder, { recursive: true });
+  }
+});
+
+test('the build of a configuration is read from the address and the list', async () => {
+  const [one] = await readConfigurations(new URLSearchParams('peer=ours&build=/other/bench/'), noJson);
+  assert.deepEqual([one.peer, one.build], ['ours', '/other/bench/']);
+  const list = JSON.stringify([{ peer: 'ours' }, { peer: 'ours', build: '/other/bench/' }]);
+  const both = await readConfigurations(new URLSearchParams({ list }), noJson);
+  assert.deepEqual(
+    both.map(({ build }: { build: string }) => build),
+    ['', '/other/bench/'],
+  );
 });

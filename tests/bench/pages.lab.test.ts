@@ -17,11 +17,12 @@ test('the benchmark page measures a list in one report', { timeout: 180_000 }, a
       options: { rasterizer: 'tiles', depthKeyBits: 16, warp: 9 },
     },
     { name: 'PlayCanvas', peer: 'playcanvas' },
+    { name: 'the same build', peer: 'ours', build: './' },
   ]);
   const report = await runPage('bench/index.html', { ...SMALL, list, n: '2000', w: '96', h: '64' });
   assert.deepEqual(report.errors, []);
-  assert.equal(report.results.length, 3);
-  const [ours, half, playcanvas] = report.results;
+  assert.equal(report.results.length, 4);
+  const [ours, half, playcanvas, same] = report.results;
   for (const { configuration, wall, cpu, burst, error } of report.results) {
     assert.equal(error, undefined);
     assert.equal(configuration.splats, 2000);
@@ -31,6 +32,9 @@ test('the benchmark page measures a list in one report', { timeout: 180_000 }, a
   assert.ok(ours.bytes.perSplat > 100);
   assert.deepEqual(half.ignoredOptions, ['warp', 'gloss']);
   assert.equal(half.rasterizer, 'tiles');
+  assert.deepEqual(same.errors, []);
+  assert.deepEqual(same.versions, report.environment.versions);
+  assert.equal(same.statistics.visible, ours.statistics.visible, 'the same splats in a frame of its own');
   if (report.environment.timestamps) {
     assert.ok(ours.span.p50 > 0 && playcanvas.span.p50 > 0);
     assert.ok('compose' in half.stages && 'rasterize' in ours.stages);
@@ -70,6 +74,7 @@ test(
     const [first, later] = report.visits;
     for (const { shownMs } of report.visits) assert.ok(shownMs > 0 && shownMs < 60_000, `${shownMs} ms`);
     assert.ok(first.chosenMs >= 0, 'the choice is made while the page is open');
+    assert.ok(first.testMs > 0, `the self-test took ${first.testMs} ms`);
     assert.equal(later.chosenMs, undefined);
     assert.equal(report.chosen.length, 1, 'what an earlier visit found is kept');
     await assert.rejects(runPage('bench/start.html', { visits: '0' }), /visits: expected a whole number/);

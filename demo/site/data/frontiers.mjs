@@ -21,6 +21,7 @@ function describe(name, { environment, scene, results, standard }) {
     scene: { ...scene, splats: scene.splats.toLocaleString('en') },
     rows: results.filter(({ error }) => !error).map((result) => rowOf(result, standard)),
     first: firstOf(results, standard),
+    hasLpips: results.some(({ quality }) => quality?.lpips !== undefined),
   };
 }
 
@@ -71,6 +72,8 @@ function rowOf(result, standard) {
     ratio: result.ratio?.burst?.p50.toFixed(2) ?? '',
     psnr: quality.psnr.toFixed(1),
     worst: quality.worst.toFixed(1),
+    ssim: quality.ssim.toFixed(4),
+    lpips: quality.lpips?.toFixed(4) ?? '',
     bytes: bytes?.perSplat.toFixed(0) ?? '',
   };
 }

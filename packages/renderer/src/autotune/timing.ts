@@ -20,15 +20,19 @@ export interface TimingScene {
 }
 
 /**
- * Resolves to whether a variant passes the self-test. The result is cached for each device.
+ * Resolves to whether a variant passes the self-test. The result is cached for each device. The performance timeline
+ * contains the duration as `gaussian-splat.self-test`, with the milliseconds that pipelines compile as `detail.compiling`.
  * @param format Format of the targets of later frames, whose pipelines are compiled meanwhile.
  */
 export const passes = (device: GPUDevice, variants: Variants, format?: GPUTextureFormat): Promise<boolean> =>
   perDevice(device, `right ${JSON.stringify(variants)}`, async () => {
+    const start = performance.now();
     await madeTogether(device, () => prepare(device, variants, format ?? ANSWER_TARGET.format));
+    const detail = { compiling: performance.now() - start };
     let fault: string | undefined = 'WebGPU calls of the self-test, which it refuses';
     const isKnown = await isValid(device, async () => (fault = await faultOf(device, variants)) === undefined);
     if (!isKnown) faultsOf(device).push(`The self-test finds errors of this GPU: ${fault}. Other variants draw.`);
+    performance.measure('gaussian-splat.self-test', { start, detail });
     return isKnown;
   });
 
