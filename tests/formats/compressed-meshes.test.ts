@@ -118,17 +118,65 @@ function largeImage(small: Uint8Array): Uint8Array<ArrayBuffer> {
   return bytes;
 }
 
+/** A mesh of Draco, version 2.2: three points, and `faces` of them with indices of a byte, uncompressed. */
+function sequentialMesh(faces: number): Uint8Array {
+  const varint = (value: number): number[] =>
+    value < 128 ? [value] : [(value & 127) | 128, ...varint(Math.floor(value / 128))];
+  const [MESH, SEQUENTIAL, RAW, POSITION, FLOAT32, GENERIC] = [1, 0, 1, 0, 9, 0];
+  const head = [
+    ...new TextEncoder().encode('DRACO'),
+    2,
+    2,
+    MESH,
+    SEQUENTIAL,
+    0,
+    0,
+    ...varint(faces),
+    ...varint(3),
+    RAW,
+  ];
+  const indices = Array.from({ length: 3 * faces }, (_, i) => i % 3);
+  // One decoder with one attribute: its kind, type, components, whether it is normalized, and its id.
+  const attributes = [1, ...varint(1), POSITION, FLOAT32, 3, 0, ...varint(0), GENERIC];
+  const corners = new Uint8Array(Float32Array.of(0, 0, 0, 1, 0, 0, 0, 1, 0).buffer);
+  return Uint8Array.from([...head, ...indices, ...attributes, ...corners]);
+}
+
+test('a mesh of Draco costs as much as it has faces, for each primitive that decodes it', async () => {
+  const draco = sequentialMesh(20_000);
+  const file = (primitives: number): Uint8Array =>
+    glbOf(
+      fixture('draco.glb'),
+      (json) => {
+        json.bufferViews = [{ buffer: 0, byteLength: draco.length }];
+        json.accessors = Array.from({ length: primitives }, () => ({ componentType: 5126, count: 3, type: 'VEC3' }));
+        const extension = { KHR_draco_mesh_compression: { bufferView: 0, attributes: { POSITION: 0 } } };
+        json.meshes = [
+          {
+            primitives: Array.from({ length: primitives }, (_, POSITION) => ({
+              ...{ attributes: { POSITION }, mode: 4, extensions: extension },
+            })),
+          },
+        ];
+      },
+      draco,
+    );
+  assert.equal((await read(file(2))).triangles, 2);
+  // Without the faces, 300 primitives cost 56 MB of the 94 MB that are allowed.
+  await assert.rejects(read(file(300)), /out-of-memory\/budget/);
+});
+
 test('damaged and excessive files are refused by name', async () => {
   const file = fixture('draco.glb');
   const refused = (bytes: Uint8Array, message: RegExp, limits?: LoadLimits): Promise<void> =>
     assert.rejects(read(bytes, limits), message);
   await refused(
-    glbOf(file, (json) => void (json.accessors[1].count = 80)),
+    glbOf(file, (json) => [1, 2, 3].forEach((k) => (json.accessors[k].count = 80))),
     /accessors\[1\]: expected 80 elements in the mesh of Draco, found 81.*decode\/corrupt/,
   );
   await refused(
-    glbOf(file, (json) => void (json.accessors[1].type = 'VEC2')),
-    /8 bytes an element in the mesh of Draco, found 12.*decode\/corrupt/,
+    glbOf(file, (json) => void (json.accessors[3].type = 'VEC4')),
+    /4 bytes an element in the mesh of Draco, found 3.*decode\/corrupt/,
   );
   await refused(
     glbOf(file, (json) => void (json.meshes[0].primitives[0].mode = 5)),
@@ -145,6 +193,17 @@ test('damaged and excessive files are refused by name', async () => {
   // Allows the pixels and the initial memory of the decoder, 84 MB, but no growth for 16 MB.
   const decoder = new Ktx2Decoder(new LoadBudget(100_000));
   await assert.rejects(decoder.decode(large, 'a'), /a: expected at most.*out-of-memory\/budget/);
+  // Once the decoder has grown, each image is charged for what Zstandard inflates: 256 bytes here, and 16 MB there.
+  const account = new LoadBudget(1_000_000);
+  const grown = new Ktx2Decoder(account);
+  const chargeOf = async (image: typeof large): Promise<number> => {
+    const before = account.taken;
+    await grown.decode(image, 'a').catch(() => undefined);
+    return account.taken - before;
+  };
+  for (let i = 0; i < 2; i++) await chargeOf(large);
+  const pixels = 4 * 4096 * 4096;
+  assert.deepEqual([await chargeOf(large), await chargeOf(small!)], [pixels + 2 ** 24, 4 * 16 * 16 + 256]);
   const other = new Ktx2Decoder(new LoadBudget(0));
   await assert.rejects(other.decode({ ...small!, width: 32 }, 'a'), /32 x 16 pixels.*decode\/corrupt/);
 });

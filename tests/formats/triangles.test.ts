@@ -50,6 +50,8 @@ test('textures within a GLB come as image files, compressed views as they are', 
   assert.deepEqual([view.source.length, view.count, view.stride, view.mode], [45, 3, 12, 'ATTRIBUTES']);
 });
 
+/** Accessors without views: their elements are zeros, and take no bytes of the file. */
+const zeros = (count: number, type: string, componentType = 5126): object => ({ count, type, componentType });
 const changed = (change: object): object => ({ ...triangle, ...change });
 const REFUSED: Readonly<Record<string, [file: object, message: RegExp]>> = {
   'a node with two parents': [changed({ nodes: [{ mesh: 0, children: [0] }] }), /one parent.*decode\/header/],
@@ -73,12 +75,35 @@ const REFUSED: Readonly<Record<string, [file: object, message: RegExp]>> = {
   ],
   'no mesh of that number': [changed({ meshes: [] }), /meshes\[0\].*decode\/header/],
   'no list of primitives': [changed({ meshes: [{}] }), /primitives.*a list.*decode\/header/],
+  'an attribute with fewer elements than vertices': [
+    changed({
+      accessors: [triangle.accessors[0], { ...triangle.accessors[0], count: 2 }],
+      meshes: [{ primitives: [{ attributes: { POSITION: 0, NORMAL: 1 } }] }],
+    }),
+    /attributes\.NORMAL: expected 3 of VEC3, found .*2.*decode\/header/,
+  ],
+  'positions that are matrices': [
+    changed({ accessors: [zeros(3, 'MAT4')] }),
+    /attributes\.POSITION: expected 3 of VEC3, found .*MAT4.*decode\/header/,
+  ],
+  'indices that are no whole numbers': [
+    changed({
+      accessors: [triangle.accessors[0], zeros(3, 'SCALAR')],
+      meshes: [{ primitives: [{ attributes: { POSITION: 0 }, indices: 1 }] }],
+    }),
+    /indices: expected whole numbers.*decode\/header/,
+  ],
+  'a stride that is no whole number of words': [
+    changed({
+      accessors: [{ ...triangle.accessors[0], componentType: 5121 }],
+      bufferViews: [{ buffer: 0, byteLength: 36, byteStride: 7 }],
+    }),
+    /byteStride: expected a stride.*decode\/header/,
+  ],
   'a primitive that is none': [changed({ meshes: [{ primitives: [null] }] }), /decode\/header/],
 };
 
 const BUDGET = /out-of-memory\/budget/;
-/** Accessors without views: their elements are zeros, and take no bytes of the file. */
-const zeros = (count: number, type: string, componentType = 5126): object => ({ count, type, componentType });
 const many = <T>(count: number, make: (k: number) => T): T[] => Array.from({ length: count }, (_, k) => make(k));
 const png = new Uint8Array(64);
 png.set([0x89, 0x50, 0x4e, 0x47, 13, 10, 26, 10]);
@@ -119,6 +144,13 @@ const MULTIPLIED: Readonly<Record<string, object>> = {
       },
     ],
   }),
+  'bytes between the elements of an accessor': changed({
+    accessors: [zeros(3, 'VEC3'), ...many(30, () => ({ ...zeros(10_000, 'SCALAR', 5121), bufferView: 0 }))],
+    bufferViews: [{ buffer: 0, byteLength: 2_520_000, byteStride: 252 }],
+    meshes: [
+      { primitives: [{ attributes: { POSITION: 0, ...Object.fromEntries(many(30, (k) => [`_${k}`, k + 1])) } }] },
+    ],
+  }),
   'vertices of a mesh, for each of its nodes': changed({
     scenes: [{ nodes: many(200, (k) => k) }],
     nodes: many(200, () => ({ mesh: 0 })),
@@ -128,6 +160,34 @@ const MULTIPLIED: Readonly<Record<string, object>> = {
 };
 for (const [what, file] of Object.entries(MULTIPLIED))
   test(`charged: ${what}`, () => assert.rejects(read(file), BUDGET));
+
+test('extensions that are not drawn are named', async () => {
+  const extensionsUsed = ['KHR_texture_transform', 'EXT_structural_metadata', 'KHR_animation_pointer', 'MSFT_lod'];
+  const { warnings } = await read(changed({ extensionsUsed }));
+  assert.deepEqual(warnings, ['Extensions of glTF that are not known are left out: KHR_animation_pointer, MSFT_lod.']);
+});
+
+test('unlit materials need not be listed, and glossy ones get a roughness', async () => {
+  const drawn = many(2, (material) => ({ attributes: { POSITION: 0 }, material }));
+  const glossy = { diffuseFactor: [1, 0.5, 0, 1], specularFactor: [0.04, 0.02, 0.08], glossinessFactor: 0.75 };
+  const { json } = await read(
+    changed({
+      meshes: [{ primitives: drawn }],
+      materials: [
+        { extensions: { KHR_materials_unlit: {} } },
+        { extensions: { KHR_materials_pbrSpecularGlossiness: glossy } },
+      ],
+    }),
+  );
+  assert.ok((json.extensionsUsed as string[]).includes('KHR_materials_unlit'));
+  const [, { pbrMetallicRoughness, extensions }] = json.materials as {
+    pbrMetallicRoughness: Record<string, unknown>;
+    extensions: Record<string, { specularColorFactor?: number[] }>;
+  }[];
+  const { baseColorFactor, metallicFactor, roughnessFactor } = pbrMetallicRoughness;
+  assert.deepEqual([baseColorFactor, metallicFactor, roughnessFactor], [[1, 0.5, 0, 1], 0, 0.25]);
+  assert.deepEqual(extensions.KHR_materials_specular.specularColorFactor, [1, 0.5, 2]);
+});
 
 test('weights beyond the morph targets are left out', async () => {
   const weights = many(1_000, () => 1);

@@ -67,10 +67,15 @@ const WITHOUT: readonly (readonly [extension: RegExp, remedy: string])[] = [
   [/spz/i, 'export the scene again with KHR_gaussian_splatting_compression_spz_2, or give the SPZ that it was made of'],
 ];
 
-/** Returns the names of the extensions that a file uses and this package does not support, without duplicates. */
-export function unknownExtensions({ extensionsUsed }: Json): string[] {
+/** Maximum number of extensions that a warning names. */
+const MAX_NAMED = 6;
+
+/** Returns a warning that names the extensions that a file uses and `known` does not match; empty without any. */
+export function leftOutExtensions({ extensionsUsed }: Json, known = HARMLESS): string[] {
   const used: unknown[] = Array.isArray(extensionsUsed) ? extensionsUsed : [];
-  return [...new Set(used.map(String))].filter((extension) => !HARMLESS.test(extension));
+  const unknown = [...new Set(used.map(String))].filter((extension) => !known.test(extension));
+  const named = unknown.slice(0, MAX_NAMED).map((extension) => extension.slice(0, 80));
+  return unknown.length > 0 ? [`Extensions of glTF that are not known are left out: ${named.join(', ')}.`] : [];
 }
 
 function tileset(name: string): GaussianSplatError {

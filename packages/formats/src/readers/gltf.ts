@@ -1,5 +1,5 @@
 import { GaussianSplatError, loadModule, type GaussianCloud, type ShDegree } from '@gaussian-splat/core';
-import { openContainer, unknownExtensions, type Json } from '../gltf/container.js';
+import { leftOutExtensions, openContainer, type Json } from '../gltf/container.js';
 import { GltfDocument } from '../gltf/document.js';
 import { multiply, placedMeshes, type Affine } from '../gltf/nodes.js';
 import { activate, activationOf, isPlain, type Activation } from '../gltf/activation.js';
@@ -90,17 +90,12 @@ async function encodeColors(cloud: DraftCloud): Promise<void> {
   encodeLinearColors(cloud, 'lin_rec709_display');
 }
 
-/** Maximum number of extensions that a warning names. */
-const MAX_NAMED = 6;
-
 /**
  * Adds warnings about animations and unknown extensions. If the file has meshes, the code that draws them reports
  * extensions.
  */
 function warnDropped(cloud: DraftCloud, json: Json, hasMeshes: boolean): void {
-  const unknown = hasMeshes ? [] : unknownExtensions(json);
-  const named = unknown.slice(0, MAX_NAMED).map((extension) => extension.slice(0, 80));
-  if (unknown.length > 0) warn(cloud, `Extensions of glTF that are not known are left out: ${named.join(', ')}.`);
+  if (!hasMeshes) for (const warning of leftOutExtensions(json)) warn(cloud, warning);
   const { animations } = json;
   if (Array.isArray(animations) && animations.length > 0)
     warn(cloud, `${grouped(animations.length)} animations are left out for splats: they are drawn as they stand.`);

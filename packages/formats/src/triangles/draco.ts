@@ -11,6 +11,8 @@ import { WasmDecoder } from './wasm-decoder.js';
 
 const DRACO = 'KHR_draco_mesh_compression';
 const TRIANGLES = 4;
+/** Bytes charged for each face and each point of a decoded mesh, to bound the work of decoding. */
+const DECODED_BYTES = 16;
 
 /** Arrays and data types of Draco by the component types of glTF. */
 const TYPES = {
@@ -105,6 +107,8 @@ function decode(
       throw damaged(where, 'a mesh of Draco', 'other data');
     const status = decoder.DecodeArrayToMesh(bytes, bytes.length, mesh);
     if (!status.ok() || mesh.ptr === 0) throw damaged(where, 'a mesh of Draco', status.error_msg());
+    // A primitive may decode a large mesh, of which its accessors show little; many primitives may have one mesh.
+    document.take(DECODED_BYTES * (mesh.num_faces() + mesh.num_points()));
     for (const [id, accessor] of attributes) {
       expectCount(document, accessor, mesh.num_points());
       document.provide(accessor, ...attributeOf(draco, decoder, mesh, id, accessor, document));

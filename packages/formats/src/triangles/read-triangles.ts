@@ -2,7 +2,7 @@ import { GaussianSplatError } from '@gaussian-splat/core';
 import type { LoadBudget } from '../budget.js';
 import { isPly } from '../signatures.js';
 import { readPlyMesh } from './ply-mesh.js';
-import { openContainer, type Json } from '../gltf/container.js';
+import { leftOutExtensions, openContainer, type Json } from '../gltf/container.js';
 import { GltfDocument, type OpenUri } from '../gltf/document.js';
 import { decodeDraco } from './draco.js';
 import { Images, type ImageFile } from './images.js';
@@ -44,8 +44,7 @@ export interface TriangleFile {
 
 /** Matches the extensions that a file may require. */
 const KNOWN =
-  /^(KHR_mesh_quantization|(EXT|KHR)_meshopt_compression|KHR_draco_mesh_compression|EXT_mesh_gpu_instancing|KHR_lights_punctual|KHR_texture_(transform|basisu)|EXT_texture_webp|KHR_materials_\w+|EXT_materials_\w+|KHR_gaussian_splatting\w*|\w+_xmp\w*)$/;
-
+  /^(KHR_mesh_quantization|(EXT|KHR)_meshopt_compression|KHR_draco_mesh_compression|EXT_mesh_gpu_instancing|KHR_lights_punctual|KHR_texture_(transform|basisu)|EXT_texture_webp|KHR_materials_\w+|EXT_materials_\w+|KHR_gaussian_splatting\w*|\w+_(xmp|structural_metadata|mesh_features)\w*)$/;
 /**
  * Reads the triangles of a glTF 2.0, GLB or PLY file. Before content is decoded, all numbers that determine the size of
  * an allocation are validated, and all content is charged to the budget.
@@ -69,7 +68,7 @@ export async function readTriangles(source: TriangleSource): Promise<TriangleFil
     images: files,
     byteLength: views.byteLength + survey.copies + images.byteLength,
     triangles: survey.triangles,
-    warnings: [...darkLights(survey.darkLights)],
+    warnings: [...darkLights(survey.darkLights), ...leftOutExtensions(file.json, KNOWN)],
   };
 }
 

@@ -23,8 +23,16 @@ const INSTANCES = 'EXT_mesh_gpu_instancing';
 const MAX_LIGHTS = 16;
 /** Number of joints that may move a vertex. */
 const JOINTS_PER_VERTEX = 4;
-/** Modes of primitives that three.js converts to triangles: strips and fans. */
-const CONVERTED_MODES: readonly unknown[] = [5, 6];
+/** Types of attributes by their names; others are not drawn. */
+const ATTRIBUTES: readonly (readonly [name: RegExp, types: readonly unknown[]])[] = [
+  [/^(POSITION|NORMAL)$/, ['VEC3']],
+  [/^(TANGENT|JOINTS_\d|WEIGHTS_\d)$/, ['VEC4']],
+  [/^TEXCOORD_\d$/, ['VEC2']],
+  [/^COLOR_\d$/, ['VEC3', 'VEC4']],
+];
+const INDEX_TYPES: readonly unknown[] = [5121, 5123, 5125];
+/** Modes of primitives that are converted for three.js: closed lines, strips and fans. */
+const CONVERTED_MODES: readonly unknown[] = [2, 5, 6];
 
 /** Indices of the objects that the scene of a file uses, except splats. The constructor charges them to the budget. */
 export class Survey {
@@ -117,11 +125,19 @@ export class Survey {
       attributes.POSITION === undefined
     )
       document.fail(path, 'attributes', 'none');
-    for (const accessor of Object.values(attributes)) this.#use(accessor);
     const { count } = layoutOf(document, attributes.POSITION);
+    for (const [name, accessor] of Object.entries(attributes)) {
+      this.#use(accessor);
+      this.#checkAttribute(name, accessor, count, path);
+    }
     // Three indices for each vertex, in a list of numbers and in an array.
     if (CONVERTED_MODES.includes(mode)) this.#copy(3 * (8 + 4) * triangleCount(document, primitive));
-    if (indices !== undefined) this.#use(indices);
+    if (indices !== undefined) {
+      this.#use(indices);
+      const { componentType, type } = document.item('accessors', indices);
+      if (type !== 'SCALAR' || !INDEX_TYPES.includes(componentType))
+        document.fail(`${path}.indices`, 'whole numbers', { componentType, type });
+    }
     if (material !== undefined) {
       if (!this.materials.has(material as number)) document.take(DRAW_BYTES);
       document.item('materials', material);
@@ -137,6 +153,14 @@ export class Survey {
     }
     // All morph targets of a primitive are one texture, in CPU and in GPU memory.
     this.#copy(2 * 16 * count * names.size * listOf(targets).length);
+  }
+
+  /** Checks that an attribute is drawable and has an element for each of `count` vertices. */
+  #checkAttribute(name: string, accessor: unknown, count: number, path: string): void {
+    const [, types] = ATTRIBUTES.find(([names]) => names.test(name)) ?? [];
+    const { type, count: own } = this.#document.item('accessors', accessor);
+    if (types && (!types.includes(type) || own !== count))
+      this.#document.fail(`${path}.attributes.${name}`, `${count} of ${types.join(' or ')}`, { type, count: own });
   }
 
   /** Returns the number of instances of a node's mesh, 1 or more, and charges them for each of its `draws`. */

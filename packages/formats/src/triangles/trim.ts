@@ -3,11 +3,14 @@ import type { Json } from '../gltf/container.js';
 import type { GltfDocument } from '../gltf/document.js';
 import { rootNodes } from '../gltf/nodes.js';
 import { sourceOf } from './images.js';
+import { withRoughness } from './materials.js';
 import type { Survey } from './survey.js';
 
-/** Matches the extensions that remain in the JSON, because the glTF loader of three.js supports them. */
-const READ =
-  /^(KHR_materials_\w+|EXT_materials_\w+|KHR_lights_punctual|KHR_texture_transform|KHR_mesh_quantization|EXT_mesh_gpu_instancing)$/;
+/**
+ * Extensions that the glTF loader of three.js supports only if the file lists them. They are listed for all files,
+ * because some files have them without listing them.
+ */
+const LISTED = ['KHR_materials_unlit', 'KHR_texture_transform'];
 
 /** Maximum length of a name in characters, because three.js copies it for each channel of an animation. */
 const NAME_LENGTH = 64;
@@ -37,7 +40,10 @@ export function trimmed(document: GltfDocument, survey: Survey): Json {
         weights: weightsOf(weights, index, survey),
       };
     }),
-    materials: only('materials', materials, (material) => ({ ...unnamed(material), name: nameOf(material.name) })),
+    materials: only('materials', materials, (material) => ({
+      ...withRoughness(unnamed(material)),
+      name: nameOf(material.name),
+    })),
     textures: list('textures').map((texture, index) =>
       isObject(texture) && hasSource(texture) ? { sampler: texture.sampler, source: sourceOf(document, index) } : {},
     ),
@@ -49,7 +55,7 @@ export function trimmed(document: GltfDocument, survey: Survey): Json {
     animations: list('animations')
       .map((animation) => animationOf(animation as Json, survey))
       .filter(({ channels }) => (channels as Json[]).length > 0),
-    extensionsUsed: list('extensionsUsed').filter((name) => typeof name === 'string' && READ.test(name)),
+    extensionsUsed: LISTED,
     ...(own && { extensions: own }),
   };
 }

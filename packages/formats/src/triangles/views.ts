@@ -90,11 +90,15 @@ export class Views {
     const width = count > 0 ? byteLength / count : 0;
     const { byteStride = width } = document.item('bufferViews', accessor.bufferView);
     const isStride = document.isIndex(byteStride) && byteStride >= width && byteStride <= 252;
-    if (count > 0 && (!isStride || byteStride % componentBytes > 0))
+    // GPUs need strides of whole words.
+    if (count > 0 && (!isStride || (byteStride !== width && byteStride % 4 > 0)))
       document.fail(`${path}, byteStride`, 'a stride that its elements fit in', byteStride);
     const span = count === 0 ? 0 : (count - 1) * (byteStride as number) + width;
     this.#checkRange(accessor, span, componentBytes, path);
-    return count * (byteStride as number);
+    const stored = count * (byteStride as number);
+    // Each accessor may have a GPU buffer of its own, with the bytes between its elements.
+    document.take(stored - byteLength);
+    return stored;
   }
 
   #checkSparse(sparse: Json, count: number, byteLength: number, componentBytes: number, path: string): void {
