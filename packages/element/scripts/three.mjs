@@ -16,7 +16,7 @@ export {
   WebGPUCoordinateSystem,
   WebGPURenderer,
 } from 'three/webgpu';
-export { neutralToneMapping, output, sRGBTransferOETF, vec4 } from 'three/tsl';
+export { materialOpacity, neutralToneMapping, output, sRGBTransferOETF, texture, vec4 } from 'three/tsl';
 export { GLTFLoader } from 'three/addons/loaders/GLTFLoader.js';
 
 export const loadMeshoptDecoder = async () =>

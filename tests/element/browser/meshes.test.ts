@@ -148,6 +148,42 @@ describe('meshes', () => {
     assert(max <= 24, `lit grays ${lit.join()} for ${shown.join()}`);
   });
 
+  it('are shown whatever bounds their file states, and opaque where their glass is', async () => {
+    const canvas = new OffscreenCanvas(1, 1);
+    canvas.getContext('2d')!.fillRect(0, 0, 1, 1);
+    const bytes = new Uint8Array(await (await canvas.convertToBlob()).arrayBuffer());
+    const black = `data:image/png;base64,${btoa(String.fromCharCode(...bytes))}`;
+    const far = { min: [100, 100, 100], max: [101, 101, 101] };
+    const half = [0.4, 0.4, 0.05] as const;
+    const element = place();
+    const elsewhere = mesh({ color: [1, 0, 0], half, stated: far }, { position: '-2 0 0' });
+    const bottle = mesh({ color: [0, 1, 0], half, clearWhere: black }, { position: '2 0 0' });
+    const orange = { surface: 'unlit', color: [1, 0.2122, 0], half: [0.02, 0.02, 0.02] } as const;
+    const points = mesh({ ...orange, drawnAs: 'points' }, { position: '0 1 0' });
+    element.append(elsewhere, bottle, points);
+    await until(() => [elsewhere, bottle, points].every(({ loaded }) => loaded), 'all');
+    await frames();
+    const screen = await screenOf(element);
+    const at = (x: number, y = 0): Rgb => screen.at(60 + x * METER, 50 - y * METER);
+    assert(isRed(at(-2)), `a box that says that it is elsewhere: ${at(-2).join()}`);
+    assert(isGreen(at(2)), `glass whose texture says that no light passes: ${at(2).join()}`);
+    const near = [-0.1, 0, 0.1].flatMap((x) => [0.9, 1, 1.1].map((y) => at(x, y)));
+    const [red, green] = near.reduce((max, color) => (color[0] > max[0] ? color : max));
+    // Points cover parts of pixels: the colors of red and green have the ratio of the base color.
+    assert(red > 60 && Math.abs(green / red - 127 / 255) < 0.1, `points: ${near.join(' ')}`);
+  });
+
+  it('are framed without the corners that are not numbers', async () => {
+    const element = document.createElement('gaussian-splat');
+    element.style.cssText = 'display: block; width: 120px; height: 100px';
+    const box = mesh({ isBroken: true });
+    element.append(box);
+    document.body.append(element);
+    await until(() => box.loaded || box.error !== null, 'the box');
+    assertEqual(box.error, null, `${box.error?.message}`);
+    assert(await comesToShow(element, (screen) => screen.middleOf(isRed) !== null), 'it is drawn');
+  });
+
   itInLab('are in pictures of toBlob(), over a color and over nothing, and hide splats there', async () => {
     const element = place({ src: GREEN });
     element.append(mesh({ half: [0.2, 0.2, 0.1] }, { position: '0 0 3m' }));

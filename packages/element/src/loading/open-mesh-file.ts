@@ -88,7 +88,12 @@ async function decoded(image: ImageFile, where: string, ktx2: Ktx2Decoder): Prom
   const bitmap = await createImageBitmap(content, options).catch((cause: unknown) =>
     fail((cause as Error).message, cause),
   );
-  if (bitmap.width === width && bitmap.height === height) return bitmap;
+  // The orientation in the metadata of a JPEG may exchange the sides.
+  if (
+    Math.max(bitmap.width, bitmap.height) === Math.max(width, height) &&
+    bitmap.width * bitmap.height === width * height
+  )
+    return bitmap;
   const found = `${bitmap.width} x ${bitmap.height}`;
   bitmap.close();
   return fail(found);

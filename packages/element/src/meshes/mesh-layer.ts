@@ -189,6 +189,8 @@ export class MeshLayer {
   hit(origin: Point, direction: Point): MeshHit | null {
     const ray = new Raycaster(new Vector3(...origin), new Vector3(...direction));
     ray.layers.enableAll();
+    // Lines and points are as thin as they are drawn.
+    ray.params.Line.threshold = ray.params.Points.threshold = 0;
     let first: (MeshHit & { readonly distance: number }) | null = null;
     for (const [model, root] of this.#shown) {
       const [met] = ray.intersectObject(root, true);

@@ -12,11 +12,15 @@ import {
   type Mesh,
   type Object3D,
   Texture,
+  type Vector3 as Vector,
 } from './three.js';
 
 /** Seconds before the end at which an animation stops, because at the end itself it restarts. */
 const BEFORE_END = 1e-4;
-/** Triangles of a glTF file as objects of three.js. */
+/** Largest coordinate that bounds contain, as for splats. */
+const FARTHEST = 1e18;
+
+/** Triangles, lines and points of a glTF file as objects of three.js. */
 export class Model {
   readonly root: Group;
   readonly triangles: number;
@@ -43,10 +47,12 @@ export class Model {
     const meshes: Mesh[] = [];
     let lights = 0;
     root.traverse((object) => {
-      if (isMesh(object)) meshes.push(object);
+      if (isMesh(object)) meshes.push(closed(object));
       if ('isLight' in object) lights++;
     });
     this.#meshes = meshes;
+    // The loader takes bounds from the file, where they may be wrong. Without them, three.js computes them.
+    for (const { geometry } of meshes) geometry.boundingBox = geometry.boundingSphere = null;
     this.hasLights = lights > 0;
     this.triangles = meshes.reduce((sum, { geometry: { index, attributes } }) => {
       return sum + Math.floor((index ?? attributes.position)?.count / 3 || 0);
@@ -121,7 +127,19 @@ export class Model {
   }
 }
 
-const isMesh = (object: Object3D): object is Mesh => 'isMesh' in object;
+/** Converts a `LineLoop`, which the renderer of three.js cannot draw, to a line whose last index is the first one. */
+function closed(mesh: Mesh): Mesh {
+  if (!mesh.isLineLoop) return mesh;
+  mesh.isLineLoop = false;
+  const { index, attributes } = mesh.geometry;
+  const indices = index?.array
+    ? Array.from(index.array)
+    : Array.from({ length: attributes.position.count }, (_, i) => i);
+  mesh.geometry.setIndex(indices.concat(indices.slice(0, 1)));
+  return mesh;
+}
+
+const isMesh = (object: Object3D): object is Mesh => 'geometry' in object;
 
 const texturesOf = (material: Material): Texture[] =>
   Object.values(material).filter(
@@ -143,9 +161,23 @@ async function fill(
   }
 }
 
+/** Bounds without the points that cannot be drawn: NaN, infinities, and coordinates beyond {@link FARTHEST}. */
+class DrawableBox extends Box3 {
+  override expandByPoint(point: Vector): this {
+    return isNear(point) ? super.expandByPoint(point) : this;
+  }
+
+  override union(box: Box3): this {
+    return isNear(box.min) && isNear(box.max) ? super.union(box) : this;
+  }
+}
+
+const isNear = ({ x, y, z }: Vector): boolean =>
+  Math.abs(x) <= FARTHEST && Math.abs(y) <= FARTHEST && Math.abs(z) <= FARTHEST;
+
 function boundsOf(root: Group): Bounds {
   root.updateMatrixWorld(true);
-  const box = new Box3().setFromObject(root, true);
+  const box = new DrawableBox().setFromObject(root, true);
   if (box.isEmpty()) return { min: [0, 0, 0], max: [0, 0, 0], center: [0, 0, 0], radius: 1 };
   const [min, max] = [box.min, box.max].map(({ x, y, z }): Vector3 => [x, y, z]);
   const at = (axis: number): number => (min[axis] + max[axis]) / 2;

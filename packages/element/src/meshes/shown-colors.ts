@@ -1,17 +1,29 @@
 /**
  * Converts meshes to display-referred colors, like those of trained splats, so that meshes and splats blend correctly.
  */
-import { neutralToneMapping, output, sRGBTransferOETF, vec4, type Material, type Texture } from './three.js';
+import {
+  materialOpacity,
+  neutralToneMapping,
+  output,
+  sRGBTransferOETF,
+  texture,
+  vec4,
+  type Material,
+  type Texture,
+} from './three.js';
 
 /** Intensity of the environment at which a rough gray surface that faces the camera has its base color. */
 const EVEN_LIGHT = 0.62;
 
+/** Whether light changes a material: not `KHR_materials_unlit`, lines and points. */
+const isLit = ({ envMapIntensity }: Material): boolean => envMapIntensity !== undefined;
+
 /**
- * Makes a material output sRGB. The colors of lit materials are tone-mapped by Khronos' PBR Neutral; those of unlit
- * materials (`KHR_materials_unlit`) stay the base color.
+ * Makes a material output sRGB. The colors of lit materials are tone-mapped by Khronos' PBR Neutral; those of other
+ * materials stay the base color.
  */
 export function showAsDisplayed(material: Material): void {
-  const light = material.isMeshBasicMaterial ? output.rgb : neutralToneMapping(output.rgb, 1);
+  const light = isLit(material) ? neutralToneMapping(output.rgb, 1) : output.rgb;
   material.outputNode = vec4(sRGBTransferOETF(light.clamp(0, 1)), output.a);
 }
 
@@ -20,15 +32,18 @@ export function showAsDisplayed(material: Material): void {
  * it, because a layer has one alpha for red, green and blue.
  */
 export function showThrough(material: Material): void {
-  if (!material.transmission) return;
-  material.opacity *= 1 - material.transmission;
+  const { transmission, transmissionMap } = material;
+  if (!transmission) return;
+  if (transmissionMap)
+    material.opacityNode = materialOpacity.mul(texture(transmissionMap).r.mul(transmission).oneMinus());
+  else material.opacity *= 1 - transmission;
   material.transmission = 0;
   material.transparent = true;
 }
 
 /** Lights a material by the environment. Skips unlit materials, whose `envMap` would be a mirror reflection. */
 export function light(material: Material, environment: Texture): void {
-  if (material.isMeshBasicMaterial || !('envMap' in material)) return;
+  if (!isLit(material)) return;
   material.envMap = environment;
   material.envMapIntensity = EVEN_LIGHT;
 }

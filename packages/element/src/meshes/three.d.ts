@@ -23,12 +23,16 @@ export interface Intersection {
 export class Raycaster {
   constructor(origin: Vector3, direction: Vector3);
   readonly layers: Layers;
+  /** Distance from a ray, in world units, within which lines and points are hit. */
+  readonly params: { readonly Line: { threshold: number }; readonly Points: { threshold: number } };
   /** Returns all intersections, the nearest first. */
   intersectObject(object: Object3D, recursive: boolean): Intersection[];
 }
 export class Box3 {
   min: Vector3;
   max: Vector3;
+  expandByPoint(point: Vector3): this;
+  union(box: Box3): this;
   setFromObject(object: Object3D, precise?: boolean): this;
   isEmpty(): boolean;
 }
@@ -87,43 +91,58 @@ export class CubeRenderTarget {
 }
 /** A value in a shader. */
 export interface ShaderNode {
+  readonly r: ShaderNode;
   readonly rgb: ShaderNode;
   readonly a: ShaderNode;
+  mul(factor: ShaderNode | number): ShaderNode;
+  oneMinus(): ShaderNode;
   clamp(low: number, high: number): ShaderNode;
 }
 /** Result of a material: linear light and alpha. */
 export const output: ShaderNode;
+/** Property `opacity` of a material. */
+export const materialOpacity: ShaderNode;
+/** Samples a texture at the coordinates of its channel, with its transform. */
+export function texture(value: Texture): ShaderNode;
 export function neutralToneMapping(color: ShaderNode, exposure: number): ShaderNode;
 export function sRGBTransferOETF(color: ShaderNode): ShaderNode;
 export function vec4(rgb: ShaderNode, a: ShaderNode): ShaderNode;
 
 export class Material {
   name: string;
-  /** True for the materials of glTF's `KHR_materials_unlit`. */
-  readonly isMeshBasicMaterial?: true;
   envMap?: Texture | null;
+  /** Undefined for materials that light does not change: `KHR_materials_unlit`, lines and points. */
   envMapIntensity?: number;
   /** Value that is written instead of {@link output}. */
   outputNode?: ShaderNode;
+  /** Value that is used instead of {@link materialOpacity}. */
+  opacityNode?: ShaderNode;
   transparent: boolean;
   opacity: number;
   depthWrite: boolean;
   alphaTest: number;
   /** Fraction of light that passes through, 0..1: glTF's `KHR_materials_transmission`. */
   transmission?: number;
+  /** Texture whose red channel is a factor of {@link transmission}. */
+  transmissionMap?: Texture | null;
   dispose(): void;
 }
 export interface Attribute {
   readonly count: number;
-  readonly array?: { readonly byteLength: number };
+  readonly array?: ArrayLike<number>;
 }
 export class BufferGeometry {
   index: Attribute | null;
   attributes: Readonly<Record<string, Attribute>>;
+  setIndex(indices: number[]): this;
+  boundingBox: Box3 | null;
+  boundingSphere: object | null;
   dispose(): void;
 }
+/** Triangles, lines (`Line`) or points (`Points`). */
 export class Mesh extends Object3D {
-  readonly isMesh: true;
+  /** Whether it is a line that returns to its start. */
+  isLineLoop?: boolean;
   geometry: BufferGeometry;
   material: Material | Material[];
   /** Bounds of a skinned mesh; null until a ray is cast. */

@@ -42,6 +42,14 @@ export interface BoxOptions {
   readonly names?: readonly [mesh: string, material: string];
   /** A splat besides, at this place. */
   readonly splat?: readonly [number, number, number];
+  /** Bounds that the file states, which may differ from those of its corners. */
+  readonly stated?: { readonly min: readonly number[]; readonly max: readonly number[] };
+  /** Whether the first corner is not a number. */
+  readonly isBroken?: boolean;
+  /** Whether the corners are drawn as points instead of triangles. */
+  readonly drawnAs?: 'points';
+  /** Address of an image: light passes where it is red. */
+  readonly clearWhere?: string;
 }
 
 /** A box that shines. */
@@ -54,13 +62,18 @@ export function boxGlb({
   isSkinned = false,
   names: [mesh, wood] = ['', ''],
   splat,
+  stated,
+  isBroken = false,
+  drawnAs,
+  clearWhere,
 }: BoxOptions = {}): File {
   const { positions, normals, indices } = box(half);
+  if (isBroken) positions[0] = NaN;
   const parts: Uint8Array[] = [];
   const views: object[] = [];
   const accessors: object[] = [];
   const add = (values: Float32Array | Uint16Array, type: string, more: object = {}): number => {
-    const components = { SCALAR: 1, VEC3: 3, VEC4: 4 }[type]!;
+    const components = { SCALAR: 1, VEC2: 2, VEC3: 3, VEC4: 4 }[type]!;
     const byteOffset = parts.reduce((sum, { byteLength }) => sum + byteLength, 0);
     views.push({ buffer: 0, byteOffset, byteLength: values.byteLength });
     parts.push(new Uint8Array(values.buffer));
@@ -70,11 +83,12 @@ export function boxGlb({
   };
   const floats = (values: readonly number[], type: string, more?: object): number =>
     add(Float32Array.from(values), type, more);
-  const range = { min: half.map((h) => -h), max: [...half] };
+  const range = stated ?? { min: half.map((h) => -h), max: [...half] };
   const corners = positions.length / 3;
   const triangles = {
     attributes: {
       ...{ POSITION: floats(positions, 'VEC3', range), NORMAL: floats(normals, 'VEC3') },
+      ...(clearWhere !== undefined && { TEXCOORD_0: floats(new Array<number>(2 * corners).fill(0), 'VEC2') }),
       ...(isSkinned && {
         JOINTS_0: add(new Uint16Array(4 * corners), 'VEC4'),
         WEIGHTS_0: floats(
@@ -83,7 +97,7 @@ export function boxGlb({
         ),
       }),
     },
-    indices: add(Uint16Array.from(indices), 'SCALAR'),
+    ...(drawnAs === 'points' ? { mode: 0 } : { indices: add(Uint16Array.from(indices), 'SCALAR') }),
     material: 0,
   };
   const primitives: object[] = [triangles];
@@ -106,7 +120,8 @@ export function boxGlb({
     nodes: isSkinned ? [{ mesh: 0, skin: 0 }, { name: 'bone' }] : [{ mesh: 0 }],
     ...(isSkinned && { skins: [{ joints: [1] }] }),
     meshes: [{ name: mesh, primitives }],
-    materials: [{ name: wood, ...material(surface, color, alpha) }],
+    materials: [{ name: wood, ...material(surface, color, alpha), ...(clearWhere !== undefined && CLEAR) }],
+    ...(clearWhere !== undefined && { textures: [{ source: 0 }], images: [{ uri: clearWhere }] }),
     extensionsUsed: ['KHR_materials_unlit', ...(splat ? ['KHR_gaussian_splatting'] : [])],
     ...(animations.length > 0 && { animations }),
     accessors,
@@ -115,6 +130,11 @@ export function boxGlb({
   };
   return new File([glb(json, parts)], 'box.glb');
 }
+
+/** Extensions of a material through which light passes where its texture is red. */
+const CLEAR = {
+  extensions: { KHR_materials_transmission: { transmissionFactor: 1, transmissionTexture: { index: 0 } } },
+};
 
 function material(surface: 'shining' | 'unlit' | 'rough', color: readonly number[], alpha: number): object {
   const base = surface === 'shining' ? [0, 0, 0] : color;
