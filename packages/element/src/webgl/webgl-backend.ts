@@ -6,7 +6,6 @@ import {
   orderView,
   OverdrawLimit,
   drawn as whenDrawn,
-  type GlFrameRequest,
   type OrderView,
 } from '@gaussian-splat/renderer/webgl';
 import type {
@@ -27,11 +26,12 @@ import { cannotShow } from './gl-session.js';
  * at most the second value.
  */
 const [OLDEST_MS, LONGEST_SORT_MS] = [80, 30];
-/**
- * Average counts of splats per pixel. A first frame above the first value is drawn in parts, each of about the second
- * value.
- */
-const [MAX_COVERED, COVERED_BY_PART] = [256, 32];
+/** Blended pixels of the first part of a first frame: a few tens of milliseconds without a GPU. */
+const FIRST_PIXELS = 2 ** 20;
+/** Shortest and longest duration of a part, milliseconds. Parts outside of this range make the next ones larger or smaller. */
+const [SHORT_PART_MS, LONG_PART_MS] = [15, 60];
+/** Cost of a splat without its pixels, in blended pixels. */
+const PIXELS_OF_QUAD = 64;
 /** Fraction of a full frame's time that is certainly proportional to the number of pixels. */
 const SURE_SHARE = 0.5;
 
@@ -55,8 +55,11 @@ export class WebGlBackend implements Backend {
   #sorted: OrderView | undefined;
   /** Time at which the order on the GPU was requested, by `performance.now`. */
   #sortedAt = 0;
-  /** Average number of splats per pixel of the frame, with the order on the GPU. */
+  /** Number of splats in the order on the GPU, and how many of them cover a pixel of the frame on average. */
+  #listed = 0;
   #covered = 0;
+  /** Number of frames and parts that were painted. */
+  #painted = 0;
   /** View of the last request for an order. */
   #asked: OrderView | undefined;
   /** Fulfills when the first order has arrived. */
@@ -174,12 +177,21 @@ export class WebGlBackend implements Backend {
    * be drawn in between.
    */
   async #paintInParts(frame: CanvasFrame): Promise<void> {
-    const covered = this.#covered * this.pixelShare ** 2;
-    const parts = covered > MAX_COVERED ? Math.ceil(covered / COVERED_BY_PART) : 1;
-    for (let part = 0; part < parts && !this.isLost && !this.#isDestroyed; part++) {
-      this.#paint(frame, [part / parts, (part + 1) / parts]);
+    const { width, height } = frame.camera;
+    const pixels = this.#covered * width * height * this.pixelShare ** 2;
+    let atMost = FIRST_PIXELS / (PIXELS_OF_QUAD + pixels / Math.max(1, this.#listed));
+    let from = 0;
+    do {
+      const begin = performance.now();
+      from = this.#paint(frame, from, Math.ceil(atMost));
+      const painted = this.#painted;
       await whenDrawn(this.scene.lease.gl).catch(() => undefined);
-    }
+      // A frame that was drawn meanwhile is newer.
+      if (this.isLost || this.#isDestroyed || painted !== this.#painted) return;
+      const ms = performance.now() - begin;
+      if (ms < SHORT_PART_MS) atMost *= 4;
+      else if (ms > LONG_PART_MS) atMost /= 2;
+    } while (from < this.#listed);
   }
 
   async probe(points: readonly ProbePoint[]): Promise<ProbeAnswer[]> {
@@ -219,6 +231,7 @@ export class WebGlBackend implements Backend {
     if (this.isLost || this.#isDestroyed || askedAt < this.#sortedAt) return;
     this.#sorted = view;
     this.#sortedAt = askedAt;
+    this.#listed = count;
     this.#covered = covered;
     this.#overdraw.note(covered, this.scene.gaussians.count);
     this.scene.frames.setOrder(order, count);
@@ -229,10 +242,11 @@ export class WebGlBackend implements Backend {
     this.#show(frame);
   }
 
-  #paint({ camera, settings }: CanvasFrame, rows?: GlFrameRequest['rows']): void {
+  #paint({ camera, settings }: CanvasFrame, from = 0, atMost = Infinity): number {
     const { quality, shDegree, filter } = this.#rendering;
-    this.scene.frames.render({
-      ...{ camera, shDegree, filter, rows },
+    this.#painted++;
+    return this.scene.frames.render({
+      ...{ camera, shDegree, filter, from, atMost },
       accumulation: quality === 'balanced' || quality === 'fast' ? 'rgba16float' : 'rgba32float',
       resolutionScale: this.pixelShare * (settings?.resolutionScale ?? 1),
     });

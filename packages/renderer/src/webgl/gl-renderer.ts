@@ -44,10 +44,12 @@ export interface GlFrameRequest {
   /** Fraction of the canvas's width and height that is rendered, above 0 and at most 1. */
   readonly resolutionScale: number;
   /**
-   * Range of rows of the image to draw, from the bottom, as fractions of the height. Default: 0 to 1. An expensive
-   * frame can be drawn in parts, so that other frames are drawn in between.
+   * Number of the farthest splats that earlier calls for this frame have drawn. Default: 0. An expensive frame can be
+   * drawn in parts, so that other frames are drawn in between.
    */
-  readonly rows?: readonly [first: number, end: number] | undefined;
+  readonly from?: number | undefined;
+  /** Maximum number of splats to draw. Default: all. */
+  readonly atMost?: number | undefined;
 }
 
 /** A rectangle of a framebuffer, as large as the camera's image. */
@@ -165,20 +167,21 @@ export class GlRenderer {
   }
 
   /**
-   * Draws one frame into the accumulation texture: call {@link present} afterwards.
-   * @param quads Program that replaces the renderer's own program for quads.
+   * Draws one frame, or a part of it, into the accumulation texture: call {@link present} afterwards.
+   * @param quads Program that replaces the renderer's own program for quads. It draws whole frames.
+   * @returns `from` of the next part; at least the number of splats in the order if there is none.
    * @throws GaussianSplatError `argument/camera` for a camera out of range; `out-of-memory/allocation` if the device
    * has too little memory.
    */
-  render(request: GlFrameRequest, quads?: GlQuads): void {
+  render(request: GlFrameRequest, quads?: GlQuads): number {
     const { camera, accumulation, resolutionScale } = request;
     validateCamera(camera);
     const drawn = scaled(camera, resolutionScale);
     // Allocates first, because the query for failed allocations waits for all earlier commands.
     const { target } = this.#accumulationOf(camera, accumulation);
     this.#projectSplats(request, drawn);
-    this.#drawQuads(target, { ...request, camera: drawn }, quads);
     this.#last = { camera, drawn };
+    return this.#drawQuads(target, { ...request, camera: drawn }, quads);
   }
 
   /**
@@ -279,23 +282,17 @@ export class GlRenderer {
     gl.drawArrays(gl.TRIANGLES, 0, 3);
   }
 
-  #drawQuads(target: WebGLFramebuffer, { camera, rows }: GlFrameRequest, quads?: GlQuads): void {
+  #drawQuads(target: WebGLFramebuffer, request: GlFrameRequest, quads?: GlQuads): number {
     const gl = this.#gl;
+    const { camera, from = 0 } = request;
     gl.bindFramebuffer(gl.FRAMEBUFFER, target);
-    const { width, height } = camera;
-    gl.viewport(0, 0, width, height);
-    if (rows) {
-      const [first, end] = rows.map((share) => Math.round(share * height));
-      gl.enable(gl.SCISSOR_TEST);
-      gl.scissor(0, first, width, end - first);
-    }
+    gl.viewport(0, 0, camera.width, camera.height);
     // Clears to black with full transmittance.
-    gl.clearBufferfv(gl.COLOR, 0, [0, 0, 0, 1]);
-    if (this.#count > 0) this.#blendQuads(camera, quads);
-    gl.disable(gl.SCISSOR_TEST);
+    if (from === 0) gl.clearBufferfv(gl.COLOR, 0, [0, 0, 0, 1]);
+    return this.#count > from ? this.#blendQuads(request, quads) : this.#count;
   }
 
-  #blendQuads(camera: Camera, quads?: GlQuads): void {
+  #blendQuads({ camera, from = 0, atMost = Infinity }: GlFrameRequest, quads?: GlQuads): number {
     const gl = this.#gl;
     const { width, height } = camera;
     gl.enable(gl.BLEND);
@@ -303,11 +300,15 @@ export class GlRenderer {
     const { facts, geometry } = this.#gaussians;
     const [count, textures] = [this.#count, this.#splatTextures];
     if (quads) quads.use({ camera, count, origin: facts.origin, textures: [...textures, geometry] });
-    else this.#programs.quads.use({ viewport: [width, height], count, unused: 0 }, textures);
+    else this.#programs.quads.use({ viewport: [width, height], count, first: from }, textures);
     gl.bindVertexArray(this.#corners);
-    const batches = Math.ceil(this.#count / QUAD_BATCH);
-    gl.drawElementsInstanced(gl.TRIANGLES, QUAD_BATCH * INDICES_PER_QUAD, gl.UNSIGNED_SHORT, 0, batches);
+    // One incomplete batch, or complete ones. Quads beyond the last splat are invisible.
+    const wanted = Math.min(count - from, Math.max(1, atMost));
+    const inBatch = wanted < count - from ? Math.min(wanted, QUAD_BATCH) : QUAD_BATCH;
+    const batches = wanted < count - from ? Math.floor(wanted / inBatch) : Math.ceil(wanted / inBatch);
+    gl.drawElementsInstanced(gl.TRIANGLES, inBatch * INDICES_PER_QUAD, gl.UNSIGNED_SHORT, 0, batches);
     gl.bindVertexArray(null);
+    return from + batches * inBatch;
   }
 
   /**
