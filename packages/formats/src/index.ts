@@ -12,6 +12,7 @@ export { MAX_DROPPED_RATIO, readScene, type ReadSceneOptions } from './read-scen
 export { readTriangles, type TriangleFile, type TriangleSource } from './triangles/read-triangles.js';
 export { Ktx2Decoder } from './triangles/ktx2.js';
 export type { ImageFile } from './triangles/images.js';
+export { imageHeader } from './triangles/image-size.js';
 export type { MeshoptView } from './triangles/views.js';
 export { isSequence, MAX_HEADER_BYTES as HEADER_BYTES } from './signatures.js';
 export type { FileBytes } from './bytes.js';

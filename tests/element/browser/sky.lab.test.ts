@@ -81,6 +81,16 @@ describe('a sky that cannot be', () => {
     await claimComing(/skybox-image: expected an image at/);
     assertEqual(element.loaded, true, 'loaded');
   });
+
+  it('is refused before it is decoded if it has many pixels in few bytes', async () => {
+    // The header of a lossless WebP of 16,383 x 16,383 pixels.
+    const side = 16_382;
+    const size = [side & 255, (side >> 8) | ((side & 3) << 6), (side >> 2) & 255, (side >> 10) & 15];
+    const words = [...'RIFF\x20\0\0\0WEBPVP8L\x14\0\0\0'].map((letter) => letter.charCodeAt(0));
+    const bytes = Uint8Array.from([...words, 0x2f, ...size, ...new Array<number>(15).fill(0)]);
+    await load({ 'skybox-image': URL.createObjectURL(new Blob([bytes])) });
+    await claimComing(/skybox-image: the image: expected at most.*out-of-memory\/budget/);
+  });
 });
 
 it('a sky and a shadow leave the GPU with their element', async () => {

@@ -1,5 +1,6 @@
 /** Environment image behind the scene. Loaded for elements with the attribute `skybox-image`. */
 import { bytesOf, fetchPatiently } from '@gaussian-splat/core/fetch';
+import { imageHeader, LoadBudget } from '@gaussian-splat/formats';
 import type { FrameTarget } from '@gaussian-splat/renderer';
 import type { ReactiveController, ReactiveControllerHost } from 'lit';
 import { credentialsOf, type Attributes } from '../attributes.js';
@@ -119,8 +120,13 @@ export class Sky implements ReactiveController, Mover {
   }
 }
 
-/** Decodes an image file, and reduces an image that exceeds the maximum texture size of the GPU. */
+/**
+ * Decodes an image file, and reduces an image that exceeds the maximum texture size of the GPU. Throws
+ * `out-of-memory/budget` for pixels that cost more than the bytes of the file allow.
+ */
 async function decode(bytes: Uint8Array<ArrayBuffer>, backend: Backend | null): Promise<ImageBitmap> {
+  const { width = 0, height = 0 } = imageHeader(bytes) ?? {};
+  new LoadBudget(bytes.length).take(4 * width * height, 'the image');
   const blob = new Blob([bytes]);
   const image = await createImageBitmap(blob);
   const max = backend?.place.limits.maxTextureDimension2D ?? 4096;
