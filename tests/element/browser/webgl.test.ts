@@ -188,6 +188,16 @@ describe('renderer="webgl"', () => {
     const point = await element.positionFromPoint(100, 80);
     assert(point && Math.hypot(point.x, point.y, point.z - 1) < 0.03, `found ${String(point)}`);
     assertEqual(await element.positionFromPoint(2, 2), null, 'beside the scene');
+    // A race with the loss of the context would remain in memory as long as the scene.
+    const { race } = Promise;
+    let races = 0;
+    Promise.race = function (this: typeof Promise, ...of: [never]) {
+      races++;
+      return race.apply(this, of);
+    } as typeof race;
+    for (let i = 0; i < 5; i++) await element.positionFromPoint(100, 80);
+    Promise.race = race;
+    assertEqual(races, 0, 'races');
     await until(() => element.queryHotspot('hotspot-front')?.visible === true, 'the label in front');
     await until(() => element.queryHotspot('hotspot-behind')?.visible === false, 'the label behind');
     assertEqual((await element.updateStats())?.drawn, element.stats?.splats, 'splats drawn');

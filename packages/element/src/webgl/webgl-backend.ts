@@ -69,6 +69,7 @@ export class WebGlBackend implements Backend {
   /** Fulfills when the first frame is drawn. */
   readonly #shown: Promise<void>;
   #resolveShown: () => void = () => undefined;
+  #isShown = false;
   /** Measured time of a full frame, milliseconds; 0 while unknown. */
   #wholeMs = 0;
   #rendering: Rendering = { quality: 'default', shDegree: 3, order: 'center' };
@@ -79,6 +80,7 @@ export class WebGlBackend implements Backend {
     let resolveOrdered: () => void;
     this.#ordered = new Promise((resolve) => (resolveOrdered = resolve));
     this.#shown = new Promise((resolve) => (this.#resolveShown = resolve));
+    void this.#shown.then(() => (this.#isShown = true));
     const { positions, areas, spawn } = scene;
     this.#sorter = new DepthSorter({
       ...{ positions, areas, spawn },
@@ -195,7 +197,8 @@ export class WebGlBackend implements Backend {
   }
 
   async probe(points: readonly ProbePoint[]): Promise<ProbeAnswer[]> {
-    await Promise.race([this.#shown, this.scene.lost]);
+    // Each race stays in the memory of its promises, and labels ask ten times a second.
+    if (!this.#isShown) await Promise.race([this.#shown, this.scene.lost]);
     return this.isLost || this.#isDestroyed ? [] : this.scene.frames.probe(points);
   }
 

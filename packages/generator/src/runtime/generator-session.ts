@@ -68,9 +68,13 @@ export class GeneratorSession {
     this.#oneInstance = oneInstance(model.header, model.contract);
     this.#weights = new WeightRelease(model, () => void this.#releaseDynamic());
     requireRoom(model, device);
+    // The device may outlive many sessions, and its promise keeps all that waits for it alive.
+    const own = new WeakRef(this);
     void device.lost.then(() => {
-      this.#isLost = true;
-      this.#end.abort();
+      const session = own.deref();
+      if (!session) return;
+      session.#isLost = true;
+      session.#end.abort();
     });
   }
 
