@@ -7,7 +7,7 @@ const STYLE = 'width: 100%; height: auto; aspect-ratio: 4 / 3';
 export const scriptOf = (cdn) => `<script type="module" src="${escape(cdn)}gaussian-splat.min.js"></script>`;
 
 /**
- * The same scene in a frame, for sites that take no script.
+ * The same scene in a frame, for sites that take no script. Some remove the style: width and height are then the size.
  * @param cdn {string} address of the folder, with a slash at the end
  * @param attributes {readonly (readonly [name: string, value: string | true])[]}
  */
@@ -17,7 +17,7 @@ export function frameOf(cdn, attributes) {
   const address = `${cdn}embed.html?${query}`;
   const isImmersive = attributes.some(([name, value]) => ['vr', 'ar'].includes(name) || value === 'walk');
   const allow = isImmersive ? 'fullscreen; xr-spatial-tracking; gamepad' : 'fullscreen';
-  return `<iframe src="${escape(address)}" title="${escape(title)}" style="width: 100%; aspect-ratio: 4 / 3; border: 0" allow="${allow}"></iframe>`;
+  return `<iframe src="${escape(address)}" title="${escape(title)}" width="800" height="600" style="${STYLE}; border: 0" allow="${allow}"></iframe>`;
 }
 
 /** Attributes of a cropped scene's own tag: the box belongs to it, and not to the element. */

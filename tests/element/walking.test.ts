@@ -63,3 +63,14 @@ test('the left stick walks and the right one turns; sticks at rest, triggers and
   // Axis 2 of many pads without the standard mapping is a trigger at rest.
   assert.equal(sticksOf([{ axes: [0, 0, -1, 0, 0, -1], mapping: '' }]).frame(), false);
 });
+
+test('a page whose permissions policy forbids gamepads walks without them', () => {
+  const getGamepads = (): never => {
+    throw new DOMException('disallowed by permissions policy', 'SecurityError');
+  };
+  const gamepads = new Gamepads(Object.assign(new EventTarget(), { navigator: { getGamepads } }) as never, () =>
+    assert.fail('deflected'),
+  );
+  gamepads.listen(new AbortController().signal);
+  assert.deepEqual(gamepads.deflection, [0, 0, 0]);
+});

@@ -3,7 +3,7 @@
  * that set their properties. Without this module, a `<gaussian-splat>` registers the other elements when it has such a
  * child.
  */
-import './index.js';
+import { GaussianSplatElement } from './index.js';
 import { define } from './composition/compose.js';
 import { defineCuts } from './effects/define.js';
 import type { SplatCutElement } from './effects/splat-cut.js';
@@ -29,5 +29,10 @@ export type SettableCutProperties = Partial<
 /** The properties of `<splat-mesh>` that a page may set. */
 export type SettableMeshProperties = SettableOf<typeof MESH_ATTRIBUTES>;
 
-define();
-defineCuts();
+// If another copy of this package has registered the parent element, only children of that copy work with it. It
+// registers them when it finds the first one.
+const parent = globalThis.customElements?.get('gaussian-splat');
+if (parent === GaussianSplatElement || parent?.prototype instanceof GaussianSplatElement) {
+  define();
+  defineCuts();
+}

@@ -79,6 +79,18 @@ describe('the CDN build', () => {
     assertEqual(parts().length - first, 7, 'parts for a sequence, one of them for all that moves');
   });
 
+  it('shows the children of its elements on a page that also has another copy of the package', async () => {
+    const origin = await (await fetch('/net/other-origin')).text();
+    await import(`${origin}/cdn/gaussian-splat.min.js`);
+    const { GaussianSplatElement: Other } = await import('@gaussian-splat/element');
+    await import('@gaussian-splat/element/scenes.js');
+    assert(customElements.get('gaussian-splat') !== Other, 'the element is that of the other copy');
+    const element = show({ alt: 'Two copies' });
+    element.innerHTML = `<splat-scene src="${COMPASS}"></splat-scene>`;
+    await until(() => element.querySelector('splat-scene')!.loaded === true, 'the child');
+    assert((await screenOf(element)).middleOf(isRed), 'the child is seen');
+  });
+
   it('on a page that refuses workers and inline styles reads on the main thread, with one warning', async () => {
     const frame = document.createElement('iframe');
     const answer = nextEvent<MessageEvent<Record<string, unknown>>>(window, 'message');

@@ -114,4 +114,29 @@ describe('embed.html', () => {
       'the frame stays blank',
     );
   });
+
+  it('keeps its size where WordPress filters the code of the playground as that of another site', async () => {
+    const module = '/demo/playground/html.js';
+    const { frameOf } = (await import(module)) as { frameOf(cdn: string, attributes: readonly string[][]): string };
+    const code = frameOf('/packages/element/cdn/', [
+      ['src', COMPASS],
+      ['alt', 'A compass'],
+    ]);
+    const page = document.createElement('template');
+    page.innerHTML = code;
+    const frame = page.content.querySelector('iframe')!;
+    // As wp_filter_oembed_result() does.
+    const kept = 'src width height frameborder marginwidth marginheight scrolling title'.split(' ');
+    for (const { name } of [...frame.attributes]) if (!kept.includes(name)) frame.removeAttribute(name);
+    frame.setAttribute('sandbox', 'allow-scripts');
+    frame.setAttribute('security', 'restricted');
+    document.body.append(frame);
+    assertEqual([frame.clientWidth, frame.clientHeight, frame.title], [800, 600, 'A compass']);
+    const whole = document.createElement('div');
+    whole.style.width = '300px';
+    whole.innerHTML = code;
+    document.body.append(whole);
+    const { clientWidth, clientHeight } = whole.querySelector('iframe')!;
+    assertEqual([clientWidth, clientHeight], [300, 225], 'with its style');
+  });
 });

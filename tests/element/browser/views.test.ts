@@ -144,6 +144,16 @@ describe('a list of views', () => {
     await until(() => spoken(element) === 'Front (1/3)', 'the words');
     assertEqual(partOf(element, 'view-name')?.textContent, 'Front', 'name');
     assertEqual(await violationsIn(element), [], 'axe');
+    const leftOf = (name: string): number => partOf(element, name)!.getBoundingClientRect().left;
+    const sign = partOf(element, 'next-view')!.querySelector('svg')!;
+    assert(
+      leftOf('previous-view') < leftOf('next-view') && getComputedStyle(sign).transform === 'none',
+      'to the right',
+    );
+    element.dir = 'rtl';
+    assert(leftOf('next-view') < leftOf('previous-view'), 'the next view is at the left');
+    assert(getComputedStyle(sign).transform.startsWith('matrix(-1'), 'its sign points to the left');
+    element.dir = '';
     element.focus();
     await sendKeys({ press: 'n' });
     await until(() => spoken(element) === 'Right (2/3)', 'N');

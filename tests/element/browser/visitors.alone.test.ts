@@ -155,6 +155,21 @@ describe('nobody loses the scene', () => {
     await until(() => partOf(element, 'reset-button') === null, 'the button to go');
     assertEqual(element.shadowRoot?.activeElement?.id, 'view', 'focus');
   });
+
+  for (const dir of ['ltr', 'rtl'])
+    it(`that button, the ruler's and the pause button do not overlap: ${dir}`, async () => {
+      const element = await scene({ dir, measure: '', 'auto-rotate': '', 'touch-action': 'none' });
+      const names = ['reset-button', 'measure-button', 'pause-button'];
+      await swipe([[[100, 80], [60, 80]]]); // prettier-ignore
+      await until(() => names.every((name) => partOf(element, name) !== null), 'the buttons');
+      const boxes = names.map((name) => partOf(element, name)!.getBoundingClientRect());
+      boxes.forEach((a, i) =>
+        boxes.slice(i + 1).forEach((b, k) => {
+          const isApart = a.right <= b.left || b.right <= a.left || a.bottom <= b.top || b.bottom <= a.top;
+          assert(isApart, `${names[i]} and ${names[i + 1 + k]}`);
+        }),
+      );
+    });
 });
 
 describe('a camera attribute counts whenever it is set', () => {
@@ -203,6 +218,35 @@ describe('the wheel', () => {
     await turnWheel(100, 80, -60);
     await until(() => radius(element) < zoomed, 'the zoom after a click');
     assertEqual(scrollY, 0, 'scroll');
+  });
+
+  it('scrolls a component whose shadow tree scrolls what is in its slot', async () => {
+    const component = document.createElement('div');
+    component.attachShadow({ mode: 'open' }).innerHTML =
+      '<div style="height: 200px; overflow-y: auto"><slot></slot><p style="height: 2000px"></p></div>';
+    document.body.append(component);
+    const element = await scene();
+    component.append(element);
+    await element.ready;
+    const before = radius(element);
+    await turnWheel(100, 80, 60);
+    await until(() => component.shadowRoot!.firstElementChild!.scrollTop > 0, 'the component to scroll');
+    assertEqual(radius(element), before, 'radius');
+    component.remove();
+  });
+
+  it('is left to the page if it moves to the side, as over a carousel', async () => {
+    const element = await scene({ zoom: 'always' });
+    const before = radius(element);
+    const wheel = (deltaX: number, deltaY: number): boolean => {
+      const event = new WheelEvent('wheel', { deltaX, deltaY, bubbles: true, cancelable: true, composed: true });
+      surfaceOf(element).dispatchEvent(event);
+      return event.defaultPrevented;
+    };
+    assertEqual(wheel(40, 3), false, 'canceled');
+    assertEqual(radius(element), before, 'radius');
+    assertEqual(wheel(3, 40), true, 'canceled, of one up or down');
+    await until(() => radius(element) > before, 'the zoom');
   });
 
   it('zooms at once where nothing scrolls, and always with zoom="always"', async () => {

@@ -2,6 +2,7 @@
 import '@gaussian-splat/element/scenes.js';
 import type { GaussianSplatElement } from '@gaussian-splat/element';
 import type { SplatSceneElement } from '@gaussian-splat/element/scenes.js';
+import { emulateMedia } from '@web/test-runner-commands';
 import {
   assert,
   assertEqual,
@@ -117,6 +118,28 @@ describe('navigation="walk"', () => {
     assert(Math.hypot(eyeOf(element)[0] - before[0], eyeOf(element)[2] - before[2]) > 0.3, 'it has walked');
   });
 
+  it('jumps to a click for visitors who prefer reduced motion', async () => {
+    await emulateMedia({ reducedMotion: 'reduce' });
+    try {
+      const element = await walkIn(room(5));
+      await atRest(element);
+      const { left, top, width, height } = element.getBoundingClientRect();
+      const at = { clientX: left + width / 2, clientY: top + 0.95 * height };
+      const target = await element.positionFromPoint(at.clientX, at.clientY);
+      assert(target, 'a point of the floor');
+      const distance = (): number => Math.hypot(eyeOf(element)[0] - target.x, eyeOf(element)[2] - target.z);
+      assert(distance() > 0.3, `${distance()} m away`);
+      const seen: number[] = [];
+      element.addEventListener('camera-change', () => seen.push(distance()));
+      viewOf(element).dispatchEvent(new MouseEvent('click', { ...at, bubbles: true }));
+      await until(() => distance() < 0.15, 'the place of the click');
+      await frames(3);
+      assert(seen.length > 0 && seen.every((left) => left < 0.15), `places on the way: ${seen.join()}`);
+    } finally {
+      await emulateMedia({ reducedMotion: 'no-preference' });
+    }
+  });
+
   it('walks to a click beside a child that takes clicks, and not to one on it', async () => {
     const element = show(
       { src: room(5), 'camera-controls': '', 'interpolation-decay': '0', 'interaction-prompt': 'none' },
@@ -168,6 +191,22 @@ describe('navigation="walk"', () => {
     near(y, 1.6, 0.03, 'height of the eyes');
     near(z, -1, 0.05, 'beside the view');
     assert(x > -1 && x < -0.5, `a step ahead of the view: ${x}`);
+  });
+
+  it('has a joystick on touch screens, beside which the ruler has its button', async () => {
+    const { matchMedia } = window;
+    window.matchMedia = (query) =>
+      query === '(pointer: coarse)' ? ({ matches: true } as MediaQueryList) : matchMedia.call(window, query);
+    try {
+      const element = await walkIn(room(5), { measure: '' });
+      const part = (name: string): HTMLElement | null => element.shadowRoot!.querySelector(`[part=${name}]`);
+      await until(() => (part('joystick')?.clientWidth ?? 0) > 0 && part('measure-button') !== null, 'both');
+      const [stick, button] = ['joystick', 'measure-button'].map((name) => part(name)!.getBoundingClientRect());
+      assert(stick.bottom <= button.top, `the joystick ends at ${stick.bottom}, the button begins at ${button.top}`);
+      assert(stick.top >= element.getBoundingClientRect().top, 'the joystick is within the scene');
+    } finally {
+      window.matchMedia = matchMedia;
+    }
   });
 
   it('takes the unit of the file: the same room in units of 50 cm', async () => {

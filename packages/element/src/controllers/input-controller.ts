@@ -294,6 +294,8 @@ export class InputController implements ReactiveController {
   #wheelZooms(event: WheelEvent): boolean {
     const { wheel } = this.#of.input;
     if (isWithin(event, labelParts.panel)) return false;
+    // Movements to the side scroll a carousel. Touchpads also report a small vertical part of them.
+    if (!event.ctrlKey && Math.abs(event.deltaX) > Math.abs(event.deltaY)) return false;
     if (event.ctrlKey || event.metaKey || wheel === 'always') return true;
     if (wheel !== 'auto') return false;
     // A label may contain a scrollable box, which the wheel then scrolls.

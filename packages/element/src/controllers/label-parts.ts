@@ -27,13 +27,14 @@ export function isWithin(event: Event, selector: string): boolean {
 
 /**
  * Returns whether the wheel can scroll something: a box between `node` and its ancestor `end`, exclusive. If `end` is
- * null, the page itself and a page around an `<iframe>` count, too.
+ * null, the page itself and a page around an `<iframe>` count, too. Boxes in the shadow trees of components count if they
+ * contain the node through a slot.
  */
 export function scrollsAround(node: Element | null, end: Element | null = null): boolean {
   if (node === end) return end === null && self !== top;
-  const { scrollHeight, clientHeight, ownerDocument, parentElement } = node!;
+  const { scrollHeight, clientHeight, ownerDocument, parentElement, assignedSlot } = node!;
   const isBox = node === ownerDocument.scrollingElement || /auto|scroll/.test(getComputedStyle(node!).overflowY);
-  return (scrollHeight > clientHeight && isBox) || scrollsAround(parentElement ?? hostOf(node!), end);
+  return (scrollHeight > clientHeight && isBox) || scrollsAround(assignedSlot ?? parentElement ?? hostOf(node!), end);
 }
 
 const hostOf = (node: Element): Element | null => (node.getRootNode() as Partial<ShadowRoot>).host ?? null;

@@ -84,6 +84,9 @@ const STYLES = css`
     line-height: 0;
     cursor: pointer;
   }
+  [part='views'] > button:dir(rtl) svg {
+    transform: scaleX(-1);
+  }
   [part='views'] ::slotted(*) {
     pointer-events: auto;
   }

@@ -19,14 +19,23 @@ export class Gamepads {
   listen(signal: AbortSignal): void {
     this.#signal = signal;
     this.#view?.addEventListener('gamepadconnected', this.#start, { signal });
-    if (this.#view?.navigator.getGamepads?.().some(Boolean)) this.#start();
+    if (this.#pads.some(Boolean)) this.#start();
+  }
+
+  /** The gamepads of the browser; none if the page's permissions policy forbids them. */
+  get #pads(): readonly (Gamepad | null)[] {
+    try {
+      return this.#view?.navigator.getGamepads?.() ?? [];
+    } catch {
+      return [];
+    }
   }
 
   /** Sum of the deflections of all gamepads. Each is -1..1. */
   get deflection(): readonly [right: number, forward: number, turn: number] {
     const beyond = (value = 0): number => (Math.abs(value) > DEAD_ZONE ? value : 0);
     let [right, forward, turn] = [0, 0, 0];
-    for (const pad of this.#frame === 0 ? [] : this.#view!.navigator.getGamepads()) {
+    for (const pad of this.#frame === 0 ? [] : this.#pads) {
       if (pad === null) continue;
       right += beyond(pad.axes[0]);
       forward -= beyond(pad.axes[1]);
@@ -41,7 +50,7 @@ export class Gamepads {
   };
 
   readonly #poll = (): void => {
-    const goesOn = !this.#signal?.aborted && this.#view!.navigator.getGamepads().some(Boolean);
+    const goesOn = !this.#signal?.aborted && this.#pads.some(Boolean);
     this.#frame = goesOn ? this.#view!.requestAnimationFrame(this.#poll) : 0;
     if (this.deflection.some((value) => value !== 0)) this.#onDeflected();
   };

@@ -1,4 +1,7 @@
-/** Joystick for the left thumb, shown on touch screens in the lower left corner of the scene. Its values are -1..1. */
+/**
+ * Joystick for the left thumb, shown on touch screens in the lower left corner of the scene, above the row of buttons.
+ * Its values are -1..1.
+ */
 export class Joystick {
   readonly element: HTMLElement;
   readonly #knob: HTMLElement;
@@ -16,7 +19,7 @@ export class Joystick {
     // Screen readers ignore the joystick, because their users have the arrow keys.
     this.element.setAttribute('aria-hidden', 'true');
     Object.assign(this.element.style, {
-      ...{ position: 'absolute', left: '16px', bottom: '16px', width: '96px', height: '96px', borderRadius: '50%' },
+      ...{ position: 'absolute', left: '16px', bottom: '60px', width: '96px', height: '96px', borderRadius: '50%' },
       ...{ background: 'rgb(0 0 0 / 25%)', border: '2px solid rgb(255 255 255 / 60%)', boxSizing: 'border-box' },
       ...{ touchAction: 'none', display: 'none', zIndex: '1' },
     });

@@ -14,6 +14,7 @@ const STYLES = css`
     position: absolute;
     inset-block-end: 8px;
     inset-inline-start: 8px;
+    max-inline-size: calc(100% - 60px);
     display: flex;
     flex-wrap: wrap;
     gap: 8px;
@@ -21,6 +22,11 @@ const STYLES = css`
   }
   .extras:empty {
     display: none;
+  }
+  /* Otherwise the reset button has the corner of these buttons. Here it is above the pause button. */
+  .extras:not(:empty) ~ [part='reset-button'] {
+    inset-block-end: 52px;
+    inset-inline: auto 8px;
   }
   .extras button {
     font: inherit;
