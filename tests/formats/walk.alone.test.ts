@@ -20,6 +20,7 @@ import {
   type VoxelFiles,
   type WalkMap,
 } from '@gaussian-splat/formats/walk';
+import { needsSharedData, sharedFile } from '../support/data.js';
 import { isLab } from '../support/extent.js';
 
 /** Splats on surfaces of boxes, y down as trainers write them, meters; walkable space is known exactly. */
@@ -273,6 +274,45 @@ test(
     assert.ok(user + system < 6e6, `${(user + system) / 1e6} s of CPU`);
   },
 );
+
+test(
+  'a captured ground of 6 by 6 m: no step leaves it, over its edge or into the air',
+  { skip: needsSharedData },
+  async () => {
+    const cloud = await readScene(sharedFile('formats/playbot3.ply'), { name: 'playbot3.ply' });
+    const east = Float32Array.from({ length: cloud.count }, (_, i) => cloud.positions[3 * i]).sort();
+    const metersPerUnit = 6 / (east[Math.floor(0.99 * cloud.count)] - east[Math.floor(0.01 * cloud.count)]);
+    const map = makeWalkMap(cloud, { frame: FRAME, metersPerUnit });
+    console.log(`${map.area.toFixed(1)} m²`);
+    assert.ok(map.area > 25 && map.area < 45, `${map.area} m²`);
+    // Heights of opaque splats, by columns of 20 cm.
+    const side = 0.2;
+    const columns = new Map<string, number[]>();
+    const column = (x: number, z: number): string => `${Math.floor(x / side)} ${Math.floor(z / side)}`;
+    for (let i = 0; i < cloud.count; i++) {
+      if (cloud.opacities[i] < 0.3) continue;
+      const [x, y, z] = [0, 1, 2].map((k) => (k === 0 ? 1 : -1) * metersPerUnit * (cloud.positions[3 * i + k] + cloud.origin[k])); // prettier-ignore
+      const key = column(x, z);
+      columns.set(key, [...(columns.get(key) ?? []), y]);
+    }
+    const isOff = ([x, y, z]: readonly [number, number, number]): boolean =>
+      ![-1, 0, 1].some((a) =>
+        [-1, 0, 1].some((b) =>
+          columns.get(column(x + a * side, z + b * side))?.some((height) => Math.abs(height - y) < 0.3),
+        ),
+      );
+    assert.equal(wander(map, isOff).out, 0);
+  },
+);
+
+test('statues and a skull in haze have no floor to walk on', { skip: needsSharedData }, async () => {
+  for (const name of ['scenes/st-peter.sog', 'scenes/angel.sog', 'scenes/skull.ply']) {
+    const cloud = await readScene(sharedFile(name), { name });
+    const { area } = makeWalkMap(cloud, { frame: FRAME });
+    console.log(`${name}: ${area.toFixed(1)} m²`);
+    assert.ok(area < 4, `${name}: ${area} m²`);
+  }
+});
 
 test(
   'gaussian-splat floor writes the map, and names what it misses',
