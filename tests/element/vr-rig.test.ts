@@ -156,6 +156,65 @@ test('steps of their own count: the floor ends where the head is, not where it w
   assert.ok(at[2] > -2, `beyond the floor, at ${at}`);
 });
 
+/** Matrix of a controller at a place of the session's space, column-major. */
+const at = (...place: number[]): number[] => [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, ...place, 1];
+
+test('both grips move, turn and scale the scene, whose points stay under the hands', () => {
+  for (const stepsOnly of [false, true]) {
+    const { rig, frame, place } = rigAt(0.3, stepsOnly, undefined, false);
+    /** Converts a point of the session's space to the scene. */
+    const sceneOf = (m: Float64Array, [x, y, z]: number[]): number[] => {
+      const p = [x - m[3], y - m[7], z - m[11]];
+      const square = m[0] ** 2 + m[4] ** 2 + m[8] ** 2;
+      return [0, 1, 2].map((k) => (m[k] * p[0] + m[4 + k] * p[1] + m[8 + k] * p[2]) / square);
+    };
+    const hold = (left: number[], right: number[], pressed = [1]): Float64Array => {
+      const input = (handedness: string, ray: number[]) => ({
+        ...{ handedness, targetRaySpace: at(...ray) },
+        gamepad: { axes: [0, 0, 0, 0], buttons: [0, 1, 2, 3, 4, 5].map((i) => ({ pressed: pressed.includes(i) })) },
+      });
+      return rig.place(
+        {
+          session: { inputSources: [input('left', left), input('right', right)] },
+          getPose: (ray: number[]) => ({ transform: { matrix: Float32Array.from(ray) } }),
+        } as never,
+        { transform: { position: place, matrix: Float32Array.from(at(place.x, place.y, place.z)) } } as never,
+        {} as never,
+        0.1,
+      );
+    };
+    const head = frame();
+    const [left, right] = [
+      [-0.25, 1.25, -0.5],
+      [0.25, 1.25, -0.5],
+    ];
+    const before = hold(left, right);
+    const expected = [left, right].map((hand) => sceneOf(before, hand));
+    const ends = [
+      [0.5, 1.5, -0.5],
+      [0.5, 1.5, -1.5],
+    ];
+    const after = hold(ends[0], ends[1]);
+    if (stepsOnly) {
+      near(frame(), head);
+      continue;
+    }
+    assert.ok(Math.abs(Math.hypot(after[0], after[4], after[8]) - 2) < 1e-6, 'twice as large');
+    ends.forEach((hand, i) => near(sceneOf(after, hand), expected[i], 1e-5));
+    near([after[1], after[5] / 2, after[9]], [0, 1, 0]);
+    // One grip alone moves nothing, and the stick walks as fast as before.
+    const first = sceneOf(hold(ends[0], left, []), [place.x, place.y, place.z]);
+    const walking = rig.place(
+      { session: { inputSources: [{ handedness: 'left', gamepad: { axes: [0, 0, 0, -1], buttons: [] } }] } } as never,
+      { transform: { position: place, matrix: Float32Array.from(at(place.x, place.y, place.z)) } } as never,
+      {} as never,
+      0.1,
+    );
+    const then = sceneOf(walking, [place.x, place.y, place.z]);
+    assert.ok(Math.abs(2 * Math.hypot(...then.map((value, k) => value - first[k])) - 0.14) < 1e-6, 'speed');
+  }
+});
+
 test('the button that leaves is held for a second', () => {
   let left = 0;
   const { frame } = rigAt(0, false, () => left++);

@@ -33,6 +33,24 @@ for (const [rate, milliseconds] of [
   });
 }
 
+test('a scene that is too slow at the lowest resolution lowers the rate of the headset, not below 72 Hz', () => {
+  const rates: number[] = [];
+  const session = {
+    ...{ frameRate: 120, supportedFrameRates: new Float32Array([60, 72, 90, 120]) },
+    ...{ updateRenderState: () => undefined, requestAnimationFrame: () => 0 },
+    updateTargetFrameRate(rate: number): Promise<void> {
+      rates.push((this.frameRate = rate));
+      return Promise.resolve();
+    },
+  };
+  const guide = { background: [0, 0, 0, 1] as const, place: () => null };
+  const loop = new XrLoop(session as never, {} as never, {} as never, guide);
+  while (loop.scale > 0.5) loop.adapt(30);
+  assert.deepEqual(rates, []);
+  for (let k = 0; k < 4; k++) loop.adapt(30);
+  assert.deepEqual(rates, [90, 72]);
+});
+
 test('one sort that was interrupted does not end orders by depth, and slow sorts do', (t) => {
   // A sort takes the time from one reading of the clock to the next.
   let [now, sortMs] = [0, 3];
@@ -43,14 +61,14 @@ test('one sort that was interrupted does not end orders by depth, and slow sorts
     origin: [0, 0, 0],
     renderer: { setOrder: () => orders++ },
   };
-  const order = new ViewOrder(scene as never, false, () => assert.fail('a worker'));
+  const order = new ViewOrder(scene as never, () => assert.fail('a worker'));
   let depth = 0;
   const update = (milliseconds: number): boolean => {
     sortMs = milliseconds;
     const before = orders;
     const worldToCamera = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, (depth += 0.1), 0, 0, 0, 1];
     const camera = { ...{ worldToCamera, width: 8, height: 8, fx: 8, fy: 8, cx: 4, cy: 4, near: 0.1, far: 9 } };
-    order.update([camera as never]);
+    order.update([camera as never], false);
     return orders > before;
   };
   for (const milliseconds of [3, 3, 80, 3, 3]) assert.equal(update(milliseconds), true, `${milliseconds} ms`);

@@ -23,6 +23,7 @@ import { isGone } from './gpu/device-failures.js';
 import { FrameScheduler } from './gpu/frame-scheduler.js';
 import type { LoadedGaussians } from './gpu/loaded-gaussians.js';
 import { defaultMemoryBudget } from './gpu/memory-budget.js';
+import { wantHeadset } from './gpu/request-device.js';
 import type { LodSettings, Drawable, ReadCounts } from './gpu/backend.js';
 import type { SceneRequest } from './loading/protocol.js';
 import type { Frame } from './dynamic/frame-filter.js';
@@ -536,6 +537,7 @@ export class ElementCore
     if (this.attributes.navigation === 'walk') this.walk.want(this.#warnOf);
     const { vr, ar, measure, shadowIntensity, skyboxImage, revealEffect } = this.attributes;
     if (revealEffect || this.source.splatShader) this.effects.want(this.#warnOf);
+    if (vr) wantHeadset();
     if (vr || ar || measure || shadowIntensity || skyboxImage) this.extras.want(this.#warnOf);
     if (this.input.enabled) this.#hands.want(this.#warnOf);
     this.reveal.settle();

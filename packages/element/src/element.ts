@@ -26,6 +26,12 @@ const CAMERA_SETTINGS: ReadonlyMap<unknown, keyof CameraSettings> = new Map([
   ['fieldOfView', 'fieldOfView'],
 ]);
 
+/** Returns the language of a node: of its nearest ancestor with `lang`, which may be outside of its shadow tree. */
+function languageAt(node: HTMLElement): string {
+  const { host } = node.getRootNode() as Partial<ShadowRoot>;
+  return node.closest<HTMLElement>('[lang]')?.lang ?? (host ? languageAt(host as HTMLElement) : '');
+}
+
 /** Names of the custom states, for `gaussian-splat:state(ready)` in CSS. */
 const STATES = ['loading', 'preview', 'ready', 'playing', 'error', 'unsupported'] as const;
 
@@ -48,6 +54,7 @@ const STATES = ['loading', 'preview', 'ready', 'playing', 'error', 'unsupported'
  * @slot ar-button - Replaces the button that starts AR.
  * @slot exit-ar-button - Replaces the button that ends AR on a phone.
  * @slot ar-prompt - Shown over the image of the camera until the scene is placed in AR.
+ * @slot ar-fallback - Shown where the browser has no AR, such as a link for another device.
  * @slot hotspot-* - A label of the page at the scene point in its `data-position`.
  * @csspart canvas - The frame.
  * @csspart poster - The image of the `poster` attribute.
@@ -297,7 +304,7 @@ export class GaussianSplatElement extends ViewingMethods {
     this.applyAttributes();
     if (isServer) return;
     this.#readDynamicValues();
-    const { lang = '' } = (this.closest('[lang]') ?? this) as HTMLElement;
+    const lang = languageAt(this);
     if (lang !== this.#lang) this.#speak((this.#lang = lang)).catch((error: Error) => this.#warn(error.message));
     if (changed.has('a11y')) this.#readStrings();
     if (changed.has('time')) this.#seekToAttribute();

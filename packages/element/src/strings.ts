@@ -28,7 +28,8 @@ export type HandWord = 'keys-orbit' | 'keys-fly' | 'interaction-prompt' | 'reset
 export type MotionWord = 'pause' | 'play';
 
 /** Texts for VR, AR and measuring; loaded with their code. */
-export type ExtraWord = 'vr' | 'ar' | 'exit-ar' | 'ar-simplified' | 'measure' | 'measure-keys' | 'measure-none';
+export type ExtraWord =
+  'vr' | 'ar' | 'exit-ar' | 'ar-simplified' | 'measure' | 'measure-keys' | 'measure-first' | 'measure-none';
 
 /**
  * All texts of the element in one language. The key `error-…` has the sentence for visitors for an

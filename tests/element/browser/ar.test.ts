@@ -261,6 +261,14 @@ describe('AR', () => {
       const other = await showLoaded({ src: COMPASS, ar: '', ...STILL });
       await frames(4);
       assertEqual(other.shadowRoot!.querySelector('a[rel=ar], [part=ar-button]'), null, 'without a model');
+      other.innerHTML = '<a slot="ar-fallback" href="#phone">Open on a phone</a>';
+      other.requestUpdate();
+      await until(() => other.firstElementChild!.assignedSlot?.name === 'ar-fallback', 'the fallback', LIMIT_MS);
+      assert((other.firstElementChild as HTMLElement).offsetHeight > 0, 'the fallback is visible');
+      element.innerHTML = other.innerHTML;
+      element.requestUpdate();
+      await frames(4);
+      assertEqual(element.firstElementChild!.assignedSlot, null, 'the fallback beside the link');
     } finally {
       Object.defineProperty(navigator, 'userAgent', userAgent);
       Reflect.deleteProperty(navigator, 'userAgent');

@@ -25,6 +25,19 @@ describe('the words of the element', () => {
     await until(() => roleOf(element) === '3D scene viewer', 'English words for a language that it has not');
   });
 
+  it('are those of the page in a component, too', async () => {
+    document.documentElement.setAttribute('lang', 'fr');
+    const component = document.createElement('div');
+    document.body.append(component);
+    const element = await showLoaded({ 'camera-controls': '' });
+    component.attachShadow({ mode: 'open' }).append(element);
+    element.requestUpdate();
+    await until(() => roleOf(element) === 'Visionneuse de scène 3D', 'French words');
+    component.lang = 'de';
+    element.requestUpdate();
+    await until(() => roleOf(element) === '3D-Ansicht', 'German words');
+  });
+
   it('give way to those of the page', async () => {
     const element = await showLoaded({ 'camera-controls': '', lang: 'es', a11y: '{"role": "Mi visor"}' });
     await until(() => keysOf(element)?.textContent.startsWith('Las flechas') === true, 'Spanish keys');

@@ -1,6 +1,7 @@
 /** The ruler: by mouse and by keyboard alone, its length, its texts, and the announcements of a screen reader. */
 import '@gaussian-splat/element';
 import type { GaussianSplatElement } from '@gaussian-splat/element';
+import { sendKeys } from '@web/test-runner-commands';
 import { assert, assertEqual, atRest, delay, nextEvent, showLoaded, until } from './support/harness.js';
 
 const STILL = { 'interpolation-decay': '0', 'interaction-prompt': 'none', 'camera-controls': '' };
@@ -92,6 +93,7 @@ describe('measure', () => {
       view.dispatchEvent(new KeyboardEvent('keydown', { key, code: key, bubbles: true }));
     press('Enter');
     await until(() => element.shadowRoot!.querySelectorAll('.ruler circle').length === 2, 'the first end and the mark');
+    await until(() => spoken(element) === 'First end set', `the announcement, not ${spoken(element)}`);
     for (let i = 0; i < 3; i++) press('ArrowRight');
     element.setAttribute('camera-target', '1m 0m 0m');
     await atRest(element);
@@ -115,5 +117,38 @@ describe('measure', () => {
     await element.updateComplete;
     assertEqual(element.shadowRoot!.querySelector('.ruler'), null, 'the ruler');
     assertEqual(element.shadowRoot!.activeElement, button(element), 'focus');
+  });
+
+  it('is put away by Escape without closing the dialog around the scene', async () => {
+    const element = await ruler({});
+    const dialog = document.createElement('dialog');
+    document.body.append(dialog);
+    dialog.append(element);
+    dialog.showModal();
+    await until(() => button(element) !== null, 'the button');
+    button(element)!.focus();
+    await sendKeys({ press: 'Enter' });
+    const isOut = (): boolean => element.shadowRoot!.querySelector('.ruler') !== null;
+    await until(isOut, 'the ruler');
+    await sendKeys({ press: 'Escape' });
+    await until(() => !isOut(), 'the end of the ruler');
+    assert(dialog.open, 'the dialog is closed');
+    await sendKeys({ press: 'Escape' });
+    await until(() => !dialog.open, 'the end of the dialog');
+  });
+
+  it('announces that there is no surface, each time', async () => {
+    const element = await ruler({ 'camera-orbit': '0deg 90deg 7m', 'camera-target': '0m 30m 0m' });
+    button(element)!.click();
+    const view = element.shadowRoot!.querySelector<HTMLElement>('#view')!;
+    const texts = new Set<string>();
+    const region = element.shadowRoot!.querySelector('[role=status]')!;
+    for (const count of [1, 2]) {
+      view.dispatchEvent(new KeyboardEvent('keydown', { key: 'Enter', code: 'Enter', bubbles: true }));
+      await until(() => {
+        if (region.textContent.startsWith('No surface here')) texts.add(region.textContent);
+        return texts.size === count;
+      }, `announcement ${count}`);
+    }
   });
 });

@@ -1,5 +1,6 @@
 /** VR by WebGPU: a fake binding over the emulated headset, and the copy of a WebGPU canvas, each eye against the oracle; and the result if the binding is not granted. */
 import '@gaussian-splat/element';
+import { executeServerCommand } from '@web/test-runner-commands';
 import type { GaussianCloud } from '@gaussian-splat/core';
 import type { GaussianSplatElement } from '@gaussian-splat/element';
 import { fetchScene, readScene } from '@gaussian-splat/formats';
@@ -85,6 +86,18 @@ describe('VR by WebGPU', () => {
     headset().layer = undefined;
   });
 
+  // The first test of the page, whose device is requested once.
+  it('asks for an adapter that is compatible with headsets, also for an element in a shadow tree', async () => {
+    headset();
+    binding = fakeBinding('array', 1);
+    const component = document.createElement('div');
+    component.attachShadow({ mode: 'open' }).innerHTML = `<gaussian-splat vr src="${COMPASS}"></gaussian-splat>`;
+    document.body.append(component);
+    const inner = component.shadowRoot!.querySelector('gaussian-splat')!;
+    await inner.ready;
+    assert(inner.loaded && binding.isCompatible, 'compatible');
+  });
+
   const layouts: readonly [Layout, number][] = [
     ['array', 1],
     ['side-by-side', 0.7],
@@ -104,6 +117,21 @@ describe('VR by WebGPU', () => {
         assert(decibels >= MIN_DB, `${eye} eye: ${decibels.toFixed(1)} dB`);
       }
       assertEqual(await sortsIn(binding, 5), 1, 'sorts a frame');
+      const before = await binding.pixels('left');
+      for (const [name, value] of [
+        ['filter', 'antialiased'],
+        ['quality', 'fast'],
+      ]) {
+        element.setAttribute(name, value);
+        const next = binding.frames + 3;
+        await until(() => binding!.frames >= next, `frames with another ${name}`, LIMIT_MS);
+        const after = await binding.pixels('left');
+        assert(
+          after.some((byte, i) => byte !== before[i]),
+          `${name} has no effect`,
+        );
+        before.set(after);
+      }
       assertEqual(headset().layer, undefined, 'a WebGL layer');
       assertEqual(binding.errors, [], 'errors of the GPU');
       assert(binding.isCompatible, 'the adapter was not asked for as compatible with headsets');
@@ -189,6 +217,34 @@ describe('VR by WebGPU', () => {
     (headset().layer!.context.getExtension('WEBGL_lose_context') as WEBGL_lose_context).loseContext();
     await until(hasStatus(element, 'failed'), 'status after a loss', LIMIT_MS);
     headset().layer = undefined;
+  });
+
+  itInLab('sessions that copy a canvas leave none of it in memory', async () => {
+    headset();
+    binding = fakeBinding('array', 1, 'not granted');
+    element = await showVr(`<splat-scene src="${COMPASS}" position="0.5 0 0"></splat-scene>`);
+    const canvases: WeakRef<object>[] = [];
+    const { OffscreenCanvas } = globalThis;
+    globalThis.OffscreenCanvas = class extends OffscreenCanvas {
+      constructor(width: number, height: number) {
+        super(width, height);
+        canvases.push(new WeakRef(this));
+      }
+    };
+    try {
+      for (let i = 0; i < 4; i++) {
+        buttonOf(element)!.click();
+        await until(() => headset().layer !== undefined && canvases.length > i, 'a WebGL layer', LIMIT_MS);
+        await leave(element);
+        await until(() => buttonOf(element!) !== null, 'the button', LIMIT_MS);
+      }
+    } finally {
+      globalThis.OffscreenCanvas = OffscreenCanvas;
+    }
+    for (let i = 0; i < 3; i++) await executeServerCommand('heap-size');
+    const kept = canvases.filter((canvas) => canvas.deref() !== undefined).length;
+    // The emulator may keep its last session.
+    assert(kept <= 1, `${kept} of ${canvases.length} canvases are in memory`);
   });
 
   it('a binding that fails ends the session, and the next click is drawn with WebGL', async () => {

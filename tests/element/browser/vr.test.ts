@@ -110,7 +110,22 @@ describe('VR', () => {
       console.log(`${eye} eye: ${decibels.toFixed(1)} dB`);
       assert(decibels >= MIN_DB, `${eye} eye: ${decibels.toFixed(1)} dB`);
     }
+    const before = headset().pixels('left');
+    element.setAttribute('filter', 'antialiased');
+    await until(
+      () =>
+        headset()
+          .pixels('left')
+          .some((value, i) => value !== before[i]),
+      'the other filter',
+      LIMIT_MS,
+    );
     await leave(element);
+  });
+
+  it('a copy of an element in a session has a status of its own', async () => {
+    const element = await showVr({ 'vr-status': 'session-started' });
+    assertEqual(element.getAttribute('vr-status'), 'not-presenting', 'status');
   });
 
   it('sorts once a frame, and the page draws nothing meanwhile', async () => {
@@ -166,6 +181,32 @@ describe('VR', () => {
       assertEqual(headset().layer, undefined, 'a layer');
       assertEqual(element.getAttribute('vr-status'), 'not-presenting', 'status');
       element.remove();
+    }
+  });
+
+  it("takes a session from the browser's own button, which is offered anew after each", async () => {
+    headset();
+    const offers: ((session: unknown) => void)[] = [];
+    const system = xr() as XrLike & { offerSession?: unknown };
+    system.offerSession = (mode: string) => {
+      assertEqual(mode, 'immersive-vr', 'mode');
+      return new Promise((accept) => offers.push(accept));
+    };
+    try {
+      const element = await showVr();
+      assertEqual(offers.length, 1, 'offers');
+      offers[0](await xr().requestSession('immersive-vr', {}));
+      await until(() => element.getAttribute('vr-status') === 'session-started', 'the session', LIMIT_MS);
+      await until(() => isDrawn(), 'a picture in the headset', LIMIT_MS);
+      await leave(element);
+      await until(() => offers.length === 2, 'another offer', LIMIT_MS);
+      element.remove();
+      const late = (await xr().requestSession('immersive-vr', {})) as unknown as EventTarget;
+      const ended = nextEvent(late, 'end', LIMIT_MS);
+      offers[1](late);
+      await ended;
+    } finally {
+      delete system.offerSession;
     }
   });
 

@@ -211,7 +211,7 @@ export class ViewController implements FrameClient {
     if (backend === null || backend.isLost || this.#first !== undefined || canvas === null) return null;
     const own = this.#pixelsOf(backend);
     if (own === null) return null;
-    this.#applyRendering(backend);
+    this.applyRendering(backend);
     const request = this.#frameRequest(backend, size ?? own);
     if (request === null) return null;
     backend.render({ ...request, background, isRead: true }, this.#host.prepareFrame());
@@ -237,7 +237,7 @@ export class ViewController implements FrameClient {
   #render(backend: Backend, request: CanvasFrame, now: number, cameraMoved: boolean): void {
     const first = this.#first;
     this.#first = undefined;
-    this.#applyRendering(backend);
+    this.applyRendering(backend);
     const content = this.#host.prepareFrame();
     const hasChanged = first === undefined && (cameraMoved || content !== this.#drawnContent);
     this.#drawnContent = content;
@@ -274,7 +274,8 @@ export class ViewController implements FrameClient {
     }, PREPARE_AFTER_MS);
   }
 
-  #applyRendering(backend: Backend): void {
+  /** Applies the settings of the page to a backend, for its next frames. */
+  applyRendering(backend: Backend): void {
     const { quality, maxShDegree: shDegree, filter, order: choice } = this.#host.attributes;
     const trainedOrder = this.#host.shown.some(({ order }) => order) ? 'pixel' : 'center';
     const order = choice === 'auto' ? trainedOrder : choice;

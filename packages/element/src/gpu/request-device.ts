@@ -19,6 +19,13 @@ export async function assertWebGpu(): Promise<void> {
   throw await why(({ noWebGpu }) => noWebGpu());
 }
 
+let wantsHeadset = false;
+
+/** Makes later requests prefer adapters that are compatible with headsets. */
+export function wantHeadset(): void {
+  wantsHeadset = true;
+}
+
 /** Features that models use if they are available. Models with float16 need `shader-f16`. */
 const GENERATOR_FEATURES: readonly GPUFeatureName[] = ['shader-f16', 'subgroups' as GPUFeatureName];
 const GENERATOR_LIMITS = [
@@ -54,7 +61,7 @@ export async function requestGpuDevice(): Promise<GPUDevice> {
     navigator.gpu.requestAdapter({ powerPreference: 'high-performance', xrCompatible });
   // Pages with the attribute `vr` need an adapter that is compatible with headsets. If there is none, any adapter is
   // used.
-  const adapter = (await request(!!document.querySelector('[vr]'))) ?? (await request(false));
+  const adapter = (await request(wantsHeadset)) ?? (await request(false));
   if (adapter === null) throw await why(({ noAdapter }) => noAdapter());
   try {
     return await adapter.requestDevice(withGeneratorNeeds(adapter, deviceDescriptor(adapter)));

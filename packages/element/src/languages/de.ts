@@ -53,5 +53,6 @@ export const words: Words = {
   measure: 'Messen',
   'measure-keys':
     'Die Eingabetaste setzt beide Enden des Lineals, die Pfeiltasten drehen die Ansicht. Escape legt das Lineal weg.',
+  'measure-first': 'Erstes Ende gesetzt',
   'measure-none': 'Hier ist keine Oberfläche',
 };

@@ -52,5 +52,6 @@ export const words: Words = {
   measure: 'Medir',
   'measure-keys':
     'Pulse Intro para fijar cada extremo de la regla; las flechas giran la vista. Escape guarda la regla.',
+  'measure-first': 'Primer extremo fijado',
   'measure-none': 'Aquí no hay ninguna superficie',
 };

@@ -52,5 +52,6 @@ export const words: Words = {
   measure: 'Mesurer',
   'measure-keys':
     'Appuyez sur Entrée pour poser chaque extrémité de la règle ; les flèches tournent la vue. Échap range la règle.',
+  'measure-first': 'Première extrémité posée',
   'measure-none': 'Aucune surface ici',
 };

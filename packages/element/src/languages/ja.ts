@@ -51,5 +51,6 @@ export const words: Words = {
   'ar-simplified': '簡略化したモデルをARで見る',
   measure: '測定',
   'measure-keys': 'Enterでものさしの両端を置きます。矢印キーで表示を回転します。Escapeでものさしを片付けます。',
+  'measure-first': '最初の端を置きました',
   'measure-none': 'ここには面がありません',
 };

@@ -51,5 +51,6 @@ export const words: Words = {
   'ar-simplified': '간단한 모델을 AR로 보기',
   measure: '재기',
   'measure-keys': 'Enter를 눌러 자의 양 끝을 정하세요. 화살표 키는 보기를 돌립니다. Escape는 자를 치웁니다.',
+  'measure-first': '첫 번째 끝을 정했습니다',
   'measure-none': '여기에는 표면이 없습니다',
 };

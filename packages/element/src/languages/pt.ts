@@ -51,5 +51,6 @@ export const words: Words = {
   'ar-simplified': 'Ver um modelo simplificado em RA',
   measure: 'Medir',
   'measure-keys': 'Pressione Enter para marcar cada ponta da régua; as setas giram a vista. Escape guarda a régua.',
+  'measure-first': 'Primeira ponta marcada',
   'measure-none': 'Não há superfície aqui',
 };

@@ -49,5 +49,6 @@ export const words: Words = {
   'ar-simplified': '在 AR 中查看简化模型',
   measure: '测量',
   'measure-keys': '按 Enter 键设置标尺的两端；箭头键旋转视图。Escape 键收起标尺。',
+  'measure-first': '已设置第一端',
   'measure-none': '此处没有表面',
 };

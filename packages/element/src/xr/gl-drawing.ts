@@ -1,4 +1,3 @@
-import type { ShDegree, SplatFilter } from '@gaussian-splat/core';
 import { drawn } from '@gaussian-splat/renderer/webgl';
 import type { SplatRow } from '../shadow/splat-file.js';
 import type { XrHost } from './xr-host.js';
@@ -16,13 +15,6 @@ import {
   type XrShown,
 } from './xr-scene.js';
 
-interface Rendering {
-  readonly shDegree: ShDegree;
-  readonly filter: SplatFilter | undefined;
-  readonly byDistance: boolean;
-  readonly spawn: () => Worker;
-}
-
 /** Draws a session with WebGL 2: the page's own splats, or the same file again in a context of the session. */
 export class GlDrawing implements XrDrawing {
   readonly clipDepth = '-1..1';
@@ -33,15 +25,15 @@ export class GlDrawing implements XrDrawing {
   readonly #context: XrContext;
   readonly #layer: XrLayer;
   readonly #source: XrSceneSource;
-  readonly #rendering: Rendering;
+  readonly #core: XrHost;
   readonly #over = new AbortController();
   #scene: XrScene | undefined;
   #order: ViewOrder | undefined;
 
-  constructor(session: XrSession, context: XrContext, source: XrSceneSource, rendering: Rendering) {
+  constructor(session: XrSession, context: XrContext, source: XrSceneSource, core: XrHost) {
     this.#context = context;
     this.#source = source;
-    this.#rendering = rendering;
+    this.#core = core;
     this.gl = context.gl;
     this.isOfPage = !context.isOwn;
     this.#layer = makeLayer(session, context.gl);
@@ -54,12 +46,7 @@ export class GlDrawing implements XrDrawing {
   static async open(session: XrSession, core: XrHost, { shown, request }: XrShown): Promise<GlDrawing> {
     if (request === null) throw unsupported('a scene that has loaded', 'none');
     const { sceneLoader: loader } = core.services;
-    const { maxShDegree: shDegree, filter, order } = core.attributes;
-    const rendering = {
-      ...{ shDegree, byDistance: order === 'distance', spawn: loader.spawn },
-      filter: filter === 'auto' ? undefined : filter,
-    };
-    return new GlDrawing(session, await contextFor(shown), { shown, request, loader }, rendering);
+    return new GlDrawing(session, await contextFor(shown), { shown, request, loader }, core);
   }
 
   get isLost(): boolean {
@@ -102,8 +89,12 @@ export class GlDrawing implements XrDrawing {
   draw(eyes: readonly XrEye[], background: XrColor, between: XrBetween, scale: number): void {
     if (!this.#scene) return;
     const { renderer } = this.#scene;
-    const { shDegree, filter } = this.#rendering;
-    this.#order?.update(eyes.map(({ camera }) => camera));
+    const { maxShDegree: shDegree, filter: choice, order } = this.#core.attributes;
+    const filter = choice === 'auto' ? undefined : choice;
+    this.#order?.update(
+      eyes.map(({ camera }) => camera),
+      order === 'distance',
+    );
     for (const eye of eyes) {
       const at = this.#rectangleOf(eye);
       between.drawBelow?.(eye);
@@ -136,7 +127,6 @@ export class GlDrawing implements XrDrawing {
   }
 
   #sort(positions: Float32Array): void {
-    const { byDistance, spawn } = this.#rendering;
-    this.#order = new ViewOrder({ ...this.#scene!, positions }, byDistance, spawn);
+    this.#order = new ViewOrder({ ...this.#scene!, positions }, this.#source.loader.spawn);
   }
 }

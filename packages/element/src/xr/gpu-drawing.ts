@@ -27,13 +27,17 @@ export class GpuDrawing implements XrDrawing {
   readonly #stereo: Stereo;
   #images = new Map<XrView, GpuImage>();
   #settings: FrameSettings | undefined;
+  /** The values of the settings, as text. */
+  #settingsKey = '';
 
   constructor(core: XrHost, backend: WebGpuBackend, target: GpuTarget) {
     this.#core = core;
     this.#backend = backend;
     this.#target = target;
     this.#stereo = new Stereo(backend.device);
-    void backend.place.lost.then(() => this.onLost('the GPU device was lost'));
+    // The device outlives the session, and its promise keeps all that waits for it alive.
+    const own = new WeakRef(this);
+    void backend.place.lost.then(() => own.deref()?.onLost('the GPU device was lost'));
     target.onLost = (what) => this.onLost(what);
   }
 
@@ -73,6 +77,7 @@ export class GpuDrawing implements XrDrawing {
 
   draw(eyes: readonly XrEye[], background: XrColor, between: XrBetween, scale: number, now: number): void {
     this.#core.advanceScene(unscaled(eyes[0].camera), now);
+    this.#core.view.applyRendering(this.#backend);
     this.#core.prepareFrame();
     const { viewpoint, view } = this.#backend;
     const views = eyes.map((eye) => ({ camera: eye.camera, bounds: eye.at, target: this.#targetOf(eye) }));
@@ -117,6 +122,7 @@ export class GpuDrawing implements XrDrawing {
     this.onLost = () => undefined;
     this.#stereo.destroy();
     this.#target.destroy();
+    this.#images.clear();
     this.#backend.viewpoint.maxSizes = 1;
   }
 
@@ -125,12 +131,13 @@ export class GpuDrawing implements XrDrawing {
   }
 
   /**
-   * Returns the frame settings of the page at a resolution scale, 0..1. Returns the same object while the scale does
-   * not change.
+   * Returns the frame settings of the page at a resolution scale, 0..1. Returns the same object while no value changes.
    */
   #settingsAt(resolutionScale: number): FrameSettings {
-    if (this.#settings?.resolutionScale === resolutionScale) return this.#settings;
     const { settings } = this.#backend.view;
+    const key = JSON.stringify([settings, resolutionScale]);
+    if (this.#settings && key === this.#settingsKey) return this.#settings;
+    this.#settingsKey = key;
     const budget = settings.splatBudget || Infinity;
     const max = isHandheld() ? Math.min(budget, HANDHELD_SPLATS) : budget;
     const splatBudget = Number.isFinite(max) ? max : 0;

@@ -130,6 +130,7 @@ export class CopyTarget implements GpuTarget {
 
   destroy(): void {
     this.onLost = () => undefined;
+    this.#context.unconfigure();
     this.#gl.getExtension('WEBGL_lose_context')?.loseContext();
   }
 }

@@ -41,6 +41,8 @@ const STYLES = css`
       sans-serif;
     font-variant-numeric: tabular-nums;
     white-space: nowrap;
+    /* The numbers and their unit keep their order on pages from right to left. */
+    direction: ltr;
     color: var(--measure-color, rgb(255 255 255));
     background: var(--measure-background, rgb(0 0 0 / 0.75));
     transform: translate(-50%, -50%);
@@ -108,7 +110,9 @@ export class Measure implements ReactiveController {
   }
 
   #say(text: string): void {
-    this.#core.behaviors.announcer.value?.say(text);
+    const { value } = this.#core.behaviors.announcer;
+    // Screen readers announce changes only. A space makes a repeated text another one.
+    value?.say(text !== '' && text === value.text ? `${text}\u00A0` : text);
   }
 
   #toggle(): void {
@@ -169,6 +173,8 @@ export class Measure implements ReactiveController {
 
   readonly #onKey = (event: KeyboardEvent): void => {
     if (event.key === 'Escape') {
+      // Otherwise a dialog around the scene would close, too.
+      event.preventDefault();
       event.stopImmediatePropagation();
       this.#put();
       this.#element.requestUpdate();
@@ -196,7 +202,7 @@ export class Measure implements ReactiveController {
     this.#ends = this.#ends.length === 1 ? [this.#ends[0], point] : [point];
     this.#draw();
     const measured = this.#measured();
-    if (!measured) return this.#say('1');
+    if (!measured) return this.#say(this.#word('measure-first'));
     this.#say(textOf(measured));
     this.#element.dispatchEvent(new CustomEvent('measure', { detail: measured }));
   }

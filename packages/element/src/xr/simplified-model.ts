@@ -10,13 +10,17 @@ import { WORDS, type XrOffer } from './xr-offer.js';
 const opensModels = (page: Document): boolean =>
   page.createElement('a').relList.supports('ar') || /iPhone|iPad/.test(page.defaultView?.navigator.userAgent ?? '');
 
-/** Link to the author's own mesh for iPhones, which have no WebXR. Not shown if the page names no mesh. */
+/**
+ * Replacements of AR on devices without WebXR: a link to the author's own mesh for iPhones, if the page names one;
+ * otherwise the author's content in the slot `ar-fallback`.
+ */
 export class SimplifiedModel implements ReactiveController {
   readonly #core: XrHost;
   readonly #place: HTMLElement;
   readonly #offer: XrOffer;
   readonly #link: HTMLAnchorElement;
   readonly #element: HTMLElement;
+  readonly #fallback: HTMLSlotElement;
 
   constructor(element: HTMLElement, core: XrHost, place: HTMLElement, offer: XrOffer) {
     this.#core = core;
@@ -27,6 +31,7 @@ export class SimplifiedModel implements ReactiveController {
     this.#link.setAttribute('part', 'ar-link');
     // Quick Look opens links whose only child is an image.
     this.#link.append(element.ownerDocument.createElement('img'));
+    this.#fallback = Object.assign(element.ownerDocument.createElement('slot'), { name: 'ar-fallback' });
   }
 
   hostUpdated(): void {
@@ -38,6 +43,10 @@ export class SimplifiedModel implements ReactiveController {
       !this.#offer.canActivate &&
       /(^|\s)quick-look(\s|$)/.test(modes) &&
       opensModels(this.#element.ownerDocument);
+    const isReplaced =
+      !isOffered && attributes.ar && this.#offer.isUnsupported && this.#element.querySelector('[slot=ar-fallback]');
+    if (!isReplaced) this.#fallback.remove();
+    else if (!this.#fallback.isConnected) this.#place.append(this.#fallback);
     if (!isOffered) return this.#link.remove();
     const text = strings['ar-simplified'] ?? WORDS['ar-simplified'];
     const image = this.#link.querySelector('img')!;

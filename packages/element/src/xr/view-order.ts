@@ -25,7 +25,6 @@ const MOVED = 0.002;
 /** Sorts the splats of a session, in one order for all views of a frame. */
 export class ViewOrder {
   readonly #scene: XrScene;
-  readonly #byDistance: boolean;
   readonly #spawn: () => Worker;
   readonly #sorter: SplatOrder;
   readonly #order: Uint32Array;
@@ -34,17 +33,19 @@ export class ViewOrder {
   /** Average duration of sorts on this thread, milliseconds; 0 before the first. */
   milliseconds = 0;
 
-  constructor(scene: XrScene, byDistance: boolean, spawn: () => Worker) {
+  constructor(scene: XrScene, spawn: () => Worker) {
     this.#scene = scene;
-    this.#byDistance = byDistance;
     this.#spawn = spawn;
     this.#sorter = new SplatOrder(scene.positions);
     this.#order = new Uint32Array(DATA_WIDTH * Math.max(1, Math.ceil(scene.positions.length / 3 / DATA_WIDTH)));
   }
 
-  /** Sorts for the views of a frame if they have moved: immediately, or in the worker. */
-  update(cameras: readonly Camera[]): void {
-    const view = this.#viewOf(cameras);
+  /**
+   * Sorts for the views of a frame if they have moved: immediately, or in the worker.
+   * @param byDistance Whether the page requests an order by distance.
+   */
+  update(cameras: readonly Camera[], byDistance: boolean): void {
+    const view = this.#viewOf(cameras, byDistance);
     if (this.#sorted && isSameView(view, this.#sorted)) return;
     if (this.#sorted === undefined || this.milliseconds <= QUICK_SORT_MS) this.#sortNow(view);
     else this.#sortSoon(view);
@@ -58,10 +59,10 @@ export class ViewOrder {
    * Returns an order by depth if the views are parallel and sorts are fast: it is exact for all eyes. Otherwise returns
    * an order by distance from the center of the eyes.
    */
-  #viewOf(cameras: readonly Camera[]): OrderView {
+  #viewOf(cameras: readonly Camera[], byDistance: boolean): OrderView {
     const [first] = cameras;
     const { origin } = this.#scene;
-    const isDepth = !this.#byDistance && this.milliseconds <= QUICK_SORT_MS && areParallel(cameras);
+    const isDepth = !byDistance && this.milliseconds <= QUICK_SORT_MS && areParallel(cameras);
     if (isDepth) return orderView(first, origin);
     const eyes = cameras.map(({ worldToCamera }) => eyeOf(worldToCamera));
     const middle = [0, 1, 2].map((k) => eyes.reduce((sum, eye) => sum + eye[k], 0) / eyes.length);

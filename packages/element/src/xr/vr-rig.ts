@@ -1,4 +1,4 @@
-import { multiply, type Vector3 } from '@gaussian-splat/core';
+import { multiply, subtract, type Vector3 } from '@gaussian-splat/core';
 import { floorAt, type WalkMap } from '@gaussian-splat/formats/walk';
 import { Walker } from '../walk/walker.js';
 import type { XrFrame, XrInput, XrPose, XrSpace } from './webxr.js';
@@ -10,12 +10,13 @@ const TURN = Math.PI / 6;
 /** Deflection of a stick, 0..1, below which it is ignored, and deflection above which it causes a snap turn. */
 const [DEAD_ZONE, TURN_ZONE] = [0.2, 0.7];
 /** Indices of a controller's buttons in the mapping `xr-standard`. */
-const [TRIGGER, LEAVE] = [0, 5];
+const [TRIGGER, SQUEEZE, LEAVE] = [0, 1, 5];
 /** Seconds for which the exit button must be held. */
 const LEAVE_SECONDS = 1;
 /** Maximum distance of a teleport, and length of the steps along its ray, meters. */
 const [REACH, RAY_STEP] = [12, 0.05];
-
+/** Minimum and maximum size of the scene, as a factor of its true size. */
+const [MIN_SCALE, MAX_SCALE] = [0.05, 20];
 /** Horizontal distance of the head from the walker, meters, above which the walker moves under the head. */
 const STRAYED = 0.05;
 
@@ -46,7 +47,9 @@ export interface VrStart {
   readonly stepsOnly: boolean;
 }
 
-/** Pose of a headset's user in the scene, changed by snap turns, motion on the floor, and teleports. */
+/**
+ * Pose and size of a headset's user in the scene, changed by snap turns, motion on the floor, teleports, and both grips.
+ */
 export class VrRig {
   readonly #start: VrStart;
   readonly #onLeave: () => void;
@@ -56,6 +59,10 @@ export class VrRig {
   /** Pose of the head in the last frame. */
   #pose: XrPose | undefined;
   #heading: number;
+  /** Size of the scene, as a factor of its true size. */
+  #scale = 1;
+  /** Positions of both controllers in the session's space, meters, while both grip buttons are pressed. */
+  #grips: readonly [Vector3, Vector3] | undefined;
   /** Position of the session space's origin in viewer space, meters; undefined before the first pose. */
   #origin: Vector3 | undefined;
   #map: WalkMap | undefined;
@@ -112,13 +119,14 @@ export class VrRig {
       this.#held.set(key, held);
       this.#read(frame, space, pose, held, seconds);
     });
+    this.#grip(frame, space);
     return this.#matrix();
   }
 
   /** Destination of a teleport in the session's space, meters; undefined without one. */
   get targetInSpace(): Vector3 | undefined {
     if (!this.target) return undefined;
-    const [x, y, z] = [0, 1, 2].map((k) => this.target![k] - this.#origin![k]);
+    const [x, y, z] = [0, 1, 2].map((k) => this.#scale * (this.target![k] - this.#origin![k]));
     const [sin, cos] = [Math.sin(this.#heading), Math.cos(this.#heading)];
     return [cos * x - sin * z, y, sin * x + cos * z];
   }
@@ -134,19 +142,20 @@ export class VrRig {
   }
 
   #floorY(floor: number): number {
-    return this.#start.isFloor ? floor : floor + EYE_HEIGHT;
+    return this.#start.isFloor ? floor : floor + EYE_HEIGHT / this.#scale;
   }
 
-  /** Converts a direction from the session's space to viewer space. */
+  /** Converts a vector from the session's space to viewer space. */
   #turned([x, y, z]: Vector3): Vector3 {
-    const [sin, cos] = [Math.sin(this.#heading), Math.cos(this.#heading)];
-    return [cos * x + sin * z, y, -sin * x + cos * z];
+    const [sin, cos] = [Math.sin(this.#heading) / this.#scale, Math.cos(this.#heading) / this.#scale];
+    return [cos * x + sin * z, y / this.#scale, -sin * x + cos * z];
   }
 
   #matrix(): Float64Array {
-    const [sin, cos] = [Math.sin(this.#heading), Math.cos(this.#heading)];
+    const scale = this.#scale;
+    const [sin, cos] = [scale * Math.sin(this.#heading), scale * Math.cos(this.#heading)];
     const [x, y, z] = this.#origin!;
-    const turn = [cos, 0, -sin, 0, 0, 1, 0, 0, sin, 0, cos, 0, 0, 0, 0, 1];
+    const turn = [cos, 0, -sin, 0, 0, scale, 0, 0, sin, 0, cos, 0, 0, 0, 0, 1];
     const move = [1, 0, 0, -x, 0, 1, 0, -y, 0, 0, 1, -z, 0, 0, 0, 1];
     return Float64Array.from(multiply(multiply(turn, move), this.#start.toViewer));
   }
@@ -165,10 +174,36 @@ export class VrRig {
     }
   }
 
+  /**
+   * Moves, turns and scales the scene with both controllers while their grip buttons are pressed, so that the points
+   * under them stay there. The scene stays upright.
+   */
+  #grip(frame: XrFrame, space: XrSpace): void {
+    const [a, b] = [...this.#held.values()].flatMap(({ input }): Vector3[] => {
+      const isHeld = !this.#start.stepsOnly && input.gamepad?.buttons[SQUEEZE]?.pressed;
+      const m = isHeld && frame.getPose(input.gripSpace ?? input.targetRaySpace, space)?.transform.matrix;
+      return m ? [[m[12], m[13], m[14]]] : [];
+    });
+    const before = this.#grips;
+    this.#grips = a && b && [a, b];
+    if (!before || !b) return;
+    const held = this.#viewerOf(middle(...before));
+    const [from, to] = [subtract(before[1], before[0]), subtract(b, a)];
+    const factor = Math.hypot(...to) / Math.max(1e-3, Math.hypot(...from));
+    this.#scale = Math.min(MAX_SCALE, Math.max(MIN_SCALE, this.#scale * factor));
+    this.#heading += Math.atan2(from[0], from[2]) - Math.atan2(to[0], to[2]);
+    this.#origin = subtract(held, this.#turned(middle(a, b)));
+  }
+
+  /** Converts a point from the session's space to viewer space, meters. */
+  #viewerOf(point: Vector3): Vector3 {
+    const from = this.#turned(point);
+    return [0, 1, 2].map((k) => this.#origin![k] + from[k]) as unknown as Vector3;
+  }
+
   /** Returns the position of the head in viewer space, meters. */
   #headAt({ transform: { position } }: XrPose): Vector3 {
-    const head = this.#turned([position.x, position.y, position.z]);
-    return [0, 1, 2].map((k) => this.#origin![k] + head[k]) as unknown as Vector3;
+    return this.#viewerOf([position.x, position.y, position.z]);
   }
 
   /** Turns the user around the head if a stick is deflected to a side, once per deflection. */
@@ -197,13 +232,15 @@ export class VrRig {
     const origin = this.#origin!;
     // Visitors also move by steps of their own.
     const walker = this.#walkerUnder(this.#headAt(pose));
+    // The speed is that of the body, not of the scaled scene.
+    const time = seconds / this.#scale;
     if (!walker) {
-      const way = 1.4 * seconds;
+      const way = 1.4 * time;
       this.#origin = [origin[0] + way * dx, origin[1], origin[2] + way * dz];
       return;
     }
     const before = walker.at;
-    walker.step(seconds, dx, dz);
+    walker.step(time, dx, dz);
     const { at, eyeFloor } = walker;
     this.#origin = [origin[0] + at[0] - before[0], this.#floorY(eyeFloor), origin[2] + at[2] - before[2]];
   }
@@ -249,7 +286,7 @@ export class VrRig {
     const origin = this.#origin!;
     for (let far = RAY_STEP; far < REACH; far += RAY_STEP) {
       const [x, y, z] = [0, 1, 2].map((k) => origin[k] + from[k] + far * way[k]);
-      const floor = this.#map ? floorAt(this.#map, x, z, y) : origin[1] - (this.#start.isFloor ? 0 : EYE_HEIGHT);
+      const floor = this.#map ? floorAt(this.#map, x, z, y) : 2 * origin[1] - this.#floorY(origin[1]);
       if (floor !== undefined && y <= floor) return [x, floor, z];
     }
     return undefined;
@@ -257,3 +294,5 @@ export class VrRig {
 }
 
 const hasTrigger = ({ gamepad }: XrInput): boolean => gamepad?.buttons[TRIGGER] !== undefined;
+
+const middle = (a: Vector3, b: Vector3): Vector3 => [(a[0] + b[0]) / 2, (a[1] + b[1]) / 2, (a[2] + b[2]) / 2];

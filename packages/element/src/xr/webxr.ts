@@ -5,11 +5,16 @@ export type XrMode = 'immersive-vr' | 'immersive-ar';
 export interface XrSystem extends EventTarget {
   isSessionSupported(mode: XrMode): Promise<boolean>;
   requestSession(mode: XrMode, options?: object): Promise<XrSession>;
+  /** Shows a button of the browser. Fulfills when the visitor presses it; rejects if another request replaces it. */
+  offerSession?(mode: XrMode, options?: object): Promise<XrSession>;
 }
 
 export interface XrSession extends EventTarget {
   readonly inputSources: Iterable<XrInput>;
   readonly frameRate?: number | undefined;
+  /** Refresh rates that {@link updateTargetFrameRate} accepts, Hz. */
+  readonly supportedFrameRates?: Iterable<number> | undefined;
+  updateTargetFrameRate?(rate: number): Promise<void>;
   readonly environmentBlendMode?: string;
   readonly enabledFeatures?: readonly string[];
   requestAnimationFrame(callback: (time: number, frame: XrFrame) => void): number;
@@ -62,6 +67,8 @@ export interface XrInput {
   readonly handedness: string;
   readonly targetRayMode?: string;
   readonly targetRaySpace: XrSpace;
+  /** Pose of the hand that holds the input. */
+  readonly gripSpace?: XrSpace | null | undefined;
   readonly gamepad?: Gamepad | null | undefined;
 }
 

@@ -35,7 +35,7 @@ export interface XrHost {
   };
   /** The world with all displayed scenes. */
   readonly world: World;
-  readonly view: { readonly backend: Backend | null };
+  readonly view: { readonly backend: Backend | null; applyRendering(backend: Backend): void };
   /** Advances moving scenes to the time of a frame. @param now requestAnimationFrame's clock, ms. */
   advanceScene(camera: Camera, now: number): void;
   /** Updates the world before a frame. Returns a text that changes whenever the frame would change. */

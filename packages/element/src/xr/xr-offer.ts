@@ -61,8 +61,11 @@ export class XrOffer implements ReactiveController {
   readonly #slot: HTMLSlotElement;
   readonly #button: HTMLButtonElement;
   readonly #place: HTMLElement;
-  #isSupported = false;
+  /** Whether the browser can start sessions; undefined until it has answered. */
+  #isSupported: boolean | undefined;
   #isStarting = false;
+  /** Whether the browser's own button was requested for the next session. */
+  #isOffered = false;
   #running: Running | undefined;
   #watching: AbortController | undefined;
   #isWarned = false;
@@ -86,7 +89,12 @@ export class XrOffer implements ReactiveController {
 
   /** Whether a session can start: it is supported, enabled, and the scene is displayed. */
   get canActivate(): boolean {
-    return this.#isSupported && this.kind.isWanted() && this.kind.canShow();
+    return this.#isSupported === true && this.kind.isWanted() && this.kind.canShow();
+  }
+
+  /** Whether the browser has answered that it cannot start sessions. */
+  get isUnsupported(): boolean {
+    return this.#isSupported === false;
   }
 
   get isPresenting(): boolean {
@@ -106,7 +114,10 @@ export class XrOffer implements ReactiveController {
     if (Object.keys(strings).length === 0) this.#button.lang = 'en';
     else this.#button.removeAttribute('lang');
     if (!this.canActivate || this.isPresenting) this.#slot.remove();
-    else if (!this.#slot.isConnected) this.#place.append(this.#slot);
+    else {
+      if (!this.#slot.isConnected) this.#place.append(this.#slot);
+      this.#offer();
+    }
     if (this.#running && this.#isOutdated(this.#running)) this.end();
   }
 
@@ -122,9 +133,25 @@ export class XrOffer implements ReactiveController {
   hostDisconnected(): void {
     this.#watching?.abort();
     this.#watching = undefined;
-    this.#isSupported = false;
+    this.#isSupported = undefined;
+    this.#isOffered = false;
     this.#slot.remove();
     this.end();
+  }
+
+  /** Requests the button that some browsers have for sessions. The last element of a page has it. */
+  #offer(): void {
+    if (this.#isOffered || this.#isStarting) return;
+    this.#isOffered = true;
+    const xr = xrOf(this.#element.ownerDocument.defaultView);
+    xr?.offerSession?.(this.kind.mode, this.kind.options()).then(
+      (session) => {
+        // The offer cannot be withdrawn, so that the element may have changed meanwhile.
+        if (!this.canActivate || this.#isStarting || this.#running) return void session.end().catch(() => undefined);
+        this.#start(session).catch((error: Error) => this.core.warn(error.message));
+      },
+      () => undefined,
+    );
   }
 
   /**
@@ -153,7 +180,7 @@ export class XrOffer implements ReactiveController {
         this.status('failed', (error as Error).message);
         throw error;
       })
-      .finally(() => (this.#isStarting = false));
+      .finally(() => (this.#isStarting = this.#isOffered = false));
   }
 
   end(): void {
@@ -213,6 +240,7 @@ export class XrOffer implements ReactiveController {
     running.over.abort(new DOMException('the session is over', 'AbortError'));
     this.#free(running);
     this.#running = undefined;
+    this.#isOffered = false;
     this.core.isImmersed = false;
     // The page has drawn no frames meanwhile, so that this time does not count.
     this.core.sources.suspend();
@@ -229,6 +257,7 @@ export class XrOffer implements ReactiveController {
 
   #watch(): void {
     const xr = xrOf(this.#element.ownerDocument.defaultView);
+    if (!xr) this.#isSupported = false;
     if (this.#watching || !xr) return;
     this.#watching = new AbortController();
     const { signal } = this.#watching;
@@ -243,8 +272,10 @@ export class XrOffer implements ReactiveController {
   }
 
   #setSupported(isSupported: boolean): void {
+    const isNew = isSupported && !this.#isSupported && !this.#running;
     this.#isSupported = isSupported;
-    if (isSupported && !this.#element.hasAttribute(`${this.kind.name}-status`)) this.status('not-presenting');
+    // Copies of an element, for example in a page cache of a framework, have its attribute of then.
+    if (isNew) this.status('not-presenting');
     this.#element.requestUpdate();
   }
 
@@ -265,6 +296,7 @@ export const WORDS: Readonly<Record<ExtraWord, string>> = {
   'exit-ar': 'Leave AR',
   measure: 'Measure',
   'measure-keys': 'Press Enter to set each end of the ruler; the arrow keys turn the view. Escape puts the ruler away.',
+  'measure-first': 'First end set',
   'measure-none': 'No surface here',
 };
 

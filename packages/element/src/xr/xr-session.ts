@@ -102,9 +102,21 @@ export class XrLoop {
     );
   }
 
-  /** Adapts the resolution to a measured frame. @param milliseconds Upper bound of the frame time on the GPU. */
+  /**
+   * Adapts the resolution to a measured frame, and the refresh rate if the lowest resolution is too slow.
+   * @param milliseconds Upper bound of the frame time on the GPU.
+   */
   adapt(milliseconds: number): void {
-    if (milliseconds > this.targetMs) this.scale = Math.max(MIN_SCALE, this.scale * SCALE_STEP);
-    else if (milliseconds < this.targetMs / 2) this.scale = Math.min(1, this.scale / SCALE_STEP);
+    if (milliseconds > this.targetMs) {
+      if (this.scale === MIN_SCALE) this.#lowerRate();
+      this.scale = Math.max(MIN_SCALE, this.scale * SCALE_STEP);
+    } else if (milliseconds < this.targetMs / 2) this.scale = Math.min(1, this.scale / SCALE_STEP);
+  }
+
+  /** Requests the next lower refresh rate of the headset, but not one below the usual rate. */
+  #lowerRate(): void {
+    const { frameRate = USUAL_RATE, supportedFrameRates = [] } = this.#session;
+    const lower = [...supportedFrameRates].filter((rate) => rate >= USUAL_RATE && rate < frameRate);
+    if (lower.length > 0) this.#session.updateTargetFrameRate?.(Math.max(...lower)).catch(() => undefined);
   }
 }
