@@ -126,6 +126,25 @@ test('a seek gives up what is on its way', async () => {
   assert.ok(signals[1].aborted);
 });
 
+test('a seek does not wait for a part that is on its way and needed later', () => {
+  const asked: string[] = [];
+  const cache = new GroupCache(clip(4), {
+    fetchPart: (group, part, signal) => {
+      asked.push(`${group}.${part}`);
+      return new Promise((_, reject) => signal.addEventListener('abort', () => reject(signal.reason as Error)));
+    },
+    onArrival: () => undefined,
+    onError: () => assert.fail('nothing went wrong'),
+  });
+  // All groups are needed from each of them in a loop.
+  cache.want(0, true);
+  cache.want(2, true);
+  assert.deepEqual(asked, ['0.0', '2.0']);
+  cache.want(2, false);
+  assert.deepEqual(asked, ['0.0', '2.0'], 'the needed part is not begun again');
+  cache.close();
+});
+
 test('what cannot be had is reported once, and passed over', async () => {
   const { cache, errors, asked, settle } = bench(clip(8), (group) => group === 1);
   cache.want(0, false);

@@ -30,7 +30,7 @@ const partsOf = (group: number): Promise<ClipPartContent[]> =>
   Promise.all(
     index.groups[group].parts.map((part) => {
       const bytes = clip.bytes.subarray(part.start, part.start + part.sceneBytes + part.motionBytes);
-      return readClipPart({ bytes, part, frames: index.groups[group].frames, name: 'a.gsv' });
+      return readClipPart({ bytes, part, frames: index.groups[group].frames, shDegree: index.shDegree, name: 'a.gsv' });
     }),
   );
 
@@ -145,7 +145,7 @@ test('parts that are others than the index says are refused', async () => {
     const { frames, parts } = asked.groups[0];
     const [part] = parts;
     const own = bytes.subarray(part.start, part.start + part.sceneBytes + part.motionBytes);
-    return readClipPart({ bytes: own, part, frames, name: 'a.gsv' }).then(
+    return readClipPart({ bytes: own, part, frames, shDegree: asked.shDegree, name: 'a.gsv' }).then(
       () => 'nothing',
       (error: Error & { code: string }) => `${error.code} ${error.message}`,
     );
@@ -227,7 +227,14 @@ test('parts that say more than they hold, or hold more than they say, are refuse
     const own = { ...part, motionBytes: packed.length, ...changes };
     let said = 'nothing';
     try {
-      await readClipPart({ bytes: concat(scene, packed), part: own, frames: group.frames, name: 'a.gsv', limits });
+      await readClipPart({
+        bytes: concat(scene, packed),
+        part: own,
+        frames: group.frames,
+        shDegree: index.shDegree,
+        name: 'a.gsv',
+        limits,
+      });
     } catch (error) {
       said = `${(error as { code: string }).code} ${(error as Error).message}`;
     }

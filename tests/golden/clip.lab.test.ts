@@ -31,6 +31,7 @@ const read = (group: number): Promise<ClipPartContent[]> =>
   Promise.all(
     index.groups[group].parts.map((part) =>
       readClipPart({
+        shDegree: index.shDegree,
         bytes: bytes.subarray(part.start, part.start + part.sceneBytes + part.motionBytes),
         ...{ part, frames: index.groups[group].frames, name: 'a.gsv' },
       }),

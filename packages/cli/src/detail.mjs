@@ -4,8 +4,7 @@
  */
 import { existsSync, mkdirSync, readdirSync, rmSync, statSync, writeFileSync } from 'node:fs';
 import { dirname, join, resolve } from 'node:path';
-import { toDegree } from '@gaussian-splat/economise';
-import { readScene, upright } from '@gaussian-splat/formats';
+import { readScene, toDegree, upright } from '@gaussian-splat/formats';
 import { deviceDescriptor, pickInitialVariants } from '@gaussian-splat/renderer';
 import {
   buildDetailTree,
@@ -146,7 +145,7 @@ async function main({ scene, out, degree, geometry, minPsnr, scored, columns, ro
   const read = await readScene(await readWhole(scene), { name: scene, openFile });
   sayWarnings(scene, read, 'detail.json');
   // Pages store no up direction, so the scene is rotated to the default, (0, -1, 0).
-  const cloud = upright(toDegree(degree, read));
+  const cloud = upright(toDegree(Math.min(degree, read.shDegree), read));
   const start = performance.now();
   const tree = buildDetailTree(cloud, { geometry });
   const built = performance.now();

@@ -89,15 +89,6 @@ export function splatsOf(cloud: GaussianCloud, numbers: Uint32Array): GaussianCl
   return reduceTo(cloud, { kept: numbers, degrees: new Uint8Array(numbers.length).fill(cloud.shDegree) }).cloud;
 }
 
-/** Returns a cloud without spherical harmonics above a degree; the same cloud if it has none. */
-export function toDegree(degree: ShDegree, cloud: GaussianCloud): GaussianCloud {
-  if (cloud.shDegree <= degree) return cloud;
-  const [all, kept] = [3 * shCoefficientCount(cloud.shDegree), 3 * shCoefficientCount(degree)];
-  const sh = new Float32Array(kept * cloud.count);
-  for (let i = 0; i < cloud.count; i++) sh.set(cloud.sh.subarray(all * i, all * i + kept), kept * i);
-  return { ...cloud, shDegree: degree, sh };
-}
-
 /** Does the same as {@link reduceTo} by parallel tasks. The arrays of the result are in memory of the pool. */
 export async function reduceInParts(cloud: GaussianCloud, choice: Choice, pool: TaskPool): Promise<ReducedCloud> {
   const reduced = roomFor(cloud, choice, pool);

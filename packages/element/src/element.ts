@@ -146,6 +146,7 @@ const STATES = ['loading', 'preview', 'ready', 'playing', 'error', 'unsupported'
  * @fires {Event} loadstart - Fired when loading starts.
  * @fires {Event} loadeddata - Fired when the first frame is available.
  * @fires {Event} canplay - Fired when the first frame is available and playback can start.
+ * @fires {Event} canplaythrough - Fired after `canplay`, because the element does not estimate download times.
  * @fires {Event} emptied - Fired when the scene is removed.
  * @fires {Event} contextlost - Fired when the GPU device is lost; the element recovers automatically.
  * @fires {Event} contextrestored - Fired when the image is restored after a lost device.

@@ -145,6 +145,7 @@ export interface GaussianSplatEventMap {
   loadstart: Event;
   loadeddata: Event;
   canplay: Event;
+  canplaythrough: Event;
   emptied: Event;
   /** Fired when the GPU device is lost. The element recovers automatically. */
   contextlost: Event;

@@ -15,8 +15,12 @@ export type SettableProperties = Partial<
     Pick<MediaProperties, 'currentTime' | 'playbackRate'>
 >;
 
-/** Values of HTMLMediaElement.readyState: no data, only the current frame, and enough data to play. */
+/**
+ * Values of HTMLMediaElement.readyState: no data, the duration without the current frame, only the current frame, and
+ * enough data to play.
+ */
 const HAVE_NOTHING = 0;
+const HAVE_METADATA = 1;
 const HAVE_CURRENT_DATA = 2;
 const HAVE_ENOUGH_DATA = 4;
 
@@ -73,14 +77,14 @@ export abstract class MediaProperties extends SplatProperties {
   }
 
   /**
-   * State of loading as on HTMLMediaElement: 0 without a scene, 4 when a scene is shown, 2 while a clip waits for its
-   * next frames.
+   * State of loading as on HTMLMediaElement: 0 without a scene, 1 when its duration is known or while a clip seeks a
+   * frame that is not loaded, 2 while a clip waits for its next frames, 4 when a scene is shown.
    */
   get readyState(): number {
-    if (this.core.sources.state !== 'ready') return HAVE_NOTHING;
-    return (this.#live?.loadedUntil?.(this.currentTime) as number) <= this.currentTime
-      ? HAVE_CURRENT_DATA
-      : HAVE_ENOUGH_DATA;
+    const { sources, playback } = this.core;
+    if (sources.state !== 'ready') return playback.canPlay ? HAVE_METADATA : HAVE_NOTHING;
+    if (!((this.#live?.loadedUntil?.(this.currentTime) as number) <= this.currentTime)) return HAVE_ENOUGH_DATA;
+    return this.seeking ? HAVE_METADATA : HAVE_CURRENT_DATA;
   }
 
   /** Times that can be sought: the whole duration of a scene with an end; empty for other scenes. */

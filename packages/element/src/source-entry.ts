@@ -2,7 +2,12 @@ import { Lazy, type Camera } from '@gaussian-splat/core';
 import type { ReactiveControllerHost } from 'lit';
 import type { Attributes } from './attributes.js';
 import type { DetailHost } from './controllers/detail-controller.js';
-import { PlaybackController, type PlaybackEvent, type PlaybackHost } from './controllers/playback-controller.js';
+import {
+  PLAYABLE,
+  PlaybackController,
+  type PlaybackEvent,
+  type PlaybackHost,
+} from './controllers/playback-controller.js';
 import { SceneController, type Entrance, type SceneHost, type SceneState } from './controllers/scene-controller.js';
 import { SourceController, type SourceHost } from './controllers/source-controller.js';
 import type { ElementError } from './errors.js';
@@ -394,7 +399,7 @@ export class SourceEntry implements SceneHost, SourceHost, PlaybackHost, Dynamic
   }
 
   notifyLoaded(url: string): void {
-    for (const type of ['loadeddata', 'canplay'] as const) this.dispatch(new Event(type));
+    for (const type of ['loadeddata', ...PLAYABLE] as const) this.dispatch(new Event(type));
     this.dispatch(new CustomEvent('load', { detail: { url } }));
   }
 

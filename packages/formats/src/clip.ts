@@ -7,6 +7,7 @@ import { isObject, parseJson, show, type Json } from './json.js';
 import { mergeClouds } from './merge-clouds.js';
 import { applyMotion, ANIMATED_ATTRIBUTES, ANIMATED_ATTRIBUTE_NAMES, readMotion, type Motion } from './motion.js';
 import { readScene } from './read-scene.js';
+import { toDegree } from './to-degree.js';
 
 const MAGIC = 'GSV\n';
 const VERSION = 1;
@@ -238,6 +239,8 @@ export interface ClipPartSource {
   readonly bytes: Uint8Array;
   readonly part: ClipPart;
   readonly frames: number;
+  /** Degree of the clip's index. A part with a lower one is padded with zeros. */
+  readonly shDegree: ShDegree;
   readonly name: string;
   readonly limits?: LoadLimits;
 }
@@ -246,15 +249,24 @@ export interface ClipPartSource {
  * Reads the scene and the motion of a part.
  * @throws GaussianSplatError as `readScene` and `readMotion` do, and `decode/header` if the part contradicts the index.
  */
-export async function readClipPart({ bytes, part, frames, name, limits }: ClipPartSource): Promise<ClipPartContent> {
+export async function readClipPart({
+  bytes,
+  part,
+  frames,
+  shDegree,
+  name,
+  limits,
+}: ClipPartSource): Promise<ClipPartContent> {
   const { sceneBytes, motionBytes, splats, planes } = part;
   if (bytes.length !== sceneBytes + motionBytes)
     throw damaged(name, `${grouped(sceneBytes + motionBytes)} bytes`, grouped(bytes.length), 'decode/truncated');
   const budget = new LoadBudget(bytes.length, limits);
-  budget.takeSplats(splats, 0, name);
+  budget.takeSplats(splats, shDegree, name);
   const cloud = await readScene(bytes.subarray(0, sceneBytes), { name, ...limits });
   if (cloud.count !== splats)
     throw damaged(name, `${grouped(splats)} splats, as the index says`, grouped(cloud.count), 'decode/header');
+  if (cloud.shDegree > shDegree)
+    throw damaged(name, `degree ${shDegree} at most, as the index says`, `degree ${cloud.shDegree}`, 'decode/header');
   const motion = await readMotion({
     ...{ bytes: bytes.subarray(sceneBytes), name, splats, frames, budget },
     hasLives: true,
@@ -264,7 +276,7 @@ export async function readClipPart({ bytes, part, frames, name, limits }: ClipPa
     0,
   );
   if (found !== planes) throw damaged(name, `${planes} planes, as the index says`, String(found), 'decode/header');
-  return { cloud, motion };
+  return { cloud: toDegree(shDegree, cloud), motion };
 }
 
 /**

@@ -35,6 +35,7 @@ const EVENTS = {
   onLoadStart: 'loadstart',
   onLoadedData: 'loadeddata',
   onCanPlay: 'canplay',
+  onCanPlayThrough: 'canplaythrough',
   onEmptied: 'emptied',
   onContextLost: 'contextlost',
   onContextRestored: 'contextrestored',

@@ -154,7 +154,12 @@ describe('a clip', () => {
 
   it('a seek into what has not come ends with the right frame', async () => {
     const element = await showLoaded({ src: `${CLIP}?slow=300` });
-    await seek(element, 1.05);
+    const arrived: number[] = [];
+    element.addEventListener('progress', ({ loaded, total }) => arrived.push(loaded / total));
+    const seeked = seek(element, 1.05);
+    assertEqual(element.readyState, HTMLMediaElement.HAVE_METADATA, 'readyState');
+    await seeked;
+    assert(arrived.length > 0 && arrived.every((share) => share > 0 && share <= 1), `progress ${arrived.join(', ')}`);
     await showsAlone(element, 10);
   });
 

@@ -187,7 +187,16 @@ describe('a sequence of files', () => {
   });
 });
 
-const REPORTED = ['emptied', 'loadstart', 'durationchange', 'loadedmetadata', 'loadeddata', 'canplay', 'error'];
+const REPORTED = [
+  'emptied',
+  'loadstart',
+  'durationchange',
+  'loadedmetadata',
+  'loadeddata',
+  'canplay',
+  'canplaythrough',
+  'error',
+];
 
 function eventsOf(element: GaussianSplatElement): string[] {
   const reported: string[] = [];
@@ -213,7 +222,15 @@ describe('the clock', () => {
     element.src = `${MOVIE}?another`;
     await nextEvent(element, 'load');
     assertEqual([element.currentTime, element.ended, element.paused], [0, false, true], 'time, ended, paused');
-    const fresh = ['emptied', 'loadstart', 'durationchange', 'loadedmetadata', 'loadeddata', 'canplay'];
+    const fresh = [
+      'emptied',
+      'loadstart',
+      'durationchange',
+      'loadedmetadata',
+      'loadeddata',
+      'canplay',
+      'canplaythrough',
+    ];
     assertEqual(reported.splice(0), ['durationchange', ...fresh], 'events');
     element.src = '/net/status/404';
     await nextEvent(element, 'error');

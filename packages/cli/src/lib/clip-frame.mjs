@@ -11,12 +11,13 @@ export async function clipMoment(bytes, name, seconds) {
   }
   const index = parseClip(bytes, name);
   const frame = frameAt(index, seconds);
-  const { first, frames, parts } = index.groups[clipGroupAt(index, frame)];
+  const { shDegree, groups } = index;
+  const { first, frames, parts } = groups[clipGroupAt(index, frame)];
   const contents = [];
   for (const part of parts) {
     const { start, sceneBytes, motionBytes } = part;
     const own = bytes.subarray(start, start + sceneBytes + motionBytes);
-    contents.push(await readClipPart({ bytes: own, part, frames, name }));
+    contents.push(await readClipPart({ bytes: own, part, frames, shDegree, name }));
   }
   return clipFrame(contents, frame - first, name, new LoadBudget(bytes.length));
 }

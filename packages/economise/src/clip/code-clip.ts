@@ -1,10 +1,11 @@
-import { boundsOf, GaussianSplatError, type GaussianCloud } from '@gaussian-splat/core';
+import { boundsOf, type GaussianCloud, type ShDegree } from '@gaussian-splat/core';
 import {
   clipFrame,
   LoadBudget,
   ANIMATED_ATTRIBUTES,
   ANIMATED_ATTRIBUTE_NAMES,
   readScene,
+  toDegree,
   upright,
   writeClipHead,
   type ClipHead,
@@ -69,8 +70,8 @@ const GROWTHS = [1, 1.25, 1.6, 2, 2.5, 3.2, 4];
 
 /**
  * Encodes frames with arbitrary splats as a clip. Quantization is as coarse as `minPsnr` allows, in held-out views of
- * some frames. Frames with an up direction other than (0, -1, 0) are rotated, as in all formats without one.
- * @throws GaussianSplatError `argument/value` if frames have different degrees of spherical harmonics.
+ * some frames. Frames with an up direction other than (0, -1, 0) are rotated, as in all formats without one. All frames
+ * of a group get the highest degree of spherical harmonics until then.
  */
 export async function codeClip(options: CodeClipOptions): Promise<CodedClip> {
   const coder = new ClipCoder(options);
@@ -91,7 +92,9 @@ class ClipCoder {
   readonly #options: CodeClipOptions;
   readonly #target: number;
   readonly #groups: WrittenGroup[] = [];
-  #facts: Omit<ClipHead, 'groups' | 'grow' | 'framesPerSecond'> | undefined;
+  #facts: Omit<ClipHead, 'groups' | 'grow' | 'framesPerSecond' | 'shDegree'> | undefined;
+  /** Highest degree of the frames until now. */
+  #shDegree: ShDegree = 0;
   #encoding: Encoding | undefined;
   #steps: MotionSteps | undefined;
   #grow = 1;
@@ -106,9 +109,13 @@ class ClipCoder {
 
   async add(begin: number, end: number): Promise<void> {
     const { openFrame, onStep = () => undefined } = this.#options;
-    const sources: GaussianCloud[] = [];
-    for (let frame = begin; frame < end; frame++) sources.push(upright(await openFrame(frame)));
-    requireOneDegree(sources, this.#facts?.shDegree);
+    const opened: GaussianCloud[] = [];
+    for (let frame = begin; frame < end; frame++) opened.push(upright(await openFrame(frame)));
+    const degree = Math.max(this.#shDegree, ...opened.map(({ shDegree }) => shDegree)) as ShDegree;
+    // An encoding is tuned for the harmonics that its frames have.
+    if (degree > this.#shDegree) this.#encoding = undefined;
+    this.#shDegree = degree;
+    const sources = opened.map((cloud) => toDegree(degree, cloud));
     const tracks = cutTracks(followSplats(sources));
     const whole = cloudOfTracks(tracks);
     const passing = tracks.lives.first.filter((first, i) => first > 0 || tracks.lives.end[i] < end - begin).length;
@@ -142,7 +149,10 @@ class ClipCoder {
   finish(): CodedClip {
     const { framesPerSecond } = this.#options;
     const groups = this.#groups;
-    const head = writeClipHead({ ...this.#facts!, framesPerSecond, grow: this.#grow, groups });
+    const head = writeClipHead({
+      ...this.#facts!,
+      ...{ shDegree: this.#shDegree, framesPerSecond, grow: this.#grow, groups },
+    });
     const bytes = concatenated([head, ...groups.flatMap(({ parts }) => parts.map((part) => part.bytes))]);
     const errors = groups.flatMap((group) => group.errors);
     return {
@@ -158,10 +168,9 @@ class ClipCoder {
   #note(frame: GaussianCloud, whole: GaussianCloud): void {
     if (whole.count <= this.#largest) return;
     this.#largest = whole.count;
-    const { shDegree, antialiased, filterVariance } = frame;
+    const { antialiased, filterVariance } = frame;
     const { origin } = this.#facts ?? frame;
     this.#facts = {
-      shDegree,
       origin,
       antialiased,
       filterVariance,
@@ -298,15 +307,4 @@ async function growthIn({ judge, frame }: FrameJudge, [coarse]: readonly ClipPar
     if (error < min) [best, min] = [grow, error];
   }
   return best;
-}
-
-function requireOneDegree(frames: readonly GaussianCloud[], degree = frames[0].shDegree): void {
-  const other = frames.find(({ shDegree }) => shDegree !== degree);
-  if (other === undefined) return;
-  throw new GaussianSplatError('argument/value', {
-    where: 'frames of a sequence',
-    expected: `spherical harmonics of degree ${degree} in each, as in the first`,
-    found: `degree ${other.shDegree}`,
-    remedy: 'export all frames in the same way',
-  });
 }

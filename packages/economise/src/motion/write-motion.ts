@@ -138,16 +138,15 @@ function changesOf(
 
 function numbersOf(
   name: Exclude<AnimatedAttributeName, 'rotation'>,
-  { shDegree, origin }: GaussianCloud,
+  { origin }: GaussianCloud,
 ): (cloud: GaussianCloud, i: number, number: number) => number {
-  const stride = 3 * shCoefficientCount(shDegree);
   const min = 1e-12;
   return {
     position: (cloud: GaussianCloud, i: number, k: number) =>
       cloud.positions[3 * i + k] + (cloud.origin[k] - origin[k]),
     scale: ({ scales }: GaussianCloud, i: number, k: number) => Math.log(Math.max(min, scales[3 * i + k])),
     opacity: ({ opacities }: GaussianCloud, i: number) => opacities[i],
-    color: ({ sh }: GaussianCloud, i: number, k: number) => sh[stride * i + k],
+    color: ({ sh, shDegree }: GaussianCloud, i: number, k: number) => sh[3 * shCoefficientCount(shDegree) * i + k],
   }[name];
 }
 

@@ -60,6 +60,7 @@ export type ChildEventMap = Record<
     | 'contextrestored'
     | 'loadeddata'
     | 'canplay'
+    | 'canplaythrough'
   >;
 
 /** Properties of a child that a page may set, for the types of frameworks. */

@@ -16,6 +16,7 @@ export type PlaybackEvent =
   | 'loadstart'
   | 'loadeddata'
   | 'canplay'
+  | 'canplaythrough'
   | 'emptied';
 
 export interface PlaybackHost {
@@ -25,6 +26,9 @@ export interface PlaybackHost {
   requestFrame(): void;
   playbackEvent(type: PlaybackEvent): void;
 }
+
+/** Events of a scene that can be played, as a video fires them for HAVE_ENOUGH_DATA. */
+export const PLAYABLE = ['canplay', 'canplaythrough'] as const;
 
 /** Minimum interval between `timeupdate` events during playback, ms, as in browsers for video. */
 const UPDATE_INTERVAL_MS = 250;
@@ -221,7 +225,7 @@ export class PlaybackController {
       this.#isWaiting = true;
       return this.suspend();
     }
-    if (this.#isWaiting) this.#host.playbackEvent('canplay');
+    if (this.#isWaiting) for (const type of PLAYABLE) this.#host.playbackEvent(type);
     this.#isWaiting = false;
     const last = this.#lastTick;
     if (last === undefined) this.#host.playbackEvent('playing');

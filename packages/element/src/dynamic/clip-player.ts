@@ -4,7 +4,7 @@ import { AnimatedGaussians } from '@gaussian-splat/renderer';
 import type { PackedAnimation } from '@gaussian-splat/renderer/tools';
 import type { SceneBounds } from '../camera/settings.js';
 import type { OpenedClip } from '../loading/clip-of.js';
-import type { ClipAnswer, ClipRequest, SceneRequest } from '../loading/protocol.js';
+import type { ClipAnswer, ClipRequest, ProgressListener, SceneRequest } from '../loading/protocol.js';
 import type { SceneWorker, SceneLoader } from '../loading/scene-loader.js';
 import { GroupCache } from './group-cache.js';
 import { GroupSlots } from './group-slots.js';
@@ -15,6 +15,8 @@ export interface ClipOptions {
   readonly device: GPUDevice;
   readonly loader: SceneLoader;
   readonly signal: AbortSignal;
+  /** Called with the loaded bytes when parts of the clip have arrived, as a video fires `progress`. */
+  readonly onProgress: ProgressListener;
   readonly listeners: DynamicListeners;
   readonly loops: () => boolean;
   /** Start position of playback, seconds. */
@@ -51,7 +53,7 @@ export class ClipPlayer implements Timeline {
    * GaussianSplatError, or the signal's reason.
    */
   static async open(options: ClipOptions): Promise<ClipPlayer> {
-    const { device, loader, request, signal, memoryBudget, startSeconds, listeners } = options;
+    const { device, loader, request, signal, onProgress, memoryBudget, startSeconds, listeners } = options;
     const ask = async <T>(own: Pick<ClipRequest, 'whole' | 'part'>, aborted: AbortSignal): Promise<T> => {
       const { url, credentials, limits } = request;
       const asked: ClipRequest = { isClip: true, url, credentials, limits, ...own };
@@ -65,13 +67,17 @@ export class ClipPlayer implements Timeline {
     const file = opened.file ?? (opened.isPartial ? whole : new Blob([await loader.fetchFile(request, signal)]));
     const cache = new GroupCache(index, {
       fetchPart: (group, part, aborted) => {
-        const { frames, parts } = index.groups[group];
+        const { groups, shDegree, origin } = index;
+        const { frames, parts } = groups[group];
         return ask<PackedAnimation>(
-          { whole: file, part: { part: parts[part], group, frames, origin: index.origin } },
+          { whole: file, part: { part: parts[part], group, frames, shDegree, origin } },
           aborted,
         );
       },
-      onArrival: () => listeners.onInput(),
+      onArrival: () => {
+        onProgress(file ? index.byteLength : cache.loadedBytes, index.byteLength);
+        listeners.onInput();
+      },
       onError: (error) => listeners.onError(error),
     });
     const first = clipGroupAt(index, frameAt(index, startSeconds));

@@ -56,6 +56,16 @@ export class GroupCache {
     ).size;
   }
 
+  /** Number of bytes of the clip file whose content is in memory. */
+  get loadedBytes(): number {
+    let sum = 0;
+    for (const { group, part, content } of this.#entries.values()) {
+      const { sceneBytes, motionBytes } = this.#index.groups[group].parts[part];
+      if (content) sum += sceneBytes + motionBytes;
+    }
+    return sum;
+  }
+
   get(group: number, part: number): PackedAnimation | undefined {
     return this.#entries.get(keyOf(group, part))?.content;
   }
@@ -79,8 +89,11 @@ export class GroupCache {
     if (key !== this.#wantedFor) {
       this.#wantedFor = key;
       this.#wanted = this.#wantedFrom(group, loops);
+      // A seek to a group that is not loaded does not wait for a part that is needed later.
+      const isUrgent = !this.get(group, 0) && !this.isMissing(group, 0);
+      const needed = isUrgent ? this.#wanted.slice(0, 1) : this.#wanted;
       for (const entry of this.#entries.values()) {
-        if (!entry.abort || this.#isWanted(entry)) continue;
+        if (!entry.abort || includes(needed, entry)) continue;
         entry.abort.abort();
         entry.abort = undefined;
       }
@@ -121,8 +134,6 @@ export class GroupCache {
     ];
   }
 
-  #isWanted = ({ group, part }: Entry): boolean => this.#wanted.some(([g, p]) => g === group && p === part);
-
   #next(): void {
     if (this.#isClosed) return;
     for (const { abort } of this.#entries.values()) if (abort) return;
@@ -141,7 +152,7 @@ export class GroupCache {
     let sum = kept.reduce((total, [, { content }]) => total + bytesOf(content!), 0);
     for (const [key, entry] of kept) {
       if (sum + needed <= MAX_BYTES) return true;
-      if (this.#isWanted(entry)) continue;
+      if (includes(this.#wanted, entry)) continue;
       sum -= bytesOf(entry.content!);
       this.#entries.delete(key);
     }
@@ -174,6 +185,9 @@ export class GroupCache {
 }
 
 const keyOf = (group: number, part: number): string => `${group} ${part}`;
+
+const includes = (wanted: readonly (readonly [number, number])[], { group, part }: Entry): boolean =>
+  wanted.some(([g, p]) => g === group && p === part);
 
 const bytesOf = ({ bases, sh, codes, curves }: PackedAnimation): number =>
   bases.byteLength + sh.byteLength + codes.byteLength + curves.byteLength;

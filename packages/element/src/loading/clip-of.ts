@@ -65,10 +65,10 @@ async function readPart(request: ClipRequest, signal: AbortSignal): Promise<Pack
 }
 
 async function readGsvPart(request: ClipRequest, signal: AbortSignal): Promise<ClipPartContent> {
-  const { part, frames } = request.part!;
+  const { part, frames, shDegree } = request.part!;
   const limits = limitsFrom(request);
   const { bytes } = await bytesAt(request, part.start, endOf(part), signal, limits());
-  return readClipPart({ bytes, part, frames, name: fileName(request.url), limits: limits() });
+  return readClipPart({ bytes, part, frames, shDegree, name: fileName(request.url), limits: limits() });
 }
 
 /** Returns whether the extension of a file's name is `.4dgs`. */

@@ -1,5 +1,5 @@
 /** Messages between the page and the scene worker. */
-import type { ErrorData, Vector3 } from '@gaussian-splat/core';
+import type { ErrorData, ShDegree, Vector3 } from '@gaussian-splat/core';
 import type { ModelPlace } from '@gaussian-splat/core/onnx';
 import type { CpuCheckMessage } from '@gaussian-splat/generator';
 import type { RendererChoice } from '../attributes.js';
@@ -145,6 +145,7 @@ export interface ClipRequest extends FileRequest {
     /** Index of the group that the part belongs to. */
     readonly group: number;
     readonly frames: number;
+    readonly shDegree: ShDegree;
     readonly origin: Vector3;
   };
 }
