@@ -98,6 +98,123 @@ test('a tileset on the Earth keeps its digits and knows where up is', async () =
   );
 });
 
+interface SubtreeBits {
+  /** Indices of the tiles, by level and Morton index. */
+  readonly tiles: readonly number[];
+  /** For each content, the tiles that have it; 1 for all. */
+  readonly contents: readonly (readonly number[] | 1)[];
+  /** Morton indices of the subtrees below. */
+  readonly children?: readonly number[];
+}
+
+/** A subtree after section 8 of the standard: binary, or JSON with a buffer beside it. */
+function subtree({ tiles, contents, children = [] }: SubtreeBits, beside?: string): Files {
+  const views: Uint8Array[] = [];
+  const bitsOf = (indices: readonly number[] | 1): object => {
+    if (indices === 1) return { constant: 1 };
+    const bits = new Uint8Array(8);
+    for (const index of indices) bits[index >> 3] |= 1 << (index & 7);
+    return indices.length === 0 ? { constant: 0 } : { bitstream: views.push(bits) - 1 };
+  };
+  const availability = {
+    tileAvailability: bitsOf(tiles),
+    contentAvailability: contents.map(bitsOf),
+    childSubtreeAvailability: bitsOf(children),
+  };
+  const binary = new Uint8Array(Buffer.concat(views));
+  const description = json({
+    buffers: [{ byteLength: binary.length, ...(beside && { uri: beside }) }],
+    bufferViews: views.map((_, k) => ({ buffer: 0, byteOffset: 8 * k, byteLength: 8 })),
+    ...availability,
+  });
+  if (beside) return { subtree: description, [beside]: binary };
+  const head = new DataView(new ArrayBuffer(24));
+  [...'subt'].forEach((letter, k) => head.setUint8(k, letter.charCodeAt(0)));
+  head.setUint32(4, 1, true);
+  const text = new Uint8Array(8 * Math.ceil(description.length / 8)).fill(32);
+  text.set(description);
+  head.setBigUint64(8, BigInt(text.length), true);
+  head.setBigUint64(16, BigInt(binary.length), true);
+  return { subtree: new Uint8Array(Buffer.concat([new Uint8Array(head.buffer), text, binary])) };
+}
+
+/** A quadtree: its root, two tiles below it, and one below the second of these, in a subtree of its own. */
+function quadtree(beside: string | undefined, more: object = {}): Files {
+  const upper = subtree({ tiles: [0, 1, 4], contents: [[0, 1]], children: [14] }, beside);
+  const lower = subtree({ tiles: [0], contents: [1] });
+  const implicitTiling = {
+    ...{ subdivisionScheme: 'QUADTREE', subtreeLevels: 2, availableLevels: 3 },
+    subtrees: { uri: 's/{level}/{x}/{y}.subtree' },
+  };
+  return {
+    'tileset.json': tileset(tile('c/{level}/{x}/{y}.glb', { implicitTiling, ...more })),
+    's/0/0/0.subtree': upper.subtree,
+    ...(beside && { [`s/0/0/${beside}`]: upper[beside] }),
+    's/2/2/3.subtree': lower.subtree,
+    ...{ 'c/0/0/0.glb': glb(10, 1), 'c/1/0/0.glb': glb(20, 2), 'c/2/2/3.glb': glb(30, 3) },
+  };
+}
+
+test('implicit tiles are found by the bits of their subtrees', async () => {
+  for (const beside of [undefined, 'bits.bin']) {
+    const files = quadtree(beside);
+    const [a, b] = await Promise.all(['c/1/0/0.glb', 'c/2/2/3.glb'].map((path) => whole(files[path])));
+    assertNear((await readTiles(files)).positions, [...a.positions, ...b.positions], 1e-6);
+    assert.equal((await readTiles(files, 2)).count, 10);
+    assert.equal((await readTiles(quadtree(beside, { refine: 'ADD' }))).count, 60);
+  }
+});
+
+test('implicit tiles may be an octree, have several contents, be those of version 1.0, and be within another tileset', async () => {
+  const tiling = { subdivisionScheme: 'OCTREE', subtreeLevels: 2, subtrees: { uri: '{level}/{x}/{y}/{z}.json' } };
+  const bits = subtree({ tiles: [0, 8], contents: [1, [8]] });
+  const contents = [{ uri: '{level}-{x}-{y}-{z}.glb' }, { uri: 'b.glb' }];
+  const files = { 'in/0/0/0/0.json': bits.subtree, ...{ 'in/1-1-1-1.glb': glb(10, 1), 'in/b.glb': glb(20, 2) } };
+  for (const inner of [
+    tile(undefined, { implicitTiling: { ...tiling, availableLevels: 2 }, contents }),
+    tile(undefined, {
+      extensions: {
+        '3DTILES_implicit_tiling': { ...tiling, maximumLevel: 1 },
+        '3DTILES_multiple_contents': { content: contents },
+      },
+    }),
+  ]) {
+    const found = await readTiles({
+      ...files,
+      'tileset.json': tileset(tile('in/a.json')),
+      'in/a.json': tileset(inner),
+    });
+    assert.equal(found.count, 30);
+  }
+});
+
+test('subtrees that are damaged, or have no end, are refused by name', async () => {
+  const files = quadtree(undefined);
+  const said = async (changes: Files): Promise<string> =>
+    readTiles({ ...files, ...changes }).then(
+      () => 'read',
+      (error: Error & { code?: string }) => `${error.code} ${error.message}`,
+    );
+  const upper = files['s/0/0/0.subtree'];
+  assert.match(
+    await said({ 's/0/0/0.subtree': upper.subarray(0, upper.length - 1) }),
+    /^decode\/truncated.*0\.subtree/,
+  );
+  assert.match(await said({ 's/0/0/0.subtree': json({ tileAvailability: { bitstream: 9 } }) }), /^decode\/header/);
+  const beyond = { buffers: [{}], bufferViews: [{ buffer: 0, byteLength: 99 }], tileAvailability: { bitstream: 0 } };
+  assert.match(await said({ 's/0/0/0.subtree': json(beyond) }), /^decode\/corrupt.*tileAvailability/);
+  const all = { constant: 1 };
+  const endless = json({ tileAvailability: all, contentAvailability: [all], childSubtreeAvailability: all });
+  const implicitTiling = {
+    ...{ subdivisionScheme: 'OCTREE', subtreeLevels: 16, availableLevels: 50 },
+    subtrees: { uri: '{level}{x}{y}{z}' },
+  };
+  await expectRefusal(tileset(tile('a{x}.glb', { implicitTiling })), 'decode/header', /at most 100,000 tiles/, {
+    name: 'tileset.json',
+    openFile: () => Promise.resolve(endless),
+  });
+});
+
 test('tiles without splats are left out with a warning, and a tileset of them is refused', async () => {
   const mesh = json({ asset: { version: '2.0' } });
   const children = [tile('fine/a.glb'), tile('mesh.gltf')];
@@ -136,7 +253,21 @@ test('files beside a tile are found in a folder whose name is encoded in its add
 test('what is wrong with a tileset is said', async () => {
   const refused = (root: object, code: string, message: RegExp): Promise<unknown> =>
     expectRefusal(tileset(root), code, message, { name: 'tileset.json', openFile: () => Promise.resolve(glb(3, 1)) });
-  await refused(tile('a.glb', { implicitTiling: {} }), 'decode/unsupported', /root.*implicit tiling/);
+  const tiling = { subdivisionScheme: 'QUADTREE', subtreeLevels: 2, availableLevels: 3 };
+  const uri = '{level}/{x}/{y}.subtree';
+  for (const [changes, message] of [
+    [{ subdivisionScheme: 'BSP' }, /subdivisionScheme/],
+    [{ subtreeLevels: 0 }, /subtreeLevels/],
+    [{ subtreeLevels: 26 }, /subtreeLevels.*1 to 25/],
+    [{ availableLevels: undefined }, /availableLevels/],
+    [{ subtrees: { uri: 'same.subtree' } }, /subtrees\.uri.*\{level\}, \{x\} and \{y\}/],
+    [{ subtrees: { uri: uri.repeat(200) } }, /at most 2,048 characters/],
+  ] as const)
+    await refused(
+      tile('a.glb', { implicitTiling: { ...tiling, subtrees: { uri }, ...changes } }),
+      'decode/header',
+      message,
+    );
   await refused(tile('a.glb', { transform: [1, 2] }), 'decode/header', /root.transform.*16 numbers/);
   await refused(tile(undefined, { children: [3] }), 'decode/header', /root.children\[0\].*a tile/);
   await refused(tile(`${'./'.repeat(2_000)}a.glb`), 'decode/header', /addresses of at most 2,048 characters/);

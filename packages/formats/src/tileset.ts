@@ -2,27 +2,13 @@
 import { grouped } from './bytes.js';
 import { damaged } from './faults.js';
 import { multiply, type Affine } from './gltf/nodes.js';
+import { implicitTiles, type OpenSubtree } from './implicit-tiles.js';
 import { isObject, parseJson, show, type Json, type JsonSource } from './json.js';
 import { MAX_INDEX_BYTES } from './lod/meta.js';
+import type { Tile, TileContent } from './tile.js';
 
 const MAX_TILES = 100_000;
 const MAX_DEPTH = 500;
-
-/** A file of a tile. */
-export interface TileContent {
-  /** URI from the tileset, with its query. */
-  readonly uri: string;
-  /** Transform from the coordinates of the tile (z up) to those of the tileset. */
-  readonly toTileset: Affine;
-}
-
-/** A node of the tree. Its contents are drawn, or the child tiles that replace them. */
-interface Tile {
-  readonly contents: readonly TileContent[];
-  readonly children: readonly Tile[];
-  /** Whether the tile's contents are drawn in addition to its children (refinement `ADD`). */
-  readonly isAdded: boolean;
-}
 
 const IDENTITY: Affine = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0];
 
@@ -30,27 +16,39 @@ const IDENTITY: Affine = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0];
  * Returns the files of a tileset at a level of detail. Level 0 is the finest; level n omits the n lowest levels of tiles
  * in each branch.
  * @param load Number of tiles of all tilesets of a load, which this function increases. They share one limit.
+ * @param openSubtree Opens the subtrees of implicit tiles by their URIs from the tileset.
  * @param toParent Transform from the coordinates of the tileset to those of its parent.
- * @throws GaussianSplatError `decode/header`, `decode/unsupported` for implicit tiling, or as `parseJson` does.
+ * @throws GaussianSplatError `decode/header`, `decode/corrupt`, `decode/truncated`, or as `parseJson` and `openSubtree` do
  */
-export function contentsAt(
+export async function contentsAt(
   source: JsonSource,
   level: number,
   load: { tiles: number },
+  openSubtree: OpenSubtree,
   toParent: Affine = IDENTITY,
-): TileContent[] {
+): Promise<TileContent[]> {
   const { root } = parseJson(source, MAX_INDEX_BYTES);
   const fail = (path: string, expected: string, found: unknown): never => {
     throw damaged(`${source.name}, ${path}`, expected, show(found), 'decode/header');
   };
+  const countTile = (path: string): void => {
+    if (++load.tiles > MAX_TILES) fail(path, `at most ${grouped(MAX_TILES)} tiles`, 'more');
+  };
+  /** Functions that complete the trees of implicit tiles. */
+  const implicit: (() => Promise<void>)[] = [];
   const open = (json: unknown, parent: Affine, isParentAdded: boolean, path: string, depth: number): Tile => {
     if (!isObject(json)) return fail(path, 'a tile', json);
-    if (++load.tiles > MAX_TILES) fail(path, `at most ${grouped(MAX_TILES)} tiles`, 'more');
+    countTile(path);
     if (depth > MAX_DEPTH) fail(path, `tiles at most ${MAX_DEPTH} deep`, 'deeper ones');
-    if (json.implicitTiling !== undefined)
-      throw damaged(`${source.name}, ${path}`, 'tiles that are listed', 'implicit tiling', 'decode/unsupported');
     const toTileset = multiply(parent, transformOf(json, `${source.name}, ${path}`));
     const isAdded = json.refine === undefined ? isParentAdded : String(json.refine).toUpperCase() === 'ADD';
+    const tiling = json.implicitTiling ?? extensionOf(json, '3DTILES_implicit_tiling');
+    if (tiling !== undefined) {
+      const tile: Tile = { contents: [], children: [], isAdded };
+      const from = { tiling, uris: urisOf(json), toTileset, isAdded, path, source, openSubtree, countTile };
+      implicit.push(async () => void Object.assign(tile, await implicitTiles(from)));
+      return tile;
+    }
     const children: unknown[] = Array.isArray(json.children) ? json.children : [];
     return {
       contents: urisOf(json).map((uri) => ({ uri, toTileset })),
@@ -58,7 +56,9 @@ export function contentsAt(
       isAdded,
     };
   };
-  return drawnOf(open(root, toParent, false, 'root', 0), level).contents;
+  const tree = open(root, toParent, false, 'root', 0);
+  for (const complete of implicit) await complete();
+  return drawnOf(tree, level).contents;
 }
 
 /** Returns the contents that are drawn for a tile at a level, and the height of its subtree; a leaf has height 0. */
@@ -71,9 +71,16 @@ function drawnOf(tile: Tile, level: number): { contents: TileContent[]; height: 
   return { contents: tile.isAdded ? [...tile.contents, ...inner] : inner, height };
 }
 
+/** Returns an extension of a tile, with which version 1.0 has what version 1.1 has as a property. */
+function extensionOf({ extensions }: Json, name: string): unknown {
+  return isObject(extensions) ? extensions[name] : undefined;
+}
+
 /** Returns the URIs of a tile: `content` has one file, `contents` several. Drafts of the format use `url` for `uri`. */
-function urisOf({ content, contents }: Json): string[] {
-  const all: unknown[] = Array.isArray(contents) ? contents : [content];
+function urisOf(tile: Json): string[] {
+  const multiple = extensionOf(tile, '3DTILES_multiple_contents');
+  const several = tile.contents ?? (isObject(multiple) ? (multiple.contents ?? multiple.content) : undefined);
+  const all: unknown[] = Array.isArray(several) ? several : [tile.content];
   return all.flatMap((one) => {
     const uri = isObject(one) ? (one.uri ?? one.url) : undefined;
     return typeof uri === 'string' && uri !== '' ? [uri] : [];

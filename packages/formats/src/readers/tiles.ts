@@ -6,7 +6,8 @@ import { multiply, type Affine } from '../gltf/nodes.js';
 import { MAX_PATH } from '../lod/meta.js';
 import { mergeClouds } from '../merge-clouds.js';
 import type { SceneSource } from '../scene-format.js';
-import { contentsAt, type TileContent } from '../tileset.js';
+import type { TileContent } from '../tile.js';
+import { contentsAt } from '../tileset.js';
 import { applyMotion } from '../transform/moved-cloud.js';
 import { isTileset, readGltf } from './gltf.js';
 import { noParts } from './sog.js';
@@ -84,7 +85,13 @@ async function* filesOf(source: SceneSource, level: number): AsyncGenerator<Tile
     }
   };
   const load = { tiles: 0 };
-  list(contentsAt(source, level, load), 0);
+  const subtreeOf =
+    (folder: string) =>
+    async (uri: string): Promise<Uint8Array> => {
+      const [path, query = ''] = (folder + uri).split(/(?=\?)/, 2);
+      return checkedPart(await opened(source, decoded(path), query), `${name}, ${uri}`);
+    };
+  list(await contentsAt(source, level, load, subtreeOf('')), 0);
   for (let content = left.pop(); content; content = left.pop()) {
     const { uri, toTileset, depth } = content;
     const [path, query = ''] = uri.split(/(?=\?)/, 2);
@@ -102,8 +109,8 @@ async function* filesOf(source: SceneSource, level: number): AsyncGenerator<Tile
     }
     if (depth >= MAX_NESTED)
       throw damaged(where, `tilesets at most ${MAX_NESTED} deep`, 'deeper ones', 'decode/header');
-    const inner = contentsAt({ bytes, name: where, budget }, level, load, toTileset);
     const folder = folderOf(path);
+    const inner = await contentsAt({ bytes, name: where, budget }, level, load, subtreeOf(folder), toTileset);
     list(
       inner.map((one) => ({ ...one, uri: folder + one.uri })),
       depth + 1,

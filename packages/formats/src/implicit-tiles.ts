@@ -1,0 +1,213 @@
+/** Implicit tiles of 3D Tiles (OGC 22-025, section 8): regular trees whose tiles are listed by bits in subtree files. */
+import { grouped, startsWith, viewOf } from './bytes.js';
+import { damaged } from './faults.js';
+import type { Affine } from './gltf/nodes.js';
+import { isObject, parseJson, show, type Json, type JsonSource } from './json.js';
+import { MAX_PATH } from './lod/meta.js';
+import type { Tile } from './tile.js';
+
+/** Opens a file by its URI from the tileset. */
+export type OpenSubtree = (uri: string) => Promise<Uint8Array>;
+
+/** An implicit tile, which is the root of a tree. */
+export interface ImplicitRoot {
+  /** The property `implicitTiling` of the tile. */
+  readonly tiling: unknown;
+  /** Templates of the URIs of its contents. */
+  readonly uris: readonly string[];
+  readonly toTileset: Affine;
+  readonly isAdded: boolean;
+  /** Path of the tile in the JSON, for error messages. */
+  readonly path: string;
+  readonly source: JsonSource;
+  readonly openSubtree: OpenSubtree;
+  /** Counts a tile. Throws for too many. */
+  readonly countTile: (path: string) => void;
+}
+
+/** Maximum level of a tile, and bits of an index in a subtree, so that both are exact integers. */
+const MAX_LEVEL = 50;
+const MAX_INDEX_BITS = 50;
+/** Maximum number of contents of a tile. */
+const MAX_CONTENTS = 64;
+/** Bytes that are charged for each content, besides its address. */
+const CONTENT_BYTES = 64;
+const MAX_SUBTREE_BYTES = 1 << 26;
+/** Bytes of the head of a binary subtree: magic number, version, and two lengths of 64 bits. */
+const HEAD_BYTES = 24;
+
+/** Level and coordinates of a tile in the whole tree. */
+interface Place {
+  readonly level: number;
+  readonly x: number;
+  readonly y: number;
+  readonly z: number;
+}
+
+/** Returns whether the tile, content or child with an index exists. */
+type Availability = (index: number) => boolean;
+
+interface Subtree {
+  /** Tiles by level, then by Morton index. */
+  readonly tiles: Availability;
+  /** For each content of a tile, the tiles that have it. */
+  readonly contents: readonly Availability[];
+  /** Subtrees below the lowest level, by Morton index. */
+  readonly children: Availability;
+}
+
+/**
+ * Returns the tree of an implicit tile.
+ * @throws GaussianSplatError `decode/header`, `decode/corrupt`, `decode/truncated`, or as `openSubtree` does
+ */
+export async function implicitTiles(root: ImplicitRoot): Promise<Tile> {
+  const where = `${root.source.name}, ${root.path}`;
+  const fail = (path: string, expected: string, found: unknown): never => {
+    throw damaged(`${where}.implicitTiling.${path}`, expected, show(found), 'decode/header');
+  };
+  const tiling = isObject(root.tiling) ? root.tiling : {};
+  const { subdivisionScheme, subtreeLevels, subtrees } = tiling;
+  // Version 1.0 has the highest level in place of the number of levels.
+  const levels = tiling.availableLevels ?? Number(tiling.maximumLevel) + 1;
+  const axes = subdivisionScheme === 'QUADTREE' ? 2 : subdivisionScheme === 'OCTREE' ? 3 : undefined;
+  if (axes === undefined) return fail('subdivisionScheme', 'QUADTREE or OCTREE', subdivisionScheme);
+  const isLevel = (value: unknown): value is number =>
+    Number.isInteger(value) && (value as number) >= 1 && (value as number) <= MAX_LEVEL;
+  const max = Math.floor(MAX_INDEX_BITS / axes);
+  if (!isLevel(subtreeLevels) || subtreeLevels > max) return fail('subtreeLevels', `1 to ${max}`, subtreeLevels);
+  if (!isLevel(levels)) return fail('availableLevels', `1 to ${MAX_LEVEL}`, levels);
+  const template = isObject(subtrees) ? subtrees.uri : undefined;
+  const isTemplate = typeof template === 'string' && ['{level}', '{x}', '{y}'].every((key) => template.includes(key));
+  if (!isTemplate) return fail('subtrees.uri', 'an address with {level}, {x} and {y}', template);
+  if (root.uris.length > MAX_CONTENTS) return fail('content', `at most ${MAX_CONTENTS} files`, root.uris.length);
+  if ([template, ...root.uris].some(({ length }) => length > MAX_PATH))
+    return fail('subtrees.uri', `addresses of at most ${grouped(MAX_PATH)} characters`, 'longer ones');
+  const tree = new ImplicitTree(root, { branches: 2 ** axes, subtreeLevels, levels, template });
+  return (
+    (await tree.subtreeAt({ level: 0, x: 0, y: 0, z: 0 })) ?? { contents: [], children: [], isAdded: root.isAdded }
+  );
+}
+
+interface TreeShape {
+  /** Number of children of a tile: 4 or 8. */
+  readonly branches: number;
+  readonly subtreeLevels: number;
+  readonly levels: number;
+  /** Template of the URIs of subtrees. */
+  readonly template: string;
+}
+
+class ImplicitTree {
+  readonly #root: ImplicitRoot;
+  readonly #shape: TreeShape;
+
+  constructor(root: ImplicitRoot, shape: TreeShape) {
+    this.#root = root;
+    this.#shape = shape;
+  }
+
+  /** Returns the highest tile of a subtree with all tiles below it; undefined if it does not exist. */
+  async subtreeAt(place: Place): Promise<Tile | undefined> {
+    const { source, openSubtree, uris, countTile, path } = this.#root;
+    countTile(path);
+    const uri = filled(this.#shape.template, place);
+    const subtree = await readSubtree(await openSubtree(uri), uri, uris.length, source, openSubtree);
+    return subtree.tiles(0) ? this.#tileAt(subtree, place, 0, 0) : undefined;
+  }
+
+  /** @param depth Level of the tile in the subtree. @param morton Index of the tile in its level of the subtree. */
+  async #tileAt(subtree: Subtree, place: Place, depth: number, morton: number): Promise<Tile> {
+    const { uris, toTileset, isAdded, source, countTile, path } = this.#root;
+    const { branches, subtreeLevels, levels } = this.#shape;
+    countTile(path);
+    const isThere = (own: Availability): boolean => own(firstOf(depth, branches) + morton);
+    const contents = uris
+      .filter((_, k) => isThere(subtree.contents[k]))
+      .map((uri) => ({ uri: filled(uri, place), toTileset }));
+    for (const { uri } of contents) source.budget.take(CONTENT_BYTES + 2 * uri.length, source.name);
+    const children: Tile[] = [];
+    for (let k = 0; k < branches && place.level + 1 < levels; k++) {
+      const [x, y, z] = [place.x, place.y, place.z].map((value, axis) => 2 * value + ((k >> axis) & 1));
+      const below = { level: place.level + 1, x, y, z };
+      const own = branches * morton + k;
+      if (depth + 1 < subtreeLevels) {
+        if (subtree.tiles(firstOf(depth + 1, branches) + own))
+          children.push(await this.#tileAt(subtree, below, depth + 1, own));
+      } else if (subtree.children(own)) {
+        const tile = await this.subtreeAt(below);
+        if (tile) children.push(tile);
+      }
+    }
+    return { contents, children, isAdded };
+  }
+}
+
+/** Index of the first tile of a level in a subtree. */
+const firstOf = (depth: number, branches: number): number => (branches ** depth - 1) / (branches - 1);
+
+const filled = (template: string, place: Place): string =>
+  template.replace(/\{(level|x|y|z)\}/g, (_, key: keyof Place) => String(place[key]));
+
+/** Reads a subtree, which is JSON, or binary with JSON and a buffer in it. */
+async function readSubtree(
+  bytes: Uint8Array,
+  uri: string,
+  contents: number,
+  { name, budget }: JsonSource,
+  open: OpenSubtree,
+): Promise<Subtree> {
+  const where = `${name}, ${uri}`;
+  const { text, binary } = chunksOf(bytes, where);
+  const json = parseJson({ bytes: text, name: where, budget }, MAX_SUBTREE_BYTES);
+  const folder = uri.slice(0, uri.lastIndexOf('/') + 1);
+  const availability = async (own: unknown, key: string): Promise<Availability> => {
+    const { constant, bitstream, bufferView = bitstream } = isObject(own) ? own : {};
+    if (bufferView === undefined) return () => constant === 1;
+    const bits = await viewIn(json, bufferView, binary, `${where}, ${key}`, (file) => open(folder + file));
+    // Indices may exceed 32 bits.
+    return (index) => (((bits[Math.floor(index / 8)] ?? 0) >> (index % 8)) & 1) === 1;
+  };
+  const { tileAvailability, contentAvailability, childSubtreeAvailability } = json;
+  const ofContents: unknown[] = Array.isArray(contentAvailability) ? contentAvailability : [contentAvailability];
+  const found: Availability[] = [];
+  for (let k = 0; k < contents; k++) found.push(await availability(ofContents[k], 'contentAvailability'));
+  return {
+    tiles: await availability(tileAvailability, 'tileAvailability'),
+    contents: found,
+    children: await availability(childSubtreeAvailability, 'childSubtreeAvailability'),
+  };
+}
+
+function chunksOf(bytes: Uint8Array, where: string): { text: Uint8Array; binary: Uint8Array } {
+  if (!startsWith(bytes, 'subt')) return { text: bytes, binary: new Uint8Array() };
+  const view = viewOf(bytes);
+  const [length, rest] = bytes.length < HEAD_BYTES ? [0, 0] : [8, 16].map((at) => Number(view.getBigUint64(at, true)));
+  const end = HEAD_BYTES + length + rest;
+  if (end > bytes.length) throw damaged(where, `${grouped(end)} bytes`, grouped(bytes.length), 'decode/truncated');
+  return {
+    text: bytes.subarray(HEAD_BYTES, HEAD_BYTES + length),
+    binary: bytes.subarray(HEAD_BYTES + length, end),
+  };
+}
+
+/** Returns the bytes of a view of a buffer, which is the binary chunk or another file. */
+async function viewIn(
+  { buffers, bufferViews }: Json,
+  index: unknown,
+  binary: Uint8Array,
+  where: string,
+  open: (file: string) => Promise<Uint8Array>,
+): Promise<Uint8Array> {
+  const item = (list: unknown, at: unknown): Json => {
+    const found: unknown = Array.isArray(list) && Number.isInteger(at) ? list[at as number] : undefined;
+    if (isObject(found)) return found;
+    throw damaged(where, 'a view of a buffer', show(at), 'decode/header');
+  };
+  const { buffer, byteOffset = 0, byteLength } = item(bufferViews, index);
+  const { uri } = item(buffers, buffer);
+  const bytes = typeof uri === 'string' ? await open(uri) : binary;
+  const [first, length] = [byteOffset, byteLength] as number[];
+  const isWithin = Number.isInteger(first) && Number.isInteger(length) && first >= 0 && length >= 0;
+  if (isWithin && first + length <= bytes.length) return bytes.subarray(first, first + length);
+  throw damaged(where, `bytes within ${grouped(bytes.length)}`, show([byteOffset, byteLength]), 'decode/corrupt');
+}
