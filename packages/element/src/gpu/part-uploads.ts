@@ -58,7 +58,11 @@ export class PartUploads {
   async #write(gaussians: Promise<GaussianBuffers> | undefined, portion: PackedPortion): Promise<void> {
     const made = await gaussians;
     // Portions that were sent before a restart of the load are ignored.
-    if (gaussians === this.#gaussians) await made?.write(portion);
+    if (gaussians !== this.#gaussians) return;
+    await made?.write(portion);
+    // Garbage collection comes late, so the words of a large scene would stay in memory beside those on the GPU.
+    for (const words of [portion.geometry, portion.sh])
+      (words?.buffer as { transfer?: (bytes: number) => unknown } | undefined)?.transfer?.(0);
   }
 
   async #allocate(head: PackedHead): Promise<GaussianBuffers> {
