@@ -3,10 +3,10 @@
  * and opacities are from the source. It needs the npm registry.
  */
 import { execFileSync } from 'node:child_process';
-import { mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
+import { mkdirSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { createRequire } from 'node:module';
 import { tmpdir } from 'node:os';
-import { join } from 'node:path';
+import { dirname, join } from 'node:path';
 import { pathToFileURL } from 'node:url';
 import { tsImport } from 'tsx/esm/api';
 import { ensureDependencies } from './lib/prepare.mjs';
@@ -14,7 +14,7 @@ import { must } from './lib/run.mjs';
 
 ensureDependencies();
 must(process.execPath, ['scripts/build.mjs', '--packages']);
-const { readScene } = await import('@gaussian-splat/formats');
+const { readScene, upright } = await import('@gaussian-splat/formats');
 const { encodingsFor } = await import('@gaussian-splat/economise');
 
 const COUNT = 400;
@@ -79,7 +79,8 @@ async function transcodedBySpark(rad) {
 
 const rows = [];
 async function judge(tool, name) {
-  const found = await readScene(readFileSync(at(name)), { name });
+  const openFile = async (path) => readFileSync(join(dirname(at(name)), path));
+  const found = upright(await readScene(readFileSync(at(name)), { name, openFile }));
   const { place, opacity } = distance(found, source);
   const isRight = found.count === COUNT && place < 0.05 && opacity < 0.02;
   rows.push({ tool, file: name, splats: found.count, place, opacity, isRight });
@@ -126,6 +127,17 @@ try {
   await judge('after spark-lib', 'a.rad');
   writeFileSync(at('a-by-spark.spz'), await transcodedBySpark(rad));
   await judge(`spark ${sparkVersion()}`, 'a-by-spark.spz');
+  // The tests' writer of LCC, whose z axis points up, and the decoder of splat-transform.
+  const { writeLcc } = await tsImport('../tests/formats/support/lcc-writer.ts', import.meta.url);
+  const { transformCloud } = await tsImport('../packages/formats/src/transform/transform-cloud.ts', import.meta.url);
+  const raised = structuredClone({ ...source, sh, shDegree: 3 });
+  transformCloud(raised, [1, 0, 0, 0, 0, 0, 1, 0, 0, -1, 0, 0]);
+  mkdirSync(at('lcc'));
+  for (const [path, bytes] of Object.entries(writeLcc([raised], { cellSize: 64 })))
+    writeFileSync(at(join('lcc', path)), bytes);
+  await judge('after ply2lcc', 'lcc/meta.lcc');
+  run('-q', 'lcc/meta.lcc', 'lcc-by-splat-transform.ply');
+  await judge(transform, 'lcc-by-splat-transform.ply');
 } finally {
   rmSync(folder, { recursive: true, force: true });
 }

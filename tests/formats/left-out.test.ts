@@ -95,9 +95,6 @@ const NAMED: readonly [name: string, bytes: Uint8Array, kind: RegExp, remedy: Re
   ['scene.slpk', archive('3dSceneLayer.json.gz', 'nodes/0'), /I3S/, /convert/i],
   ['0.b3dm', TWELVE, /3D Tiles/, /\.glb/],
   ['reply', text('{"geometricError": 1, "root": {"children": []}, "x": 1}'), /3D Tiles/, /\.glb/],
-  ['scene.lcc', text('{"version": "5.0", "totalSplats": 1000}'), /LCC scene/, /splat-transform/],
-  ['reply', text('{"version": "5.0", "totalSplats": 1000}'), /LCC scene/, /splat-transform/],
-  ['lcc.zip', archive('scene.lcc', 'index.bin', 'data.bin'), /LCC scene/, /splat-transform/],
   ['scene.splatv', TWELVE, /splatv/, /sequence/],
   ['reply', Uint8Array.of(0x4b, 0x67, 0, 0, 9, 0, 0, 0, 91), /splatv/, /sequence/],
 ];
@@ -134,7 +131,7 @@ const CASES: Readonly<Record<string, RegExp>> = {
   'glb-log-scales-2.3.1.glb': /^3 splats classic The glTF has logarithms/,
   'gsplat-png-meta.json': /decode\/unsupported.*gsplat's PNG compression/,
   'mip-source.ply': /^\d+ splats 0\.1$/,
-  'scene.lcc': /decode\/unsupported.*LCC scene/,
+  'scene.lcc': /decode\/header.*attributes, scale: expected min and max/,
   'spz-splat-transform-2.7.1.spz': /^3 splats classic assumed$/,
   'spz-splat-transform-3.7.0.spz': /^3 splats classic assumed$/,
   'stg-lite.ply': /decode\/unsupported.*SpacetimeGaussians/,

@@ -1,7 +1,7 @@
 /** Rare formats, and extensions and media types of all formats. Loaded for files without a common signature. */
 import { usualFormats } from './formats.js';
 import type { SceneFormat } from './scene-format.js';
-import { isRad, looksLikeKsplat } from './signatures.js';
+import { isJsonWith, isRad, looksLikeKsplat } from './signatures.js';
 
 const lateFormats: readonly SceneFormat[] = [
   {
@@ -11,6 +11,22 @@ const lateFormats: readonly SceneFormat[] = [
     mimeTypes: [],
     hasSignature: isRad,
     load: async () => (await import('./readers/rad.js')).readRad,
+  },
+  {
+    name: 'lcc',
+    title: 'LCC (XGRIDS)',
+    extensions: ['.lcc'],
+    mimeTypes: [],
+    hasSignature: isJsonWith(/"totalLevel"\s*:/),
+    load: async () => (await import('./readers/lcc.js')).readLcc,
+  },
+  {
+    name: 'lcc2',
+    title: 'LCC2 (XGRIDS)',
+    extensions: ['.lcc2'],
+    mimeTypes: [],
+    hasSignature: isJsonWith(/"(totalLevels|lod_3dgs_info)"\s*:/),
+    load: async () => (await import('./readers/lcc2.js')).readLcc2,
   },
   {
     name: 'ksplat',

@@ -21,19 +21,6 @@ const EXPORT = 'save the splats as PLY with the trainer that wrote it, and give 
 
 export const UNREAD_KINDS: readonly UnreadKind[] = [
   {
-    found: 'an LCC2 scene of XGRIDS',
-    remedy: CONVERT,
-    extensions: /^lcc2$/,
-    within: /\.lcc2$/i,
-  },
-  {
-    found: 'an LCC scene of XGRIDS',
-    remedy: CONVERT,
-    extensions: /^lcc$/,
-    fits: (_, text) => /"totalSplats"\s*:/.test(text),
-    within: /\.lcc$/i,
-  },
-  {
     found: 'a .splatv scene, whose splats move',
     remedy: 'export each moment as a PLY or SPZ of its own, and show them as a sequence',
     extensions: /^splatv$/,

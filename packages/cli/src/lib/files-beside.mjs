@@ -45,8 +45,27 @@ const sidecarOf = (scene, { sidecarName }) =>
   extname(scene).toLowerCase() === '.onnx' ? sidecarName(basename(scene)) : undefined;
 
 async function namedBy(file) {
-  const read = { '.gltf': buffersOf, '.onnx': weightsOf, '.json': partsOf }[extname(file).toLowerCase()];
+  const readers = {
+    '.gltf': buffersOf,
+    '.onnx': weightsOf,
+    '.json': partsOf,
+    '.lcc': partsOfLcc,
+    '.lcc2': partsOfLcc2,
+  };
+  const read = readers[extname(file).toLowerCase()];
   return read === undefined ? [] : read(file);
+}
+
+/** Not every LCC scene has harmonics and surroundings. */
+const partsOfLcc = (file) => [
+  ...['index.bin', 'data.bin'],
+  ...['shcoef.bin', 'environment.bin'].filter((name) => existsSync(join(dirname(file), name))),
+];
+
+function partsOfLcc2(file) {
+  const { root } = JSON.parse(readFileSync(file, 'utf8'));
+  const earlier = root.files?.map((path) => path.replace(/^\//, '').replace(/(\.sog)?$/, '.sog'));
+  return root.splatFiles ?? earlier ?? [];
 }
 
 async function buffersOf(file) {

@@ -200,5 +200,5 @@ class SharedReading {
 
 /** Returns whether a file may refer to other files, which then contain most bytes of the scene. */
 function mayHaveParts(name: string): boolean {
-  return /\.(json|gltf)$/i.test(name);
+  return /\.(json|gltf|lcc2?)$/i.test(name);
 }

@@ -19,7 +19,7 @@ const DESCRIPTIONS = [
 ] as const;
 /** Maximum number of files with the same name of {@link DESCRIPTIONS} that are opened to find a scene. */
 const MAX_DESCRIPTIONS = 16;
-const SCENE_FILE = /\.(gltf|glb|ply|spz|splat|ksplat|sog|rad)$/i;
+const SCENE_FILE = /\.(gltf|glb|ply|spz|splat|ksplat|sog|rad|lcc2?)$/i;
 /** Matches PLY files that are not the result of training: initial points in 3DGS, COLMAP and nerfstudio, and cameras. */
 const FIRST_POINTS = /(^|\/)(input|sparse(_pc)?|points?(3d)?|cameras?)\.ply$/i;
 /** Matches the splats after a number of iterations in the output of 3DGS. Group 1 is the folder, group 2 the number. */
@@ -68,9 +68,9 @@ async function mainFile(archive: Archive, name: string): Promise<string | undefi
   if (scenes.length === 1) return scenes[0];
   const last = lastIteration(scenes);
   if (last !== undefined) return last;
-  // The other scenes may be files that a glTF refers to.
-  const gltf = scenes.filter((path) => /\.gltf$/i.test(path));
-  if (gltf.length === 1) return gltf[0];
+  // The other scenes may be files that a description refers to.
+  const descriptions = scenes.filter((path) => /\.(gltf|lcc2?)$/i.test(path));
+  if (descriptions.length === 1) return descriptions[0];
   if (scenes.length > 0) throw (await namedArchive(archive, name)) ?? severalScenes(name, scenes);
   return undefined;
 }

@@ -1,0 +1,176 @@
+import { GaussianSplatError, shCoefficientCount, type GaussianCloud } from '@gaussian-splat/core';
+import { grouped, viewOf } from '../bytes.js';
+import { allocateCloud, SH_C0, type DraftCloud } from '../cloud.js';
+import { damaged, warn } from '../faults.js';
+import { checkedPart } from '../foreign-signatures.js';
+import { parseLccIndex, parseLccMeta, type LccMeta, type LccRanges, type LccRun } from '../lcc/meta.js';
+import { mergeClouds } from '../merge-clouds.js';
+import type { SceneSource } from '../scene-format.js';
+import { noParts } from './sog.js';
+
+/** Bytes of a splat in `data.bin`, and of its harmonics in `shcoef.bin`. `environment.bin` has both in turn. */
+const [SPLAT_BYTES, HARMONICS_BYTES] = [32, 64];
+const COEFFICIENTS = 15;
+
+/**
+ * Reads LCC of XGRIDS: a description (`.lcc`) with `index.bin`, `data.bin`, and perhaps `shcoef.bin` and
+ * `environment.bin` beside it. The level of detail is `source.level`; 0 is the finest. The splats of the environment
+ * are added at every level. The z axis points up, which becomes `hints.up`.
+ */
+export async function readLcc(source: SceneSource): Promise<GaussianCloud> {
+  const { name, level = 0, maxSplats = Infinity, signal } = source;
+  const meta = parseLccMeta(source);
+  const part = partOpener(source);
+  const index = await part('index.bin');
+  const runs = parseLccIndex(index, meta.levels, `${name}, index.bin`);
+  const countAt = (own: number): number => runs[own].reduce((sum, { count }) => sum + count, 0);
+  let own = Math.min(level === 'all' ? 0 : level, meta.levels - 1);
+  while (own < meta.levels - 1 && countAt(own) > maxSplats) own++;
+  const count = countAt(own);
+  const data = await part('data.bin');
+  if (SPLAT_BYTES * count > data.length)
+    throw damaged(
+      `${name}, index.bin`,
+      `at most ${grouped(Math.floor(data.length / SPLAT_BYTES))} splats`,
+      grouped(count),
+    );
+  const harmonics = meta.hasHarmonics ? await part('shcoef.bin') : undefined;
+  signal?.throwIfAborted();
+  const cloud = allocateCloud(count, harmonics ? 3 : 0, source);
+  let first = 0;
+  for (const run of runs[own]) {
+    requireRoom(data, run, SPLAT_BYTES, `${name}, data.bin`);
+    if (harmonics) requireRoom(harmonics, run, HARMONICS_BYTES, `${name}, shcoef.bin`);
+    const records = { bytes: data, start: run.start, stride: SPLAT_BYTES };
+    const coefficients = harmonics && {
+      ...{ bytes: harmonics, start: (run.start / SPLAT_BYTES) * HARMONICS_BYTES, stride: HARMONICS_BYTES },
+    };
+    unpack(records, coefficients, meta.ranges, cloud, first, run.count);
+    first += run.count;
+  }
+  const whole = await withEnvironment(cloud, meta, part, source);
+  whole.hints = { ...whole.hints, up: [0, 0, 1] };
+  return whole;
+}
+
+type OpenPart = (path: string) => Promise<Uint8Array>;
+
+function partOpener({ openFile, name }: SceneSource): OpenPart {
+  const open = openFile ?? noParts(name, 'scene.zip');
+  return async (path) => checkedPart(await open(path), `${name}, ${path}`);
+}
+
+/** Adds the splats of `environment.bin`. The description does not say whether there is such a file. */
+async function withEnvironment(
+  cloud: DraftCloud,
+  { hasHarmonics, around }: LccMeta,
+  part: OpenPart,
+  source: SceneSource,
+): Promise<DraftCloud> {
+  const path = 'environment.bin';
+  const bytes = await part(path).catch((error: unknown) => {
+    source.signal?.throwIfAborted();
+    const code = error instanceof GaussianSplatError ? error.code : '';
+    if (code.startsWith('out-of-memory')) throw error;
+    if (/^network\/(?!status)/.test(code))
+      warn(cloud, `The surroundings (${path}) are left out: ${(error as Error).message}`);
+    return undefined;
+  });
+  if (!bytes || bytes.length === 0) return cloud;
+  const stride = SPLAT_BYTES + (hasHarmonics ? HARMONICS_BYTES : 0);
+  if (bytes.length % stride !== 0)
+    throw damaged(
+      `${source.name}, ${path}`,
+      `splats of ${stride} bytes`,
+      `${grouped(bytes.length)} bytes`,
+      'decode/truncated',
+    );
+  const count = bytes.length / stride;
+  const own = allocateCloud(count, cloud.shDegree, source);
+  const coefficients = hasHarmonics ? { bytes, start: SPLAT_BYTES, stride } : undefined;
+  unpack({ bytes, start: 0, stride }, coefficients, around, own, 0, count);
+  return mergeClouds(
+    [cloud, own].map((each) => ({ cloud: each, first: 0, count: each.count })),
+    source,
+  );
+}
+
+function requireRoom({ length }: Uint8Array, { start, count }: LccRun, bytes: number, name: string): void {
+  const end = (start / SPLAT_BYTES + count) * bytes;
+  if (start % SPLAT_BYTES !== 0) throw damaged(name, `offsets that are multiples of ${SPLAT_BYTES}`, grouped(start));
+  if (end > length) throw damaged(name, `${grouped(end)} bytes`, grouped(length), 'decode/truncated');
+}
+
+/** Records of the same size: byte offset of the first one, and bytes from one to the next. */
+interface Records {
+  readonly bytes: Uint8Array;
+  readonly start: number;
+  readonly stride: number;
+}
+
+/** Writes splats to a cloud, from index `first` on. */
+function unpack(
+  records: Records,
+  harmonics: Records | undefined,
+  ranges: LccRanges,
+  cloud: DraftCloud,
+  first: number,
+  count: number,
+): void {
+  const { positions, scales, rotations, opacities, sh, shDegree } = cloud;
+  const { min, max } = ranges.scale;
+  const view = viewOf(records.bytes);
+  const stride = 3 * shCoefficientCount(shDegree);
+  for (let k = 0; k < count; k++) {
+    const at = records.start + records.stride * k;
+    const i = first + k;
+    for (let axis = 0; axis < 3; axis++) {
+      positions[3 * i + axis] = view.getFloat32(at + 4 * axis, true);
+      sh[stride * i + axis] = (view.getUint8(at + 12 + axis) / 255 - 0.5) / SH_C0;
+      scales[3 * i + axis] = mix(min[axis], max[axis], view.getUint16(at + 16 + 2 * axis, true) / 65_535);
+    }
+    opacities[i] = view.getUint8(at + 15) / 255;
+    unpackRotation(view.getUint32(at + 22, true), rotations, 4 * i);
+  }
+  if (harmonics) unpackHarmonics(harmonics, ranges, sh.subarray(stride * first), stride, count);
+}
+
+const mix = (a: number, b: number, t: number): number => a * (1 - t) + b * t;
+
+/**
+ * Decodes a quaternion (w, x, y, z). The highest 2 bits of the word are the index in (x, y, z, w) of the largest
+ * component, which is not stored. The others have 10 bits each, from -1/sqrt(2) to 1/sqrt(2); the lowest bits are the
+ * first of them.
+ */
+function unpackRotation(word: number, out: Float32Array, at: number): void {
+  const largest = word >>> 30;
+  let squares = 0;
+  for (let component = 0, shift = 0; component < 4; component++) {
+    if (component === largest) continue;
+    const value = (((word >>> shift) & 1023) / 1023 - 0.5) * Math.SQRT2;
+    out[at + ((component + 1) & 3)] = value;
+    squares += value * value;
+    shift += 10;
+  }
+  out[at + ((largest + 1) & 3)] = Math.sqrt(Math.max(0, 1 - squares));
+}
+
+/** Writes coefficients: a word for each, with 11 bits of red, which are the lowest, 10 of green, and 11 of blue. */
+function unpackHarmonics(
+  { bytes, start, stride: recordBytes }: Records,
+  { harmonics: { min, max } }: LccRanges,
+  sh: Float32Array,
+  stride: number,
+  count: number,
+): void {
+  const view = viewOf(bytes);
+  for (let k = 0; k < count; k++) {
+    for (let c = 0; c < COEFFICIENTS; c++) {
+      const word = view.getUint32(start + recordBytes * k + 4 * c, true);
+      const to = stride * k + 3 * (c + 1);
+      sh[to] = mix(min[0], max[0], (word & 2047) / 2047);
+      sh[to + 1] = mix(min[1], max[1], ((word >>> 11) & 1023) / 1023);
+      sh[to + 2] = mix(min[2], max[2], (word >>> 21) / 2047);
+    }
+  }
+}
