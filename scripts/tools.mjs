@@ -8,6 +8,7 @@ import { createRequire } from 'node:module';
 import { tmpdir } from 'node:os';
 import { dirname, join } from 'node:path';
 import { pathToFileURL } from 'node:url';
+import { zipSync } from 'fflate';
 import { tsImport } from 'tsx/esm/api';
 import { ensureDependencies } from './lib/prepare.mjs';
 import { must } from './lib/run.mjs';
@@ -138,6 +139,14 @@ try {
   await judge('after ply2lcc', 'lcc/meta.lcc');
   run('-q', 'lcc/meta.lcc', 'lcc-by-splat-transform.ply');
   await judge(transform, 'lcc-by-splat-transform.ply');
+  const { writeSog } = await tsImport('../tests/formats/support/sog-writer.ts', import.meta.url);
+  writeFileSync(at('lcc/a.sog'), zipSync(writeSog(raised)));
+  const root = { splatFiles: ['a.sog'], child: [{ data: { '3dgs': { name: 0 } } }] };
+  const meta = { totalLevels: 1, totalSplats: COUNT, lodSplats: [COUNT], root };
+  writeFileSync(at('lcc/meta.lcc2'), JSON.stringify(meta));
+  await judge('after splat-transform', 'lcc/meta.lcc2');
+  run('-q', 'lcc/meta.lcc2', 'lcc2-by-splat-transform.ply');
+  await judge(transform, 'lcc2-by-splat-transform.ply');
 } finally {
   rmSync(folder, { recursive: true, force: true });
 }
