@@ -1,5 +1,6 @@
 /** The axis of instances: its required position, the remaining shapes, and how values of several become those of one. */
 import assert from 'node:assert/strict';
+import { readFileSync } from 'node:fs';
 import { test } from 'node:test';
 import {
   checkContract,
@@ -12,96 +13,36 @@ import {
 } from '@gaussian-splat/core/contract';
 import type { OnnxTensor } from '@gaussian-splat/core/onnx';
 import { bindInputs, groupInstances, inputsOfInstances, stackInputs, type Inputs } from '@gaussian-splat/generator';
-import { assertHelpful, brief, faultsOf, headerWith, PACKED, SPLIT, tensor } from './support.js';
+import { assertHelpful, brief, faultsOf, headerWith, PACKED, tensor } from './support.js';
 
 const MANY: Contract = { ...PACKED, instances: { axis: 'B', most: 8 } };
 const TIMES = tensor('time', ['B', 1]);
 const GAUSSIANS = tensor('gaussians', ['B', 10, 13]);
 const SEED = tensor('seed', [1], 'int32');
 const withSeed: Contract = { ...MANY, inputs: { ...MANY.inputs, seed: { role: 'seed' } } };
-const splitOutputs = (lead: OnnxTensor['dims']): OnnxTensor[] => [
-  tensor('p', [...lead!, 10, 3]),
-  tensor('s', [...lead!, 10, 3]),
-  tensor('r', [...lead!, 10, 4]),
-  tensor('h', [...lead!, 10, 9, 3]),
-  tensor('o', [...lead!, 10, 1]),
-  tensor('c', [...lead!], 'int32'),
-];
-const SPLIT_MANY: Contract = { ...SPLIT, inputs: PACKED.inputs, instances: { axis: 'B', most: 4 } };
 
-const CASES: readonly [
-  what: string,
-  inputs: OnnxTensor[],
-  outputs: OnnxTensor[],
-  contract: Contract,
-  faults: string[],
-][] = [
-  ['nothing wrong', [TIMES], [GAUSSIANS], MANY, []],
-  ['an input that all share', [TIMES, SEED], [GAUSSIANS], withSeed, []],
-  ['split, with a count', [TIMES], splitOutputs(['B']), SPLIT_MANY, []],
-  ['an output without it', [TIMES], [tensor('gaussians', [10, 13])], MANY, ['instances gaussians']],
-  [
-    'an axis of another name',
-    [TIMES],
-    [tensor('gaussians', ['N', 10, 13])],
-    MANY,
-    ['instances gaussians', 'shape gaussians'],
-  ],
-  [
-    'a size that all share',
-    [TIMES],
-    [tensor('gaussians', [4, 10, 13])],
-    MANY,
-    ['instances gaussians', 'shape gaussians'],
-  ],
-  ['no input with it', [tensor('time', [1])], [GAUSSIANS], MANY, ['instances instances']],
-  [
-    'an N that may change',
-    [TIMES],
-    [tensor('gaussians', ['B', 'N', 13])],
-    MANY,
-    ['instances gaussians', 'rows gaussians'],
-  ],
-  [
-    'the axis twice',
-    [TIMES],
-    [tensor('gaussians', ['B', 'B', 13])],
-    MANY,
-    ['instances gaussians', 'instances gaussians', 'rows gaussians'],
-  ],
-  [
-    'the axis behind',
-    [tensor('time', [1, 'B'])],
-    [GAUSSIANS],
-    MANY,
-    ['instances instances', 'instances time', 'shape time'],
-  ],
-  ['a shape that is wrong for one, too', [tensor('time', ['B', 3])], [GAUSSIANS], MANY, ['shape time']],
-  ['the axis, undeclared', [TIMES], [GAUSSIANS], PACKED, ['shape gaussians', 'shape time']],
-  [
-    'a picture of each',
-    [TIMES, tensor('image', ['B', 1, 3, 8, 8])],
-    [GAUSSIANS],
-    { ...MANY, inputs: { ...MANY.inputs, image: { role: 'image' } } },
-    ['instances image'],
-  ],
-  [
-    'a post-processor',
-    [tensor('image', [1, 3, 8, 8])],
-    [tensor('out', [1, 3, 8, 8])],
-    {
-      version: 1,
-      inputs: { image: { role: 'image' } },
-      outputs: { layout: 'image', image: 'out' },
-      instances: { axis: 'B', most: 2 },
-    },
-    ['instances instances'],
-  ],
-];
+type Declared = readonly [name: string, dims: OnnxTensor['dims'], dtype?: OnnxTensor['dtype']];
 
-for (const [what, inputs, outputs, contract, faults] of CASES) {
+/** The corpus of both checkers: packages/exporter/tests/test_instances.py holds the other one against it. */
+const { contract: base, cases } = JSON.parse(
+  readFileSync(new URL('../fixtures/instances.json', import.meta.url), 'utf8'),
+) as {
+  readonly contract: Contract;
+  readonly cases: readonly {
+    readonly what: string;
+    readonly inputs: readonly Declared[];
+    readonly outputs: readonly Declared[];
+    /** Changes of the contract; null for a field that is not there. */
+    readonly contract?: object;
+    readonly faults: readonly string[];
+  }[];
+};
+
+for (const { what, inputs, outputs, contract, faults } of cases) {
   test(`instances: ${what}`, () => {
-    const found = checkContract(headerWith(inputs, outputs), contract);
+    const given = JSON.stringify({ ...base, ...contract }, (_, value: unknown) => value ?? undefined);
+    const [declaredInputs, declaredOutputs] = [inputs, outputs].map((list) => list.map((each) => tensor(...each)));
+    const found = checkContract(headerWith(declaredInputs, declaredOutputs), parseContract(given));
     assertHelpful(found);
     assert.deepEqual(brief(found), faults);
   });

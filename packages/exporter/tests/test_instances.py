@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,7 @@ from gaussian_exporter.families.avatar import export_avatar
 from gaussian_exporter.families.classic import export_classic
 from gaussian_exporter.families.hexplane import export_hexplane
 from gaussian_exporter.graph import INSTANCES, Graph
+from gaussian_exporter.header import contract_faults, header_faults
 from gaussian_exporter.outputs import Options
 from gaussian_exporter.placement import gpu_findings
 
@@ -25,6 +27,22 @@ from . import test_avatar, test_classic, test_hexplane
 from .running import FACTS, error, parts, rows, run
 
 ONE, MANY = Options(), Options(instances=8)
+CORPUS = json.loads((Path(__file__).parents[3] / "tests/fixtures/instances.json").read_text())
+
+
+@pytest.mark.parametrize("case", CORPUS["cases"], ids=[case["what"] for case in CORPUS["cases"]])
+def test_the_rules_of_the_axis_are_those_of_the_checker_of_pages(case: Any) -> None:
+    # tests/contract/instances.test.ts holds the other checker against the same file.
+    contract = {key: value for key, value in (CORPUS["contract"] | case.get("contract", {})).items() if value}
+
+    def declared(name: str, dims: list[int | str], dtype: str = "float32") -> onnx.ValueInfoProto:
+        return onnx.helper.make_tensor_value_info(name, onnx.helper.np_dtype_to_tensor_dtype(np.dtype(dtype)), dims)
+
+    inputs, outputs = ([declared(*each) for each in case[end]] for end in ("inputs", "outputs"))
+    graph = onnx.helper.make_graph([], "declared", inputs, outputs)
+    model = onnx.helper.make_model(graph, opset_imports=[onnx.helper.make_opsetid("", 17)], ir_version=8)
+    faults = [*contract_faults(contract), *header_faults(model, contract, Path())]
+    assert sorted(f"{fault.code} {fault.tensor or fault.where}" for fault in faults) == case["faults"]
 
 
 def body(options: Options, **how: Any) -> onnx.ModelProto:

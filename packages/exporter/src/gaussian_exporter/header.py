@@ -1,7 +1,7 @@
 """A file held against its contract before it runs: names, shapes, element types, rows, versions, operators, files.
 
 One rule set with the checker of pages and shells (packages/core/src/contract: parse-contract.ts, check-contract.ts,
-check-file.ts); tests/fixtures/verdicts.json holds both.
+check-file.ts, instances.ts); tests/fixtures/verdicts.json and instances.json hold both.
 """
 
 from __future__ import annotations
@@ -25,6 +25,8 @@ _SCHEMA: dict[str, Any] = json.loads(files(__package__).joinpath("contract_schem
 _OLDEST_OPSET = 7
 _DOMAINS = ("", "ai.onnx", "com.microsoft", "ai.onnx.ml")
 _FLOATS, _INTEGERS = ("float32", "float16"), ("int32", "int64")
+# Roles of inputs that cannot have an axis of instances.
+_SHARED_ROLES = ("gaussians", "image", "depth", "state")
 _MATRICES = ("view", "camera_to_world", "intrinsics", "projection", "view_projection")
 _ONE: list[Sequence[int | str]] = [(1,), ()]
 _POSES: dict[str, tuple[int, list[Sequence[int | str]]]] = {
@@ -65,6 +67,7 @@ class Tensor:
                 self.dims = tuple(
                     d.dim_value if d.HasField("dim_value") else d.dim_param or None for d in tensor.shape.dim
                 )
+        self.declared = self.dims
         self.has_axis = axis is not None and bool(self.dims) and self.dims is not None and self.dims[0] == axis
         if self.has_axis and self.dims is not None:
             self.dims = self.dims[1:]
@@ -207,6 +210,7 @@ def _tensors(model: onnx.ModelProto, contract: Mapping[str, Any]) -> Iterator[Fa
     stored = {tensor.name for tensor in model.graph.initializer}
     inputs = {v.name: Tensor(v, axis) for v in model.graph.input if v.name not in stored}
     outputs = {value.name: Tensor(value, axis) for value in model.graph.output}
+    yield from _instances(list(inputs.values()), outputs, contract)
     for name, tensor in inputs.items():
         binding = contract["inputs"].get(name)
         if binding is None:
@@ -219,6 +223,48 @@ def _tensors(model: onnx.ModelProto, contract: Mapping[str, Any]) -> Iterator[Fa
             yield _missing("input", name, binding["role"], inputs)
         yield from _of_another_model(name, binding["role"], contract["outputs"]["layout"])
     yield from _outputs(outputs, contract)
+
+
+def _instances(inputs: Sequence[Tensor], outputs: Mapping[str, Tensor], contract: Mapping[str, Any]) -> Iterator[Fault]:
+    """The axis of instances must be the first dimension of every output that the contract names and of at least one
+    input, and must occur nowhere else. The other dimensions of outputs must be numbers."""
+    if "instances" not in contract:
+        return
+    axis, bindings, named = contract["instances"]["axis"], contract["inputs"], contract["outputs"]
+
+    def fault(where: str, expected: str, found: str, remedy: str, tensor: str = "") -> Fault:
+        return _fault("instances", tensor, where, expected, found, remedy)
+
+    if named["layout"] == "image":
+        yield fault("instances", "a model that writes Gaussians", "a post-processor", "leave out instances")
+        return
+    state = next((name for name, binding in bindings.items() if binding["role"] == "state"), None)
+    if state is not None:
+        remedy = "leave out instances: each would need a state of its own"
+        yield fault(f"input {state}", "a model without a state", "an input with the role state", remedy, state)
+        return
+    tensors = [outputs[named[field]] for field in FIELDS if named.get(field) in outputs]
+    written = [tensor for tensor in tensors if tensor.declared is not None]
+    for tensor in written:
+        where, found = f"output {tensor.name}", _shown(tensor.declared or ())
+        if not tensor.has_axis:
+            remedy = f"export it with the symbolic axis {axis} before all others"
+            yield fault(where, f"{axis} as its first dimension", found, remedy, tensor.name)
+        # Fixed sizes give each instance the same offset in every run.
+        elif any(not isinstance(dim, int) for dim in tensor.dims or ()):
+            remedy = "fix N; rows that do not live may lie behind a count, or have the opacity 0"
+            yield fault(where, f"numbers behind {axis}", found, remedy, tensor.name)
+    for tensor in (*inputs, *written):
+        if axis in (tensor.declared or ())[1:]:
+            expected, remedy = f"{axis} as the first dimension only", "name this axis as no other, and put it first"
+            yield fault(f"tensor {tensor.name}", expected, _shown(tensor.declared or ()), remedy, tensor.name)
+    for tensor in inputs:
+        if tensor.has_axis and bindings.get(tensor.name, {}).get("role") in _SHARED_ROLES:
+            found, remedy = _shown(tensor.declared or ()), "export it without the axis"
+            yield fault(f"input {tensor.name}", "a tensor that all instances share", found, remedy, tensor.name)
+    if not any(tensor.has_axis for tensor in inputs):
+        remedy = "leave out instances: all would be alike"
+        yield fault("instances", f"an input whose first dimension is {axis}", "none", remedy)
 
 
 def _of_another_model(name: str, role: str, layout: str) -> Iterator[Fault]:
@@ -312,9 +358,6 @@ def _outputs(written: Mapping[str, Tensor], contract: Mapping[str, Any]) -> Iter
         dims = None if tensor.dims is None else bare(tensor.dims, rules)
         if dims is not None and field not in ("count", "image"):
             shapes.append((field, tensor, dims))
-        if "instances" in contract and not tensor.has_axis:
-            expected = f"{contract['instances']['axis']} as its first dimension"
-            yield _fault("instances", tensor.name, where, expected, str(tensor), "export it with that axis")
     n_max = contract.get("nMax")
     fixed = [(tensor, dims[0]) for _, tensor, dims in shapes if isinstance(dims[0], int)]
     for tensor, count in fixed:
