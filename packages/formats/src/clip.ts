@@ -1,5 +1,12 @@
 /** Reader of clips (.gsv): animated scenes in one file, read by byte ranges. docs/sequences.md describes the format. */
-import { keepUsable, type Bounds, type GaussianCloud, type ShDegree, type Vector3 } from '@gaussian-splat/core';
+import {
+  GaussianSplatError,
+  keepUsable,
+  type Bounds,
+  type GaussianCloud,
+  type ShDegree,
+  type Vector3,
+} from '@gaussian-splat/core';
 import { LoadBudget, type LoadLimits } from './budget.js';
 import { grouped, startsWith, viewOf } from './bytes.js';
 import { damaged } from './faults.js';
@@ -194,13 +201,18 @@ class IndexReader {
   }
 }
 
-/** Returns the bytes of head and index. In the file, the scene and the motion of each part follow in order. */
+/**
+ * Returns the bytes of head and index. In the file, the scene and the motion of each part follow in order.
+ * @throws GaussianSplatError `argument/value` for an index that {@link parseClip} would refuse for its size.
+ */
 export function writeClipHead({ groups, ...facts }: ClipHead): Uint8Array<ArrayBuffer> {
+  requireAtMost(groups.length, MAX_GROUPS, 'groups');
   const rows = groups.map(({ frames, parts }) => [
     frames,
     ...parts.map(({ splats, planes, sceneBytes, motionBytes }) => [splats, planes, sceneBytes, motionBytes]),
   ]);
   const index = new TextEncoder().encode(JSON.stringify({ ...facts, groups: rows }));
+  requireAtMost(index.length, MAX_CLIP_INDEX_BYTES, 'bytes');
   const bytes = new Uint8Array(CLIP_HEAD_BYTES + index.length);
   bytes.set(new TextEncoder().encode(MAGIC));
   const view = viewOf(bytes);
@@ -208,6 +220,16 @@ export function writeClipHead({ groups, ...facts }: ClipHead): Uint8Array<ArrayB
   view.setUint32(8, index.length, true);
   bytes.set(index, CLIP_HEAD_BYTES);
   return bytes;
+}
+
+function requireAtMost(value: number, max: number, what: string): void {
+  if (value <= max) return;
+  throw new GaussianSplatError('argument/value', {
+    where: 'index of a clip',
+    expected: `at most ${grouped(max)} ${what}`,
+    found: grouped(value),
+    remedy: 'put more frames into a group, or divide the clip',
+  });
 }
 
 /** Returns the index of the group that contains a frame. The frame index counts from 0 and must be within the clip. */

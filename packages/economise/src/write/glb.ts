@@ -3,6 +3,7 @@ import { upright } from '@gaussian-splat/formats';
 import type { WrittenCloud } from './index.js';
 import { arraysOf, columnsOf, type Columns } from '../parts/cloud-memory.js';
 import { inline, partsOf, poolFor, type TaskPool } from '../parts/task-pool.js';
+import { fileBytes, MAX_UINT32, requireAtMost } from './file-bytes.js';
 import { EXTENSION, glbColumns, placeBounds, placeOf, type GlbColumn } from './glb-columns.js';
 
 const [FLOAT, SHORT] = [5126, 5122];
@@ -31,6 +32,8 @@ interface Primitive {
  * A scene with an up direction other than (0, -1, 0) is rotated.
  *
  * @returns The file, in memory that the pool's tasks share.
+ * @throws GaussianSplatError `argument/value` for a file of 4 GiB or more, before its allocation;
+ * `out-of-memory/allocation`
  */
 export async function writeGlb({ cloud: given, degrees }: WrittenCloud, pool: TaskPool = inline): Promise<Uint8Array> {
   const cloud = upright(given);
@@ -116,7 +119,9 @@ function describe(
 function containerOf(json: object, byteLength: number, pool: TaskPool): { bytes: Uint8Array; start: number } {
   const text = new TextEncoder().encode(JSON.stringify(json));
   const textLength = text.length + (-text.length & 3);
-  const bytes = new Uint8Array(pool.allocate(28 + textLength + byteLength));
+  const total = 28 + textLength + byteLength;
+  requireAtMost('GLB', total, MAX_UINT32, 'bytes');
+  const bytes = fileBytes('GLB', total, (length) => pool.allocate(length));
   const view = new DataView(bytes.buffer);
   const words = (at: number, ...values: number[]): void =>
     values.forEach((value, k) => view.setUint32(at + 4 * k, value, true));

@@ -1,10 +1,12 @@
 import { shCoefficientCount, type GaussianCloud } from '@gaussian-splat/core';
+import { fileBytes } from './file-bytes.js';
 import { safeOrbitOf } from './safe-orbit.js';
 
 /**
  * Writes the PLY of 3D Gaussian Splatting, binary, float32, without normals, with comments for filter, up and order, and
  * the elements of Niantic's library for the limits of a camera;
  * positions are float64 if the cloud lies too far from (0, 0, 0) for float32.
+ * @throws GaussianSplatError `out-of-memory/allocation`
  */
 export function writePly(cloud: GaussianCloud): Uint8Array<ArrayBuffer> {
   const {
@@ -41,7 +43,8 @@ export function writePly(cloud: GaussianCloud): Uint8Array<ArrayBuffer> {
     'end_header',
   ];
   const header = new TextEncoder().encode(`${lines.join('\n')}\n`);
-  const bytes = new Uint8Array(header.length + 4 * ((names.length + (isFar ? 3 : 0)) * count + (orbit?.length ?? 0)));
+  const numbers = (names.length + (isFar ? 3 : 0)) * count + (orbit?.length ?? 0);
+  const bytes = fileBytes('PLY', header.length + 4 * numbers);
   bytes.set(header);
   const view = new DataView(bytes.buffer, header.length);
   let at = 0;

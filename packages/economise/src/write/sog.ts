@@ -3,6 +3,7 @@ import { upright } from '@gaussian-splat/formats';
 import { packedOrder } from '@gaussian-splat/renderer/tools';
 import type { SplatVisibility } from '../pages/splat-visibility.js';
 import type { Steps } from '../steps.js';
+import { requireAtMost } from './file-bytes.js';
 import { findPalette, type Palette } from './palette.js';
 import { addedBy, DIGITS, roundPalette, weightsOf } from './sog-palette.js';
 import { writeZip } from './zip.js';
@@ -46,6 +47,8 @@ const USUAL_EFFORT = 0.7;
 /** Largest code of a position along an axis: SOG stores 16 bits. */
 const MAX_PLACES = 65_535;
 const PALETTE_ROW = 64;
+/** Maximum number of splats: WebP has at most 16,383 pixels a side, and the width is a multiple of 4. */
+const MAX_SPLATS = 16_380 ** 2;
 /** Largest code of a codebook, one byte. Steps that would need larger codes are enlarged. */
 const MAX_CODES = 255;
 const LN2 = Math.LN2;
@@ -64,12 +67,14 @@ export async function writeSog(given: GaussianCloud, options: SogOptions): Promi
 /**
  * Returns the files of a SOG by name, `meta.json` first.
  * @param order Indices of the splats to write, at least one, in the order of the file.
+ * @throws GaussianSplatError `argument/value` for more splats than a WebP image has pixels.
  */
 export async function sogFiles(
   cloud: GaussianCloud,
   order: Uint32Array,
   options: SogOptions,
 ): Promise<ReadonlyMap<string, Uint8Array>> {
+  requireAtMost('SOG', order.length, MAX_SPLATS, 'splats');
   const { steps } = options;
   const images = new Map<string, Image>();
   const means = putMeans(cloud, order, steps.place, images);

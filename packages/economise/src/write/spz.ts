@@ -1,5 +1,6 @@
 import { GaussianSplatError, shCoefficientCount, type GaussianCloud } from '@gaussian-splat/core';
 import { upright } from '@gaussian-splat/formats';
+import { fileBytes, MAX_UINT32, requireAtMost } from './file-bytes.js';
 import { safeOrbitOf } from './safe-orbit.js';
 
 /** Precision of an SPZ. */
@@ -31,7 +32,8 @@ const FLAG_EXTENSIONS = 2;
 /**
  * Writes SPZ version 3 (Niantic) in the coordinates of PLY, which it declares, with the maximum number of fractional
  * bits for 24-bit coordinates. A scene with an up direction other than (0, -1, 0) is rotated.
- * @throws GaussianSplatError `argument/value` for coordinates beyond 8,388,607.
+ * @throws GaussianSplatError `argument/value` for coordinates beyond 8,388,607, and for more splats than 32 bits count;
+ * `out-of-memory/allocation`
  */
 export async function writeSpz(given: GaussianCloud, options: SpzOptions): Promise<Uint8Array<ArrayBuffer>> {
   const cloud = upright(given);
@@ -44,7 +46,8 @@ export async function writeSpz(given: GaussianCloud, options: SpzOptions): Promi
   ];
   const coefficients = shCoefficientCount(shDegree) - 1;
   const fractionalBits = fractionalBitsOf(cloud);
-  const body = new Uint8Array(16 + count * (20 + 3 * coefficients) + 4 * records.length);
+  requireAtMost('SPZ', count, MAX_UINT32, 'splats');
+  const body = fileBytes('SPZ', 16 + count * (20 + 3 * coefficients) + 4 * records.length);
   const view = new DataView(body.buffer);
   // "NGSP", version, count.
   [0x5053474e, 3, count].forEach((value, k) => view.setUint32(4 * k, value, true));

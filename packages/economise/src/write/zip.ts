@@ -1,3 +1,5 @@
+import { fileBytes, MAX_UINT32, requireAtMost } from './file-bytes.js';
+
 /** Signatures of a file's local header, of its entry in the central directory, and of the end of the directory. */
 const LOCAL = 0x04034b50;
 const CENTRAL = 0x02014b50;
@@ -5,6 +7,8 @@ const END = 0x06054b50;
 /** Version 2.0 of ZIP; and the date 1980-01-01, so that archives of the same files are identical. */
 const VERSION = 20;
 const DATE = 0x21;
+/** Maximum number of files of an archive without the extension ZIP64. */
+const MAX_FILES = 65_535;
 
 const CRC_TABLE = Uint32Array.from({ length: 256 }, (_, byte) => {
   let code = byte;
@@ -21,11 +25,15 @@ function crc32(bytes: Uint8Array): number {
 /**
  * Writes a ZIP archive without compression, because the files are already compressed.
  * @param files Bytes of the files by name.
+ * @throws GaussianSplatError `argument/value` for more than ZIP holds without ZIP64, before the allocation;
+ * `out-of-memory/allocation`
  */
 export function writeZip(files: ReadonlyMap<string, Uint8Array>): Uint8Array<ArrayBuffer> {
   const entries = [...files].map(([name, bytes]) => ({ name: new TextEncoder().encode(name), bytes }));
   const total = entries.reduce((sum, { name, bytes }) => sum + 30 + 46 + 2 * name.length + bytes.length, 22);
-  const zip = new Uint8Array(total);
+  requireAtMost('SOG', entries.length, MAX_FILES, 'files in its ZIP archive');
+  requireAtMost('SOG', total, MAX_UINT32, 'bytes in its ZIP archive');
+  const zip = fileBytes('SOG', total);
   const view = new DataView(zip.buffer);
   let at = 0;
   const put = (fields: readonly (readonly [bytes: 2 | 4, value: number])[]): void => {

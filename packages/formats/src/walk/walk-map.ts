@@ -165,19 +165,32 @@ const NO_FLOOR = -0x8000;
 const HEIGHT_UNIT = 0.01;
 /** Maximum uncompressed size of a file in bytes. */
 const MAX_BYTES = 2 ** 26;
+/** Maximum size of the line of JSON that is written, in bytes. */
+const MAX_HEAD_BYTES = 1024;
+/** Maximum number of layers of a file. Layers of few cells would take much more memory than their bytes. */
+const MAX_LAYERS = 1024;
 
 /**
  * Returns the bytes of a `.floor` file: gzip of one line of JSON, followed by the heights of all layers. Heights are int16
  * differences from the previous height, in units of `heightUnit` meters.
+ * @throws GaussianSplatError `argument/value` for a map that {@link decodeWalkMap} would refuse for its size.
  */
 export function encodeWalkMap(map: WalkMap): Uint8Array {
   const { layers, ...rest } = map;
+  const heightBytes = 2 * layers.length * map.width * map.depth;
+  if (layers.length > MAX_LAYERS || heightBytes > MAX_BYTES - MAX_HEAD_BYTES)
+    throw new GaussianSplatError('argument/value', {
+      where: 'map of a floor',
+      expected: `at most ${MAX_LAYERS} floors above each other, and ${MAX_BYTES} bytes`,
+      found: `${layers.length} floors and ${heightBytes} bytes`,
+      remedy: 'use a larger cell; check the unit of the scene',
+    });
   let highest = 0;
   for (const layer of layers) for (const height of layer) if (Math.abs(height) > highest) highest = Math.abs(height);
   const heightUnit = Math.max(HEIGHT_UNIT, highest / 0x3fff);
   const head = JSON.stringify({ format: FORMAT, version: VERSION, ...rest, layers: layers.length, heightUnit });
   const start = new TextEncoder().encode(`${head}\n`);
-  const bytes = new Uint8Array(start.length + 2 * layers.length * map.width * map.depth);
+  const bytes = new Uint8Array(start.length + heightBytes);
   bytes.set(start);
   const view = new DataView(bytes.buffer, start.length);
   let at = 0;
@@ -193,9 +206,6 @@ export function encodeWalkMap(map: WalkMap): Uint8Array {
   }
   return gzipSync(bytes, { level: 9, mtime: 0 });
 }
-
-/** Maximum number of layers of a file. Layers of few cells would take much more memory than their bytes. */
-const MAX_LAYERS = 1024;
 
 /** Returns a list of `count` values; NaN instead of any other value. */
 const numbersOf = (value: unknown, count: number): readonly unknown[] =>
