@@ -1,3 +1,7 @@
+/**
+ * Floors: found in splats and voxels, stored, walked on, and bounded in work.
+ * SECURITY.md: "A scene costs what it weighs".
+ */
 import assert from 'node:assert/strict';
 import { spawnSync } from 'node:child_process';
 import { existsSync, mkdtempSync, readFileSync, rmSync } from 'node:fs';
@@ -21,7 +25,7 @@ import {
   type WalkMap,
 } from '@gaussian-splat/formats/walk';
 import { needsSharedData, sharedFile } from '../support/data.js';
-import { isLab } from '../support/extent.js';
+import { isLab, onlyInLab } from '../support/extent.js';
 
 /** Splats on surfaces of boxes, y down as trainers write them, meters; walkable space is known exactly. */
 interface Box {
@@ -253,6 +257,36 @@ test('what is no room has no floor, and no exception', () => {
   assert.equal(floorAt(map, 100, 100, 0), undefined);
   assert.deepEqual(wayTo(map, [0, 0, 0], [50, 0, 50]), []);
   assert.throws(() => makeWalkMap(single, { frame: FRAME, metersPerUnit: 0 }), { code: 'argument/value' });
+});
+
+/** Plates above each other, every other voxel of 4 m, in 64 columns: each height is compared with all of its column. */
+function plates(): Parameters<typeof floorOf> {
+  const size = [8, 2 ** 16, 8] as const;
+  const solid = Uint8Array.from({ length: 64 * size[1] }, (_, at) => (Math.floor(at / 8) % size[1]) % 2);
+  return [{ corner: [0, 0, 0], size, voxel: 4 }, solid];
+}
+const tooMuch = { code: 'out-of-memory/budget' };
+
+test('the search for a floor ends after the seconds of the page', () => {
+  const [grid, solid] = plates();
+  const before = process.cpuUsage();
+  assert.throws(() => floorOf(grid, solid, { limits: { maxSeconds: 0.2 } }), tooMuch);
+  const large = cloudOf(ROOM);
+  large.scales.fill(50);
+  assert.throws(() => makeWalkMap(large, { frame: FRAME, limits: { maxSeconds: 0.2 } }), tooMuch);
+  const { user, system } = process.cpuUsage(before);
+  assert.ok(user + system < 8e6, `${(user + system) / 1e6} s of CPU`);
+});
+
+test('without a limit it ends after a number of steps', { skip: onlyInLab }, () => {
+  const [grid, solid] = plates();
+  assert.throws(() => floorOf(grid, solid), tooMuch);
+});
+
+test('a grid of more columns than a floor may have is refused before they are searched', () => {
+  const size = [2049, 4, 2048] as const;
+  const solid = new Uint8Array(size[0] * size[1] * size[2]);
+  assert.throws(() => floorOf({ corner: [0, 0, 0], size, voxel: 0.05 }, solid), tooMuch);
 });
 
 test(

@@ -31,11 +31,11 @@ export async function makeFloor(request: FloorRequest, signal: AbortSignal): Pro
       const tree = await fetchScene(address.href, fetchOptions());
       const { frame, metersPerUnit = 1 } = options;
       const { grid, solid } = readVoxels({ head: bytes, tree, name, limits: limits() }, frame, metersPerUnit);
-      return floorOf(grid, solid, options);
+      return floorOf(grid, solid, { ...options, limits: limits() });
     }
     const openFile = /^(blob|data):/.test(url) ? undefined : fileOpenerFor(url, fetchOptions);
     const cloud = await readScene(bytes, { name, signal, openFile, ...limits() });
-    return makeWalkMap(cloud, options);
+    return makeWalkMap(cloud, { ...options, limits: limits() });
   } catch (error) {
     signal.throwIfAborted();
     throw named(error, name);

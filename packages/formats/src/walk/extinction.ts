@@ -1,4 +1,6 @@
 import { GaussianSplatError, type GaussianCloud, type Vector3 } from '@gaussian-splat/core';
+import type { LoadLimits } from '../budget.js';
+import { FloorWork } from './floor-work.js';
 
 /** Rows of the rotation from the coordinates of a cloud to those with y up. */
 export type UpFrame = readonly [Vector3, Vector3, Vector3];
@@ -25,14 +27,14 @@ export interface GridOptions {
   readonly frame: UpFrame;
   /** Edge of a voxel in meters; default 0.05. It is larger if the scene would need more than {@link MAX_VOXELS}. */
   readonly voxel?: number;
+  /** Time limit; the work itself is always limited, to about a minute. */
+  readonly limits?: Pick<LoadLimits, 'maxSeconds'>;
 }
 
 /** Maximum number of voxels of a grid, 64 MB of float32. */
 export const MAX_VOXELS = 2 ** 24;
 /** Maximum number of splats that are added to a grid. Of more splats, an evenly spaced sample represents all. */
 const MAX_SPLATS = 500_000;
-/** Maximum number of voxels that all splats together cover, about a minute of work. */
-const MAX_COVERED = 2 ** 33;
 /** Fraction of the splats that may be outside the grid on each side, so that distant outliers do not enlarge it. */
 const OUTLIERS = 0.003;
 /** Number of voxels around the scene on each side of the grid. */
@@ -44,9 +46,13 @@ const MAX_ALPHA = 0.999;
  * Returns the optical depth of a scene: the sum of `-ln(1 - alpha)` of all splats at the center of each voxel. Covariances
  * are widened by the variance of a voxel, edge² / 12, so that thin walls do not fall between voxel centers.
  * @throws GaussianSplatError `argument/value` for lengths that are not positive and finite; `out-of-memory/budget` if
- * splats cover too many voxels.
+ * splats cover too many voxels, or the work exceeds its limits.
  */
-export function extinctionOf(cloud: GaussianCloud, options: GridOptions): ExtinctionGrid {
+export function extinctionOf(
+  cloud: GaussianCloud,
+  options: GridOptions,
+  work = new FloorWork(options.limits),
+): ExtinctionGrid {
   const { metersPerUnit = 1, frame } = options;
   for (const [name, value] of Object.entries({ metersPerUnit, voxel: options.voxel ?? 0.05 }))
     if (!(value > 0 && value < Infinity))
@@ -59,16 +65,9 @@ export function extinctionOf(cloud: GaussianCloud, options: GridOptions): Extinc
   const step = Math.max(1, Math.ceil(cloud.count / MAX_SPLATS));
   const centers = centersOf(cloud, frame, metersPerUnit, step);
   const grid = emptyGrid(centers, options.voxel ?? 0.05);
-  let left = MAX_COVERED;
-  for (let k = 0, i = 0; i < cloud.count && left >= 0; k++, i += step)
-    left -= addSplat(grid, cloud, i, k, centers, frame, metersPerUnit, step);
-  if (left >= 0) return grid;
-  throw new GaussianSplatError('out-of-memory/budget', {
-    where: 'floor of the scene',
-    expected: `splats that cover at most ${MAX_COVERED} voxels`,
-    found: 'larger ones',
-    remedy: 'remove the splats around the scene, or make a file of its floor and name it in walk-map',
-  });
+  for (let k = 0, i = 0; i < cloud.count; k++, i += step)
+    work.take(addSplat(grid, cloud, i, k, centers, frame, metersPerUnit, step));
+  return grid;
 }
 
 /** Returns the centers of every `step`th splat, [N, 3], in meters with y up. */

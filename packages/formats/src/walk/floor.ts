@@ -1,5 +1,7 @@
 import type { GaussianCloud, Vector3 } from '@gaussian-splat/core';
+import { grouped } from '../bytes.js';
 import { extinctionOf, type ExtinctionGrid, type GridOptions, type VoxelGrid } from './extinction.js';
+import { FloorWork, tooLarge } from './floor-work.js';
 import { solidsOf } from './solids.js';
 import type { WalkMap } from './walk-map.js';
 
@@ -20,16 +22,22 @@ const BRIDGE = 0.3;
 const MAX_RADIUS = 8;
 /** Maximum horizontal distance in meters of the floor from the point `near`. */
 const REACH = 3;
+/** Maximum number of columns of a grid, of their floors, and of the cells of all regions: 10,000 m² at 5 cm. */
+const MAX_FLOORS = 2 ** 22;
+/** Maximum number of heights of a map over all layers, 128 MB of float32. */
+const MAX_HEIGHTS = 2 ** 25;
 
 /**
  * Finds the walkable floor of a scene from its splats. Surfaces are solid voxels with free height above, which a flood
  * fill joins if a body fits between them. The result is the largest floor below `near` within 3 m of it, or else the
  * lowest of the large floors.
- * @throws GaussianSplatError `argument/value` for lengths that are not positive and finite.
+ * @throws GaussianSplatError `argument/value` for lengths that are not positive and finite; `out-of-memory/budget` for
+ * a scene that takes too much work or memory.
  */
 export function makeWalkMap(cloud: GaussianCloud, options: FloorOptions): WalkMap {
-  const grid = extinctionOf(cloud, options);
-  return floorOf(grid, solidsOf(grid), options);
+  const work = new FloorWork(options.limits);
+  const grid = extinctionOf(cloud, options, work);
+  return floorOf(grid, solidsOf(grid), options, work);
 }
 
 /** A grid with or without the optical depth of its voxels. */
@@ -39,13 +47,19 @@ type FloorGrid = VoxelGrid & Partial<ExtinctionGrid>;
  * Finds the walkable floor as {@link makeWalkMap} does, but from solid voxels. If `grid` has no optical depths, a surface
  * is at the center of its voxel.
  * @param solid Voxels, [nz, ny, nx]: 1 for solid, 0 for empty.
+ * @throws GaussianSplatError `out-of-memory/budget` as {@link makeWalkMap} does.
  */
-export function floorOf(grid: FloorGrid, solid: Uint8Array, options: Omit<FloorOptions, 'frame'> = {}): WalkMap {
+export function floorOf(
+  grid: FloorGrid,
+  solid: Uint8Array,
+  options: Omit<FloorOptions, 'frame'> = {},
+  work = new FloorWork(options.limits),
+): WalkMap {
   const body: Body = { height: 1.6, radius: 0.2, step: 0.3, ...options };
   const { corner, size, voxel } = grid;
   const middle = [0, 2].map((axis) => corner[axis] + (size[axis] * voxel) / 2);
   const near: Vector3 = options.near ?? [middle[0], Infinity, middle[1]];
-  return new FloorFinder(grid, solid, body).find(near);
+  return new FloorFinder(grid, solid, body, work).find(near);
 }
 
 interface Body {
@@ -92,13 +106,23 @@ class FloorFinder {
   /** For each column, heights in meters that already belong to a region. */
   readonly #seen: number[][];
   readonly #disc: readonly (readonly [x: number, z: number])[];
+  readonly #work: FloorWork;
+  /** Number of cells of all regions. */
+  #cells = 0;
 
-  constructor(grid: FloorGrid, solid: Uint8Array, body: Body) {
+  constructor(grid: FloorGrid, solid: Uint8Array, body: Body, work: FloorWork) {
     this.#grid = grid;
     this.#solid = solid;
     this.#body = body;
+    this.#work = work;
     const [nx, , nz] = grid.size;
-    this.#floors = Array.from({ length: nx * nz }, (_, c) => this.#floorsOf(c % nx, Math.floor(c / nx)));
+    requireAtMost(nx * nz, MAX_FLOORS, 'columns');
+    let count = 0;
+    this.#floors = Array.from({ length: nx * nz }, (_, c) => {
+      const heights = this.#floorsOf(c % nx, Math.floor(c / nx));
+      requireAtMost((count += heights.length), MAX_FLOORS, 'surfaces with free height above');
+      return heights;
+    });
     this.#seen = this.#floors.map(() => []);
     this.#disc = discOf(Math.ceil(body.radius / grid.voxel));
   }
@@ -123,6 +147,7 @@ class FloorFinder {
   #floorsOf(x: number, z: number): number[] {
     const { values, size, corner, voxel } = this.#grid;
     const [nx, ny] = size;
+    this.#work.take(ny);
     const needed = Math.ceil(this.#body.height / voxel);
     const column = x + nx * ny * z;
     const heights: number[] = [];
@@ -148,10 +173,12 @@ class FloorFinder {
   }
 
   #near(c: number, y: number): number | undefined {
+    this.#work.take(1 + this.#floors[c].length);
     return this.#floors[c].find((height) => Math.abs(height - y) <= this.#body.step);
   }
 
   #isSeen(c: number, height: number): boolean {
+    this.#work.take(1 + this.#seen[c].length);
     return this.#seen[c].some((seen) => Math.abs(seen - height) <= this.#body.step / 2);
   }
 
@@ -186,6 +213,7 @@ class FloorFinder {
     for (const [dx, dz] of this.#disc) {
       const [i, j] = [x + dx, z + dz];
       if (i < 0 || j < 0 || i >= nx || j >= nz) continue;
+      this.#work.take(Math.max(1, high + 1 - low));
       for (let k = low; k <= high; k++) if (this.#solid[i + nx * (k + ny * j)] === 1) return true;
     }
     return false;
@@ -213,6 +241,7 @@ class FloorFinder {
         const reached = this.#near(next, y) ?? this.#bridged(i, j, y);
         if (reached === undefined || this.#isSeen(next, reached) || this.#isBlocked(i, j, reached)) continue;
         this.#seen[next].push(reached);
+        requireAtMost(++this.#cells, MAX_FLOORS, 'cells');
         open.push(cells.length);
         cells.push(next);
         heights.push(reached);
@@ -240,7 +269,11 @@ class FloorFinder {
       const at = (c % nx) - x0 + width * (Math.floor(c / nx) - z0);
       let layer = 0;
       while (layers[layer] !== undefined && !Number.isNaN(layers[layer][at])) layer++;
-      layers[layer] ??= new Float32Array(width * depth).fill(NaN);
+      this.#work.take(1 + layer);
+      if (layer === layers.length) {
+        requireAtMost(width * depth * (layer + 1), MAX_HEIGHTS, 'heights');
+        layers.push(new Float32Array(width * depth).fill(NaN));
+      }
       layers[layer][at] = heights[index];
     });
     const area = cells.length * voxel * voxel;
@@ -250,6 +283,10 @@ class FloorFinder {
       : [corner[0] + ((c % nx) + 0.5) * voxel, heights[nearest], corner[2] + (Math.floor(c / nx) + 0.5) * voxel];
     return { cell: voxel, corner: origin, width, depth, layers, step: this.#body.step, start, area };
   }
+}
+
+function requireAtMost(value: number, max: number, what: string): void {
+  if (value > max) throw tooLarge(`at most ${grouped(max)} ${what}`, `${grouped(value)} or more`);
 }
 
 const SIDES = [
