@@ -40,13 +40,19 @@ function allowed(name) {
   );
 }
 
-/** Redirects lead to other servers, too: the policy of the page lets none of them be asked. */
+/**
+ * Redirects lead to other servers, too: the policy of the page lets none of them be asked. A worker has the policy of its own script, or that of the page if the
+ * page made its script as text. In a sandboxed frame the element makes that text itself.
+ */
 function restrict() {
   const policy = document.createElement('meta');
   policy.httpEquiv = 'Content-Security-Policy';
   const sources = [location.origin, ...origins].join(' ');
   policy.content = `connect-src ${sources}; img-src ${sources} blob: data:`;
   document.head.append(policy);
+  if (globalThis.origin === 'null') return;
+  const text = `import ${JSON.stringify(new URL('scene-worker.js', import.meta.url))}`;
+  customElements.get('gaussian-splat').workerLocation = `data:text/javascript,${encodeURIComponent(text)}`;
 }
 
 function show() {

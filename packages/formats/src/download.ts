@@ -70,7 +70,9 @@ export class Download {
     const from = Math.max(0, this.#body.length - OVERLAP);
     const [total, tag] = [this.#total, this.#tag];
     const isPart = from > 0 && total !== undefined && tag !== undefined;
-    const isOwn = (globalThis.location?.origin ?? this.#address.origin) === this.#address.origin;
+    // A redirect may have led to another origin.
+    const { origin } = new URL(this.#response?.url || this.#address);
+    const isOwn = (globalThis.location?.origin ?? this.#address.origin) === origin;
     // `If-Range` causes a preflight request if it is sent cross-origin, and does not allow weak tags.
     const ifRange = isPart && isOwn && !tag.startsWith('W/') ? { 'If-Range': tag } : {};
     const headers = isPart ? { Range: `bytes=${from}-`, ...ifRange } : {};

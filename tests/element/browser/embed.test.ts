@@ -102,6 +102,25 @@ describe('embed.html', () => {
     assert(/^src: expected the address/.test((await open('')).querySelector('p')!.textContent), 'no address');
   });
 
+  it('asks no other server if its own redirects there', async () => {
+    const other = await (await fetch('/net/other-origin')).text();
+    const to = (address: string): string => `/net/redirect?to=${encodeURIComponent(address)}`;
+    const shown = async (src: string): Promise<boolean> => {
+      const page = await open(String(new URLSearchParams({ src, loading: 'eager' })));
+      const scene = page.querySelector<Splat & { readonly error: Error | null }>('gaussian-splat')!;
+      await until(() => scene.loaded || scene.error !== null, 'the end of the load', 30_000);
+      return scene.loaded;
+    };
+    assertEqual(await shown(to(COMPASS)), true, 'a redirect within the server');
+    assertEqual(await shown(to(`${other}/fixtures/compass.splat?embedded`)), false, 'one to another server');
+    const asked = (await (await fetch(`${other}/asked`)).json()) as string[];
+    assertEqual(
+      asked.filter((url) => url.includes('embedded')),
+      [],
+      'requests to the other server',
+    );
+  });
+
   it('says what its server must send where a sandbox takes its origin away', async () => {
     const frame = document.createElement('iframe');
     frame.setAttribute('sandbox', 'allow-scripts');

@@ -96,6 +96,10 @@ const ANSWERS = {
     context.body = 'no';
   },
 
+  redirect(context) {
+    context.redirect(context.query.to);
+  },
+
   /** From now on these files, by the ends of their paths with commas between them, are not found; nothing for none. */
   lose(context, ends) {
     lost = ends ? ends.split(',').map((end) => `/${end}`) : [];
@@ -509,13 +513,17 @@ const TYPES = {
 };
 
 /**
- * A server of another origin, as a CDN is: /cdn/ and /fixtures/ with permission to be read, /closed/ without.
+ * A server of another origin, as a CDN is: /cdn/ and /fixtures/ with permission to be read, /closed/ without. `asked` returns the requests until now.
  * @returns its origin.
  */
 export async function startOtherOrigin() {
   const folders = { cdn: join(root, 'packages/element/cdn'), fixtures, closed: fixtures };
+  const asked = [];
   const server = createServer((request, response) => {
     const [, folder, ...rest] = new URL(request.url, 'http://x').pathname.split('/');
+    if (folder === 'asked')
+      return response.writeHead(200, { 'Access-Control-Allow-Origin': '*' }).end(JSON.stringify(asked));
+    asked.push(request.url);
     const path = join(folders[folder] ?? '', normalize(`/${rest.join('/')}`));
     if (!(folder in folders) || !existsSync(path)) return response.writeHead(404).end();
     const headers = { 'Content-Type': TYPES[extname(path)] ?? 'application/octet-stream' };
