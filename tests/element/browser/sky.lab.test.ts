@@ -82,14 +82,26 @@ describe('a sky that cannot be', () => {
     assertEqual(element.loaded, true, 'loaded');
   });
 
-  it('is refused before it is decoded if it has many pixels in few bytes', async () => {
-    // The header of a lossless WebP of 16,383 x 16,383 pixels.
-    const side = 16_382;
-    const size = [side & 255, (side >> 8) | ((side & 3) << 6), (side >> 2) & 255, (side >> 10) & 15];
-    const words = [...'RIFF\x20\0\0\0WEBPVP8L\x14\0\0\0'].map((letter) => letter.charCodeAt(0));
-    const bytes = Uint8Array.from([...words, 0x2f, ...size, ...new Array<number>(15).fill(0)]);
-    await load({ 'skybox-image': URL.createObjectURL(new Blob([bytes])) });
-    await claimComing(/skybox-image: the image: expected at most.*out-of-memory\/budget/);
+  it('is refused before it is decoded if it has too many pixels, or a header that tells nothing about them', async () => {
+    const decode = globalThis.createImageBitmap;
+    let decoded = 0;
+    globalThis.createImageBitmap = (...given: Parameters<typeof decode>) => {
+      if (given[0] instanceof Blob) decoded++;
+      return decode(...given);
+    };
+    try {
+      // A PNG of 40,000 x 40,000 pixels, 6.4 GB after decoding.
+      const png = Uint8Array.of(0x89, 0x50, 0x4e, 0x47, 13, 10, 26, 10, 0, 0, 0, 13, 0x49, 0x48, 0x44, 0x52);
+      const size = [0, 0, 0x9c, 0x40, 0, 0, 0x9c, 0x40, 8, 6, 0, 0, 0];
+      const urlOf = (...parts: BlobPart[]): string => URL.createObjectURL(new Blob(parts));
+      const element = await load({ 'skybox-image': urlOf(png, Uint8Array.from(size)) });
+      await claimComing(/skybox-image: .*at most 134,217,728 pixels, found 40000 x 40000/);
+      element.skyboxImage = urlOf('GIF89a', new Uint8Array(100));
+      await claimComing(/skybox-image: expected a JPEG, PNG, WebP or AVIF image/);
+      assertEqual([element.loaded, decoded], [true, 0], 'loaded, decoded images');
+    } finally {
+      globalThis.createImageBitmap = decode;
+    }
   });
 });
 

@@ -1,4 +1,5 @@
 import { GaussianSplatError } from '@gaussian-splat/core';
+import { boundedImageHeader } from '@gaussian-splat/formats';
 import { imageShapeOf, type GeneratorModel, type GpuTensor } from '@gaussian-splat/generator';
 import { ImageTensor, type ImageShape } from '@gaussian-splat/renderer';
 import { fetchBeside } from './model-files.js';
@@ -171,6 +172,7 @@ async function pixelsOf(
   }
   if (typeof source !== 'string' && !(source instanceof Blob)) return source;
   const blob = typeof source === 'string' ? await fetchImage(source, options) : source;
+  boundedImageHeader(new Uint8Array(await blob.arrayBuffer()), `control ${name}`);
   // The image is rotated as the file declares.
   return createImageBitmap(blob, { imageOrientation: 'from-image', premultiplyAlpha: 'premultiply' }).catch(
     (cause: unknown) => {

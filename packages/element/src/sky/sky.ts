@@ -1,6 +1,6 @@
 /** Environment image behind the scene. Loaded for elements with the attribute `skybox-image`. */
 import { bytesOf, fetchPatiently } from '@gaussian-splat/core/fetch';
-import { imageHeader, LoadBudget } from '@gaussian-splat/formats';
+import { boundedImageHeader } from '@gaussian-splat/formats';
 import type { FrameTarget } from '@gaussian-splat/renderer';
 import type { ReactiveController, ReactiveControllerHost } from 'lit';
 import { credentialsOf, type Attributes } from '../attributes.js';
@@ -93,7 +93,10 @@ export class Sky implements ReactiveController, Mover {
     const address = new URL(url, element.baseURI);
     const response = await fetchPatiently(address, { credentials: credentialsOf(attributes.crossorigin), signal });
     if (!response.ok) throw new Error(`expected an image at ${address.href}, found status ${response.status}`);
-    const image = await decode(await bytesOf(response, undefined, MAX_BYTES), view.backend);
+    const bytes = await bytesOf(response, undefined, MAX_BYTES);
+    if (boundedImageHeader(bytes, address.href) === undefined)
+      throw new Error(`expected a JPEG, PNG, WebP or AVIF image at ${address.href}, found another file`);
+    const image = await decode(bytes, view.backend);
     if (signal.aborted) image.close();
     else this.#show(image);
   }
@@ -120,13 +123,8 @@ export class Sky implements ReactiveController, Mover {
   }
 }
 
-/**
- * Decodes an image file, and reduces an image that exceeds the maximum texture size of the GPU. Throws
- * `out-of-memory/budget` for pixels that cost more than the bytes of the file allow.
- */
+/** Decodes an image file, and reduces an image that exceeds the maximum texture size of the GPU. */
 async function decode(bytes: Uint8Array<ArrayBuffer>, backend: Backend | null): Promise<ImageBitmap> {
-  const { width = 0, height = 0 } = imageHeader(bytes) ?? {};
-  new LoadBudget(bytes.length).take(4 * width * height, 'the image');
   const blob = new Blob([bytes]);
   const image = await createImageBitmap(blob);
   const max = backend?.place.limits.maxTextureDimension2D ?? 4096;

@@ -1,16 +1,37 @@
-import { asciiOf, startsWith, viewOf } from '../bytes.js';
+import { GaussianSplatError } from '@gaussian-splat/core';
+import { asciiOf, grouped, startsWith, viewOf } from '../bytes.js';
 
 /** Media type of an image file, and its size in pixels. */
 export interface ImageHeader {
-  readonly type: 'image/png' | 'image/jpeg' | 'image/webp' | 'image/ktx2';
+  readonly type: 'image/png' | 'image/jpeg' | 'image/webp' | 'image/avif' | 'image/ktx2';
   readonly width: number;
   readonly height: number;
 }
 
-/** Reads the header of a PNG, JPEG, WebP or KTX2 image. Undefined for other files, and for headers without a size. */
+/** Reads the header of a PNG, JPEG, WebP, AVIF or KTX2 image. Undefined for other files, and for headers without a size. */
 export function imageHeader(bytes: Uint8Array): ImageHeader | undefined {
-  const found = pngHeader(bytes) ?? jpegHeader(bytes) ?? webpHeader(bytes) ?? ktx2Header(bytes);
+  const found = pngHeader(bytes) ?? jpegHeader(bytes) ?? webpHeader(bytes) ?? avifHeader(bytes) ?? ktx2Header(bytes);
   return found && found.width > 0 && found.height > 0 ? found : undefined;
+}
+
+/** Maximum number of pixels of an image outside a mesh: 16,384 x 8,192, which take 512 MB after decoding. */
+const MAX_PIXELS = 2 ** 27;
+
+/**
+ * Reads the header of an image file before a browser decodes the file, which may be a thousandth of its pixels.
+ * @param where Name of the image in error messages.
+ * @returns The header; undefined if the file is none of the formats of {@link imageHeader}.
+ * @throws GaussianSplatError `out-of-memory/budget` for more than {@link MAX_PIXELS}.
+ */
+export function boundedImageHeader(bytes: Uint8Array, where: string): ImageHeader | undefined {
+  const header = imageHeader(bytes);
+  if (header === undefined || header.width * header.height <= MAX_PIXELS) return header;
+  throw new GaussianSplatError('out-of-memory/budget', {
+    where,
+    expected: `an image of at most ${grouped(MAX_PIXELS)} pixels`,
+    found: `${header.width} x ${header.height}`,
+    remedy: 'reduce the image',
+  });
 }
 
 function pngHeader(bytes: Uint8Array): ImageHeader | undefined {
@@ -57,6 +78,36 @@ function jpegHeader(bytes: Uint8Array): ImageHeader | undefined {
     else at += 2 + Math.max(2, view.getUint16(at + 2));
   }
   return undefined;
+}
+
+/**
+ * Reads the size of an AVIF image. A grid of tiles has several sizes, of which the largest is that of the image.
+ * Undefined for sequences of images, whose size is elsewhere.
+ */
+function avifHeader(bytes: Uint8Array): ImageHeader | undefined {
+  const [brands] = startsWith(bytes, 'ftyp', 4) ? boxesIn(bytes, 'ftyp') : [];
+  if (!brands || startsWith(brands, 'avis') || !asciiOf(brands, 0, brands.length).includes('avif')) return undefined;
+  const sizes = boxesIn(bytes, 'meta')
+    .flatMap((meta) => boxesIn(meta.subarray(4), 'iprp'))
+    .flatMap((properties) => boxesIn(properties, 'ipco'))
+    .flatMap((properties) => boxesIn(properties, 'ispe'))
+    .filter(({ length }) => length >= 12)
+    .map(viewOf);
+  const max = (at: number): number => sizes.reduce((most, view) => Math.max(most, view.getUint32(at)), 0);
+  return { type: 'image/avif', width: max(4), height: max(8) };
+}
+
+/** Returns the contents of all boxes of a type in a list of boxes (ISO/IEC 14496-12), up to one that has no valid length. */
+function boxesIn(bytes: Uint8Array, type: string): Uint8Array[] {
+  const found: Uint8Array[] = [];
+  const view = viewOf(bytes);
+  for (let at = 0; at + 8 <= bytes.length;) {
+    const end = at + view.getUint32(at);
+    if (end < at + 8 || end > bytes.length) break;
+    if (startsWith(bytes, type, at + 4)) found.push(bytes.subarray(at + 8, end));
+    at = end;
+  }
+  return found;
 }
 
 function webpHeader(bytes: Uint8Array): ImageHeader | undefined {

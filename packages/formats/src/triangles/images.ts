@@ -54,7 +54,8 @@ export class Images {
     const path = `images[${index}]`;
     const bytes = await this.#bytesOf(document.item('images', index), path);
     const header = imageHeader(bytes);
-    if (header === undefined) throw damaged(`${document.name}, ${path}`, IMAGES, 'another file', 'decode/unsupported');
+    if (header === undefined || header.type === 'image/avif')
+      throw damaged(`${document.name}, ${path}`, IMAGES, 'another file', 'decode/unsupported');
     const { width, height } = header;
     if (Math.max(width, height) > MAX_SIDE) {
       const expected = `at most ${grouped(MAX_SIDE)} pixels a side`;
