@@ -4,9 +4,12 @@ import { executeServerCommand } from '@web/test-runner-commands';
 import type { GaussianCloud } from '@gaussian-splat/core';
 import type { GaussianSplatElement } from '@gaussian-splat/element';
 import { fetchScene, readScene } from '@gaussian-splat/formats';
+import { Stereo } from '@gaussian-splat/renderer';
 import { renderOracle, toRgba } from '../../oracle/oracle.js';
+import { detailFolder } from '../../support/detail-folder.js';
 import { itInLab } from '../../support/extent-in-pages.js';
 import { psnr } from '../../support/metrics.js';
+import { pebbles } from '../../support/scenes/pebbles.js';
 import { fakeBinding, type FakeBinding, type Layout } from './support/gpu-binding.js';
 import { EYE, headset } from './support/headset.js';
 import { assert, assertEqual, claimComing, COMPASS, nextEvent, showLoaded, until } from './support/harness.js';
@@ -181,6 +184,32 @@ describe('VR by WebGPU', () => {
       const decibels = closeness(element, cloud, eye, headset().pixels(eye));
       console.log(`copied, ${eye} eye: ${decibels.toFixed(1)} dB`);
       assert(decibels >= MIN_DB, `${eye} eye: ${decibels.toFixed(1)} dB`);
+    }
+    await leave(element);
+  });
+
+  it('a streamed child that comes in the session is drawn with its levels of detail', async () => {
+    headset();
+    binding = fakeBinding('array', 1);
+    element = await showVr();
+    const { draw } = Stereo.prototype;
+    let budget = 0;
+    Stereo.prototype.draw = function (...given) {
+      budget = given[3]?.splatBudget ?? 0;
+      return draw.apply(this, given);
+    };
+    try {
+      buttonOf(element)!.click();
+      await until(() => binding!.frames > 1, 'a picture in the headset', LIMIT_MS);
+      assertEqual(budget, 0, 'budget of a scene without levels');
+      const folder = detailFolder(pebbles(2_000));
+      for (const [name, body] of folder.files) await fetch(`/net/kept/session/${name}`, { method: 'PUT', body });
+      await fetch('/net/kept/session/detail.json', { method: 'PUT', body: JSON.stringify(folder.manifest) });
+      element.loading = 'eager';
+      element.innerHTML = '<splat-scene src="/net/kept/session/detail.json"></splat-scene>';
+      await until(() => budget > 0, 'frames within the budget of the child', 2 * LIMIT_MS);
+    } finally {
+      Stereo.prototype.draw = draw;
     }
     await leave(element);
   });
