@@ -1,6 +1,7 @@
 /** Implementation of `gaussian-splat render`: draws one image of a scene with the renderer of the element. */
 import { basename, resolve } from 'node:path';
 import { cameraFromCalibration } from '@gaussian-splat/core';
+import { isClip } from './lib/clip-frame.mjs';
 import { parseSceneOptions, runCommand, sayWarnings, UsageError } from './lib/command.mjs';
 import {
   DRAW_OPTIONS,
@@ -36,14 +37,17 @@ function parseOptions(args) {
     out: text,
     float: text,
     view: text,
-    time: { ...text, default: '0' },
+    time: text,
     ...DRAW_OPTIONS,
   });
   if (parsed === undefined) return undefined;
   const { values } = parsed;
   if (values.camera === undefined) throw new UsageError('--camera is missing');
   if (values.out === undefined && values.float === undefined) throw new UsageError('--out or --float is missing');
-  if (!(Number(values.time) >= 0)) throw new UsageError(`--time: expected seconds from 0 on, found "${values.time}"`);
+  if (values.time !== undefined && !isClip(parsed.scene))
+    throw new UsageError(`--time: expected a clip (.gsv or .4dgs), found ${parsed.scene}, which does not change`);
+  if (!(Number(values.time ?? 0) >= 0))
+    throw new UsageError(`--time: expected seconds from 0 on, found "${values.time}"`);
   return { ...values, scene: parsed.scene, drawing: readDrawOptions(values) };
 }
 
@@ -78,7 +82,7 @@ function checkFiles({ scene, camera, out, float }) {
 async function render(options) {
   checkFiles(options);
   const camera = readCamera(options.camera, options.view);
-  const cloud = await readSceneFile(options.scene, Number(options.time));
+  const cloud = await readSceneFile(options.scene, Number(options.time ?? 0));
   sayWarnings(options.scene, cloud);
   const renderer = await openSceneRenderer(cloud, options.drawing);
   const pixels = await renderer.draw(camera);

@@ -1,15 +1,17 @@
-/** Implementation of `gaussian-splat video`: draws frames along a camera path, as PNG files or as a video. */
+/**
+ * Implementation of `gaussian-splat video`: draws frames along a camera path, as PNG files or as a video. A clip advances
+ * by the duration of a frame.
+ */
 import { existsSync, mkdirSync, readdirSync, statSync } from 'node:fs';
 import { join, resolve } from 'node:path';
-import { boundsOf } from '@gaussian-splat/core';
 import { camerasAlong } from '@gaussian-splat/element/camera-path.js';
 import { parseSceneOptions, runCommand, sayWarnings, UsageError } from './lib/command.mjs';
 import {
   DRAW_OPTIONS,
   encodePng,
+  openMovingScene,
   openSceneRenderer,
   readDrawOptions,
-  readSceneFile,
   toBytes,
 } from './lib/draw-scene.mjs';
 import { checkVideo, isVideo, keepsAlpha, openVideo } from './lib/ffmpeg.mjs';
@@ -21,6 +23,7 @@ const USAGE = `usage: gaussian-splat video SCENE (--path VIEWS.json | --turntabl
   --path FILE          what the attribute "views" of the element takes: a list of views, a cameras.json, or the
                        settings of SuperSplat, whose keyframes count. The path is that of flyPath()
   --turntable          one turn around the target instead
+                       A clip (.gsv, .4dgs) plays from its beginning meanwhile; its last frame stays.
   --out PATH           a folder for frame-0000.png, frame-0001.png ... with straight alpha; or a video, for which
                        ffmpeg must be installed: .webm keeps the alpha, .mp4 has none
   --size WxH           pixels; default: 1280x720
@@ -145,10 +148,11 @@ function openFolder(folder, { width, height, frames }) {
 async function video(options) {
   checkFiles(options);
   const views = options.path === undefined ? undefined : readViews(options.path);
-  const cloud = await readSceneFile(options.scene);
+  const scene = await openMovingScene(options.scene);
+  const cloud = await scene.splats(0);
   sayWarnings(options.scene, cloud);
   const { width, height, frameRate } = options;
-  const cameras = camerasAlong({ ...options, views, bounds: { ...boundsOf(cloud), up: cloud.hints?.up } });
+  const cameras = camerasAlong({ ...options, views, bounds: scene.bounds });
   if (cameras.length > MAX_FRAMES)
     throw new UsageError(`--seconds: expected at most ${MAX_FRAMES} frames, found ${cameras.length}`);
   const target = resolve(options.out);
@@ -158,7 +162,10 @@ async function video(options) {
   const isOpaque = options.drawing.background[3] === 1;
   const output = open(target, { width, height, frameRate, isOpaque, frames: cameras.length });
   try {
-    for (const camera of cameras) await output.write(toBytes(await renderer.draw(camera)));
+    for (const [frame, camera] of cameras.entries()) {
+      await renderer.show(await scene.splats(frame / frameRate));
+      await output.write(toBytes(await renderer.draw(camera)));
+    }
     await output.finish();
   } catch (error) {
     await output.abort();

@@ -1,10 +1,10 @@
 /** Functions of the commands that draw a scene: reading, rendering, and encoding of images. */
 import { dirname, join, resolve } from 'node:path';
 import { PNG } from 'pngjs';
-import { SPLAT_FILTERS } from '@gaussian-splat/core';
+import { boundsOf, SPLAT_FILTERS } from '@gaussian-splat/core';
 import { readScene } from '@gaussian-splat/formats';
 import { capture, deviceDescriptor, GaussianBuffers, packGaussians, Viewpoint, World } from '@gaussian-splat/renderer';
-import { clipMoment, isClip } from './clip-frame.mjs';
+import { clipMoment, isClip, openClip } from './clip-frame.mjs';
 import { CommandError, UsageError } from './command.mjs';
 import { readWhole } from './input-file.mjs';
 import { requestNodeAdapter } from './node-gpu.mjs';
@@ -54,10 +54,31 @@ export async function readSceneFile(name, seconds = 0) {
 }
 
 /**
+ * Opens a scene that may change over time. `splats(seconds)` resolves to the same cloud until the frame of a clip changes.
+ * @param name Path of the scene.
+ */
+export async function openMovingScene(name) {
+  if (!isClip(name)) {
+    const cloud = await readSceneFile(name);
+    return { bounds: { ...boundsOf(cloud), up: cloud.hints?.up }, splats: async () => cloud };
+  }
+  const clip = await openClip(await readWhole(resolve(name)), name);
+  let [shown, cloud] = [-1, undefined];
+  return {
+    bounds: clip.bounds,
+    async splats(seconds) {
+      const frame = clip.frame(seconds);
+      if (frame !== shown) [shown, cloud] = [frame, await clip.splats(frame)];
+      return cloud;
+    },
+  };
+}
+
+/**
  * Opens a renderer of a scene.
  * @param options Result of {@link readDrawOptions}.
- * @returns The renderer. `draw(camera)` resolves to float32 premultiplied RGBA, [height, width, 4], top row first. It
- * rejects if WebGPU's validation has reported an error.
+ * @returns The renderer. `show(cloud)` replaces the splats. `draw(camera)` resolves to float32 premultiplied RGBA,
+ * [height, width, 4], top row first. It rejects if WebGPU's validation has reported an error.
  */
 export async function openSceneRenderer(cloud, options) {
   const { antialiased, filterVariance } = options.filter === undefined ? cloud : SPLAT_FILTERS[options.filter];
@@ -68,9 +89,20 @@ export async function openSceneRenderer(cloud, options) {
   const accumulation = chooseAccumulation(options.accumulation, device);
   const world = new World();
   const viewpoint = new Viewpoint(device, world, { settings: { rasterizer: options.raster, accumulation } });
-  const gaussians = await GaussianBuffers.upload(device, packGaussians({ ...cloud, antialiased, filterVariance }));
-  world.add({ scene: gaussians });
+  let shown;
+  const show = async (next) => {
+    if (next === shown?.cloud) return;
+    if (shown) world.remove(shown.placement);
+    shown?.gaussians.destroy();
+    shown = undefined;
+    // Frames of a clip may have no splats.
+    if (next.count === 0) return;
+    const gaussians = await GaussianBuffers.upload(device, packGaussians({ ...next, antialiased, filterVariance }));
+    shown = { cloud: next, gaussians, placement: world.add({ scene: gaussians }) };
+  };
+  await show(cloud);
   return {
+    show,
     viewpoint,
     accumulation,
     mode: antialiased ? 'antialiased' : 'classic',
