@@ -8,6 +8,7 @@ import { cpSync, mkdirSync, rmSync, writeFileSync } from 'node:fs';
 import { createRequire } from 'node:module';
 import { dirname, join } from 'node:path';
 import { fileURLToPath } from 'node:url';
+import { RUNTIME_FILES } from '@gaussian-splat/generator';
 import { nodeResolve } from '@rollup/plugin-node-resolve';
 import terser from '@rollup/plugin-terser';
 import { minifyTemplateLiterals } from 'rollup-plugin-minify-template-literals';
@@ -103,15 +104,7 @@ const emptyFirst = {
   buildStart: () => MADE.forEach((folder) => rmSync(path(folder), { recursive: true, force: true })),
 };
 
-/** ONNX Runtime for generators, in both its builds: fetched by pages that show a generator, and by no other. */
-const RUNTIME_FILES = [
-  'ort.jspi.bundle.min.mjs',
-  'ort-wasm-simd-threaded.jspi.wasm',
-  'ort.webgpu.bundle.min.mjs',
-  'ort-wasm-simd-threaded.asyncify.wasm',
-];
-
-/** And the page for iframes. */
+/** ONNX Runtime for generators, which other pages do not fetch; and the page for iframes. */
 const copyOthers = {
   name: 'copy-others',
   writeBundle() {

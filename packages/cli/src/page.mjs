@@ -25,12 +25,6 @@ const CDN = elementFile('cdn');
 const ELEMENT = new URL('../dist/single.js', import.meta.url);
 const SCRIPT = '<script type="module" src="cdn/gaussian-splat.min.js"></script>';
 
-/** Files of ONNX Runtime that a page with a generator needs, in `onnxruntime-web/dist`. */
-const RUNTIME = [
-  ...['ort.jspi.bundle.min.mjs', 'ort.webgpu.bundle.min.mjs'],
-  ...['ort-wasm-simd-threaded.jspi.wasm', 'ort-wasm-simd-threaded.asyncify.wasm'],
-];
-
 async function makePage({ scene, folder, port, isServed, isSingle }) {
   const page = join(folder, 'index.html');
   mkdirSync(folder, { recursive: true });
@@ -41,7 +35,7 @@ async function makePage({ scene, folder, port, isServed, isSingle }) {
 }
 
 async function writeFolder(scene, folder, page) {
-  copyElement(scene, join(folder, 'cdn'));
+  await copyElement(scene, join(folder, 'cdn'));
   const tag = tagOf(await copyScene(scene, folder), titleOf(scene));
   if (existsSync(page))
     console.log(`\n${page} is there already and stays as it is. Paste into it:\n\n${SCRIPT}\n${tag}`);
@@ -101,16 +95,17 @@ function parseOptions(args) {
 }
 
 /** Copies the element without source maps, and ONNX Runtime (43 MB) if the scene is a generator. */
-function copyElement(scene, target) {
+async function copyElement(scene, target) {
   const isNeeded = (path) => {
     const inside = relative(CDN, path);
     return !inside.endsWith('.map') && (isModel(scene) || !inside.startsWith('onnxruntime'));
   };
   cpSync(CDN, target, { recursive: true, filter: isNeeded });
   if (!isModel(scene)) return;
+  const { RUNTIME_FILES } = await import('@gaussian-splat/generator');
   // The published element does not contain the runtime, which is a dependency of the checker.
   const dist = dirname(createRequire(import.meta.resolve('@gaussian-splat/check')).resolve('onnxruntime-web'));
-  for (const name of RUNTIME) {
+  for (const name of RUNTIME_FILES) {
     const file = join(target, 'onnxruntime', name);
     if (!existsSync(file)) cpSync(join(dist, name), file);
   }

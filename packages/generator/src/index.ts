@@ -29,7 +29,7 @@ export { handleCpuRun, type CpuCheckMessage, type StartWorker } from './cpu-chec
 export { compareOutputs, isDifferent, type OutputDifference, type Comparison } from './cpu-check/compare.js';
 export type { CpuCheckResult } from './cpu-check/record.js';
 export type { RunOutputs, SessionKind } from './runtime/ort-session.js';
-export { isRuntimeRequested, setRunLimit, setRuntimeLocation } from './runtime/load-runtime.js';
+export { isRuntimeRequested, RUNTIME_FILES, setRunLimit, setRuntimeLocation } from './runtime/load-runtime.js';
 export { readTensors, type TensorPart } from './runtime/tensor-buffers.js';
 export { openModel, type GeneratorModel, type ModelSource } from './runtime/open-model.js';
 export { acquireSession, type AcquireOptions, type SessionLease } from './runtime/shared-sessions.js';

@@ -89,9 +89,8 @@ let loading: Promise<Runtime> | undefined;
 let copies = 0;
 
 /**
- * Sets the folder of four files of onnxruntime-web 1.30.0: `ort.jspi.bundle.min.mjs`, `ort.webgpu.bundle.min.mjs`,
- * `ort-wasm-simd-threaded.jspi.wasm` and `ort-wasm-simd-threaded.asyncify.wasm`. Default: the folder `onnxruntime/`
- * next to this module, as in the CDN build.
+ * Sets the folder of the files {@link RUNTIME_FILES} of onnxruntime-web 1.30.0. Default: the folder `onnxruntime/` next
+ * to this module, as in the CDN build.
  * @param folder Absolute URL, or a URL relative to the page.
  */
 export function setRuntimeLocation(folder: string | URL): void {
@@ -157,11 +156,16 @@ export function folderBeside(module: string | undefined): string {
   });
 }
 
-const FILES =
-  'ort.jspi.bundle.min.mjs, ort.webgpu.bundle.min.mjs, ort-wasm-simd-threaded.jspi.wasm, ort-wasm-simd-threaded.asyncify.wasm';
+/** Files of the folder `dist` of onnxruntime-web that pages with a generator fetch, two for each of its builds. */
+export const RUNTIME_FILES = [
+  'ort.jspi.bundle.min.mjs',
+  'ort.webgpu.bundle.min.mjs',
+  'ort-wasm-simd-threaded.jspi.wasm',
+  'ort-wasm-simd-threaded.asyncify.wasm',
+] as const;
 
 const REMEDY =
-  `put these files of node_modules/onnxruntime-web/dist there (npm install onnxruntime-web@1.30.0): ${FILES}; ` +
+  `put these files of node_modules/onnxruntime-web/dist there (npm install onnxruntime-web@1.30.0): ${RUNTIME_FILES.join(', ')}; ` +
   'or name their folder with GaussianSplatElement.runtimeLocation (without the element: setRuntimeLocation)';
 
 /** Time limit for loading a script, milliseconds, because its progress is not observable. */
