@@ -24,8 +24,6 @@ const NOT_ASKED: Readonly<Record<string, string>> = {
   'start-helpers': 'PLY files of 32 MB',
   'part-uploads': 'PLY files that are uploaded in parts',
   'preview-uploads': 'previews of files that arrive slowly',
-  timing: 'asked for again by the next request for variants; this test does not refuse it yet',
-  sh: 'imported by timing',
   'file-request': 'shared by chunks that are asked for',
 };
 

@@ -48,11 +48,14 @@ const loadTiming = (): Promise<typeof trials> => loadModule(SELF_TEST, () => imp
  * @throws GaussianSplatError as {@link autotune} does.
  */
 export function pickInitialVariants(device: GPUDevice, options: StartOptions = {}): Promise<Variants> {
+  return once(device, 'started', (choice) => choice.chosen ?? start(device, options, choice));
+}
+
+/** Makes a choice once for each device. A choice whose code could not be loaded is forgotten, and made again later. */
+function once(device: GPUDevice, name: keyof Choice, make: (choice: Choice) => Promise<Variants>): Promise<Variants> {
   const choice = choiceOf(device);
-  return (choice.started ??= (choice.chosen ?? start(device, options, choice)).catch((error: unknown) => {
-    // Forgets a choice whose code could not be loaded, so that the next request chooses again.
-    if ((error as Partial<GaussianSplatError>).code === 'network/unreachable')
-      choice.started = choice.chosen = undefined;
+  return (choice[name] ??= make(choice).catch((error: unknown) => {
+    if ((error as Partial<GaussianSplatError>).code === 'network/unreachable') choice[name] = undefined;
     throw error;
   }));
 }
@@ -79,7 +82,7 @@ async function start(device: GPUDevice, options: StartOptions, choice: Choice): 
  * @throws GaussianSplatError `unsupported/wrong-image` if no variant passes the self-test.
  */
 export function autotune(device: GPUDevice, options: AutotuneOptions = {}): Promise<Variants> {
-  return (choiceOf(device).chosen ??= choose(device, options));
+  return once(device, 'chosen', () => choose(device, options));
 }
 
 async function choose(device: GPUDevice, options: AutotuneOptions): Promise<Variants> {
