@@ -53,6 +53,23 @@ const FRAME_RATE = 30;
 /** Media types in order of preference. */
 const TYPES = ['video/webm;codecs=vp9', 'video/webm', 'video/mp4'];
 
+/** Elements that are recorded. Two recordings would move the same camera, seek the same clock, and share a canvas. */
+const recorded = new WeakSet<HTMLElement>();
+
+/**
+ * Reserves an element for one recording, until the returned function is called.
+ * @throws DOMException `InvalidStateError` during another recording of the element
+ */
+function reserve({ element }: RecordingHost, method: string): () => void {
+  if (recorded.has(element))
+    throw new DOMException(
+      `${method}: expected no other recording of this element, found one; wait until it ends, or end it by its signal or by return()`,
+      'InvalidStateError',
+    );
+  recorded.add(element);
+  return () => recorded.delete(element);
+}
+
 /** Records a video in real time: see `record()` of the element. */
 export async function record(host: RecordingHost, options: RecordOptions): Promise<Blob> {
   const { frameRate = FRAME_RATE, bitsPerSecond, signal } = options;
@@ -76,12 +93,14 @@ export async function record(host: RecordingHost, options: RecordOptions): Promi
     recorder.addEventListener('stop', () => resolve());
     recorder.addEventListener('error', () => reject(new DOMException('The recording failed', 'EncodingError')));
   });
+  const release = reserve(host, 'record()');
   const before = host.camera.goal;
   host.onFrame = copy;
-  recorder.start();
   try {
+    recorder.start();
     await drive(host, path, duration, signal);
   } finally {
+    release();
     host.onFrame = undefined;
     if (path) host.camera.moveTo(before);
     if (recorder.state !== 'inactive') recorder.stop();
@@ -167,6 +186,7 @@ export async function* recordFrames(host: RecordingHost, options: FrameOptions):
   const frames = count ?? frameCount(seconds, frameRate);
   if (!(frames >= 1 && frames < Infinity))
     throw new TypeError('recordFrames(): expected a path, a duration or a number of frames, found none');
+  const release = reserve(host, 'recordFrames()');
   const before = { goal: camera.goal, time: playback.currentTime, isPaused: playback.paused };
   if (!before.isPaused) playback.pause();
   try {
@@ -177,6 +197,7 @@ export async function* recordFrames(host: RecordingHost, options: FrameOptions):
       yield await takeImage(host, image);
     }
   } finally {
+    release();
     if (path) camera.moveTo(before.goal);
     if (playback.canPlay) {
       playback.currentTime = before.time;

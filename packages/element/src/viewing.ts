@@ -152,9 +152,9 @@ export abstract class ViewingMethods extends MediaProperties {
   /**
    * Records a video of the element in real time: along the camera's `path`, for a `duration`, or until `signal` is
    * aborted. Afterwards the camera returns to its pose.
-   * @returns Rejects with an `InvalidStateError` if no scene is shown, with a `NotSupportedError` if the browser cannot
-   * record this type, and with a `TypeError` if the page has no views to follow, if no option ends the recording, or if
-   * the background is not a color.
+   * @returns Rejects with an `InvalidStateError` if no scene is shown or another recording has not ended, with a
+   * `NotSupportedError` if the browser cannot record this type, and with a `TypeError` if the page has no views to
+   * follow, if no option ends the recording, or if the background is not a color.
    */
   async record(options: RecordOptions = {}): Promise<Blob> {
     return (await this.#images()).record(this.core, options);
@@ -163,7 +163,8 @@ export abstract class ViewingMethods extends MediaProperties {
   /**
    * Yields the images of a video one by one. Each frame is drawn for its own time, however long that takes: `for await
    * (const image of element.recordFrames({ path: 'turntable' }))`. The frames are equal to those of `gaussian-splat
-   * video`. An animated scene advances by the duration of a frame, and must be visible.
+   * video`. An animated scene advances by the duration of a frame, and must be visible. An element has one recording at
+   * a time: a loop that does not end must call `return()`.
    */
   async *recordFrames(options: FrameOptions = {}): AsyncGenerator<Blob, void> {
     yield* (await this.#images()).recordFrames(this.core, options);

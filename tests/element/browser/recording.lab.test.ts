@@ -87,6 +87,27 @@ describe('the frames of a path', () => {
     assertEqual(endless, 'TypeError', 'without an end');
   });
 
+  it('have their element for themselves: another recording is refused, and works after the first', async () => {
+    const element = await showLoaded(STILL, STYLE);
+    const named = (recording: Promise<unknown>): Promise<unknown> => recording.catch(({ name }: Error) => name);
+    const options = { path: 'turntable', frames: 3, background: 'white' } as const;
+    const alone = await framesOf(element.recordFrames(options));
+    const images = element.recordFrames(options);
+    const frames: Blob[] = [(await images.next()).value as Blob];
+    assertEqual(
+      await Promise.all([named(framesOf(element.recordFrames(options))), named(element.record({ duration: 50 }))]),
+      ['InvalidStateError', 'InvalidStateError'],
+      'recordings beside it',
+    );
+    for await (const image of images) frames.push(image);
+    assertEqual(await maxDifference(frames, alone), 0, 'difference to a recording alone');
+    const videos = [element.record({ duration: 300 }), element.record({ duration: 300 })].map(named);
+    const [first, second] = await Promise.all(videos);
+    assert(first instanceof Blob && first.size > 100, 'the first of two videos');
+    assertEqual(second, 'InvalidStateError', 'the second');
+    assert((await named(element.record({ duration: 100 }))) instanceof Blob, 'one after both');
+  });
+
   it('end with an error if another scene takes the place of one that moves', async () => {
     const element = await showLoaded({ ...STILL, src: '/net/clip/ball.gsv' }, STYLE);
     const images = element.recordFrames({ frames: 10, frameRate: 10 });
