@@ -144,16 +144,14 @@ export function framePath({ frames }: Pick<SceneSequence, 'frames'>, frame: numb
 
 /**
  * Returns the index of the frame at a time in seconds. Times outside the sequence are clamped to its first or last frame.
- * With `loop`, they wrap around.
  */
 export function frameAt(
   { frameCount, framesPerSecond }: Pick<SceneSequence, 'frameCount' | 'framesPerSecond'>,
   timeSeconds: number,
-  loop = false,
 ): number {
   // The offset prevents that rounding errors, for example of 1/24 s times 24, select the previous frame.
   const frame = Math.floor(timeSeconds * framesPerSecond + 1e-6);
-  return loop ? ((frame % frameCount) + frameCount) % frameCount : Math.min(frameCount - 1, Math.max(0, frame || 0));
+  return Math.min(frameCount - 1, Math.max(0, frame || 0));
 }
 
 /** Throws for paths that no server accepts. A player parses the path of a frame before each request. */

@@ -55,6 +55,9 @@ const PLACED = {
   loop: flag(),
 };
 
+/** Attributes that give a child a clock of its own. */
+export const CLOCK_ATTRIBUTES = ['autoplay', 'loop'] as const;
+
 export const SCENE_ATTRIBUTES = {
   /**
    * URL of the scene: a file, a sequence, a clip, a streamed folder, or a generator. The property takes a `File` or `Blob` as well.

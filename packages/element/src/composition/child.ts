@@ -9,7 +9,7 @@ import type { GaussianSplatEventMap } from '../events.js';
 import type { DynamicState } from '../dynamic/dynamic-model.js';
 import { frameOf } from '../camera/settings.js';
 import type { Source } from '../element-host.js';
-import type { MESH_ATTRIBUTES, PropertiesOf } from './attributes.js';
+import { CLOCK_ATTRIBUTES, type MESH_ATTRIBUTES, type PropertiesOf } from './attributes.js';
 import type { WorldEntry } from '../world-entry.js';
 import { SourceEntry, type EntryCore, type SourceOwner } from '../source-entry.js';
 import { cameraInScene, isSolid, matrixOf, matrixOfFrame, readMatrix, sceneToWorld, transposed } from './placing.js';
@@ -82,7 +82,7 @@ export abstract class SplatChild extends ReactiveElement implements SourceOwner 
   constructor() {
     super();
     // Boolean properties are initialized, because frameworks use their type to interpret a bare attribute.
-    Object.assign(this, { autoplay: false, loop: false, interactive: false, hidden: false });
+    for (const name of [...CLOCK_ATTRIBUTES, 'interactive', 'hidden'] as const) this[name] = false;
   }
 
   /**
@@ -186,11 +186,11 @@ export abstract class SplatChild extends ReactiveElement implements SourceOwner 
   }
 
   /**
-   * Whether the child has its own clock: it has `autoplay` or `loop`, or a script has controlled its playback.
+   * Whether the child has its own clock: it has one of {@link CLOCK_ATTRIBUTES}, or a script has controlled its playback.
    * @internal
    */
   get hasOwnClock(): boolean {
-    return this.autoplay || this.loop || this.#isDriven;
+    return this.#isDriven || CLOCK_ATTRIBUTES.some((name) => this[name]);
   }
 
   /** @internal */
@@ -208,8 +208,7 @@ export abstract class SplatChild extends ReactiveElement implements SourceOwner 
 
   /** @internal */
   get overrides(): Partial<Attributes> {
-    const { autoplay, loop } = this;
-    const own = { autoplay, loop, time: null };
+    const own = { ...Object.fromEntries(CLOCK_ATTRIBUTES.map((name) => [name, this[name]])), time: null };
     return this.crossorigin === null ? own : { ...own, crossorigin: this.read('crossorigin', this.crossorigin) };
   }
 

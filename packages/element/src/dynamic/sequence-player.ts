@@ -111,7 +111,7 @@ export class SequencePlayer implements Timeline {
    */
   #showLate(frame: number): void {
     if (this.#slots.get(frame)?.packed) return;
-    // The shown frame may belong to the previous loop.
+    // The shown frame may belong to the previous round.
     const before = this.#shown < frame ? this.#shown : -1;
     const late = [...this.#slots.keys()].filter(
       (held) => held > before && held < frame && this.#slots.get(held)!.packed,
@@ -128,7 +128,7 @@ export class SequencePlayer implements Timeline {
   }
 
   #frameAt(timeSeconds: number): number {
-    return frameAt(this.#sequence, timeSeconds, false);
+    return frameAt(this.#sequence, timeSeconds);
   }
 
   #show(frame: number): void {
