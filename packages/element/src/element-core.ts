@@ -296,12 +296,6 @@ export class ElementCore
     return [...this.sources.ownEntry.inputs, ...(this.view.backend?.filter?.inputs ?? [])];
   }
 
-  /** Seeks to a time in seconds: of the displayed scene, or of the next scene if the page has requested another one. */
-  seek(seconds: number): void {
-    if (this.sources.ownEntry.isLeaving) this.playback.startNextAt(seconds);
-    else this.playback.currentTime = seconds;
-  }
-
   /** Prepares playback: dismisses the poster, and loads the scene even if it is out of view. */
   prepareToPlay(): void {
     this.sources.ownEntry.needNow();
@@ -532,7 +526,6 @@ export class ElementCore
   #updated(): void {
     this.sources.ownEntry.update();
     this.live.wantPost(this.sources.ownEntry.postprocess);
-    if (!this.sources.ownEntry.isLeaving) this.playback.keepScene();
     if (this.attributes.views) this.tour.want(this.#warnOf);
     if (this.attributes.navigation === 'walk') this.walk.want(this.#warnOf);
     const { vr, ar, measure, shadowIntensity, skyboxImage, revealEffect } = this.attributes;

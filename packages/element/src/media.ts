@@ -1,4 +1,3 @@
-import { notPlayed } from './controllers/playback-controller.js';
 import { SplatProperties } from './properties.js';
 import type { Timeline } from './dynamic/dynamic-model.js';
 import type { ElementCore } from './element-core.js';
@@ -44,7 +43,7 @@ export abstract class MediaProperties extends SplatProperties {
 
   set currentTime(seconds: number) {
     // Frameworks set undefined or null to unset a property.
-    if (isSaid(seconds)) this.core.seek(seconds);
+    if (isSaid(seconds)) this.core.sources.ownEntry.seek(seconds);
   }
 
   /** Duration in seconds; NaN without an animated scene, Infinity for one without an end. */
@@ -114,11 +113,8 @@ export abstract class MediaProperties extends SplatProperties {
    */
   async play(): Promise<void> {
     const { playback } = this.core;
-    const { pauses } = playback;
-    // Waits until a `src` that was just set is requested, so that the removal of the previous scene does not reject the
-    // promise.
-    await this.updateComplete;
-    if (playback.pauses !== pauses) throw notPlayed();
+    // The removal of the scene that a new `src` replaces must not reject the promise.
+    await this.core.sources.ownEntry.requested();
     this.core.prepareToPlay();
     // A scene that is shown plays, also while a child loads.
     if (!playback.canPlay) await playback.waitFor(this.ready);
@@ -128,7 +124,7 @@ export abstract class MediaProperties extends SplatProperties {
 
   /** Pauses playback. */
   pause(): void {
-    this.core.sources.ownEntry.hasBegun = true;
+    this.core.sources.ownEntry.begin();
     this.core.playback.pause();
   }
 }

@@ -4,6 +4,7 @@ import type { Attributes } from './attributes.js';
 import type { DetailHost } from './controllers/detail-controller.js';
 import {
   PLAYABLE,
+  notPlayed,
   PlaybackController,
   type PlaybackEvent,
   type PlaybackHost,
@@ -115,7 +116,9 @@ export class SourceEntry implements SceneHost, SourceHost, PlaybackHost, Dynamic
   /** Loading progress, 0..1; null while unknown. */
   progress: number | null = null;
   /** Whether the source has played or was paused, after which it does not start automatically. */
-  hasBegun = false;
+  #hasBegun = false;
+  /** Whether that was for the source that the owner requests next, so that it outlasts the current one. */
+  #isForNext = false;
   /** Bytes received and bytes in total; the total is undefined while unknown. */
   #bytes: [loaded: number, total: number | undefined] = [0, undefined];
 
@@ -191,6 +194,10 @@ export class SourceEntry implements SceneHost, SourceHost, PlaybackHost, Dynamic
   update(): void {
     if (!this.#isIn) return;
     this.#source.set(this.owner.source);
+    if (!this.isLeaving) {
+      this.#isForNext = false;
+      this.ownClock.keepScene();
+    }
     if (this.attributes.detail !== 'auto') this.#detail.want(this.#warnOf);
     this.#updateDetail();
     this.startPlaying();
@@ -219,6 +226,30 @@ export class SourceEntry implements SceneHost, SourceHost, PlaybackHost, Dynamic
     return this.#source.isOther(this.owner.source);
   }
 
+  /** Prevents the automatic start of the source, or of the one that its owner has just requested. */
+  begin(): void {
+    this.#hasBegun = true;
+    this.#isForNext = this.isLeaving;
+  }
+
+  /**
+   * Resolves when the source of its owner is requested. Rejects with an `AbortError` if `pause()` is called or another
+   * source is set first.
+   */
+  async requested(): Promise<void> {
+    const { owner, playback } = this;
+    const { src } = owner.source;
+    const { pauses } = playback;
+    await owner.element.updateComplete;
+    if (playback.pauses !== pauses || owner.source.src !== src) throw notPlayed();
+  }
+
+  /** Seeks to a time in seconds: of the displayed source, or of the one that its owner has just requested. */
+  seek(seconds: number): void {
+    if (this.isLeaving) this.playback.startNextAt(seconds);
+    else this.playback.currentTime = seconds;
+  }
+
   get postprocess(): readonly string[] {
     return this.#source.postprocess;
   }
@@ -230,7 +261,7 @@ export class SourceEntry implements SceneHost, SourceHost, PlaybackHost, Dynamic
 
   /** Starts automatic playback if it is allowed, and if the source has neither played nor been paused before. */
   startPlaying(): void {
-    if (!this.hasBegun && this.#core?.mayMove && this.player?.canPlay) this.ownClock.play();
+    if (!this.#hasBegun && this.#core?.mayMove && this.player?.canPlay) this.ownClock.play();
   }
 
   /** Sets the transform of the source in the world. Called before each frame. */
@@ -341,7 +372,7 @@ export class SourceEntry implements SceneHost, SourceHost, PlaybackHost, Dynamic
   playbackEvent(type: PlaybackEvent): void {
     this.dispatch(new Event(type));
     if (type !== 'play' && type !== 'pause') return;
-    this.hasBegun ||= type === 'play';
+    if (type === 'play') this.#hasBegun = true;
     // Custom states and the pause button of the element depend on the state of playback.
     this.#core?.element.requestUpdate();
   }
@@ -410,7 +441,7 @@ export class SourceEntry implements SceneHost, SourceHost, PlaybackHost, Dynamic
   emptied(): void {
     this.#source.needNow(false);
     this.progress = null;
-    this.hasBegun = false;
+    this.#hasBegun = this.#isForNext;
     this.ownClock.empty();
     this.ownClock.stopWaits();
     this.dispatch(new Event('emptied'));

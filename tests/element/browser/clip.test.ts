@@ -71,6 +71,30 @@ describe('a clip', () => {
     await until(() => element.currentTime > 0, 'a script starts it');
   });
 
+  it('what a script says just after another src is about that scene, and what it said before is not', async () => {
+    const element = await showLoaded({ src: CLIP, autoplay: '' });
+    const child = document.createElement('splat-scene');
+    child.setAttribute('autoplay', '');
+    child.setAttribute('src', CLIP);
+    element.append(child);
+    await until(() => element.currentTime > 0 && child.currentTime > 0, 'both play');
+    for (const each of [element, child]) {
+      each.src = `${CLIP}?frames=8`;
+      each.pause();
+      each.currentTime = 0.35;
+    }
+    for (const each of [element, child])
+      await until(() => each.loaded && each.duration === 0.8, `the next scene of ${each.localName}`);
+    await delay(300);
+    for (const { localName, paused, currentTime } of [element, child])
+      assertEqual([paused, currentTime], [true, 0.35], `paused and time of ${localName}`);
+    element.src = child.src = CLIP;
+    await until(() => element.currentTime > 0.4 && child.currentTime > 0.4, 'later scenes to play by themselves');
+    const played = element.play().catch(({ name }: Error) => name);
+    element.src = `${CLIP}?frames=8`;
+    assertEqual(await played, 'AbortError', 'a promise of the scene before');
+  });
+
   it('stands while its element has no height', async () => {
     const element = await showLoaded({ src: CLIP });
     await element.play();

@@ -3,7 +3,6 @@ import { ReactiveElement, type PropertyDeclarations } from 'lit';
 import type { Box } from '@gaussian-splat/renderer';
 import { declarations, type Attribute, type Attributes } from '../attributes.js';
 import { readAttribute } from '../camera/grammar.js';
-import { notPlayed } from '../controllers/playback-controller.js';
 import type { ElementError } from '../errors.js';
 import type { GaussianSplatEventMap } from '../events.js';
 import type { DynamicState } from '../dynamic/dynamic-model.js';
@@ -127,7 +126,7 @@ export abstract class SplatChild extends ReactiveElement implements SourceOwner 
   set currentTime(seconds: number) {
     if (seconds === null || seconds === undefined) return;
     this.#drive();
-    this.entry.playback.currentTime = seconds;
+    this.entry.seek(seconds);
   }
 
   /** Duration in seconds; NaN if nothing is animated, Infinity if the animation has no end. */
@@ -159,9 +158,7 @@ export abstract class SplatChild extends ReactiveElement implements SourceOwner 
   async play(): Promise<void> {
     this.#drive();
     const { playback } = this.entry;
-    const { pauses } = playback;
-    await this.updateComplete;
-    if (playback.pauses !== pauses) throw notPlayed();
+    await this.entry.requested();
     await playback.waitFor(this.ready);
     if (!playback.canPlay) throw new DOMException('There is nothing that moves', 'NotSupportedError');
     playback.play();
@@ -177,7 +174,7 @@ export abstract class SplatChild extends ReactiveElement implements SourceOwner 
   #drive(): void {
     const { playback: before, ownClock } = this.entry;
     this.#isDriven = true;
-    this.entry.hasBegun = true;
+    this.entry.begin();
     if (before === ownClock || !ownClock.canPlay) return;
     ownClock.playbackRate = before.playbackRate;
     if (before.currentTime !== ownClock.currentTime) ownClock.currentTime = before.currentTime;
