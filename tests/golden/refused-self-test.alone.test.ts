@@ -1,9 +1,12 @@
 /** The code of the self-test is refused at first: a device is not left without variants because of that. */
 import assert from 'node:assert/strict';
 import { register } from 'node:module';
-import { test } from 'node:test';
+import { after, test } from 'node:test';
 import { autotune, deviceDescriptor, pickInitialVariants } from '@gaussian-splat/renderer';
 import { requestNodeAdapter } from '../../packages/cli/src/lib/node-gpu.mjs';
+import { endNodeDevice } from '../support/node-device.js';
+
+after(endNodeDevice);
 
 /** Requests of the module that fail. */
 const REFUSED = 4;
@@ -25,5 +28,6 @@ test('a choice whose code was refused is made again, by each way that asks for i
     await assert.rejects(choose(device, options), { code: 'network/unreachable' });
   assert.equal((await pickInitialVariants(device, options)).threads, 'serial');
   assert.equal(await autotune(device), await autotune(device), 'the choice is made once');
+  await device.queue.onSubmittedWorkDone();
   device.destroy();
 });
