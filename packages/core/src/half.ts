@@ -21,14 +21,22 @@ const bits = new Uint32Array(float.buffer);
 /** Returns the bits of the float16 nearest to a number, ties to even. Numbers beyond its range become infinity. */
 export function numberToHalf(value: number): number {
   float[0] = value;
-  const sign = (bits[0] >>> 16) & 0x8000;
-  const magnitude = Math.abs(float[0]);
-  if (Number.isNaN(magnitude)) return sign | 0x7e00;
-  if (magnitude >= 65_520) return sign | 0x7c00;
-  const exponent = Math.max(-14, Math.floor(Math.log2(magnitude || 2 ** -24)));
-  const scaled = magnitude / 2 ** (exponent - 10);
-  const floor = Math.floor(scaled);
-  const isUp = scaled - floor > 0.5 || (scaled - floor === 0.5 && floor % 2 === 1);
-  // A fraction that rounds up to 2048 carries into the exponent.
-  return sign + (exponent + 14) * 1024 + floor + (isUp ? 1 : 0);
+  const b = bits[0];
+  const sign = (b >>> 16) & 0x8000;
+  const exponent = (b >>> 23) & 0xff;
+  const mantissa = b & 0x7fffff;
+  if (exponent === 255 && mantissa > 0) return sign | 0x7e00;
+  // Normal number: rounding up may carry into the exponent, which gives the correct result.
+  if (exponent > 112) return sign | Math.min(0x7c00, roundedShift(((exponent - 112) << 23) | mantissa, 13));
+  if (exponent < 102) return sign;
+  // Subnormal: the implicit leading one becomes explicit.
+  return sign | roundedShift(mantissa | 0x800000, 126 - exponent);
+}
+
+/** Returns value / 2^shift, rounded to the nearest integer, ties to even. */
+function roundedShift(value: number, shift: number): number {
+  const floor = value >>> shift;
+  const rest = value & ((1 << shift) - 1);
+  const half = 1 << (shift - 1);
+  return rest > half || (rest === half && (floor & 1) === 1) ? floor + 1 : floor;
 }

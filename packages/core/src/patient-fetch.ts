@@ -72,13 +72,21 @@ export async function bytesOf(
     if (length > maxBytes) throw new RangeError(`more than ${maxBytes} bytes`);
     chunks.push(chunk);
   }
-  const bytes = new Uint8Array(length);
+  return concatenated(Uint8Array, chunks);
+}
+
+/** Returns a new array of a type with the elements of all parts, in their order. */
+export function concatenated<T extends Uint8Array | Uint32Array | Int32Array | Float32Array>(
+  Numbers: new (length: number) => T,
+  parts: readonly ArrayLike<number>[],
+): T {
+  const all = new Numbers(parts.reduce((sum, { length }) => sum + length, 0));
   let at = 0;
-  for (const chunk of chunks) {
-    bytes.set(chunk, at);
-    at += chunk.length;
+  for (const part of parts) {
+    all.set(part, at);
+    at += part.length;
   }
-  return bytes;
+  return all;
 }
 
 function inTime<T>(reading: Promise<T>, ms: number): Promise<T> {

@@ -1,4 +1,5 @@
 import { GaussianSplatError, type GaussianCloud } from '@gaussian-splat/core';
+import { concatenated } from '@gaussian-splat/core/fetch';
 import {
   ANIMATED_ATTRIBUTES,
   ANIMATED_ATTRIBUTE_NAMES,
@@ -9,7 +10,6 @@ import {
   type AnimatedAttributeName,
 } from '@gaussian-splat/formats';
 import { packedOrder } from '@gaussian-splat/renderer/tools';
-import { concatenated } from '../concatenated.js';
 import {
   minCurve,
   motionFile,
@@ -137,7 +137,7 @@ export class TrackedPart {
       planes: ANIMATED_ATTRIBUTE_NAMES.reduce((sum, name) => sum + ANIMATED_ATTRIBUTES[name] * parts[name].rank, 0),
       sceneBytes: this.#scene.length,
       motionBytes: motion.length,
-      bytes: concatenated([this.#scene, motion]),
+      bytes: concatenated(Uint8Array, [this.#scene, motion]),
     };
   }
 }

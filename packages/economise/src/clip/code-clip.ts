@@ -1,4 +1,5 @@
 import { boundsOf, type GaussianCloud, type ShDegree } from '@gaussian-splat/core';
+import { concatenated } from '@gaussian-splat/core/fetch';
 import {
   clipFrame,
   LoadBudget,
@@ -12,7 +13,6 @@ import {
   type ClipPartContent,
   type AnimatedAttributeName,
 } from '@gaussian-splat/formats';
-import { concatenated } from '../concatenated.js';
 import type { GpuEvaluator } from '../gpu/gpu-evaluator.js';
 import { decibels, mean, meanSquareOf } from '../measure.js';
 import { judgeOf, typicalSize, type CodeSequenceOptions } from '../motion/code-sequence.js';
@@ -153,7 +153,7 @@ class ClipCoder {
       ...this.#facts!,
       ...{ shDegree: this.#shDegree, framesPerSecond, grow: this.#grow, groups },
     });
-    const bytes = concatenated([head, ...groups.flatMap(({ parts }) => parts.map((part) => part.bytes))]);
+    const bytes = concatenated(Uint8Array, [head, ...groups.flatMap(({ parts }) => parts.map((part) => part.bytes))]);
     const errors = groups.flatMap((group) => group.errors);
     return {
       bytes,

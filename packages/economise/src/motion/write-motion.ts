@@ -1,5 +1,5 @@
-import { concatenated } from '../concatenated.js';
 import { GaussianSplatError, shCoefficientCount, type GaussianCloud } from '@gaussian-splat/core';
+import { concatenated } from '@gaussian-splat/core/fetch';
 import {
   FADE_NAMES,
   MOTION_MODES,
@@ -94,11 +94,11 @@ export function motionFile({
   parts.flatMap((part) => [...part.curves]).forEach((value, k) => curves.setFloat32(4 * k, value, true));
   const planes = parts.flatMap(({ codes }) => codes.map((own) => smaller(own, deflate)));
   const modes = Uint8Array.from(planes, ({ mode }) => mode);
-  const begin = concatenated([bytesOf(head), bytesOf(curves), modes]);
+  const begin = concatenated(Uint8Array, [bytesOf(head), bytesOf(curves), modes]);
   const lifetimes = lives ? [lives.first, lives.end].flatMap((words) => halvesOf(words).map(deflate)) : [];
   const { fades } = lives ?? {};
   if (fades) lifetimes.push(...FADE_NAMES.map((name) => deflate(fades[name])));
-  return concatenated([deflate(begin), ...lifetimes, ...planes.map(({ bytes }) => bytes), END]);
+  return concatenated(Uint8Array, [deflate(begin), ...lifetimes, ...planes.map(({ bytes }) => bytes), END]);
 }
 
 /** Returns the low bytes of 16-bit words, and their high bytes. */
@@ -248,7 +248,7 @@ function smaller(codes: Int16Array, deflate: MotionOptions['deflate']): { mode: 
       planes[i] = folded & 255;
       planes[own.length + i] = (folded >> 8) & 255;
     });
-    return concatenated([deflate(planes.subarray(0, own.length)), deflate(planes.subarray(own.length))]);
+    return concatenated(Uint8Array, [deflate(planes.subarray(0, own.length)), deflate(planes.subarray(own.length))]);
   });
   return plain.length <= changed.length
     ? { mode: MOTION_MODES.plain, bytes: plain }

@@ -1,4 +1,4 @@
-import { concatenated } from '../concatenated.js';
+import { concatenated } from '@gaussian-splat/core/fetch';
 import { DIFFERENCES, headBytes, PLAIN, PLANES, planesOf, type SplatLevel } from '@gaussian-splat/renderer/tools';
 
 /** Compresses bytes to a section of a raw deflate stream. A sync flush ends it, so that sections can be concatenated. */
@@ -70,7 +70,7 @@ export function joined(head: Uint8Array, { whole: planes }: Planes, deflate: Def
     head[head.length - planes.length + k] = mode;
     (mode === PLAIN ? plain : changed).forEach((part) => runs.add(part));
   });
-  return concatenated([deflate(head), ...runs.pieces, END]);
+  return concatenated(Uint8Array, [deflate(head), ...runs.pieces, END]);
 }
 
 /** Bytes, and their compressed section. */
@@ -102,7 +102,7 @@ class Runs {
 
   add(piece: Piece): void {
     const last = this.#runs.at(-1);
-    const both = last && pieceOf(concatenated([last.bytes, piece.bytes]), this.#deflate);
+    const both = last && pieceOf(concatenated(Uint8Array, [last.bytes, piece.bytes]), this.#deflate);
     if (both && both.deflated.length < lengthOf([last, piece])) this.#runs[this.#runs.length - 1] = both;
     else this.#runs.push(piece);
   }

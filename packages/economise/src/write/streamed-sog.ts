@@ -1,4 +1,5 @@
 import { quaternionOfMatrix, shCoefficientCount, symmetricEigen, type GaussianCloud } from '@gaussian-splat/core';
+import { concatenated } from '@gaussian-splat/core/fetch';
 import { upright } from '@gaussian-splat/formats';
 import { packedOrder } from '@gaussian-splat/renderer/tools';
 import { buildLevels, recentered, type SplatLevel } from '@gaussian-splat/renderer/stages';
@@ -69,7 +70,12 @@ export async function writeStreamedSog(
               cloud,
             );
       const kept =
-        level === 0 ? joined(parts.map((box) => box.kept)) : Uint32Array.from({ length: offset }, (_, i) => i);
+        level === 0
+          ? concatenated(
+              Uint32Array,
+              parts.map((box) => box.kept),
+            )
+          : Uint32Array.from({ length: offset }, (_, i) => i);
       const folder = `${level}_${k}`;
       filenames.push(`${folder}/meta.json`);
       for (const [name, bytes] of await sogFiles(part, kept, level === 0 ? options : { ...options, seen: undefined }))
@@ -108,16 +114,6 @@ function groupsOf(boxes: readonly Box[], level: number): number[][] {
     splats += count;
   });
   return groups;
-}
-
-function joined(parts: readonly Uint32Array[]): Uint32Array {
-  const all = new Uint32Array(parts.reduce((sum, { length }) => sum + length, 0));
-  let at = 0;
-  for (const part of parts) {
-    all.set(part, at);
-    at += part.length;
-  }
-  return all;
 }
 
 /** Concatenates levels to one cloud. Merged splats may have opacities above 1, which become 1. */

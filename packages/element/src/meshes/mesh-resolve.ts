@@ -1,4 +1,5 @@
 /** Resolves three.js's multisampled depth to one depth for each pixel. */
+import { readBack } from '@gaussian-splat/renderer/tools';
 
 const SHADER = /* wgsl */ `
 @group(0) @binding(0) var samples: texture_depth_multisampled_2d;
@@ -91,12 +92,11 @@ export class MeshResolve {
     const { depth } = this;
     if (depth === undefined || pixels.length === 0) return new Float32Array(pixels.length);
     const device = this.#device;
-    const { STORAGE, COPY_DST, COPY_SRC, MAP_READ } = GPUBufferUsage;
+    const { STORAGE, COPY_DST, COPY_SRC } = GPUBufferUsage;
     const make = (name: string, bytes: number, usage: number): GPUBuffer =>
       device.createBuffer({ label: `gs.mesh_probe.${name}`, size: bytes * pixels.length, usage });
     const points = make('points', 8, STORAGE | COPY_DST);
     const found = make('found', 4, STORAGE | COPY_SRC);
-    const staging = make('read', 4, COPY_DST | MAP_READ);
     try {
       device.queue.writeBuffer(points, 0, Uint32Array.from(pixels.flat()));
       const pipeline = device.createComputePipeline({
@@ -116,12 +116,10 @@ export class MeshResolve {
       pass.setBindGroup(0, group);
       pass.dispatchWorkgroups(Math.ceil(pixels.length / 64));
       pass.end();
-      encoder.copyBufferToBuffer(found, 0, staging, 0, 4 * pixels.length);
-      device.queue.submit([encoder.finish()]);
-      await staging.mapAsync(GPUMapMode.READ);
-      return new Float32Array(staging.getMappedRange().slice(0));
+      const [depths] = await readBack(device, [{ buffer: found }], encoder);
+      return new Float32Array(depths);
     } finally {
-      for (const buffer of [points, found, staging]) buffer.destroy();
+      for (const buffer of [points, found]) buffer.destroy();
     }
   }
 

@@ -1,5 +1,6 @@
 /** Reader of `.4dgs` files, whose splats appear, move and fade: https://github.com/avala-ai/4dgs. */
 import type { GaussianCloud, Vector3 } from '@gaussian-splat/core';
+import { concatenated } from '@gaussian-splat/core/fetch';
 import { LoadBudget, type LoadLimits } from '../budget.js';
 import { damaged } from '../faults.js';
 import { ATTRIBUTE, type AttributeId } from './streams.js';
@@ -182,19 +183,15 @@ function mergedStates(states: readonly State[], shDegree: number): State {
   const bins = new Map<AttributeId, Int32Array>();
   for (const id of ids) {
     const width = Math.max(...states.map((s) => (count(s) > 0 ? (s.bins.get(id)?.length ?? 0) / count(s) : 0)), 1);
-    bins.set(id, concatenated(states.map((s) => s.bins.get(id) ?? new Int32Array(width * count(s)))));
+    const own = states.map((state) => state.bins.get(id) ?? new Int32Array(width * count(state)));
+    bins.set(id, concatenated(Int32Array, own));
   }
   if (states.length === 0) for (const id of Object.values(ATTRIBUTE)) bins.set(id, new Int32Array(0));
-  const bands = Array.from({ length: shDegree }, (_, k) => concatenated(states.map((s) => s.bands[k])));
+  const bandOf = (_: unknown, k: number): Int32Array =>
+    concatenated(
+      Int32Array,
+      states.map(({ bands }) => bands[k]),
+    );
+  const bands = Array.from({ length: shDegree }, bandOf);
   return { bins, bands };
-}
-
-function concatenated(arrays: readonly Int32Array[]): Int32Array {
-  const all = new Int32Array(arrays.reduce((sum, { length }) => sum + length, 0));
-  let at = 0;
-  for (const array of arrays) {
-    all.set(array, at);
-    at += array.length;
-  }
-  return all;
 }

@@ -1,4 +1,5 @@
 import { BUFFER_USAGE } from './kernel.js';
+import { readBack } from './read-back.js';
 
 /** Beginning and end of one pass of a frame, in milliseconds of the GPU's own clock. */
 export interface PassTime {
@@ -75,18 +76,12 @@ export class PassTimer implements FrameTimer {
   }
 
   async #readStamps(count: number): Promise<BigUint64Array> {
-    const { copySource, copyDestination, mapRead } = BUFFER_USAGE;
-    const size = 8 * count;
-    const resolved = this.#device.createBuffer({ label: 'gs.timer.resolved', size, usage: QUERY_RESOLVE | copySource });
-    const staging = this.#device.createBuffer({ label: 'gs.timer.staging', size, usage: mapRead | copyDestination });
+    const usage = QUERY_RESOLVE | BUFFER_USAGE.copySource;
+    const resolved = this.#device.createBuffer({ label: 'gs.timer.resolved', size: 8 * count, usage });
     const encoder = this.#device.createCommandEncoder({ label: 'gs.timer' });
     encoder.resolveQuerySet(this.#queries, 0, count, resolved, 0);
-    encoder.copyBufferToBuffer(resolved, 0, staging, 0, size);
-    this.#device.queue.submit([encoder.finish()]);
-    await staging.mapAsync(0x1);
-    const stamps = new BigUint64Array(staging.getMappedRange().slice(0));
+    const [stamps] = await readBack(this.#device, [{ buffer: resolved }], encoder);
     resolved.destroy();
-    staging.destroy();
-    return stamps;
+    return new BigUint64Array(stamps);
   }
 }

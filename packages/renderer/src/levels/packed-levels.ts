@@ -1,4 +1,5 @@
 import type { GaussianCloud } from '@gaussian-splat/core';
+import { concatenated } from '@gaussian-splat/core/fetch';
 import { constants } from '../generated/shaders.js';
 import { packGaussians, type PackedGaussians, type PackOptions } from '../pack/pack.js';
 import { buildLevelsAbove, finish } from './build-levels.js';
@@ -51,8 +52,8 @@ export function* buildPackedLevels(leaves: PackedGaussians): Generator<void, Pac
     ...{ ...leaves, count, droppedCount: 0, leafCount: undefined },
     geometry: new Uint32Array(GEOMETRY_WORDS * count),
     sh: new Uint32Array(shWords(leaves.shDegree, leaves.shPrecision) * count),
-    chunks: concatenated(chunks.slice(1)),
-    details: concatenated(details.slice(1)),
+    chunks: concatenated(Float32Array, chunks.slice(1)),
+    details: concatenated(Float32Array, details.slice(1)),
   };
   yield* packLevels(levels, coarser);
   return { leafDetails: details[0], coarser };
@@ -99,7 +100,7 @@ export function joinLevels(leaves: PackedGaussians, { leafDetails, coarser }: Pa
   sh.set(coarser.sh, stride * start);
   chunks.set(leaves.chunks);
   chunks.set(coarser.chunks, leaves.chunks.length);
-  const details = concatenated([leafDetails, coarser.details!]);
+  const details = concatenated(Float32Array, [leafDetails, coarser.details!]);
   return { ...leaves, count, geometry, sh, chunks, details, leafCount: leaves.count };
 }
 
@@ -113,14 +114,4 @@ export function packWithDetail(given: GaussianCloud, options: PackOptions = {}):
   const packed = packGaussians(given, options);
   const levels = finish(buildPackedLevels(packed));
   return levels === undefined ? packed : joinLevels(packed, levels);
-}
-
-function concatenated(parts: readonly Float32Array[]): Float32Array {
-  const whole = new Float32Array(parts.reduce((sum, { length }) => sum + length, 0));
-  let at = 0;
-  for (const part of parts) {
-    whole.set(part, at);
-    at += part.length;
-  }
-  return whole;
 }
