@@ -69,6 +69,8 @@ interface InstanceRequest {
 export class Generator {
   /** Destination of the output of runs. Without a sink, nothing runs. */
   sink: GaussianSink | undefined;
+  /** All models of the chain, in execution order. */
+  readonly models: readonly GeneratorModel[];
   readonly #chain: Chain;
   readonly #options: GeneratorOptions;
   readonly #runner: RunLoop<RunRequest> | BatchSlot<InstanceRequest>;
@@ -81,6 +83,7 @@ export class Generator {
   private constructor(chain: Chain, options: GeneratorOptions) {
     this.#chain = chain;
     this.#options = options;
+    this.models = chain.models;
     const { ofInstances } = chain;
     this.#runner = ofInstances ? this.#seatOf(ofInstances) : this.#ownLoop();
   }
@@ -113,12 +116,7 @@ export class Generator {
 
   /** The model whose output is drawn, which is the last of a chain. */
   get model(): GaussianModelFile {
-    return this.#chain.models.at(-1) as GaussianModelFile;
-  }
-
-  /** All models of the chain, in execution order. */
-  get models(): readonly GeneratorModel[] {
-    return this.#chain.models;
+    return this.models.at(-1) as GaussianModelFile;
   }
 
   /** Slowest session kind of all models; undefined before the first run. */

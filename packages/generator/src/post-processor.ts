@@ -44,6 +44,8 @@ export class PostProcessor {
   readonly input: ImageInput;
   /** The input that takes the depth of the frame; undefined if no model has such an input. */
   readonly depth: ImageInput | undefined;
+  /** All models, in execution order. */
+  readonly models: readonly GeneratorModel[];
   readonly #chain: Chain;
   readonly #options: PostProcessorOptions;
   readonly #loop: RunLoop<RunRequest>;
@@ -55,8 +57,9 @@ export class PostProcessor {
   private constructor(chain: Chain, options: PostProcessorOptions) {
     this.#chain = chain;
     this.#options = options;
-    this.input = imageInput(chain.models);
-    this.depth = depthInput(chain.models);
+    this.models = chain.models;
+    this.input = imageInput(this.models);
+    this.depth = depthInput(this.models);
     this.#loop = new RunLoop({
       queue: chain.device.queue,
       isDue: ({ inputs }) => !this.#isShown(inputs) || this.isConverging,
@@ -88,11 +91,6 @@ export class PostProcessor {
       chain.release();
       throw error;
     }
-  }
-
-  /** All models, in execution order. */
-  get models(): readonly GeneratorModel[] {
-    return this.#chain.models;
   }
 
   /** Slowest session kind of all models; undefined before the first run. */
@@ -154,7 +152,7 @@ export class PostProcessor {
   }
 
   #run({ inputs }: RunRequest): Promise<void> {
-    const { name, dtype } = this.#chain.models.at(-1)!.outputs[0] as { name: string; dtype: FinishedImage['dtype'] };
+    const { name, dtype } = this.models.at(-1)!.outputs[0] as { name: string; dtype: FinishedImage['dtype'] };
     return this.#chain.run(inputs, ({ tensors, dims }) => {
       if (this.#loop.isClosed) return;
       this.#repeats = this.#isShown(inputs) ? this.#repeats + 1 : 0;

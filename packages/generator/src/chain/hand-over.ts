@@ -1,6 +1,7 @@
 import { numberToHalf } from '@gaussian-splat/core';
 import { ContractError } from '@gaussian-splat/core/contract';
-import { bufferBytes, TENSOR_USAGE } from '../runtime/tensor-buffers.js';
+import { SessionBuffers } from '../runtime/session-buffers.js';
+import { bufferBytes } from '../runtime/tensor-buffers.js';
 import { elementsOf, type GpuTensor, type Inputs } from '../input-value.js';
 import type { RunOutputs } from '../runtime/ort-session.js';
 import type { GeneratorModel } from '../runtime/open-model.js';
@@ -10,17 +11,17 @@ import type { Connection } from './connect.js';
  * Tensors between two models of a chain, or between two runs of one model: outputs of the first, kept on the GPU until
  * the second has run.
  */
-export class HandOver {
+export class HandOver extends SessionBuffers {
   readonly #device: GPUDevice;
   readonly #model: GeneratorModel;
   readonly #connections: readonly Connection[];
-  readonly #buffers = new Map<string, GPUBuffer>();
   #tensors: Record<string, GpuTensor> = {};
   #rows = 0;
   #version = 0;
 
   /** Creates an empty hand-over. @param model The model that writes the tensors. */
   constructor(device: GPUDevice, model: GeneratorModel, connections: readonly Connection[]) {
+    super(device);
     this.#device = device;
     this.#model = model;
     this.#connections = connections;
@@ -67,38 +68,24 @@ export class HandOver {
   /** Fills the tensor of an input with one number, for the time before the first run. */
   fill(input: string, { dtype, dims }: Pick<GpuTensor, 'dtype' | 'dims'>, value: number): void {
     const length = elementsOf(dims);
-    const buffer = this.#bufferOf(input, bufferBytes(dtype, length));
+    const buffer = this.of(`chain.${input}`, bufferBytes(dtype, length));
     const words = new Uint32Array(buffer.size / 4).fill(wordOf(dtype, value));
     this.#device.queue.writeBuffer(buffer, 0, words);
     this.#tensors = { ...this.#tensors, [input]: { buffer, dtype, dims, version: ++this.#version } };
-  }
-
-  destroy(): void {
-    for (const buffer of this.#buffers.values()) buffer.destroy();
-    this.#buffers.clear();
   }
 
   #shaped(input: string, output: string, dims: readonly number[]): GpuTensor {
     const { dtype: written, max } = this.#model.outputs.find(({ name }) => name === output)!;
     // A 64-bit count is no input of another model, because `connect` requires equal types on both sides.
     const dtype = written as GpuTensor['dtype'];
-    const buffer = this.#bufferOf(input, bufferBytes(dtype, max ?? elementsOf(dims)));
+    const buffer = this.of(`chain.${input}`, bufferBytes(dtype, max ?? elementsOf(dims)));
     return { buffer, dtype, dims, version: this.#version };
   }
 
   #countRows(input: string, dims: readonly number[]): GpuTensor {
-    const buffer = this.#bufferOf(input, bufferBytes('int32', 1));
+    const buffer = this.of(`chain.${input}`, bufferBytes('int32', 1));
     this.#device.queue.writeBuffer(buffer, 0, Int32Array.of(this.#rows));
     return { buffer, dtype: 'int32', dims, version: this.#version };
-  }
-
-  #bufferOf(input: string, size: number): GPUBuffer {
-    const found = this.#buffers.get(input);
-    if (found !== undefined && found.size >= size) return found;
-    found?.destroy();
-    const buffer = this.#device.createBuffer({ label: `gs.generator.chain.${input}`, size, usage: TENSOR_USAGE });
-    this.#buffers.set(input, buffer);
-    return buffer;
   }
 }
 

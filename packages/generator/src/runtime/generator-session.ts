@@ -256,7 +256,7 @@ export class GeneratorSession {
     const fault = new ContractError([runFault(this.model, error instanceof Error ? error.message : String(error))]);
     if (isFirst) {
       this.#failures++;
-      this.#hasBroken = live.hasBrokenRuntime;
+      this.#hasBroken = live.runtime.isBroken;
       this.#lastFailure = fault;
     }
     return fault;

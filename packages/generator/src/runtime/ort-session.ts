@@ -43,7 +43,8 @@ const QUIET = { logSeverityLevel: 4 } as const;
 /** A session of ONNX Runtime with inputs and outputs on the GPU. It must not be used again after a failed run. */
 export class OrtSession {
   readonly kind: SessionKind;
-  readonly #runtime: Runtime;
+  /** The session's copy of the runtime, which may be unusable. */
+  readonly runtime: Runtime;
   readonly #session: InferenceSession;
   readonly #device: GPUDevice;
   readonly #outputs: readonly ModelOutput[];
@@ -66,7 +67,7 @@ export class OrtSession {
     fixed: Readonly<FixedOutputs>,
   ) {
     this.kind = kind;
-    this.#runtime = runtime;
+    this.runtime = runtime;
     this.#session = session;
     this.#device = device;
     this.#outputs = outputs;
@@ -116,11 +117,6 @@ export class OrtSession {
     return this.#hasFailed;
   }
 
-  /** Whether the session's copy of the runtime is unusable. */
-  get hasBrokenRuntime(): boolean {
-    return this.#runtime.isBroken;
-  }
-
   /**
    * Runs the model, and calls `use` with its output. `use` must submit its GPU work before it returns, and no other
    * call of the runtime runs meanwhile.
@@ -129,12 +125,12 @@ export class OrtSession {
    */
   async run(inputs: Inputs, use: (outputs: RunOutputs) => void): Promise<void> {
     try {
-      await this.#runtime.exclusive(() => {
+      await this.runtime.exclusive(() => {
         if (this.#isReleased) throw new RuntimeGone('the session was released');
         return this.#run(inputs, use);
       });
     } catch (error) {
-      if (this.#runtime.isBroken && !(error instanceof RuntimeGone)) this.#hasFailed = true;
+      if (this.runtime.isBroken && !(error instanceof RuntimeGone)) this.#hasFailed = true;
       throw error;
     }
   }
@@ -143,7 +139,7 @@ export class OrtSession {
   async release(): Promise<void> {
     if (this.#isReleased) return;
     this.#isReleased = true;
-    await this.#runtime.exclusive(() => this.#session.release()).catch(() => undefined);
+    await this.runtime.exclusive(() => this.#session.release()).catch(() => undefined);
     this.#buffers.destroy();
     // The runtime does not free the output buffers of a captured session.
     for (const buffer of this.#written) buffer.destroy();
@@ -181,7 +177,7 @@ export class OrtSession {
   async #feed(name: string, input: InputValue): Promise<void> {
     const isRead = this.kind === 'wasm' || input.dtype === 'int64';
     if (isRead) {
-      const { Tensor } = this.#runtime.ort;
+      const { Tensor } = this.runtime.ort;
       const data = isOnGpu(input) ? await numbersOf(this.#device, input) : input.data;
       this.#feeds[name] = new Tensor(input.dtype, data as never, input.dims);
       return;
@@ -198,7 +194,7 @@ export class OrtSession {
     const isSame = feed?.gpuBuffer === buffer && feed.dims.every((dim, i) => dim === dims[i]);
     if (!isSame) {
       const dataType = dtype as 'float32' | 'float16' | 'int32';
-      this.#feeds[name] = this.#runtime.ort.Tensor.fromGpuBuffer(buffer, { dataType, dims });
+      this.#feeds[name] = this.runtime.ort.Tensor.fromGpuBuffer(buffer, { dataType, dims });
     }
     return buffer;
   }
