@@ -52,7 +52,7 @@ test('missing pages are named in the order of what doing without them costs', ()
     );
     for (const page of requested.slice(0, 20)) assert.ok(residency.begin(page) && residency.settle(page));
   }
-  assert.ok(residency.residents > 200);
+  assert.ok(residency.slots.count > 200);
 });
 
 test('a page at hand comes before those that are needed up to four times as much, and keeps none of them away where it finds no room', () => {
@@ -102,9 +102,9 @@ test('a pool that is too small comes to rest, and nothing that is worth much mor
       (page) => shares[page],
     );
     const isLeaf = (page: number): boolean =>
-      !Array.from(residency.pageIn).some((resident) => list.parent[resident] === page);
+      !Array.from(residency.slots.pageIn).some((resident) => list.parent[resident] === page);
     const extra = Math.min(
-      ...[...residency.pageIn].filter((page) => page !== 0 && isLeaf(page)).map((page) => requests[page]),
+      ...[...residency.slots.pageIn].filter((page) => page !== 0 && isLeaf(page)).map((page) => requests[page]),
     );
     const lacking = Math.max(...requests.filter((_, page) => !residency.isResident(page)));
     assert.ok(lacking <= 1.5 * extra, `view ${view}: ${lacking} is missing, ${extra} is there`);
@@ -115,7 +115,7 @@ test('pages on their way are never promised the same slot', () => {
   const list = pageTree(200);
   const residency = opened(list, 17);
   settle(list, residency, (page) => (page <= 16 ? 0.1 : 0));
-  assert.equal(residency.residents, 17);
+  assert.equal(residency.slots.count, 17);
   // All sixteen leaves may leave for others below one of them, which must stay: fifteen can come.
   const requests = new Float32Array(200);
   [0, 1].forEach((page) => (requests[page] = 1000));
@@ -156,7 +156,7 @@ function costs(pages: number, slots: number): { sample: number; page: number } {
     residency.note(view(k));
     placeAll(residency);
   }
-  assert.equal(residency.residents, slots);
+  assert.equal(residency.slots.count, slots);
   let [sample, placing, placed] = [Infinity, 0, 0];
   for (let k = 12; k < 42; k++) {
     const requests = view(k);
@@ -195,7 +195,7 @@ test('of pages that find no room one is tried, and a page that is needed more an
   };
   sample((page) => (page === 0 ? 100 : 0));
   assert.equal(sample((page) => (page <= 10 ? 100 : 0)).length, 10);
-  assert.equal(residency.residents, 11);
+  assert.equal(residency.slots.count, 11);
   const tried = sample((page) => (page <= 10 ? 100 : page === 400 ? 200 : 101 + page / 1000));
   assert.deepEqual(tried, [399, 400]);
   assert.ok(residency.isResident(400));

@@ -34,18 +34,18 @@ function opened(list: PageList, slots: number): Residency {
 
 /** Asserts that each page is in as many slots as it needs, each slot holds one page, and a page's parents are resident. @returns slots in use */
 function check(list: PageList, residency: Residency): number {
-  const residents = [...new Set(residency.pageIn)].filter((page) => page !== NONE);
-  assert.equal(residency.residents, residents.length);
+  const residents = [...new Set(residency.slots.pageIn)].filter((page) => page !== NONE);
+  assert.equal(residency.slots.count, residents.length);
   for (const page of residents) {
-    const slots = residency.slotsOf(page);
+    const slots = residency.slots.of(page);
     assert.equal(slots.length, list.slots[page], `page ${page}`);
     assert.equal(new Set(slots).size, slots.length);
-    assert.ok(slots.every((slot) => residency.pageIn[slot] === page));
-    assert.equal(residency.slotOf[page], slots[0]);
+    assert.ok(slots.every((slot) => residency.slots.pageIn[slot] === page));
+    assert.equal(residency.slots.slotOf[page], slots[0]);
     if (page !== 0) assert.ok(residency.isResident(list.parent[page]), `page ${page} hangs in the air`);
   }
   for (let page = 0; page < list.count; page++) {
-    if (!residents.includes(page)) assert.equal(residency.slotOf[page], NONE);
+    if (!residents.includes(page)) assert.equal(residency.slots.slotOf[page], NONE);
   }
   return residents.reduce((sum, page) => sum + list.slots[page], 0);
 }
@@ -68,11 +68,11 @@ test('whatever is wished for, comes or fails, pages are there whole or not at al
       residency.cancel(page);
       continue;
     }
-    const before = new Set(residency.pageIn);
+    const before = new Set(residency.slots.pageIn);
     const settled = residency.settle(page);
     if (settled === undefined) {
       refused++;
-      assert.deepEqual(new Set(residency.pageIn), before, 'a page that finds no room drives nothing out');
+      assert.deepEqual(new Set(residency.slots.pageIn), before, 'a page that finds no room drives nothing out');
       continue;
     }
     placed++;
@@ -157,7 +157,7 @@ test('views at rest come to rest in a pool that is too small, and nothing that h
         if (residency.begin(page) && residency.settle(page)) placed++;
       }
     }
-    const left = residency.pageIn.length - check(list, residency);
+    const left = residency.slots.pageIn.length - check(list, residency);
     requests().forEach((request, page) => {
       if (request > 0 && !residency.isResident(page)) assert.ok(list.slots[page] > left, `page ${page} has room`);
     });
@@ -180,7 +180,7 @@ test('what is under way is bounded in slots, not in pages', async () => {
   });
   const largest = Math.max(...list.slots.subarray(1));
   const waiting = new Set<number>();
-  for (let round = 0; round < 600 && residency.residents < list.count; round++) {
+  for (let round = 0; round < 600 && residency.slots.count < list.count; round++) {
     residency.note(
       requestsOf(
         list,
@@ -197,7 +197,7 @@ test('what is under way is bounded in slots, not in pages', async () => {
     const next = traffic.next();
     if (next !== undefined && residency.settle(next.page)) waiting.delete(next.page);
   }
-  assert.equal(residency.residents, list.count);
+  assert.equal(residency.slots.count, list.count);
   assert.equal(traffic.underWay, 0);
   assert.equal(list.chunks[1], 60);
   assert.equal(list.slots[1], 60 / SLOT_CHUNKS);

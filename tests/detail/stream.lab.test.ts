@@ -219,11 +219,11 @@ test('whatever is wished for, comes or fails, what is above a page is there, and
     const [page] = coming.splice(Math.floor(random() * coming.length), 1);
     if (page !== undefined && random() < 0.2) residency.cancel(page);
     else if (page !== undefined) residency.settle(page);
-    const residents = [...residency.pageIn].filter((resident) => resident !== NONE);
+    const residents = [...residency.slots.pageIn].filter((resident) => resident !== NONE);
     assert.equal(new Set(residents).size, residents.length);
     assert.ok(residents.includes(0));
     for (const resident of residents) {
-      assert.equal(residency.pageIn[residency.slotOf[resident]], resident);
+      assert.equal(residency.slots.pageIn[residency.slots.slotOf[resident]], resident);
       if (resident !== 0) assert.ok(residency.isResident(list.parent[resident]), `page ${resident} hangs in the air`);
     }
   }

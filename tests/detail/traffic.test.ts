@@ -98,8 +98,8 @@ test('a thousand pages that arrive as fast as they are sent for: few are under w
   const all = pool(1200, 1200);
   const random = randomSource(2);
   const shares = Float32Array.from({ length: 1200 }, () => 0.1 + 0.9 * random());
-  for (let frame = 0; all.residency.residents < 1200; frame++) {
-    assert.ok(frame < 1000, `${all.residency.residents} of 1200 pages after 1000 frames`);
+  for (let frame = 0; all.residency.slots.count < 1200; frame++) {
+    assert.ok(frame < 1000, `${all.residency.slots.count} of 1200 pages after 1000 frames`);
     if (frame % 6 === 0) all.look((page) => shares[page]);
     for (let answers = 0; answers < 3; answers++) await all.server.answer();
     assert.ok(all.traffic.underWay <= MAX_IN_FLIGHT && all.server.max <= MAX_FETCHES);
@@ -150,7 +150,7 @@ test('pages that two looks do not wish for are given up where they are, and may 
     place(all, 16);
     all.traffic.sendForMore();
   }
-  assert.equal(all.residency.residents, 201, 'the root and what is below it');
+  assert.equal(all.residency.slots.count, 201, 'the root and what is below it');
 });
 
 test('pages that fail are told of once, make room for others, and nothing comes of a closed scene', async () => {
@@ -244,7 +244,7 @@ test('in a small pool, whatever comes in whatever order, what is above a page is
       await turn();
       place(all, Math.floor(3 * random()));
       all.traffic.sendForMore();
-      const residents = [...all.residency.pageIn].filter((page) => page !== NONE);
+      const residents = [...all.residency.slots.pageIn].filter((page) => page !== NONE);
       assert.equal(new Set(residents).size, residents.length);
       for (const page of residents.filter((page) => page !== 0)) {
         assert.ok(all.residency.isResident(all.list.parent[page]), `page ${page} hangs in the air`);
@@ -253,7 +253,7 @@ test('in a small pool, whatever comes in whatever order, what is above a page is
       assert.ok(frame < 599, `view ${view} never comes to rest`);
     }
   }
-  assert.ok(all.traffic.abandoned > 0 && all.residency.residents === 120);
+  assert.ok(all.traffic.abandoned > 0 && all.residency.slots.count === 120);
 });
 
 test('rows that changed are written once, in pieces that never reach over a buffer', () => {

@@ -70,6 +70,35 @@ test('a scene beyond the budget is refused before the device hears of it', async
   ledger.budgetBytes = Infinity;
 });
 
+test('what was allocated before a refusal of the device is freed, and its bytes are given back', async () => {
+  const device = await serialDevice();
+  const createBuffer = device.createBuffer.bind(device);
+  const open = new Set<GPUBuffer>();
+  for (const make of [
+    () => GaussianBuffers.upload(device, packGaussians(smallCloud(512, 1), { sh: 'int8' })),
+    () => DynamicGaussians.create(device, writeTensors(smallCloud(512, 1), SPEC).layout),
+  ]) {
+    let made = 0;
+    device.createBuffer = (descriptor) => {
+      if (++made === 3) throw new Error('refused');
+      const buffer = createBuffer(descriptor);
+      const destroy = buffer.destroy.bind(buffer);
+      buffer.destroy = () => {
+        open.delete(buffer);
+        return destroy();
+      };
+      open.add(buffer);
+      return buffer;
+    };
+    await assert.rejects(
+      make(),
+      (error: unknown) => error instanceof GaussianSplatError && error.code === 'out-of-memory/allocation',
+    );
+    device.createBuffer = createBuffer;
+    assert.deepEqual([made, open.size, MemoryLedger.of(device).bytes], [3, 0, 0]);
+  }
+});
+
 after(endNodeDevice);
 
 test('what is soon not needed any more is given back before anybody is refused, and no more of it than there must be', () => {

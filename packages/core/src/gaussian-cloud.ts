@@ -16,11 +16,14 @@ export function shCoefficientCount(degree: ShDegree): 1 | 4 | 9 | 16 {
  */
 export type SplatFilter = 'classic' | 'antialiased' | 'mip';
 
-/** Parameters of a low-pass filter. */
+/** Screen-space low-pass filter of a scene in training. */
 export interface FilterRule {
-  /** Whether opacities are compensated for the added variance. */
+  /** Whether training compensated opacities for the variance that the filter adds. The renderer then does so, too. */
   readonly antialiased: boolean;
-  /** Added variance in px²; undefined is the classic 0.3. */
+  /**
+   * Variance in px² of the filter. Undefined: 0.3, as in INRIA's and gsplat's trainers, with and without compensation.
+   * Mip-Splatting and Brush's mip mode use 0.1.
+   */
   readonly filterVariance?: number | undefined;
 }
 
@@ -69,7 +72,7 @@ export interface CloudHints {
  * Coordinates are those of the trainers and of INRIA's PLY files: OpenCV's for an upright capture (x right, y down, z
  * forward). Readers convert formats with other coordinates.
  */
-export interface GaussianCloud {
+export interface GaussianCloud extends FilterRule {
   /** Number of Gaussians N. */
   readonly count: number;
   /** World position, in float64, of the local point (0, 0, 0) of {@link positions}. */
@@ -88,13 +91,6 @@ export interface GaussianCloud {
    */
   readonly sh: Float32Array;
   readonly shDegree: ShDegree;
-  /** Whether training compensated opacities for the variance that the screen-space filter adds. */
-  readonly antialiased: boolean;
-  /**
-   * Variance in px² of the screen-space low-pass filter in training. Undefined: 0.3, as in INRIA's and gsplat's
-   * trainers, with and without compensation. Mip-Splatting and Brush's mip mode use 0.1.
-   */
-  readonly filterVariance?: number | undefined;
   /** Metadata of the file. */
   readonly hints?: CloudHints | undefined;
   /**

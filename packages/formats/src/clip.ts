@@ -3,6 +3,7 @@ import {
   GaussianSplatError,
   keepUsable,
   type Bounds,
+  type FilterRule,
   type GaussianCloud,
   type ShDegree,
   type Vector3,
@@ -50,15 +51,13 @@ export interface ClipGroup {
 }
 
 /** Index at the beginning of a clip file: properties of all frames, and the groups of frames. */
-export interface ClipIndex {
+export interface ClipIndex extends FilterRule {
   readonly framesPerSecond: number;
   readonly frameCount: number;
   readonly durationSeconds: number;
   readonly shDegree: ShDegree;
   readonly origin: Vector3;
   readonly bounds: Bounds & { readonly up?: Vector3 | undefined };
-  readonly antialiased: boolean;
-  readonly filterVariance?: number | undefined;
   /** Factor of the scales of the first part's splats while other parts of its group are missing, 1 to 8. */
   readonly grow: number;
   readonly groups: readonly ClipGroup[];

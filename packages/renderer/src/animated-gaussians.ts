@@ -1,13 +1,14 @@
-import { GaussianSplatError, type ShDegree, type Vector3 } from '@gaussian-splat/core';
-import type { GaussianBlock, GaussianScene } from './gaussian-scene.js';
+import { GaussianSplatError, type FilterRule, type ShDegree, type Vector3 } from '@gaussian-splat/core';
+import type { GaussianBlock } from './gaussian-scene.js';
 import * as layouts from './generated/clip-layouts.js';
 import { animate } from './generated/clip-shaders.js';
 import { constants } from './generated/shaders.js';
 import { BUFFER_USAGE } from './gpu/kernel.js';
-import { GpuMemory, withMemoryCheck } from './gpu/memory.js';
+import { type GpuMemory, withMemoryCheck } from './gpu/memory.js';
 import { writeStruct } from './gpu/struct.js';
-import { bytesPerSplat, MemoryLedger, type Reservation } from './memory-ledger.js';
+import { bytesPerSplat } from './memory-ledger.js';
 import { animationBytes, planeCodes, type PackedAnimation } from './pack/pack-animated.js';
+import { SceneBuffers } from './scene-buffers.js';
 import { Stage } from './stages/stage.js';
 import { CHUNK_NUMBERS, GEOMETRY_WORDS, shWords } from './pack/words.js';
 
@@ -15,12 +16,10 @@ const { CULL_GROUP } = constants;
 const PIECES = ['bases', 'sh', 'codes', 'curves'] as const;
 
 /** Size of the buffers of a clip: the largest sizes of each part over all its groups of frames. */
-export interface AnimatedRoom {
+export interface AnimatedRoom extends FilterRule {
   /** Parts of a group in their order: splats, planes of codes, and frames. */
   readonly parts: readonly { readonly rows: number; readonly planes: number; readonly frames: number }[];
   readonly shDegree: ShDegree;
-  readonly antialiased: boolean;
-  readonly filterVariance?: number | undefined;
   readonly origin: Vector3;
   /** Factor that enlarges the splats of the first part while other parts are missing. */
   readonly grow: number;
@@ -51,62 +50,41 @@ const FIELDS = layouts.Animate.fields;
  * Gaussians of a clip. Each group of frames is uploaded once, and the GPU evaluates each frame. All buffers are created
  * at the start, so that playback allocates nothing.
  */
-export class AnimatedGaussians implements GaussianScene {
-  readonly count: number;
-  readonly shDegree: ShDegree;
-  readonly shPrecision = 'float16';
-  readonly antialiased: boolean;
-  readonly filterVariance?: number | undefined;
-  readonly origin: Vector3;
+export class AnimatedGaussians extends SceneBuffers {
   readonly blocks: readonly GaussianBlock[];
   readonly #device: GPUDevice;
-  readonly #memory: GpuMemory;
-  readonly #reservation: Reservation;
   readonly #stage: Stage<typeof animate>;
   readonly #slots: readonly (readonly SlotPart[])[];
   readonly #grow: number;
   #version = 0;
   #frameCount = 0;
 
-  private constructor(device: GPUDevice, room: AnimatedRoom) {
-    this.#device = device;
+  private constructor(device: GPUDevice, memory: GpuMemory, room: AnimatedRoom) {
     const rooms = room.parts.map(({ rows }) => CULL_GROUP * Math.ceil(rows / CULL_GROUP));
-    this.count = rooms.reduce((sum, rows) => sum + rows, 0);
-    this.shDegree = room.shDegree;
-    this.antialiased = room.antialiased;
-    this.filterVariance = room.filterVariance;
-    this.origin = room.origin;
+    const count = rooms.reduce((sum, rows) => sum + rows, 0);
+    super(memory, room, count);
+    memory.reserve(whatOf(count), bytesOf(room, count), room.memoryBudget);
+    this.#device = device;
     this.#grow = room.grow;
-    this.#reservation = MemoryLedger.of(device).reserve(
-      whatOf(this.count),
-      bytesOf(room, this.count),
-      room.memoryBudget,
-    );
-    this.#memory = new GpuMemory(device);
-    try {
-      this.#stage = new Stage(device, animate, constants.CULL_GROUP);
-      const { storage, copySource } = BUFFER_USAGE;
-      const part = (name: string, words: number): GPUBuffer =>
-        this.#memory.buffer(`gs.animate.${name}`, 4 * words, storage | copySource);
-      const page = {
-        count: this.count,
-        geometry: part('geometry', GEOMETRY_WORDS * this.count),
-        sh: part('sh', shWords(this.shDegree, this.shPrecision) * this.count),
-        chunks: part('chunks', (CHUNK_NUMBERS * this.count) / CULL_GROUP),
-      };
-      this.blocks = [page];
-      this.#slots = Array.from({ length: ANIMATION_SLOTS }, () => {
-        let first = 0;
-        return room.parts.map((own, k) => {
-          const slot = this.#slotPart(room, own, rooms[k], first);
-          first += rooms[k];
-          return slot;
-        });
+    this.#stage = new Stage(device, animate, constants.CULL_GROUP);
+    const { storage, copySource } = BUFFER_USAGE;
+    const part = (name: string, words: number): GPUBuffer =>
+      memory.buffer(`gs.animate.${name}`, 4 * words, storage | copySource);
+    const page = {
+      count,
+      geometry: part('geometry', GEOMETRY_WORDS * count),
+      sh: part('sh', shWords(this.shDegree, this.shPrecision) * count),
+      chunks: part('chunks', (CHUNK_NUMBERS * count) / CULL_GROUP),
+    };
+    this.blocks = [page];
+    this.#slots = Array.from({ length: ANIMATION_SLOTS }, () => {
+      let first = 0;
+      return room.parts.map((own, k) => {
+        const slot = this.#slotPart(room, own, rooms[k], first);
+        first += rooms[k];
+        return slot;
       });
-    } catch (error) {
-      this.destroy();
-      throw error;
-    }
+    });
   }
 
   /**
@@ -115,15 +93,11 @@ export class AnimatedGaussians implements GaussianScene {
    * part is larger than a binding of the device; `out-of-memory/allocation` if the device has too little memory.
    */
   static create(device: GPUDevice, room: AnimatedRoom): Promise<AnimatedGaussians> {
-    return withMemoryCheck(device, 'a clip', () => new AnimatedGaussians(device, room));
+    return withMemoryCheck(device, 'a clip', (memory) => new AnimatedGaussians(device, memory, room));
   }
 
   get version(): number {
     return this.#version;
-  }
-
-  get byteLength(): number {
-    return this.#memory.byteLength;
   }
 
   /** Number of splats of the displayed group that were uploaded when the frame was evaluated. */
@@ -197,11 +171,6 @@ export class AnimatedGaussians implements GaussianScene {
     this.#version++;
   }
 
-  destroy(): void {
-    this.#reservation.release();
-    this.#memory.destroy();
-  }
-
   #slotPart(
     { shDegree }: AnimatedRoom,
     { rows, planes, frames }: AnimatedRoom['parts'][number],
@@ -211,7 +180,7 @@ export class AnimatedGaussians implements GaussianScene {
     const { storage, uniform, copyDestination } = BUFFER_USAGE;
     const sizes = animationBytes({ rows, planes, frames, shDegree });
     const buffer = (name: (typeof PIECES)[number]): GPUBuffer =>
-      this.#memory.buffer(`gs.animate.${name}`, sizes[name], storage | copyDestination);
+      this.memory.buffer(`gs.animate.${name}`, sizes[name], storage | copyDestination);
     const buffers = { bases: buffer('bases'), sh: buffer('sh'), codes: buffer('codes'), curves: buffer('curves') };
     const values = new Uint32Array(layouts.Animate.size / 4);
     const nothing = { ranks: [0, 0, 0, 0], color_rank: 0, curve_count: 0, frame: 0, rows: 0, plane_codes: 0, grow: 1 };
@@ -220,7 +189,7 @@ export class AnimatedGaussians implements GaussianScene {
       { ...nothing, row_room: rowRoom, first_row: first, sh_degree: shDegree },
       values.buffer,
     );
-    const own = this.#memory.buffer('gs.animate.uniform', layouts.Animate.size, uniform | copyDestination);
+    const own = this.memory.buffer('gs.animate.uniform', layouts.Animate.size, uniform | copyDestination);
     const [{ geometry, sh, chunks }] = this.blocks;
     const { bases, sh: base_sh, codes, curves } = buffers;
     const bindings = this.#stage.bind({ animate: own, bases, base_sh, codes, curves, gaussians: geometry, sh, chunks });

@@ -3,7 +3,7 @@ import type { GaussianBlock, PageRequests } from './gaussian-scene.js';
 import type { GeometryReading } from './geometry-reading.js';
 import { constants, layouts } from './generated/shaders.js';
 import { BUFFER_USAGE } from './gpu/kernel.js';
-import { GpuMemory } from './gpu/memory.js';
+import { BufferOwner, GpuMemory } from './gpu/memory.js';
 import { writeStruct } from './gpu/struct.js';
 import type { ProbedSplat } from './probed-splat.js';
 import type { RenderSettings } from './render-settings.js';
@@ -29,23 +29,22 @@ const OPAQUE_DEPTH = -Math.log(1e-4);
 export const opticalFactor = (opacity: number): number => Math.min(1, -Math.log(1 - opacity) / OPAQUE_DEPTH);
 
 /** The blocks of the visible scenes of a world, with a `View` uniform for each. */
-export class BlockTable {
+export class BlockTable extends BufferOwner {
   #blocks: readonly GaussianBlock[] = [];
   #firstGroups: Uint32Array = new Uint32Array(1);
   readonly #device: GPUDevice;
-  readonly #memory: GpuMemory;
   #uniforms!: GPUBuffer;
   #uniformBytes = new ArrayBuffer(0);
-  readonly #world: World;
+  readonly world: World;
   #layout = -1;
   #placements: readonly Placement[] = [];
   /** Placement of each block. */
   #placementOf: readonly Placement[] = [];
 
   constructor(device: GPUDevice, world: World) {
+    super(new GpuMemory(device));
     this.#device = device;
-    this.#world = world;
-    this.#memory = new GpuMemory(device);
+    this.world = world;
     this.lay();
   }
 
@@ -54,7 +53,7 @@ export class BlockTable {
    * large enough.
    */
   lay(): void {
-    const { layout, placements } = this.#world;
+    const { layout, placements } = this.world;
     this.#layout = layout;
     this.#placements = placements.filter(({ visible }) => visible);
     this.#blocks = this.#placements.flatMap(({ scene }) => scene.blocks);
@@ -62,10 +61,10 @@ export class BlockTable {
     this.#firstGroups = firstGroups(this.#blocks);
     const bytes = VIEW_STRIDE * Math.max(1, this.#blocks.length);
     if (bytes <= this.#uniformBytes.byteLength) return;
-    this.#memory.destroy();
+    this.memory.destroy();
     this.#uniformBytes = new ArrayBuffer(bytes);
     const { uniform, copyDestination } = BUFFER_USAGE;
-    this.#uniforms = this.#memory.buffer('gs.views', bytes, uniform | copyDestination);
+    this.#uniforms = this.memory.buffer('gs.views', bytes, uniform | copyDestination);
   }
 
   get blocks(): readonly GaussianBlock[] {
@@ -120,11 +119,6 @@ export class BlockTable {
     return this.#placements.some(({ scene }) => scene.pageRequests !== undefined);
   }
 
-  /** Incremented when a property of a placement changes: see `World.changes`. */
-  get changes(): number {
-    return this.#world.changes;
-  }
-
   /** Calls `update` of each scene: streamed scenes then upload the received pages. */
   update(): void {
     for (const { scene } of this.#placements) scene.update?.();
@@ -145,10 +139,6 @@ export class BlockTable {
     return this.blocks.reduce((sum, { count }) => sum + count, 0);
   }
 
-  get byteLength(): number {
-    return this.#memory.byteLength;
-  }
-
   /** Returns the binding of the `View` uniform of a block. */
   view(page: number): GPUBufferBinding {
     return { buffer: this.#uniforms, offset: VIEW_STRIDE * page, size: layouts.View.size };
@@ -156,7 +146,7 @@ export class BlockTable {
 
   /** Whether the table still matches the visible scenes of the world; if not, call {@link lay}. */
   get isCurrent(): boolean {
-    return this.#layout === this.#world.layout;
+    return this.#layout === this.world.layout;
   }
 
   /**
@@ -204,10 +194,6 @@ export class BlockTable {
     }
     const bytes = VIEW_STRIDE * Math.max(1, this.#blocks.length);
     this.#device.queue.writeBuffer(this.#uniforms, 0, this.#uniformBytes, 0, bytes);
-  }
-
-  destroy(): void {
-    this.#memory.destroy();
   }
 }
 

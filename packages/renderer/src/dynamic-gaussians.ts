@@ -1,23 +1,21 @@
-import { boundsOf, GaussianSplatError, type Bounds, type ShDegree, type Vector3 } from '@gaussian-splat/core';
+import { boundsOf, GaussianSplatError, type Bounds, type FilterRule, type Vector3 } from '@gaussian-splat/core';
 import type { GaussianLayout } from '@gaussian-splat/core/contract';
 import { pageCapacity } from './gaussian-buffers.js';
-import type { GaussianBlock, GaussianScene } from './gaussian-scene.js';
+import type { GaussianBlock } from './gaussian-scene.js';
 import * as layouts from './generated/live-layouts.js';
 import { BUFFER_USAGE } from './gpu/kernel.js';
-import { GpuMemory, withMemoryCheck } from './gpu/memory.js';
+import { type GpuMemory, withMemoryCheck } from './gpu/memory.js';
 import { writeStruct } from './gpu/struct.js';
 import { readSamples } from './read-samples.js';
+import { SceneBuffers } from './scene-buffers.js';
 import { ingestStage } from './stages/ingest.js';
-import { bytesPerSplat, MemoryLedger, type Reservation } from './memory-ledger.js';
+import { bytesPerSplat } from './memory-ledger.js';
 import { cullGroups } from './stages/stage.js';
 import { countBytes, ingestValues, TensorBindings } from './tensor-bindings.js';
 import { CHUNK_NUMBERS, GEOMETRY_WORDS, shWords } from './pack/words.js';
 
-export interface DynamicGaussiansOptions {
-  /** Whether the model was trained with opacity compensation for the dilation. Default false. */
-  readonly antialiased?: boolean;
-  /** Variance in px² of the screen-space low-pass filter of training; undefined is the classic 0.3. */
-  readonly filterVariance?: number | undefined;
+/** Options of {@link DynamicGaussians.create}. `antialiased` is false by default. */
+export interface DynamicGaussiansOptions extends Partial<FilterRule> {
   /** Upper limit of the GPU memory of the scene in bytes; default: no limit but the device's. */
   readonly memoryBudget?: number;
 }
@@ -57,21 +55,11 @@ interface DynamicBlock extends GaussianBlock {
  * converts the tensors to the blocks in a single submission. Every frame therefore shows exactly one run, however long
  * the next run takes.
  */
-export class DynamicGaussians implements GaussianScene {
-  /** Capacity in rows. */
-  readonly count: number;
-  readonly shDegree: ShDegree;
-  readonly shPrecision = 'float16';
-  readonly antialiased: boolean;
-  /** Variance in px² of the screen-space low-pass filter of training; undefined is the classic 0.3. */
-  readonly filterVariance?: number | undefined;
-  readonly origin = ORIGIN;
+export class DynamicGaussians extends SceneBuffers {
   readonly blocks: readonly DynamicBlock[];
   readonly layout: GaussianLayout;
   readonly #device: GPUDevice;
   readonly #stage: ReturnType<typeof ingestStage>;
-  readonly #memory: GpuMemory;
-  readonly #reservation: Reservation;
   readonly #places: TensorBindings;
   readonly #bindings = new Map<string, readonly GPUBindGroup[]>();
   #version = 0;
@@ -82,24 +70,20 @@ export class DynamicGaussians implements GaussianScene {
    */
   #before = 0;
 
-  private constructor(device: GPUDevice, layout: GaussianLayout, options: DynamicGaussiansOptions) {
+  private constructor(
+    device: GPUDevice,
+    memory: GpuMemory,
+    layout: GaussianLayout,
+    { antialiased = false, filterVariance, memoryBudget }: DynamicGaussiansOptions,
+  ) {
+    const { capacity, shDegree = 0 } = layout;
+    super(memory, { shDegree, antialiased, filterVariance, origin: ORIGIN }, capacity);
+    memory.reserve(whatOf(layout), capacity * bytesPerSplat(shDegree, this.shPrecision), memoryBudget);
     this.#device = device;
     this.layout = layout;
-    this.count = layout.capacity;
-    this.shDegree = layout.shDegree ?? 0;
-    this.antialiased = options.antialiased ?? false;
-    this.filterVariance = options.filterVariance;
-    const bytes = layout.capacity * bytesPerSplat(this.shDegree, this.shPrecision);
-    this.#reservation = MemoryLedger.of(device).reserve(whatOf(layout), bytes, options.memoryBudget);
     this.#stage = ingestStage(device);
-    this.#memory = new GpuMemory(device);
-    try {
-      this.#places = new TensorBindings(layout, this.#memory);
-      this.blocks = this.#makeBlocks();
-    } catch (error) {
-      this.destroy();
-      throw error;
-    }
+    this.#places = new TensorBindings(layout, memory);
+    this.blocks = this.#makeBlocks();
     // An empty run makes all rows invisible.
     this.ingest({}, 0);
   }
@@ -115,17 +99,12 @@ export class DynamicGaussians implements GaussianScene {
     layout: GaussianLayout,
     options: DynamicGaussiansOptions = {},
   ): Promise<DynamicGaussians> {
-    return withMemoryCheck(device, whatOf(layout), () => new DynamicGaussians(device, layout, options));
+    return withMemoryCheck(device, whatOf(layout), (memory) => new DynamicGaussians(device, memory, layout, options));
   }
 
   /** Number of calls of {@link ingest} with rows, plus one. */
   get version(): number {
     return this.#version;
-  }
-
-  /** Bytes of allocated GPU memory, without the tensors, which belong to the generator. */
-  get byteLength(): number {
-    return this.#memory.byteLength;
   }
 
   /**
@@ -187,10 +166,9 @@ export class DynamicGaussians implements GaussianScene {
     return this.#dropped;
   }
 
-  destroy(): void {
-    this.#reservation.release();
+  override destroy(): void {
     this.#bindings.clear();
-    this.#memory.destroy();
+    super.destroy();
   }
 
   #makeBlocks(): DynamicBlock[] {
@@ -201,14 +179,14 @@ export class DynamicGaussians implements GaussianScene {
     for (let first = 0; first < this.count; first += capacity) {
       const count = Math.min(capacity, this.count - first);
       const part = (name: string, words: number): GPUBuffer =>
-        this.#memory.buffer(`gs.ingest.${name}`, 4 * words, storage | copySource);
+        this.memory.buffer(`gs.ingest.${name}`, 4 * words, storage | copySource);
       const page = {
         first,
         count,
         geometry: part('geometry', GEOMETRY_WORDS * count),
         sh: part('sh', shStride * count),
         chunks: part('chunks', CHUNK_NUMBERS * cullGroups(count)),
-        uniform: this.#memory.buffer('gs.ingest.uniform', layouts.Ingest.size, uniform | copyDestination),
+        uniform: this.memory.buffer('gs.ingest.uniform', layouts.Ingest.size, uniform | copyDestination),
       };
       const bytes = new ArrayBuffer(layouts.Ingest.size);
       writeStruct(layouts.Ingest, ingestValues(this.layout, first, count, 0), bytes);

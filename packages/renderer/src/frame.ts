@@ -70,7 +70,7 @@ function keepWithinBudget(pass: GPUComputePassEncoder, { blocks, budget }: Frame
 /** Returns the page requests of the streamed scenes that are due for recording in this frame. */
 function feedbackDue({ bindings, camera, settings }: Frame): PageRequests[] {
   const all = new Set(bindings.blocks.flatMap(({ requests }) => (requests ? [requests.of] : [])));
-  return [...all].filter((requests) => requests.isDue(camera, settings, bindings.table.changes));
+  return [...all].filter((requests) => requests.isDue(camera, settings, bindings.table.world.changes));
 }
 
 function recordFeedback(pass: GPUComputePassEncoder, { bindings }: Frame, due: readonly PageRequests[]): void {

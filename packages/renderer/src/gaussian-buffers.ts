@@ -1,13 +1,13 @@
-import { loadModule, type ShDegree, type Vector3 } from '@gaussian-splat/core';
-import type { GaussianBlock, GaussianScene } from './gaussian-scene.js';
+import { loadModule } from '@gaussian-splat/core';
+import type { GaussianBlock } from './gaussian-scene.js';
 import { constants } from './generated/shaders.js';
 import { BUFFER_USAGE } from './gpu/kernel.js';
-import { GpuMemory, withMemoryCheck } from './gpu/memory.js';
-import { MemoryLedger, type Reservation } from './memory-ledger.js';
+import { type GpuMemory, withMemoryCheck } from './gpu/memory.js';
 import { DETAIL_NUMBERS } from './levels/chunk-detail.js';
 import type { PackedGaussians, PackedHead } from './pack/pack.js';
+import { SceneBuffers } from './scene-buffers.js';
 import type { DetailBudget } from './stages/detail-budget.js';
-import { CHUNK_NUMBERS, GEOMETRY_WORDS, type ShPrecision, shWords } from './pack/words.js';
+import { CHUNK_NUMBERS, GEOMETRY_WORDS, shWords } from './pack/words.js';
 
 export interface UploadOptions {
   /** Upper limit of the GPU memory of the scene in bytes; default: no limit but the device's. */
@@ -24,17 +24,7 @@ export type PackedPortion = Partial<Pick<PackedGaussians, 'geometry' | 'sh' | 'c
 const WORDS_AT_ONCE = 1 << 20;
 
 /** Gaussians on the GPU, ready for any {@link Viewpoint} of the same device. */
-export class GaussianBuffers implements GaussianScene {
-  /** Number of splats over all levels of detail. */
-  readonly count: number;
-  readonly shDegree: ShDegree;
-  readonly shPrecision: ShPrecision;
-  /** Whether the scene was trained with opacity compensation, which the renderer then applies. */
-  readonly antialiased: boolean;
-  /** Variance in px² of the screen-space low-pass filter of training; undefined is the classic 0.3. */
-  readonly filterVariance?: number | undefined;
-  /** World position, in float64, of the origin of the positions on the GPU. */
-  readonly origin: Vector3;
+export class GaussianBuffers extends SceneBuffers {
   /** Number of splats of the finest level; undefined without levels of detail. */
   readonly leafCount: number | undefined;
   /** Number of splats of the source that were dropped because of an unusable value. */
@@ -44,35 +34,18 @@ export class GaussianBuffers implements GaussianScene {
   /** Stages that keep frames within a splat budget; undefined without levels of detail. */
   readonly detailBudget: DetailBudget | undefined;
   readonly #queue: GPUQueue;
-  readonly #memory: GpuMemory;
-  readonly #reservation: Reservation;
   #isDestroyed = false;
   /** Number of words that {@link write} may still upload in this step. */
   #left = WORDS_AT_ONCE;
   /** Resolves when the GPU has processed all steps before the last one. */
   #taken: Promise<undefined> | undefined;
 
-  private constructor(device: GPUDevice, packed: SceneSize, memoryBudget?: number, budget?: DetailBudget) {
+  private constructor(device: GPUDevice, memory: GpuMemory, packed: SceneSize, budget?: DetailBudget) {
+    super(memory, packed, packed.count);
     this.detailBudget = budget;
     this.#queue = device.queue;
-    ({
-      count: this.count,
-      shDegree: this.shDegree,
-      shPrecision: this.shPrecision,
-      antialiased: this.antialiased,
-      filterVariance: this.filterVariance,
-      origin: this.origin,
-      droppedCount: this.droppedCount,
-      leafCount: this.leafCount,
-    } = packed);
-    this.#reservation = MemoryLedger.of(device).reserve(whatOf(packed), sceneBytes(packed), memoryBudget);
-    this.#memory = new GpuMemory(device);
-    try {
-      this.blocks = makeBlocks(device, packed, this.#memory);
-    } catch (error) {
-      this.destroy();
-      throw error;
-    }
+    ({ droppedCount: this.droppedCount, leafCount: this.leafCount } = packed);
+    this.blocks = makeBlocks(device, packed, memory);
   }
 
   /**
@@ -102,7 +75,10 @@ export class GaussianBuffers implements GaussianScene {
     { memoryBudget }: UploadOptions = {},
     budget?: DetailBudget,
   ): Promise<GaussianBuffers> {
-    return withMemoryCheck(device, whatOf(packed), () => new GaussianBuffers(device, packed, memoryBudget, budget));
+    return withMemoryCheck(device, whatOf(packed), (memory) => {
+      memory.reserve(whatOf(packed), sceneBytes(packed), memoryBudget);
+      return new GaussianBuffers(device, memory, packed, budget);
+    });
   }
 
   /**
@@ -153,15 +129,9 @@ export class GaussianBuffers implements GaussianScene {
     ];
   }
 
-  /** Bytes of allocated GPU memory. */
-  get byteLength(): number {
-    return this.#memory.byteLength;
-  }
-
-  destroy(): void {
+  override destroy(): void {
     this.#isDestroyed = true;
-    this.#reservation.release();
-    this.#memory.destroy();
+    super.destroy();
   }
 }
 

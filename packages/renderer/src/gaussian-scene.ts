@@ -1,4 +1,4 @@
-import type { Camera, ShDegree, Vector3 } from '@gaussian-splat/core';
+import type { Camera, FilterRule, ShDegree, Vector3 } from '@gaussian-splat/core';
 import type { GeometryReading } from './geometry-reading.js';
 import type { Resource } from './gpu/kernel.js';
 import type { RenderSettings } from './render-settings.js';
@@ -48,15 +48,11 @@ export interface PageRequests {
  * Gaussians on the GPU for a {@link Viewpoint}. `GaussianBuffers` contains those of a file, `DynamicGaussians` those of
  * a generator. Only the content of the buffers changes during the lifetime of a scene.
  */
-export interface GaussianScene {
+export interface GaussianScene extends FilterRule {
   /** Capacity in splats. All of them are processed, but transparent ones are not drawn. */
   readonly count: number;
   readonly shDegree: ShDegree;
   readonly shPrecision: ShPrecision;
-  /** Whether the scene was trained with opacity compensation, which the renderer then applies. */
-  readonly antialiased: boolean;
-  /** Variance in px² of the screen-space low-pass filter of training; undefined is the classic 0.3. */
-  readonly filterVariance?: number | undefined;
   /** World position, in float64, of the origin of the positions on the GPU. */
   readonly origin: Vector3;
   readonly blocks: readonly GaussianBlock[];

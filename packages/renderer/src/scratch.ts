@@ -1,6 +1,6 @@
 import { constants, layouts } from './generated/shaders.js';
 import { BUFFER_USAGE } from './gpu/kernel.js';
-import { GpuMemory } from './gpu/memory.js';
+import { BufferOwner, GpuMemory } from './gpu/memory.js';
 import type { BlockTable } from './block-table.js';
 import { scanBytes } from './stages/stage.js';
 
@@ -18,7 +18,7 @@ const { size: PLAN_SIZE } = layouts.Plan;
 const { size: PAGE_PLAN_SIZE } = layouts.PagePlan;
 
 /** Buffers between the stages of a frame. Their size does not depend on the camera. */
-export class Scratch {
+export class Scratch extends BufferOwner {
   /** Maximum number of visible splats in a frame. Survivors beyond it are not drawn, but counted in `Plan.overflow`. */
   readonly capacity: number;
   /** Weight of each chunk, followed by one f32: the error threshold of a budget in pixels. */
@@ -47,14 +47,13 @@ export class Scratch {
   readonly digitCounts: GPUBuffer;
   readonly digitTotals: GPUBuffer;
   readonly #device: GPUDevice;
-  readonly #memory: GpuMemory;
   readonly #kept = new Map<string, GPUBuffer>();
 
   /** @param pingPongBytes Minimum size of {@link pingPong}. */
   constructor(device: GPUDevice, { visible, groups, pages }: ScratchSize, pingPongBytes: number) {
     const memory = new GpuMemory(device);
+    super(memory);
     this.#device = device;
-    this.#memory = memory;
     const { storage, uniform, copyDestination, copySource } = BUFFER_USAGE;
     this.capacity = visible;
     const buffer = (name: string, bytes: number): GPUBuffer =>
@@ -108,8 +107,8 @@ export class Scratch {
     const { storage, copyDestination, copySource } = BUFFER_USAGE;
     const grown = (buffer: GPUBuffer, bytes: number): GPUBuffer => {
       if (buffer.size >= bytes) return buffer;
-      this.#memory.free(buffer);
-      return this.#memory.buffer(buffer.label, bytes, storage | copySource | copyDestination);
+      this.memory.free(buffer);
+      return this.memory.buffer(buffer.label, bytes, storage | copySource | copyDestination);
     };
     const sizes = groupBytes(groups, pages);
     this.chunkShares = grown(this.chunkShares, sizes.chunkShares);
@@ -129,7 +128,7 @@ export class Scratch {
   /** Resizes {@link pingPong} for a rasterizer. All bindings of both buffers must be recreated. */
   fitPingPong(bytes: number): void {
     if (this.#pingPong[0].size === this.#pingPongSize(bytes)) return;
-    for (const buffer of this.#pingPong) this.#memory.free(buffer);
+    for (const buffer of this.#pingPong) this.memory.free(buffer);
     this.#pingPong = this.#makePingPong(bytes);
   }
 
@@ -164,18 +163,10 @@ export class Scratch {
     let buffer = this.#kept.get(name);
     if (buffer === undefined) {
       const { storage, copyDestination, copySource } = BUFFER_USAGE;
-      buffer = this.#memory.buffer(`gs.${name}`, bytes * this.capacity, storage | copySource | copyDestination);
+      buffer = this.memory.buffer(`gs.${name}`, bytes * this.capacity, storage | copySource | copyDestination);
       this.#kept.set(name, buffer);
     }
     return buffer;
-  }
-
-  get byteLength(): number {
-    return this.#memory.byteLength;
-  }
-
-  destroy(): void {
-    this.#memory.destroy();
   }
 
   #pingPongSize(bytes: number): number {
@@ -185,7 +176,7 @@ export class Scratch {
   #makePingPong(bytes: number): readonly [GPUBuffer, GPUBuffer] {
     const { storage, copyDestination, copySource } = BUFFER_USAGE;
     const buffer = (name: string): GPUBuffer =>
-      this.#memory.buffer(`gs.sort.${name}`, this.#pingPongSize(bytes), storage | copySource | copyDestination);
+      this.memory.buffer(`gs.sort.${name}`, this.#pingPongSize(bytes), storage | copySource | copyDestination);
     return [buffer('spare_keys'), buffer('spare_order')];
   }
 }

@@ -19,6 +19,10 @@ const wholeChunks = (count: number): number => CULL_GROUP * Math.max(1, Math.cei
 export class SequenceGaussians implements GaussianScene {
   readonly shDegree: ShDegree;
   readonly shPrecision: ShPrecision;
+  /** Capacity in splats. */
+  readonly count: number;
+  readonly blocks: readonly GaussianBlock[];
+  readonly byteLength: number;
   readonly #device: GPUDevice;
   readonly #buffers: GaussianBuffers;
   #frame: PackedGaussians;
@@ -27,6 +31,7 @@ export class SequenceGaussians implements GaussianScene {
   private constructor(device: GPUDevice, buffers: GaussianBuffers, frame: PackedGaussians) {
     this.#device = device;
     this.#buffers = buffers;
+    ({ count: this.count, blocks: this.blocks, byteLength: this.byteLength } = buffers);
     this.#frame = frame;
     this.shDegree = frame.shDegree;
     this.shPrecision = frame.shPrecision;
@@ -40,11 +45,6 @@ export class SequenceGaussians implements GaussianScene {
     const room = wholeChunks(HEADROOM * frame.count);
     const buffers = await GaussianBuffers.upload(device, padded(frame, room), options);
     return new SequenceGaussians(device, buffers, frame);
-  }
-
-  /** Capacity in splats. */
-  get count(): number {
-    return this.#buffers.count;
   }
 
   /** Number of splats of the current frame. */
@@ -68,16 +68,8 @@ export class SequenceGaussians implements GaussianScene {
     return this.#frame.origin;
   }
 
-  get blocks(): readonly GaussianBlock[] {
-    return this.#buffers.blocks;
-  }
-
   get version(): number {
     return this.#version;
-  }
-
-  get byteLength(): number {
-    return this.#buffers.byteLength;
   }
 
   /** Whether a frame fits the capacity, and its spherical harmonics have the layout of the buffers. */

@@ -1,5 +1,4 @@
-import { shCoefficientCount, validateCloud, type GaussianCloud, type ShDegree } from '@gaussian-splat/core';
-import type { GaussianScene } from '@gaussian-splat/renderer';
+import { validateCloud, type GaussianCloud, type ShDegree } from '@gaussian-splat/core';
 import type { GaussianBlock } from '@gaussian-splat/renderer/tools';
 import {
   BUFFER_USAGE,
@@ -11,42 +10,25 @@ import {
   layouts,
   pageCapacity,
   recentered,
+  SceneBuffers,
   shWords,
   withMemoryCheck,
   writeStruct,
 } from '@gaussian-splat/renderer/stages';
+import { widthsOf } from '../parts/cloud-memory.js';
 
 const { CULL_GROUP, SHAPE_SCALE, COLOR_COEFFICIENT_MAJOR } = constants;
-
-/** Returns the count of numbers of each attribute for a splat. */
-function widthsOf(degree: ShDegree) {
-  return { positions: 3, scales: 3, rotations: 4, sh: 3 * shCoefficientCount(degree), opacities: 1 } as const;
-}
 
 /**
  * A cloud on the GPU. The stage for generator outputs packs it, in a tenth of the CPU time of other scenes. Splats keep
  * the order of the cloud, so that a slot is the index of a splat. Harmonics are float16. Unusable splats are not drawn.
  */
-export class CloudBuffers implements GaussianScene {
-  readonly count: number;
-  readonly shDegree: ShDegree;
-  readonly shPrecision = 'float16';
-  readonly antialiased: boolean;
-  readonly filterVariance: number | undefined;
-  readonly origin: GaussianScene['origin'];
+export class CloudBuffers extends SceneBuffers {
   readonly version = 0;
   readonly blocks: readonly GaussianBlock[];
-  readonly #memory: GpuMemory;
 
-  private constructor(device: GPUDevice, cloud: GaussianCloud, memory: GpuMemory, pageSplats: number) {
-    ({
-      count: this.count,
-      shDegree: this.shDegree,
-      antialiased: this.antialiased,
-      filterVariance: this.filterVariance,
-      origin: this.origin,
-    } = cloud);
-    this.#memory = memory;
+  private constructor(device: GPUDevice, memory: GpuMemory, cloud: GaussianCloud, pageSplats: number) {
+    super(memory, cloud, cloud.count);
     const max = pageCapacity(device, 4 * Math.max(...Object.values(widthsOf(cloud.shDegree))));
     const capacity = Math.min(max, CULL_GROUP * Math.max(1, Math.floor(pageSplats / CULL_GROUP)));
     const pages: GaussianBlock[] = [];
@@ -65,18 +47,8 @@ export class CloudBuffers implements GaussianScene {
    */
   static async upload(device: GPUDevice, cloud: GaussianCloud, pageSplats = Infinity): Promise<CloudBuffers> {
     validateCloud(cloud);
-    const memory = new GpuMemory(device);
-    try {
-      const make = (): CloudBuffers => new CloudBuffers(device, recentered(cloud), memory, pageSplats);
-      return await withMemoryCheck(device, `scene of ${cloud.count} splats`, make);
-    } catch (error) {
-      memory.destroy();
-      throw error;
-    }
-  }
-
-  destroy(): void {
-    this.#memory.destroy();
+    const where = `scene of ${cloud.count} splats`;
+    return withMemoryCheck(device, where, (memory) => new CloudBuffers(device, memory, recentered(cloud), pageSplats));
   }
 }
 

@@ -1,6 +1,12 @@
-import type { GaussianScene } from '@gaussian-splat/renderer';
 import type { GaussianBlock } from '@gaussian-splat/renderer/tools';
-import { BUFFER_USAGE, GpuMemory, rareKernelOf, withMemoryCheck, writeStruct } from '@gaussian-splat/renderer/stages';
+import {
+  BUFFER_USAGE,
+  type GpuMemory,
+  rareKernelOf,
+  SceneBuffers,
+  withMemoryCheck,
+  writeStruct,
+} from '@gaussian-splat/renderer/stages';
 import { readBack } from '@gaussian-splat/renderer/tools';
 import { economiseCut, GONE, SCORE_GROUP, UNJUDGED } from '../generated/shaders.js';
 import type { Cut } from '../reduce.js';
@@ -13,17 +19,10 @@ const DEGREES = 4;
  * A copy of a scene on the GPU that cuts modify. Removed splats become transparent, and colors lose bands. The
  * bounds of chunks do not change.
  */
-export class CutScene implements GaussianScene {
-  readonly count: number;
-  readonly shDegree: GaussianScene['shDegree'];
-  readonly shPrecision: GaussianScene['shPrecision'];
-  readonly antialiased: boolean;
-  readonly filterVariance: number | undefined;
-  readonly origin: GaussianScene['origin'];
+export class CutScene extends SceneBuffers {
   readonly blocks: readonly GaussianBlock[];
   readonly #device: GPUDevice;
   readonly #scene: SceneParts;
-  readonly #memory: GpuMemory;
   readonly #uniforms: readonly GPUBuffer[];
   readonly #kept: GPUBuffer;
   /** For each part of the scene, the degree that each splat keeps, or GONE if it is removed. */
@@ -31,18 +30,10 @@ export class CutScene implements GaussianScene {
   readonly #bindings: readonly GPUBindGroup[];
   #version = 0;
 
-  private constructor(device: GPUDevice, scene: SceneParts, memory: GpuMemory) {
+  private constructor(device: GPUDevice, memory: GpuMemory, scene: SceneParts) {
+    super(memory, scene.gaussians, scene.gaussians.count);
     this.#device = device;
     this.#scene = scene;
-    ({
-      count: this.count,
-      shDegree: this.shDegree,
-      shPrecision: this.shPrecision,
-      antialiased: this.antialiased,
-      filterVariance: this.filterVariance,
-      origin: this.origin,
-    } = scene.gaussians);
-    this.#memory = memory;
     const { uniform, storage, copySource, copyDestination } = BUFFER_USAGE;
     const copyOf = (name: string, buffer: GPUBuffer): GPUBuffer =>
       memory.buffer(`gs.economise.cut_${name}`, buffer.size, storage | copySource);
@@ -62,15 +53,9 @@ export class CutScene implements GaussianScene {
   }
 
   /** Allocates the copy of a scene. @throws GaussianSplatError `out-of-memory/*` */
-  static async of(device: GPUDevice, scene: SceneParts): Promise<CutScene> {
-    const memory = new GpuMemory(device);
-    try {
-      const where = `copy of a scene of ${scene.gaussians.count} splats`;
-      return await withMemoryCheck(device, where, () => new CutScene(device, scene, memory));
-    } catch (error) {
-      memory.destroy();
-      throw error;
-    }
+  static of(device: GPUDevice, scene: SceneParts): Promise<CutScene> {
+    const where = `copy of a scene of ${scene.gaussians.count} splats`;
+    return withMemoryCheck(device, where, (memory) => new CutScene(device, memory, scene));
   }
 
   get version(): number {
@@ -123,10 +108,6 @@ export class CutScene implements GaussianScene {
       }
     }
     return { staying: staying.subarray(0, length), degrees };
-  }
-
-  destroy(): void {
-    this.#memory.destroy();
   }
 
   #bind({ page, scores, lowered }: ScenePart, p: number): GPUBindGroup {

@@ -1,6 +1,6 @@
 import { shCoefficientCount, type GaussianCloud, type ShDegree } from '@gaussian-splat/core';
 import type { GaussianBlock } from '@gaussian-splat/renderer/tools';
-import { BUFFER_USAGE, GpuMemory, pageCapacity, withMemoryCheck } from '@gaussian-splat/renderer/stages';
+import { BUFFER_USAGE, type GpuMemory, pageCapacity, withMemoryCheck } from '@gaussian-splat/renderer/stages';
 import { CloudBuffers } from './cloud-buffers.js';
 import { layouts } from './layouts.js';
 
@@ -82,17 +82,10 @@ export class SceneParts {
     );
     const pageSplats = Math.min(maxSplats, pageCapacity(device, largest));
     const gaussians = await CloudBuffers.upload(device, cloud, pageSplats);
-    const memory = new GpuMemory(device);
     try {
-      const destroy = (): void => memory.destroy();
       const where = `scores of ${cloud.count} splats`;
-      const { made } = await withMemoryCheck(device, where, () => ({
-        made: new SceneParts(memory, gaussians, views),
-        destroy,
-      }));
-      return made;
+      return await withMemoryCheck(device, where, (memory) => new SceneParts(memory, gaussians, views));
     } catch (error) {
-      memory.destroy();
       gaussians.destroy();
       throw error;
     }

@@ -1,5 +1,5 @@
 import { upright } from '@gaussian-splat/formats';
-import { boundsOf, validateCloud, type Bounds, type GaussianCloud, type Vector3 } from '@gaussian-splat/core';
+import { boundsOf, validateCloud, type GaussianCloud } from '@gaussian-splat/core';
 import {
   boundLevel,
   CENTER_ROUNDING,
@@ -25,7 +25,6 @@ import {
   parentErrors,
   QUANTIZED_CHUNK_WORDS,
   recentered,
-  type ShPrecision,
   type SplatLevel,
   widenReach,
 } from '@gaussian-splat/renderer/tools';
@@ -45,22 +44,14 @@ export interface BuiltPage {
 }
 
 /** Levels of detail of a scene, or of a part of it, before the division into pages. Level 0 is the finest. */
-export interface DetailTree {
-  /** Number of splats of the finest level, without padding splats. */
-  readonly splats: number;
+export interface DetailTree extends Pick<
+  DetailManifest,
+  'splats' | 'shPrecision' | 'geometry' | 'antialiased' | 'filterVariance' | 'order' | 'origin' | 'bounds'
+> {
   readonly levels: readonly SplatLevel[];
   /** Rows of the struct `Chunk` for each level. */
   readonly chunks: readonly Float32Array[];
   readonly errors: readonly ChunkErrors[];
-  readonly shPrecision: ShPrecision;
-  readonly geometry?: 'quantized';
-  readonly antialiased: boolean;
-  /** Filter variance of training in px²; undefined is 0.3. */
-  readonly filterVariance?: number | undefined;
-  /** Sort order of splats in training: `pixel` for per-pixel order. See `CloudHints.order`. */
-  readonly order?: 'pixel' | undefined;
-  readonly origin: Vector3;
-  readonly bounds: Bounds;
 }
 
 export interface DetailTreeOptions {

@@ -23,7 +23,7 @@ export function arraysOf({ positions, scales, rotations, opacities, sh }: Column
 }
 
 /** Returns the count of numbers of each array for a splat. */
-const widthsOf = (degree: ShDegree) =>
+export const widthsOf = (degree: ShDegree) =>
   ({ positions: 3, scales: 3, rotations: 4, opacities: 1, sh: 3 * shCoefficientCount(degree) }) as const;
 
 /**

@@ -1,4 +1,4 @@
-import type { GaussianCloud } from '@gaussian-splat/core';
+import type { FilterRule, GaussianCloud } from '@gaussian-splat/core';
 import { readSplats } from '@gaussian-splat/formats';
 import { putCloud, type Columns, type Part } from './cloud-memory.js';
 
@@ -6,11 +6,9 @@ import { putCloud, type Columns, type Part } from './cloud-memory.js';
 const BLOCK = 1 << 14;
 
 /** Result of reading a part of a file. */
-export interface PartRead {
+export interface PartRead extends FilterRule {
   /** Number of usable splats, which are contiguous from the beginning of the part's range. */
   readonly count: number;
-  readonly antialiased: boolean;
-  readonly filterVariance: number | undefined;
   readonly hints: GaussianCloud['hints'];
   /** Number of unusable splats by reason; see `GaussianCloud.faults`. */
   readonly faults: readonly number[];

@@ -1,14 +1,14 @@
 import { shCoefficientCount, type GaussianCloud } from '@gaussian-splat/core';
-import type { GaussianScene } from '@gaussian-splat/renderer';
 import type { GaussianBlock } from '@gaussian-splat/renderer/tools';
 import {
   BUFFER_USAGE,
   constants,
-  GpuMemory,
+  type GpuMemory,
   ingestStage,
   Ingest,
   pageCapacity,
   recentered,
+  SceneBuffers,
   withMemoryCheck,
   writeStruct,
 } from '@gaussian-splat/renderer/stages';
@@ -48,40 +48,26 @@ export interface RefinedPart {
  * A scene on the GPU whose parameters are optimized. It holds float32 parameters for the optimizer and packed splats for
  * the renderer.
  */
-export class RefinedScene implements GaussianScene {
-  readonly count: number;
-  readonly shDegree: GaussianScene['shDegree'];
-  readonly shPrecision = 'float16';
-  readonly antialiased: boolean;
-  readonly filterVariance: number | undefined;
-  readonly origin: GaussianScene['origin'];
+export class RefinedScene extends SceneBuffers {
   readonly blocks: readonly GaussianBlock[];
   readonly parts: readonly RefinedPart[];
   /** array<vec2i>: SCREEN_NUMBERS fixed-point numbers of each splat. Each part takes {@link RefinedPart.row} splats. */
   readonly screen: GPUBuffer;
   readonly #device: GPUDevice;
-  readonly #memory: GpuMemory;
   readonly #ingest: ReturnType<typeof ingestStage>;
   readonly #cloud: GaussianCloud;
   #version = 0;
 
   private constructor(
     device: GPUDevice,
-    { cloud, degrees }: Omit<ReducedCloud, 'kept'>,
     memory: GpuMemory,
+    { cloud, degrees }: Omit<ReducedCloud, 'kept'>,
     max: number,
   ) {
+    super(memory, cloud, cloud.count);
     this.#device = device;
-    this.#memory = memory;
     this.#cloud = cloud;
     this.#ingest = ingestStage(device);
-    ({
-      count: this.count,
-      shDegree: this.shDegree,
-      antialiased: this.antialiased,
-      filterVariance: this.filterVariance,
-      origin: this.origin,
-    } = cloud);
     const { storage, copyDestination } = BUFFER_USAGE;
     const parts: RefinedPart[] = [];
     let first = 0;
@@ -104,18 +90,12 @@ export class RefinedScene implements GaussianScene {
    * @throws GaussianSplatError `out-of-memory/*`
    */
   static async of(device: GPUDevice, reduced: Omit<ReducedCloud, 'kept'>, maxSplats = Infinity): Promise<RefinedScene> {
-    const memory = new GpuMemory(device);
     const sought = SH_STEP + 3 * shCoefficientCount(reduced.cloud.shDegree);
     const capacity = pageCapacity(device, 2 * FLOAT_BYTES * sought);
     const max = Math.min(capacity, CULL_GROUP * Math.max(1, Math.floor(maxSplats / CULL_GROUP)));
-    try {
-      const cloud = recentered(reduced.cloud);
-      const make = (): RefinedScene => new RefinedScene(device, { ...reduced, cloud }, memory, max);
-      return await withMemoryCheck(device, `${reduced.cloud.count} splats to refine`, make);
-    } catch (error) {
-      memory.destroy();
-      throw error;
-    }
+    const cloud = recentered(reduced.cloud);
+    const where = `${cloud.count} splats to refine`;
+    return withMemoryCheck(device, where, (memory) => new RefinedScene(device, memory, { ...reduced, cloud }, max));
   }
 
   get version(): number {
@@ -152,10 +132,6 @@ export class RefinedScene implements GaussianScene {
     return { ...this.#cloud, positions, scales, rotations, opacities, sh };
   }
 
-  destroy(): void {
-    this.#memory.destroy();
-  }
-
   get #width(): number {
     return SH_AT + 3 * shCoefficientCount(this.shDegree);
   }
@@ -173,13 +149,13 @@ export class RefinedScene implements GaussianScene {
     const row = CULL_GROUP * Math.ceil(count / CULL_GROUP);
     const sought = SH_STEP + this.#width - SH_AT;
     const buffer = (name: string, bytes: number, content?: Uint32Array): GPUBuffer =>
-      this.#memory.buffer(`gs.refine.${name}`, bytes, storage | copySource | copyDestination, content);
-    const page = pageOf(this.#memory, this.shDegree, count);
+      this.memory.buffer(`gs.refine.${name}`, bytes, storage | copySource | copyDestination, content);
+    const page = pageOf(this.memory, this.shDegree, count);
     const rows = numbersOf(this.#cloud, begin, count, this.#width);
     const numbers = buffer('numbers', rows.byteLength, new Uint32Array(rows.buffer));
     const bytes = this.#ingestOf(count);
     const packing = this.#ingest.bind({
-      ingest: this.#memory.buffer('gs.refine.ingest', bytes.byteLength, uniform, new Uint32Array(bytes)),
+      ingest: this.memory.buffer('gs.refine.ingest', bytes.byteLength, uniform, new Uint32Array(bytes)),
       ...{ positions: numbers, shapes: numbers, rotations: numbers, colors: numbers, opacities: numbers },
       ...{ gaussians: page.geometry, sh: page.sh, chunks: page.chunks },
     });

@@ -3,6 +3,7 @@ import type { Viewpoint } from '@gaussian-splat/renderer';
 import {
   BUFFER_USAGE,
   cameraValues,
+  BufferOwner,
   GpuMemory,
   layouts as rendererLayouts,
   rareKernelOf,
@@ -85,27 +86,26 @@ export const USUAL_DESCENT: OptimizerOptions = {
 };
 
 /** Fits the splats of a scene to images by gradient descent. */
-export class SceneFitter {
+export class SceneFitter extends BufferOwner {
   readonly #device: GPUDevice;
   readonly #viewpoint: Viewpoint;
   readonly #scene: RefinedScene;
   readonly #errors: ImageErrors;
-  readonly #memory: GpuMemory;
   readonly #views: GPUBuffer;
   readonly #refineViews: GPUBuffer;
   readonly #steps: readonly GPUBuffer[];
 
   /** @param errors Holds the reference images and their views. */
   constructor(device: GPUDevice, viewpoint: Viewpoint, scene: RefinedScene, errors: ImageErrors) {
+    super(new GpuMemory(device));
     this.#device = device;
     this.#viewpoint = viewpoint;
     this.#scene = scene;
     this.#errors = errors;
-    this.#memory = new GpuMemory(device);
     const { uniform, copyDestination } = BUFFER_USAGE;
     [this.#views, this.#refineViews] = this.#writeViews();
     this.#steps = scene.parts.map(() =>
-      this.#memory.buffer('gs.refine.step', layouts.RefineStep.size, uniform | copyDestination),
+      this.memory.buffer('gs.refine.step', layouts.RefineStep.size, uniform | copyDestination),
     );
   }
 
@@ -178,10 +178,6 @@ export class SceneFitter {
     this.#device.queue.submit([encoder.finish()]);
   }
 
-  destroy(): void {
-    this.#memory.destroy();
-  }
-
   /**
    * Runs one step of Adam, and packs the changed splats.
    * @param number Number of the step, from 1 on.
@@ -235,7 +231,7 @@ export class SceneFitter {
     });
     const { uniform } = BUFFER_USAGE;
     return [views, small].map((bytes) =>
-      this.#memory.buffer('gs.refine.views', bytes.byteLength, uniform, new Uint32Array(bytes)),
+      this.memory.buffer('gs.refine.views', bytes.byteLength, uniform, new Uint32Array(bytes)),
     ) as [GPUBuffer, GPUBuffer];
   }
 }

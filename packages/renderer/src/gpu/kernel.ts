@@ -73,19 +73,18 @@ function asBindingResource(resource: Resource): GPUBindingResource {
 export type Overrides = Readonly<Record<string, number>>;
 
 /** A compute shader on one device. Its entry point is `main`. */
-export class ComputeKernel<S extends ShaderDescription> {
+export class ComputeKernel<S extends ShaderDescription> extends ShaderProgram<S> {
   readonly #device: GPUDevice;
   readonly #name: string;
   readonly #overrides: Overrides;
-  readonly #program: ShaderProgram<S>;
   #made: GPUComputePipeline | undefined;
   #making: Promise<void> | undefined;
 
   constructor(device: GPUDevice, shader: S, overrides: Overrides = {}) {
+    super(device, shader, SHADER_STAGE.compute);
     this.#device = device;
     this.#name = shader.name;
     this.#overrides = overrides;
-    this.#program = new ShaderProgram(device, shader, SHADER_STAGE.compute);
   }
 
   /**
@@ -108,13 +107,9 @@ export class ComputeKernel<S extends ShaderDescription> {
   get #descriptor(): GPUComputePipelineDescriptor {
     return {
       label: `gs.${this.#name}`,
-      layout: this.#program.pipelineLayout,
-      compute: { module: this.#program.module, entryPoint: 'main', constants: this.#overrides },
+      layout: this.pipelineLayout,
+      compute: { module: this.module, entryPoint: 'main', constants: this.#overrides },
     };
-  }
-
-  bind(resources: Resources<S>): GPUBindGroup {
-    return this.#program.bind(resources);
   }
 
   get #pipeline(): GPUComputePipeline {

@@ -1,4 +1,5 @@
 import { GaussianSplatError } from '@gaussian-splat/core';
+import { MemoryLedger, type Reservation } from '../memory-ledger.js';
 
 /**
  * Minimum size of a buffer in bytes. A binding must contain at least one element of its array, even for an empty scene.
@@ -12,6 +13,7 @@ const SMALLEST_BUFFER = 64;
 export class GpuMemory {
   readonly #device: GPUDevice;
   readonly #buffers = new Map<GPUBuffer, number>();
+  #reservation: Reservation | undefined;
 
   constructor(device: GPUDevice) {
     this.#device = device;
@@ -41,13 +43,37 @@ export class GpuMemory {
     return buffer;
   }
 
+  /** Reserves bytes of the device until {@link destroy}, with the parameters and errors of {@link MemoryLedger.reserve}. */
+  reserve(...bytes: Parameters<MemoryLedger['reserve']>): void {
+    this.#reservation = MemoryLedger.of(this.#device).reserve(...bytes);
+  }
+
   free(buffer: GPUBuffer): void {
     if (this.#buffers.delete(buffer)) buffer.destroy();
   }
 
   destroy(): void {
+    this.#reservation?.release();
     for (const buffer of this.#buffers.keys()) buffer.destroy();
     this.#buffers.clear();
+  }
+}
+
+/** An owner of GPU buffers, which are destroyed with it. */
+export abstract class BufferOwner {
+  protected readonly memory: GpuMemory;
+
+  constructor(memory: GpuMemory) {
+    this.memory = memory;
+  }
+
+  /** Bytes of allocated GPU memory. */
+  get byteLength(): number {
+    return this.memory.byteLength;
+  }
+
+  destroy(): void {
+    this.memory.destroy();
   }
 }
 
@@ -64,27 +90,29 @@ function requireBufferSize(device: GPUDevice, label: string, size: number): void
 }
 
 /**
- * Runs `allocate`, waits until the device has confirmed the allocation, and resolves to its result.
+ * Runs `allocate`, waits until the device has confirmed the allocation, and resolves to its result. If anything fails,
+ * the memory is destroyed.
  * @param where Name of the owner, for error messages.
  * @throws GaussianSplatError `out-of-memory/allocation` if the device has too little memory; errors of `allocate`.
  */
 export async function withMemoryCheck<T extends { destroy(): void }>(
   device: GPUDevice,
   where: string,
-  allocate: () => T,
+  allocate: (memory: GpuMemory) => T,
 ): Promise<T> {
   device.pushErrorScope('out-of-memory');
+  const memory = new GpuMemory(device);
   let made: T | undefined;
   let thrown: unknown;
   try {
-    made = allocate();
+    made = allocate(memory);
   } catch (error) {
     thrown = error;
   }
   const refusal = await device.popErrorScope();
-  if (thrown instanceof GaussianSplatError) throw thrown;
   if (made !== undefined && refusal === null) return made;
-  made?.destroy();
+  (made ?? memory).destroy();
+  if (thrown instanceof GaussianSplatError) throw thrown;
   throw new GaussianSplatError('out-of-memory/allocation', {
     where,
     expected: 'enough free GPU memory',

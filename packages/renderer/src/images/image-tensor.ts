@@ -3,7 +3,7 @@ import { imageToTensor } from '../generated/live-shaders.js';
 import * as layouts from '../generated/live-layouts.js';
 import { constants } from '../generated/shaders.js';
 import { BUFFER_USAGE, kernelOf, TEXTURE_USAGE, type ComputeKernel } from '../gpu/kernel.js';
-import { GpuMemory } from '../gpu/memory.js';
+import { BufferOwner, GpuMemory } from '../gpu/memory.js';
 import { writeStruct } from '../gpu/struct.js';
 
 /** Size and element type of a tensor [views, channels, height, width]. */
@@ -28,15 +28,15 @@ export type ImageFit = 'stretch' | 'cover';
  * channels are planes of red, green and blue in 0..1, sRGB-encoded, top row first, over black if the image is
  * transparent. Images of another size are resampled bilinearly, with antialiasing when they shrink.
  */
-export class ImageTensor {
+export class ImageTensor extends BufferOwner {
   readonly shape: ImageShape;
+  readonly dtype: ImageShape['dtype'];
   /** [views, channels, height, width] */
   readonly dims: readonly [number, 1 | 3 | 4, number, number];
   /** Elements of the tensor; a word contains two float16. */
   readonly buffer: GPUBuffer;
   readonly #device: GPUDevice;
   readonly #kernel: ComputeKernel<typeof imageToTensor>;
-  readonly #memory: GpuMemory;
   readonly #uniform: GPUBuffer;
   readonly #uniformBytes = new ArrayBuffer(layouts.ImageToTensor.size);
   /** Number of words of one image. */
@@ -50,28 +50,20 @@ export class ImageTensor {
    */
   constructor(device: GPUDevice, shape: ImageShape) {
     const { width, height, dtype, channels = 3, views = 1 } = shape;
+    super(new GpuMemory(device));
     this.shape = shape;
+    this.dtype = dtype;
     this.dims = [views, channels, height, width];
     this.#words = (channels * width * height) / (dtype === 'float16' ? 2 : 1);
     if (views > 1 && !Number.isInteger(this.#words)) throw oddHalves(width, height);
     this.#device = device;
     this.#kernel = kernelOf(device, imageToTensor);
-    this.#memory = new GpuMemory(device);
     const { storage, uniform, copySource, copyDestination } = BUFFER_USAGE;
     // The size is a multiple of 16 bytes, because ONNX Runtime does not copy smaller units.
     const size = Math.ceil((4 * views * this.#words) / 16) * 16;
-    this.buffer = this.#memory.buffer('gs.picture.tensor', size, storage | copySource | copyDestination);
+    this.buffer = this.memory.buffer('gs.picture.tensor', size, storage | copySource | copyDestination);
     const usage = uniform | copyDestination;
-    this.#uniform = this.#memory.buffer('gs.picture.uniform', layouts.ImageToTensor.size, usage);
-  }
-
-  get dtype(): ImageShape['dtype'] {
-    return this.shape.dtype;
-  }
-
-  /** Bytes of allocated GPU memory. */
-  get byteLength(): number {
-    return this.#memory.byteLength;
+    this.#uniform = this.memory.buffer('gs.picture.uniform', layouts.ImageToTensor.size, usage);
   }
 
   /** Number of images written since the creation of the tensor. */
@@ -124,10 +116,6 @@ export class ImageTensor {
     this.write(texture, fit, view);
     // The submitted commands keep the texture alive until they are executed.
     texture.destroy();
-  }
-
-  destroy(): void {
-    this.#memory.destroy();
   }
 
   #writeUniform(width: number, height: number, fit: ImageFit, view: number): void {

@@ -1,50 +1,29 @@
-import type { ShDegree, Vector3 } from '@gaussian-splat/core';
 import { GaussianBuffers, type UploadOptions } from '../gaussian-buffers.js';
 import type { GaussianBlock, GaussianScene } from '../gaussian-scene.js';
 import { constants } from '../generated/shaders.js';
 import { BUFFER_USAGE } from '../gpu/kernel.js';
-import { GpuMemory, withMemoryCheck } from '../gpu/memory.js';
+import { type GpuMemory, withMemoryCheck } from '../gpu/memory.js';
+import { SceneBuffers } from '../scene-buffers.js';
 import type { DetailBudget } from '../stages/detail-budget.js';
 import { DETAIL_NUMBERS } from './chunk-detail.js';
 import type { PackedLevels } from './packed-levels.js';
-import type { ShPrecision } from '../pack/words.js';
 
 /**
  * A scene on the GPU with additional levels of detail. It shares the splats of the scene, and has the coarser splats in
  * extra blocks. If the setting `detail` is 0 without a splat budget, the image equals that of the scene byte for byte.
  */
-export class DetailedGaussians implements GaussianScene {
-  /** Number of splats over all levels. */
-  readonly count: number;
-  readonly shDegree: ShDegree;
-  readonly shPrecision: ShPrecision;
-  readonly antialiased: boolean;
-  /** Variance in px² of the screen-space low-pass filter of training; undefined is the classic 0.3. */
-  readonly filterVariance?: number | undefined;
-  readonly origin: Vector3;
+export class DetailedGaussians extends SceneBuffers {
   readonly blocks: readonly GaussianBlock[];
   readonly #leaves: GaussianScene;
   readonly #coarser: GaussianBuffers;
-  readonly #memory: GpuMemory;
+  readonly detailBudget: DetailBudget | undefined;
 
-  private constructor(device: GPUDevice, leaves: GaussianScene, details: Float32Array, coarser: GaussianBuffers) {
+  private constructor(memory: GpuMemory, leaves: GaussianScene, details: Float32Array, coarser: GaussianBuffers) {
+    super(memory, leaves, leaves.count + coarser.count);
     this.#leaves = leaves;
     this.#coarser = coarser;
-    this.#memory = new GpuMemory(device);
-    ({
-      shDegree: this.shDegree,
-      shPrecision: this.shPrecision,
-      antialiased: this.antialiased,
-      filterVariance: this.filterVariance,
-      origin: this.origin,
-    } = leaves);
-    this.count = leaves.count + coarser.count;
-    try {
-      this.blocks = [...withDetails(leaves.blocks, details, this.#memory), ...coarser.blocks];
-    } catch (error) {
-      this.#memory.destroy();
-      throw error;
-    }
+    this.detailBudget = coarser.detailBudget;
+    this.blocks = [...withDetails(leaves.blocks, details, memory), ...coarser.blocks];
   }
 
   /**
@@ -63,15 +42,11 @@ export class DetailedGaussians implements GaussianScene {
     const own = await GaussianBuffers.upload(device, coarser, options);
     try {
       const what = `levels of detail of ${leaves.count} splats`;
-      return await withMemoryCheck(device, what, () => new DetailedGaussians(device, leaves, leafDetails, own));
+      return await withMemoryCheck(device, what, (memory) => new DetailedGaussians(memory, leaves, leafDetails, own));
     } catch (error) {
       own.destroy();
       throw error;
     }
-  }
-
-  get detailBudget(): DetailBudget | undefined {
-    return this.#coarser.detailBudget;
   }
 
   get version(): number {
@@ -79,13 +54,13 @@ export class DetailedGaussians implements GaussianScene {
   }
 
   /** Bytes of GPU memory of the levels, without the scene itself. */
-  get byteLength(): number {
-    return this.#memory.byteLength + this.#coarser.byteLength;
+  override get byteLength(): number {
+    return super.byteLength + this.#coarser.byteLength;
   }
 
   /** Frees the levels, but not the scene. */
-  destroy(): void {
-    this.#memory.destroy();
+  override destroy(): void {
+    super.destroy();
     this.#coarser.destroy();
   }
 }

@@ -2,6 +2,7 @@ import {
   GaussianSplatError,
   isUsable,
   validateCloud,
+  type FilterRule,
   type GaussianCloud,
   type ShDegree,
   type Vector3,
@@ -26,13 +27,10 @@ export interface PackOptions {
 }
 
 /** Properties of packed Gaussians without their data. */
-export interface PackedHead {
+export interface PackedHead extends FilterRule {
   readonly count: number;
   readonly shDegree: ShDegree;
   readonly shPrecision: ShPrecision;
-  readonly antialiased: boolean;
-  /** Variance in px² of the screen-space low-pass filter of training; undefined is the classic 0.3. */
-  readonly filterVariance?: number | undefined;
   readonly origin: Vector3;
   readonly droppedCount: number;
   /** Number of splats of the finest level, which precede all others; undefined without levels of detail. */

@@ -30,20 +30,16 @@ export class BoundImages {
 }
 
 /** Rasterizes splats without depth, auxiliary outputs or per-pixel order. */
-export class PlainPainter implements TilePainter {
+export class PlainPainter extends BoundImages implements TilePainter {
   readonly tile = constants.TILE;
   readonly #device: GPUDevice;
-  readonly #bound = new BoundImages();
 
   constructor(device: GPUDevice) {
+    super();
     this.#device = device;
   }
 
   kernel(variant: RasterizeVariant): RasterizeKernel {
     return rasterizeKernel(this.#device, rasterizeTiles, variant);
-  }
-
-  bind(kernel: RasterizeKernel, painted: PaintedTiles): GPUBindGroup {
-    return this.#bound.bind(kernel, painted);
   }
 }

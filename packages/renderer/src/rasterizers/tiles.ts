@@ -1,6 +1,6 @@
 import { constants, layouts } from '../generated/shaders.js';
 import { BUFFER_USAGE } from '../gpu/kernel.js';
-import { GpuMemory } from '../gpu/memory.js';
+import { BufferOwner, GpuMemory } from '../gpu/memory.js';
 import { writeStruct } from '../gpu/struct.js';
 import { sortedIn, SortStage, type SortBindings } from '../stages/sort.js';
 import type { Threads } from '../stages/stage.js';
@@ -11,7 +11,6 @@ import type {
   RasterSettings,
   Rasterizer,
   RasterizerInputs,
-  Room,
   Slice,
 } from './rasterizer.js';
 import { pairBuffers, releasableBytesOf, type PairBuffers } from './pair-buffers.js';
@@ -67,11 +66,11 @@ const TRANSPARENT = [0, 0, 0, 0] as const;
  *
  * Pairs beyond the capacity are dropped. They belong to the farthest splats.
  */
-export class TilesRasterizer implements Rasterizer {
+export class TilesRasterizer extends BufferOwner implements Rasterizer {
   readonly name = 'tiles';
+  readonly pingPongBytes = releasableBytesOf;
   readonly #device: GPUDevice;
   readonly #accumulation: AccumulationFormat;
-  readonly #memory: GpuMemory;
   readonly #plain: TilePainter;
   readonly #sort: SortStage;
   readonly #view: GPUBuffer;
@@ -82,18 +81,14 @@ export class TilesRasterizer implements Rasterizer {
   readonly #bound = new Map<string, GridBindings>();
 
   constructor(device: GPUDevice, accumulation: AccumulationFormat, threads: Threads) {
+    super(new GpuMemory(device));
     this.#device = device;
     this.#accumulation = accumulation;
-    this.#memory = new GpuMemory(device);
     this.#plain = new PlainPainter(device);
     listingKernels(device, this.#plain.tile);
     this.#sort = new SortStage(device, threads, 'given');
     const usage = BUFFER_USAGE.uniform | BUFFER_USAGE.copyDestination;
-    this.#view = this.#memory.buffer('gs.rasterize.view', layouts.BinView.size, usage);
-  }
-
-  get byteLength(): number {
-    return this.#memory.byteLength;
+    this.#view = this.memory.buffer('gs.rasterize.view', layouts.BinView.size, usage);
   }
 
   get pairPlan(): GPUBuffer | undefined {
@@ -105,14 +100,10 @@ export class TilesRasterizer implements Rasterizer {
     return STORABLE.includes(format) || (needsFeature && this.#device.features.has('bgra8unorm-storage'));
   }
 
-  pingPongBytes(room: Room): number {
-    return releasableBytesOf(room);
-  }
-
   bind(inputs: RasterizerInputs): void {
     this.#release();
     this.#inputs = inputs;
-    this.#buffers = pairBuffers(this.#memory, inputs);
+    this.#buffers = pairBuffers(this.memory, inputs);
   }
 
   prepare(settings: RasterSettings, format: GPUTextureFormat, painter: TilePainter = this.#plain): void {
@@ -165,13 +156,9 @@ export class TilesRasterizer implements Rasterizer {
     paint.end();
   }
 
-  destroy(): void {
-    this.#memory.destroy();
-  }
-
   #release(): void {
     // `free` ignores the ping-pong buffers, because they belong to another `GpuMemory`.
-    for (const buffer of Object.values(this.#buffers ?? {}).flat()) this.#memory.free(buffer as GPUBuffer);
+    for (const buffer of Object.values(this.#buffers ?? {}).flat()) this.memory.free(buffer as GPUBuffer);
     this.#forgetGrids();
     this.#buffers = undefined;
   }
@@ -191,8 +178,8 @@ export class TilesRasterizer implements Rasterizer {
     const grid = { columns, rows, bits: Math.ceil(Math.log2(bins)) };
     const own = {
       kernels: listingKernels(this.#device, painter.tile),
-      ranges: this.#memory.buffer('gs.bin.ranges', 8 * bins, BUFFER_USAGE.storage | BUFFER_USAGE.copyDestination),
-      binOrder: this.#memory.buffer('gs.bin.order', 4 * bins, BUFFER_USAGE.storage),
+      ranges: this.memory.buffer('gs.bin.ranges', 8 * bins, BUFFER_USAGE.storage | BUFFER_USAGE.copyDestination),
+      binOrder: this.memory.buffer('gs.bin.order', 4 * bins, BUFFER_USAGE.storage),
     };
     const bound = { grid, ...own, ...this.#bindings(inputs, buffers, grid.bits, own) };
     this.#bound.set(key, bound);
@@ -201,8 +188,8 @@ export class TilesRasterizer implements Rasterizer {
 
   #forgetGrids(): void {
     for (const { ranges, binOrder } of this.#bound.values()) {
-      this.#memory.free(ranges);
-      this.#memory.free(binOrder);
+      this.memory.free(ranges);
+      this.memory.free(binOrder);
     }
     this.#bound.clear();
   }

@@ -1,4 +1,11 @@
-import { GaussianSplatError, type Bounds, type ErrorCode, type ShDegree, type Vector3 } from '@gaussian-splat/core';
+import {
+  GaussianSplatError,
+  type Bounds,
+  type ErrorCode,
+  type FilterRule,
+  type ShDegree,
+  type Vector3,
+} from '@gaussian-splat/core';
 import { constants } from '../generated/shaders.js';
 import { DETAIL_NUMBERS } from '../levels/chunk-detail.js';
 import { CLASSES, CLASS_STEP, MIN_OPACITY_STEP, type PageCoding } from './page-coding.js';
@@ -54,7 +61,7 @@ export interface TreeInstance {
 }
 
 /** Manifest (`detail.json`) of a streamed scene. docs/lod-format.md describes the files. */
-export interface DetailManifest {
+export interface DetailManifest extends FilterRule {
   readonly format: 'gaussian-splat-detail';
   /** 2 with {@link geometry}, 4 with {@link coding}, otherwise 1. Version 3 was never released. */
   readonly version: 1 | 2 | 4;
@@ -69,9 +76,6 @@ export interface DetailManifest {
   readonly geometry?: 'quantized';
   /** Coding of the files, which `decodePage` converts to words. Default: files contain the words. */
   readonly coding?: PageCoding;
-  readonly antialiased: boolean;
-  /** Variance in px² of the screen-space low-pass filter of training; undefined is the classic 0.3. */
-  readonly filterVariance?: number | undefined;
   /** Sort order of splats in training; undefined if splats were sorted by the depth of their centers. */
   readonly order?: 'pixel' | undefined;
   readonly origin: Vector3;

@@ -21,7 +21,8 @@ const STALE_AFTER = 2;
  * A feedback pass costs time linear in the number of pages. The arrival or eviction of a page costs logarithmic time.
  */
 export class Residency {
-  readonly #slots: PageSlots;
+  /** The slots of the resident pages. */
+  readonly slots: PageSlots;
   readonly #list: PageList;
   readonly #isCached: (page: number) => boolean;
   /** [P] screen error of a missing page in pixels, from the last feedback pass; 0 if it is not requested. */
@@ -59,7 +60,7 @@ export class Residency {
   constructor(list: PageList, slots: number, isCached: (page: number) => boolean = () => false) {
     this.#list = list;
     this.#isCached = isCached;
-    this.#slots = new PageSlots(list.count, slots);
+    this.slots = new PageSlots(list.count, slots);
     this.#request = new Float32Array(list.count);
     this.#requestedAt = new Uint32Array(list.count);
     this.#below = new Uint32Array(list.count);
@@ -69,23 +70,8 @@ export class Residency {
     this.#evictees = new RankedHeap(slots);
   }
 
-  /** [S] page in each slot, or {@link NONE}. */
-  get pageIn(): Uint32Array {
-    return this.#slots.pageIn;
-  }
-
-  /** [P] first slot of each page, or {@link NONE}. */
-  get slotOf(): Uint32Array {
-    return this.#slots.slotOf;
-  }
-
   isResident(page: number): boolean {
-    return this.slotOf[page] !== NONE;
-  }
-
-  /** Returns the slots of a resident page in the order of its chunks; empty for other pages. */
-  slotsOf(page: number): readonly number[] {
-    return this.#slots.of(page);
+    return this.slots.slotOf[page] !== NONE;
   }
 
   /** Returns the number of slots that a page needs. */
@@ -93,20 +79,15 @@ export class Residency {
     return this.#list.slots[page];
   }
 
-  /** Number of resident pages. */
-  get residents(): number {
-    return this.#slots.count;
-  }
-
   /** Number of slots of the resident pages. */
   get slotsInUse(): number {
-    return this.pageIn.length - this.#slots.empty;
+    return this.slots.pageIn.length - this.slots.empty;
   }
 
   /** Number of chunks of the resident pages. */
   get chunks(): number {
     let chunks = 0;
-    for (const page of this.#slots.pages()) chunks += this.#list.chunks[page];
+    for (const page of this.slots.pages()) chunks += this.#list.chunks[page];
     return chunks;
   }
 
@@ -208,10 +189,10 @@ export class Residency {
       this.cancel(page);
       return undefined;
     }
-    const left = evictees.map((evictee) => ({ page: evictee, slots: this.#slots.clear(evictee) }));
+    const left = evictees.map((evictee) => ({ page: evictee, slots: this.slots.clear(evictee) }));
     this.#coming.delete(page);
     this.#slotsComing -= this.#list.slots[page];
-    const slots = this.#slots.fill(page, this.#list.slots[page]);
+    const slots = this.slots.fill(page, this.#list.slots[page]);
     for (const evictee of evictees) {
       this.#isListed[evictee] = 0;
       this.#release(this.#list.parent[evictee]);
@@ -222,7 +203,7 @@ export class Residency {
 
   /** Number of slots that pages in transit need beyond the empty ones. */
   get #lackingSlots(): number {
-    return Math.max(0, this.#slotsComing - this.#slots.empty);
+    return Math.max(0, this.#slotsComing - this.slots.empty);
   }
 
   #noteNoRoom(slots: number, need: number): void {
@@ -249,7 +230,7 @@ export class Residency {
   #rankEvictable(): void {
     this.#evictees.clear();
     this.#isListed.fill(0);
-    for (const page of this.#slots.pages()) {
+    for (const page of this.slots.pages()) {
       if (!this.#isEvictable(page)) continue;
       this.#isListed[page] = 1;
       this.#evictees.add(page, this.#evictionPriority(page));
@@ -322,7 +303,7 @@ export class Residency {
    * Reserves slots for one more page in transit. Returns false, and reserves nothing, if too few pages are less needed.
    */
   #makeRoom(page: number): boolean {
-    const lacking = this.#slotsComing + this.#list.slots[page] - this.#slots.empty;
+    const lacking = this.#slotsComing + this.#list.slots[page] - this.slots.empty;
     const before = this.#reserved.length;
     while (this.#slotsAside < lacking) {
       const evictee = this.#nextEvictable();
@@ -340,7 +321,7 @@ export class Residency {
   /** Returns the pages to evict for a new page; undefined if too few pages are sufficiently less needed. */
   #evicteesFor(page: number): number[] | undefined {
     const evictees: number[] = [];
-    for (let room = this.#slots.empty; room < this.#list.slots[page];) {
+    for (let room = this.slots.empty; room < this.#list.slots[page];) {
       const aside = this.#reserved.shift();
       if (aside !== undefined) this.#slotsAside -= this.#list.slots[aside];
       const evictee = aside !== undefined && this.#isEvictable(aside) ? aside : this.#nextEvictable();

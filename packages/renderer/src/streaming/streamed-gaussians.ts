@@ -1,8 +1,8 @@
-import { GaussianSplatError, type Bounds, type ShDegree, type Vector3 } from '@gaussian-splat/core';
-import type { GaussianBlock, GaussianScene } from '../gaussian-scene.js';
+import { GaussianSplatError, type Bounds, type Vector3 } from '@gaussian-splat/core';
+import type { GaussianBlock } from '../gaussian-scene.js';
 import { constants } from '../generated/shaders.js';
-import { GpuMemory, withMemoryCheck } from '../gpu/memory.js';
-import { MemoryLedger, type Reservation } from '../memory-ledger.js';
+import { type GpuMemory, withMemoryCheck } from '../gpu/memory.js';
+import { SceneBuffers } from '../scene-buffers.js';
 import { detailBudgetOn, type DetailBudget } from '../stages/detail-budget.js';
 import { ARRIVAL_MS, PageFadeIn } from './page-fade-in.js';
 import { SLOT_CHUNKS, type DetailManifest } from './manifest.js';
@@ -17,7 +17,6 @@ import type { SlotWords } from './slot-words.js';
 import { UploadBudget } from './upload-budget.js';
 import { aheadMs } from './camera-motion.js';
 import { PageFeedback } from './page-feedback.js';
-import type { ShPrecision } from '../pack/words.js';
 
 export interface PoolOptions {
   /**
@@ -93,19 +92,11 @@ function requireTime(arrivalMs: number): void {
  * Draw the scene with the setting `detail` above 0 or with a `splatBudget`. Without either, every view requests the
  * finest pages.
  */
-export class StreamedGaussians implements GaussianScene {
-  /** Capacity of the pool in splats. */
-  readonly count: number;
+export class StreamedGaussians extends SceneBuffers {
   /** Number of splats in the finest level. */
   readonly leafCount: number;
-  readonly shDegree: ShDegree;
-  readonly shPrecision: ShPrecision;
-  readonly antialiased: boolean;
-  /** Variance in px² of the screen-space low-pass filter of training; undefined is the classic 0.3. */
-  readonly filterVariance?: number | undefined;
   /** Sort order of splats in training: see `CloudHints.order`. */
   readonly order: 'pixel' | undefined;
-  readonly origin: Vector3;
   readonly bounds: Bounds;
   readonly blocks: readonly GaussianBlock[];
   readonly detailBudget: DetailBudget;
@@ -113,8 +104,6 @@ export class StreamedGaussians implements GaussianScene {
   readonly pageRequests: PageFeedback;
   readonly #source: PageSource;
   readonly #options: PoolOptions;
-  readonly #memory: GpuMemory;
-  readonly #reservation: Reservation;
   readonly #pool: PagePool;
   readonly #residency: Residency;
   readonly #traffic: PageStreamer<readonly SlotWords[]>;
@@ -130,41 +119,26 @@ export class StreamedGaussians implements GaussianScene {
   #uploaded = { blocks: 0, bytes: 0, milliseconds: 0 };
   #version = 1;
 
-  private constructor(device: GPUDevice, source: PageSource, options: PoolOptions) {
+  private constructor(device: GPUDevice, memory: GpuMemory, source: PageSource, options: PoolOptions) {
+    requireTime(options.arrivalMs ?? ARRIVAL_MS);
     const { scene, list } = source;
-    const { shDegree, shPrecision, antialiased, filterVariance, order, origin, bounds } = scene;
-    this.order = order;
-    [this.shDegree, this.shPrecision, this.antialiased, this.filterVariance, this.origin] = [
-      shDegree,
-      shPrecision,
-      antialiased,
-      filterVariance,
-      origin,
-    ];
-    this.bounds = bounds;
+    const size = poolSize(scene, list, options.memoryBudget ?? DEFAULT_BUDGET);
+    const { slots } = size;
+    super(memory, scene, slots * SLOT_CHUNKS * constants.CULL_GROUP);
+    memory.reserve('pages of a streamed scene', poolBytes(scene, size));
+    ({ order: this.order, bounds: this.bounds } = scene);
     this.detailBudget = detailBudgetOn(device);
     this.leafCount = scene.splats;
     this.#source = source;
     this.#options = options;
-    requireTime(options.arrivalMs ?? ARRIVAL_MS);
-    const size = poolSize(scene, list, options.memoryBudget ?? DEFAULT_BUDGET);
-    const { slots } = size;
-    this.count = slots * SLOT_CHUNKS * constants.CULL_GROUP;
-    this.#reservation = MemoryLedger.of(device).reserve('pages of a streamed scene', poolBytes(scene, size));
-    this.#memory = new GpuMemory(device);
-    try {
-      this.#pool = new PagePool(device, this.#memory, scene, size);
-      this.pageRequests = new PageFeedback(device, this.#memory, {
-        pages: list.count,
-        aheadMs: () => aheadMs(this.#traffic.arrivalMs),
-        version: () => this.#version,
-        onFeedback: (requests, lacking) => this.#take(requests, lacking),
-        onStale: () => this.#options.onChange?.(),
-      });
-    } catch (error) {
-      this.destroy();
-      throw error;
-    }
+    this.#pool = new PagePool(device, memory, scene, size);
+    this.pageRequests = new PageFeedback(device, memory, {
+      pages: list.count,
+      aheadMs: () => aheadMs(this.#traffic.arrivalMs),
+      version: () => this.#version,
+      onFeedback: (requests, lacking) => this.#take(requests, lacking),
+      onStale: () => this.#options.onChange?.(),
+    });
     this.blocks = this.#pool.pages;
     this.#residency = new Residency(list, slots, source.isCached);
     this.#traffic = new PageStreamer(this.#residency, {
@@ -200,7 +174,11 @@ export class StreamedGaussians implements GaussianScene {
    */
   static async openSource(device: GPUDevice, source: PageSource, options: PoolOptions): Promise<StreamedGaussians> {
     const what = `streamed scene of ${source.scene.splats} splats`;
-    const scene = await withMemoryCheck(device, what, () => new StreamedGaussians(device, source, options));
+    const scene = await withMemoryCheck(
+      device,
+      what,
+      (memory) => new StreamedGaussians(device, memory, source, options),
+    );
     try {
       const { signal = new AbortController().signal } = options;
       signal.throwIfAborted();
@@ -222,16 +200,11 @@ export class StreamedGaussians implements GaussianScene {
     return this.#version;
   }
 
-  /** Bytes of allocated GPU memory. */
-  get byteLength(): number {
-    return this.#memory.byteLength;
-  }
-
   /** The pages on the GPU, from the last feedback pass, and what limits them. */
   get progress(): StreamProgress {
-    const { residents, slotsInUse, chunks, lacksSlots } = this.#residency;
+    const { slots, slotsInUse, chunks, lacksSlots } = this.#residency;
     return progressOf({
-      resident: residents,
+      resident: slots.count,
       total: this.#source.list.count,
       coming: this.#traffic.underWay + this.#placing,
       splats: chunks * constants.CULL_GROUP,
@@ -246,7 +219,7 @@ export class StreamedGaussians implements GaussianScene {
    * slot.
    */
   get pagesInSlots(): readonly (number | undefined)[] {
-    return Array.from(this.#residency.pageIn, (page) => (page === NONE ? undefined : page));
+    return Array.from(this.#residency.slots.pageIn, (page) => (page === NONE ? undefined : page));
   }
 
   /**
@@ -279,12 +252,11 @@ export class StreamedGaussians implements GaussianScene {
     if (this.#traffic.waiting + this.#placing > 0) queueMicrotask(() => this.#options.onChange?.());
   }
 
-  destroy(): void {
+  override destroy(): void {
     this.#isDestroyed = true;
-    this.#traffic?.close();
-    this.pageRequests?.destroy();
-    this.#reservation.release();
-    this.#memory.destroy();
+    this.#traffic.close();
+    this.pageRequests.destroy();
+    super.destroy();
   }
 
   /** Number of pages with assigned slots that are still uploading or fading in. */

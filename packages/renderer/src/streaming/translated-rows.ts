@@ -21,7 +21,7 @@ export class TranslatedRows {
     this.#layout = chunkLayout(format);
     this.#list = list;
     this.#residency = residency;
-    const slots = residency.pageIn.length;
+    const slots = residency.slots.pageIn.length;
     this.#table = new DetailTable(slots);
     this.#rows = Array.from({ length: slots }, (_, slot) => new PageRows(this.#table.rowsOf(slot)));
   }
@@ -37,7 +37,7 @@ export class TranslatedRows {
       parent[page] === NONE
         ? undefined
         : this.#rowsOf(parent[page], parentChunk[page]).above(parentChunk[page] % SLOT_CHUNKS);
-    const slots = this.#residency.slotsOf(page);
+    const slots = this.#residency.slots.of(page);
     parts.forEach((words, k) => {
       const { chunks } = words;
       const rows = this.#rows[slots[k]];
@@ -49,8 +49,8 @@ export class TranslatedRows {
 
   /** Sets the fade-in of a page, 0 to `ARRIVED`. The page replaces its parent chunks by this fraction. */
   setArrived(page: number, arrived: number): void {
-    if (this.#list.slots[page] === 1) this.#setSlot(this.#residency.slotOf[page], arrived);
-    else for (const slot of this.#residency.slotsOf(page)) this.#setSlot(slot, arrived);
+    if (this.#list.slots[page] === 1) this.#setSlot(this.#residency.slots.slotOf[page], arrived);
+    else for (const slot of this.#residency.slots.of(page)) this.#setSlot(slot, arrived);
     this.#setBelow(page, arrived);
   }
 
@@ -69,7 +69,7 @@ export class TranslatedRows {
   }
 
   #rowsOf(page: number, chunk: number): PageRows {
-    return this.#rows[this.#residency.slotsOf(page)[Math.floor(chunk / SLOT_CHUNKS)]];
+    return this.#rows[this.#residency.slots.of(page)[Math.floor(chunk / SLOT_CHUNKS)]];
   }
 
   #setSlot(slot: number, arrived: number): void {
@@ -82,12 +82,12 @@ export class TranslatedRows {
     if (parent === NONE) return;
     const first = this.#list.parentChunk[page];
     if (this.#list.slots[parent] === 1 && this.#list.parentChunks[page] === 1) {
-      const slot = this.#residency.slotOf[parent];
+      const slot = this.#residency.slots.slotOf[parent];
       this.#rows[slot].setBelow(first, arrived);
       this.#table.touch(slot);
       return;
     }
-    const slots = this.#residency.slotsOf(parent);
+    const slots = this.#residency.slots.of(parent);
     const end = first + this.#list.parentChunks[page];
     for (let chunk = first; chunk < end; chunk++) {
       const slot = slots[Math.floor(chunk / SLOT_CHUNKS)];
