@@ -111,15 +111,12 @@ export abstract class MediaProperties extends SplatProperties {
    * @returns Rejects with a `NotSupportedError` if there is no animated scene, and with an `AbortError` if `pause()` or
    * another `src` intervenes.
    */
-  async play(): Promise<void> {
-    const { playback } = this.core;
-    // The removal of the scene that a new `src` replaces must not reject the promise.
-    await this.core.sources.ownEntry.requested();
-    this.core.prepareToPlay();
+  play(): Promise<void> {
     // A scene that is shown plays, also while a child loads.
-    if (!playback.canPlay) await playback.waitFor(this.ready);
-    if (!playback.canPlay) throw new DOMException('There is no scene that moves', 'NotSupportedError');
-    playback.play();
+    return this.core.playback.playWhenReady(this.core.sources.ownEntry.requested(), () => {
+      this.core.prepareToPlay();
+      return this.ready;
+    });
   }
 
   /** Pauses playback. */

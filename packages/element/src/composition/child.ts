@@ -1,4 +1,4 @@
-import { multiply, type Camera, type Matrix4, type Vector3 } from '@gaussian-splat/core';
+import { Lazy, multiply, type Camera, type Matrix4, type Vector3 } from '@gaussian-splat/core';
 import { ReactiveElement, type PropertyDeclarations } from 'lit';
 import type { Box } from '@gaussian-splat/renderer';
 import { declarations, type Attribute, type Attributes } from '../attributes.js';
@@ -12,7 +12,6 @@ import { CLOCK_ATTRIBUTES, type MESH_ATTRIBUTES, type PropertiesOf } from './att
 import type { WorldEntry } from '../world-entry.js';
 import { SourceEntry, type EntryCore, type SourceOwner } from '../source-entry.js';
 import { cameraInScene, isSolid, matrixOf, matrixOfFrame, readMatrix, sceneToWorld, transposed } from './placing.js';
-import { Lazy } from '../lazy.js';
 import type { Interaction, InteractionHost, ScenePointerEvent } from './interaction.js';
 
 type Written = string | number | ArrayLike<number | string> | null | undefined;
@@ -92,7 +91,7 @@ export abstract class SplatChild extends ReactiveElement implements SourceOwner 
 
   /** Whether the child is loaded and shown. */
   get loaded(): boolean {
-    return this.entry.state === 'ready';
+    return this.entry.scene.state === 'ready';
   }
 
   /** Resolves when the child is shown ({@link loaded}), has failed ({@link error}), or has no source. Never rejects. */
@@ -102,7 +101,7 @@ export abstract class SplatChild extends ReactiveElement implements SourceOwner 
 
   /** The error for which the child is not shown; null without an error. */
   get error(): ElementError | null {
-    return this.entry.error;
+    return this.entry.scene.error;
   }
 
   /** Loading progress of the child, 0..1. */
@@ -155,13 +154,9 @@ export abstract class SplatChild extends ReactiveElement implements SourceOwner 
    * @returns Rejects with a `NotSupportedError` if nothing is animated, and with an `AbortError` if `pause()` is called
    * or another `src` is set first.
    */
-  async play(): Promise<void> {
+  play(): Promise<void> {
     this.#drive();
-    const { playback } = this.entry;
-    await this.entry.requested();
-    await playback.waitFor(this.ready);
-    if (!playback.canPlay) throw new DOMException('There is nothing that moves', 'NotSupportedError');
-    playback.play();
+    return this.entry.playback.playWhenReady(this.entry.requested(), () => this.ready);
   }
 
   /** Pauses playback at the frame that is shown, and gives the child its own clock. */

@@ -167,14 +167,23 @@ export class PlaybackController {
   }
 
   /**
-   * Returns a promise that resolves with `ready`, when a scene can be played. Rejects with an `AbortError` if {@link
-   * stopWaits} is called first.
+   * Plays when a scene can be played, for `play()` of elements.
+   * @param requested Fulfills when the scene of the attributes is requested, so that the removal of the previous scene
+   * does not reject the result. Rejects if that scene is not to be played.
+   * @param ready Returns a promise that fulfills when the scene is shown or nothing is pending.
+   * @returns Rejects with a `NotSupportedError` if nothing is animated, and with an `AbortError` if {@link pause} or
+   * {@link stopWaits} is called first.
    */
-  waitFor(ready: Promise<void>): Promise<void> {
-    return new Promise((resolve, reject) => {
-      this.#waits.add(reject);
-      void ready.then(resolve).finally(() => this.#waits.delete(reject));
-    });
+  async playWhenReady(requested: Promise<unknown>, ready: () => Promise<void>): Promise<void> {
+    await requested;
+    const isReady = ready();
+    if (!this.canPlay)
+      await new Promise<void>((resolve, reject) => {
+        this.#waits.add(reject);
+        void isReady.then(resolve).finally(() => this.#waits.delete(reject));
+      });
+    if (!this.canPlay) throw new DOMException('There is no scene that moves', 'NotSupportedError');
+    this.play();
   }
 
   /** Rejects the promises of all pending calls of `play`. */
