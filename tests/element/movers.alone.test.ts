@@ -22,8 +22,8 @@ function framed(changes: Partial<RawAttributes> = {}): CameraController {
 
 function rotating(camera: CameraController, rotationPerSecond = 100 * degrees): AutoRotateController {
   const controller = new AutoRotateController(host, {
-    ...{ camera, mayTurn: true, attributes: { autoRotateDelay: 0, rotationPerSecond } },
-    requestFrame: () => undefined,
+    ...{ camera, mayTurn: true },
+    core: { attributes: { autoRotateDelay: 0, rotationPerSecond }, requestFrame: () => undefined },
   });
   controller.start();
   return controller;
@@ -61,8 +61,8 @@ test('the prompt leaves the camera where it was, at a limit too', (t) => {
   for (const limits of [{}, { maxCameraOrbit: '2deg auto auto' }, { minCameraOrbit: '-1deg auto auto' }]) {
     const camera = framed(limits);
     const prompt = new PromptController(host, {
-      ...{ camera, mayPrompt: true, promptWiggles: true, attributes: { interactionPromptThreshold: 10 } },
-      requestFrame: () => undefined,
+      ...{ camera, mayPrompt: true, promptWiggles: true },
+      core: { attributes: { interactionPromptThreshold: 10 }, requestFrame: () => undefined },
     });
     prompt.hostUpdated();
     t.mock.timers.tick(20);

@@ -327,9 +327,10 @@ test('levels of detail are built once pictures have moved slowly for 1.5 s, rest
         return {} as SceneLoader;
       },
     },
-    ...{ memoryBudget: undefined, splatsChanged: () => undefined, warn: () => undefined },
+    ...{ memoryBudget: undefined, splatsChanged: () => undefined, owner: { warn: () => undefined } },
   });
-  detail.update({ gaussians: { count: 60_000, blocks: [] }, detail: {} } as unknown as LoadedGaussians);
+  const place = { isLost: false };
+  detail.update({ place, gaussians: { count: 60_000, blocks: [] }, detail: {} } as unknown as LoadedGaussians);
   const pass = (milliseconds: number): void => {
     now += milliseconds;
     context.mock.timers.tick(milliseconds);

@@ -16,7 +16,7 @@ function limitsWith(memoryBudget: number | undefined, sceneLimits: SceneLimits):
   const host = {
     attributes: { crossorigin: null, loading: 'eager' },
     services: { sceneLimits, urlModifier: null },
-    ...{ isInSight: true, isConnected: true, memoryBudget },
+    ...{ core: { isInSight: true }, isConnected: true, memoryBudget },
     scene: { want: (request: SceneRequest | null) => (found = request), see: () => undefined, isOther: () => false },
   };
   const source = { src: 'https://a.example/a.ply', contract: null, chain: null, postprocess: null };

@@ -3,22 +3,22 @@ import type { ReactiveControllerHost } from 'lit';
 import type { Attributes } from './attributes.js';
 import type { CameraAction } from './camera/gestures.js';
 import { viewName, type ViewName } from './camera/spoken.js';
-import type { A11yStrings } from './strings.js';
 import type { AnnouncerController, AnnouncerHost } from './controllers/announcer-controller.js';
 import type { AutoRotateHost } from './controllers/auto-rotate-controller.js';
 import type { CameraController } from './controllers/camera-controller.js';
 import type { FlyHost } from './controllers/fly-controller.js';
 import type { InputOptions } from './controllers/input-controller.js';
-import type { MotionController, MotionHost } from './controllers/motion-controller.js';
+import type { MotionController, MotionCore, MotionHost } from './controllers/motion-controller.js';
 import { prefersReducedMotion, reducedMotion, type Mover } from './controllers/motion.js';
 import type { PromptController, PromptHost } from './controllers/prompt-controller.js';
 
 /** The part of the element that {@link Behaviors} uses. */
-export interface BehaviorHost extends Omit<MotionHost, 'startTurning'> {
+export interface BehaviorHost extends MotionCore {
   readonly attributes: Attributes;
   readonly camera: CameraController;
   readonly input: InputOptions;
-  readonly strings: A11yStrings;
+  /** Whether automatic motion is allowed. */
+  readonly mayMove: boolean;
   readonly surface: HTMLElement | null;
   /** The walk controller; its `value` is undefined until its code is loaded. */
   readonly walk: { readonly value: { readonly isRefused: boolean; ahead(meters: number): void } | undefined };
@@ -34,9 +34,10 @@ export class Behaviors implements AutoRotateHost, PromptHost, FlyHost, Announcer
   /** The interaction prompt; undefined until the code of the camera controls is loaded. */
   prompt: PromptController | undefined;
   readonly camera: CameraController;
-  readonly #host: BehaviorHost;
+  readonly core: BehaviorHost;
   readonly #element: ReactiveControllerHost;
-  readonly #movers: Mover[] = [];
+  /** Automatic motions of the camera, which {@link advance} advances in each frame. */
+  readonly movers: Mover[] = [];
 
   // The following code is loaded on demand, because few pages need it.
 
@@ -44,7 +45,7 @@ export class Behaviors implements AutoRotateHost, PromptHost, FlyHost, Announcer
   readonly announcer: Lazy<AnnouncerController>;
   /** The button with which a visitor pauses automatic motion. */
   readonly motion: Lazy<MotionController>;
-  readonly #autoRotate = new Lazy('the code that turns the camera', async () => {
+  readonly autoRotate = new Lazy('the code that turns the camera', async () => {
     const { AutoRotateController } = await import('./controllers/auto-rotate-controller.js');
     return this.#added(new AutoRotateController(this.#element, this));
   });
@@ -54,7 +55,7 @@ export class Behaviors implements AutoRotateHost, PromptHost, FlyHost, Announcer
   });
 
   constructor(element: ReactiveControllerHost & HTMLElement, host: BehaviorHost) {
-    this.#host = host;
+    this.core = host;
     this.camera = host.camera;
     this.#element = element;
     this.motion = new Lazy(
@@ -75,8 +76,9 @@ export class Behaviors implements AutoRotateHost, PromptHost, FlyHost, Announcer
       hostUpdated: () => {
         this.camera.pivot = this.#flies ? 'eye' : 'target';
         if (this.mayFly) this.#fly.want(this.#warnOf);
-        if (this.attributes.autoRotate) this.#autoRotate.want(this.#warnOf);
-        if (this.attributes.autoRotate || this.player) this.motion.want(this.#warnOf);
+        const { attributes, player } = host;
+        if (attributes.autoRotate) this.autoRotate.want(this.#warnOf);
+        if (attributes.autoRotate || player) this.motion.want(this.#warnOf);
       },
       hostConnected: () => {
         // `focusout` is fired also when the focus moves from the frame to a button in the shadow tree.
@@ -91,26 +93,6 @@ export class Behaviors implements AutoRotateHost, PromptHost, FlyHost, Announcer
     });
   }
 
-  get attributes(): Attributes {
-    return this.#host.attributes;
-  }
-
-  get surface(): HTMLElement | null {
-    return this.#host.surface;
-  }
-
-  get strings(): A11yStrings {
-    return this.#host.strings;
-  }
-
-  get player(): MotionHost['player'] {
-    return this.#host.player;
-  }
-
-  get isOnShow(): boolean {
-    return this.#host.isOnShow;
-  }
-
   get viewName(): ViewName {
     const { theta, phi } = this.camera.orbit;
     return viewName(theta, phi);
@@ -121,28 +103,21 @@ export class Behaviors implements AutoRotateHost, PromptHost, FlyHost, Announcer
    * sides.
    */
   get isFocused(): boolean {
-    return !this.#flies && (this.surface?.matches(':focus') ?? false);
+    return !this.#flies && (this.core.surface?.matches(':focus') ?? false);
   }
 
   get mayTurn(): boolean {
-    const mayMove = this.isOnShow && !prefersReducedMotion() && !this.motion.value?.isHeld;
-    return this.attributes.autoRotate && mayMove && !hasKeyboard(this.surface);
+    const { attributes, mayMove, surface } = this.core;
+    return attributes.autoRotate && mayMove && !hasKeyboard(surface);
   }
 
   get mayPrompt(): boolean {
-    return this.#host.input.enabled && this.attributes.interactionPrompt === 'auto' && this.isOnShow;
+    const { input, attributes, isOnShow } = this.core;
+    return input.enabled && attributes.interactionPrompt === 'auto' && isOnShow;
   }
 
   get mayFly(): boolean {
-    return this.#host.input.enabled && this.#flies && !this.#walks;
-  }
-
-  requestFrame(): void {
-    this.#host.requestFrame();
-  }
-
-  startTurning(): void {
-    this.#autoRotate.value?.start();
+    return this.core.input.enabled && this.#flies && !this.#walks;
   }
 
   flyBy(right: number, up: number, forward: number): void {
@@ -154,45 +129,40 @@ export class Behaviors implements AutoRotateHost, PromptHost, FlyHost, Announcer
    * Whether the prompt swings the camera: only if the page selects it and the visitor does not prefer reduced motion.
    */
   get promptWiggles(): boolean {
-    return this.attributes.interactionPromptStyle === 'wiggle' && !prefersReducedMotion();
+    return this.core.attributes.interactionPromptStyle === 'wiggle' && !prefersReducedMotion();
   }
 
   /**
    * Whether the camera walks on the floor. It does not move until a floor is found, and it flies if the scene has none.
    */
   get #walks(): boolean {
-    return this.attributes.navigation === 'walk' && !this.#host.walk.value?.isRefused;
+    return this.core.attributes.navigation === 'walk' && !this.core.walk.value?.isRefused;
   }
 
   get #flies(): boolean {
-    return this.attributes.navigation !== 'orbit';
+    return this.core.attributes.navigation !== 'orbit';
   }
 
   promptBy(prompt: PromptController): void {
     this.prompt = this.#added(prompt);
   }
 
-  /** Adds an automatic motion of the camera, which {@link advance} then advances in each frame. */
-  add(mover: Mover): void {
-    this.#movers.push(mover);
-  }
-
   #added<T extends Mover>(mover: T): T {
-    this.add(mover);
+    this.movers.push(mover);
     this.#element.requestUpdate();
     return mover;
   }
 
-  readonly #warnOf = ({ message }: Error): void => this.#host.warn(message);
+  readonly #warnOf = ({ message }: Error): void => this.core.warn(message);
 
   /** Restarts the delay after which auto-rotation begins. */
   rest(): void {
-    this.#autoRotate.value?.rest();
+    this.autoRotate.value?.rest();
   }
 
   /** Advances all automatic motions to the time of a frame, `now` in milliseconds. */
   advance(now: number): void {
-    for (const mover of this.#movers) if (mover.advance(now)) this.requestFrame();
+    for (const mover of this.movers) if (mover.advance(now)) this.core.requestFrame();
   }
 
   /** Applies a visitor's gesture or key. @returns Whether it has an effect; false only for a zoom beyond its limit. */
@@ -226,7 +196,7 @@ export class Behaviors implements AutoRotateHost, PromptHost, FlyHost, Announcer
     const camera = this.camera;
     if (action.type === 'zoom') {
       const ahead = -Math.log(action.factor);
-      if (this.#walks) return this.#host.walk.value?.ahead(WHEEL_METERS * ahead);
+      if (this.#walks) return this.core.walk.value?.ahead(WHEEL_METERS * ahead);
       return camera.moveBy(0, 0, ahead * camera.bounds.radius);
     }
     const share = camera.fieldOfView.radians / (2 * Math.PI);

@@ -44,11 +44,11 @@ export async function takeImage(host: ImageHost, options: ImageOptions): Promise
 }
 
 /** Waits for all submitted work, then returns whether the device is lost. */
-async function wasLost(backend: Pick<Backend, 'finished' | 'isLost'>): Promise<boolean> {
+async function wasLost(backend: Pick<Backend, 'finished' | 'place'>): Promise<boolean> {
   await backend.finished();
   // The loss is reported in a later task.
   await new Promise((resolve) => setTimeout(resolve));
-  return backend.isLost;
+  return backend.place.isLost;
 }
 
 export const nothingToDraw = (): DOMException =>

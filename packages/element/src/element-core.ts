@@ -4,7 +4,6 @@ import type { ProbeAnswer, ProbePoint } from '@gaussian-splat/renderer/tools';
 import type { ReactiveControllerHost } from 'lit';
 import type { Attributes } from './attributes.js';
 import { Behaviors, type BehaviorHost } from './behaviors.js';
-import type { CameraAction } from './camera/gestures.js';
 import type { ViewerFrame } from './camera/orbit.js';
 import { frameOf } from './camera/settings.js';
 import type { PickedPoint } from './camera/values.js';
@@ -18,18 +17,18 @@ import { SizeController, windowOf } from './controllers/size-controller.js';
 import { ViewController, type ViewHost } from './controllers/view-controller.js';
 import { VisibilityController } from './controllers/visibility-controller.js';
 import type { EffectsHost } from './effects/effects.js';
-import type { CameraChangeSource, GaussianSplatEventMap } from './events.js';
+import type { CameraChangeSource } from './events.js';
 import { isGone } from './gpu/device-failures.js';
 import { FrameScheduler } from './gpu/frame-scheduler.js';
 import type { LoadedGaussians } from './gpu/loaded-gaussians.js';
 import { defaultMemoryBudget } from './gpu/memory-budget.js';
 import { wantHeadset } from './gpu/request-device.js';
-import type { LodSettings, Drawable, ReadCounts } from './gpu/backend.js';
+import type { Drawable, ReadCounts } from './gpu/backend.js';
 import type { SceneRequest } from './loading/protocol.js';
 import type { Frame } from './dynamic/frame-filter.js';
 import type { GeneratorInput } from './dynamic/inputs.js';
 import type { SoundHost } from './dynamic/sound.js';
-import type { DynamicWiring } from './dynamic/dynamic-wiring.js';
+import type { DynamicHost, DynamicWiring } from './dynamic/dynamic-wiring.js';
 import type { QueryHost } from './position-from-point.js';
 import { SourceEntry, type SourceOwner } from './source-entry.js';
 import { SourceList } from './source-list.js';
@@ -62,10 +61,16 @@ export class ElementCore
   /** The clock of the element. */
   readonly playback: PlaybackController;
   readonly live: DynamicWiring;
+  /** Current attributes of the page. */
+  attributes: Attributes;
+  /** Inputs of the page for generators, besides the time. */
+  dynamicValues: DynamicHost['owner']['dynamicValues'] = { pose: undefined, controls: {}, images: {} };
+  /** Texts that screen readers speak, in the language of the page. */
+  strings: A11yStrings = {};
   readonly services: Services;
   readonly source: ElementHost['source'];
   readonly warn: ElementHost['warn'];
-  readonly #host: ElementHost;
+  readonly #part: ElementHost['part'];
   readonly #visibility: VisibilityController;
   #counts: ReadCounts | undefined;
   #children: MutationObserver | undefined;
@@ -96,7 +101,7 @@ export class ElementCore
     async () => {
       const { WalkController } = await import('./walk/walk-controller.js');
       const walk = new WalkController(this.element, this);
-      this.behaviors.add(walk);
+      this.behaviors.movers.push(walk);
       return walk;
     },
     this.#update,
@@ -153,11 +158,11 @@ export class ElementCore
   /** Template of the prompt, reset button and keyboard help; undefined until the code for input is loaded. */
   handsView: TemplateModel['handsView'];
 
-  constructor(element: ReactiveControllerHost & HTMLElement, host: ElementHost) {
+  constructor(element: ReactiveControllerHost & HTMLElement, attributes: Attributes, host: ElementHost) {
     this.element = element;
-    this.#host = host;
-    ({ services: this.services, source: this.source, warn: this.warn } = host);
-    this.camera = new CameraController(host.attributes.camera, () => this.requestFrame());
+    this.attributes = attributes;
+    ({ services: this.services, source: this.source, part: this.#part, warn: this.warn } = host);
+    this.camera = new CameraController(attributes.camera, () => this.requestFrame());
     this.#visibility = new VisibilityController(element, () => this.#onVisibility());
     this.size = new SizeController(
       element,
@@ -188,20 +193,6 @@ export class ElementCore
     });
   }
 
-  // Current attributes of the page.
-
-  get attributes(): Attributes {
-    return this.#host.attributes;
-  }
-
-  get dynamicValues(): ElementHost['dynamicValues'] {
-    return this.#host.dynamicValues;
-  }
-
-  get strings(): A11yStrings {
-    return this.#host.strings;
-  }
-
   get input(): InputOptions {
     const { cameraControls: enabled, disableZoom, disablePan, disableTap, touchAction, zoom: wheel } = this.attributes;
     return { enabled, zoom: !disableZoom, pan: !disablePan, tap: !disableTap, touchAction, wheel };
@@ -220,19 +211,15 @@ export class ElementCore
   }
 
   get canvas(): HTMLCanvasElement | null {
-    return this.#host.part<HTMLCanvasElement>('canvas');
+    return this.#part<HTMLCanvasElement>('canvas');
   }
 
   get surface(): HTMLElement | null {
-    return this.#host.part('#view');
+    return this.#part('#view');
   }
 
   get hotspotLayer(): HTMLElement | null {
-    return this.#host.part('#hotspots');
-  }
-
-  dispatch(event: GaussianSplatEventMap[keyof GaussianSplatEventMap]): void {
-    this.element.dispatchEvent(event);
+    return this.#part('#hotspots');
   }
 
   // Interface of scripts.
@@ -303,11 +290,6 @@ export class ElementCore
     this.element.requestUpdate();
   }
 
-  /** Replaces the canvas after the element was moved out of a document that no longer has a window. */
-  leaveWindowless(): void {
-    this.view.renewCanvas();
-  }
-
   /** Returns the visible surface under a point of the page, in CSS pixels: see the element's method of this name. */
   async positionFromPoint(clientX: number, clientY: number): Promise<PickedPoint | null> {
     const { positionFromPoint } = await queries.get();
@@ -353,24 +335,8 @@ export class ElementCore
     return this.input.enabled && this.isOnShow && this.#hands.value?.isTouch === true && this.camera.isTouched;
   }
 
-  get hasImage(): boolean {
-    return this.sources.hasImage;
-  }
-
   get player(): BehaviorHost['player'] {
     return this.effects.value?.playerWith(this.sources.player) ?? this.sources.player;
-  }
-
-  get world(): SourceList['world'] {
-    return this.sources.world;
-  }
-
-  get shown(): readonly LoadedGaussians[] {
-    return this.sources.shown;
-  }
-
-  get levels(): LodSettings {
-    return this.sources.levels;
   }
 
   /** The camera at the default size of an element, for a generator that runs before the image has a size. */
@@ -417,14 +383,6 @@ export class ElementCore
     this.view.requestFrame();
   }
 
-  beforeFrame(now: number): void {
-    this.behaviors.advance(now);
-  }
-
-  advanceScene(camera: Camera, now: number): void {
-    this.sources.advance(camera, now);
-  }
-
   afterFrame(camera: Camera): void {
     this.drawnFrom = camera;
     this.labels.value?.frameDrawn(camera);
@@ -433,7 +391,7 @@ export class ElementCore
 
   cameraChanged(source: CameraChangeSource): void {
     this.behaviors.announcer.value?.cameraMoved();
-    this.dispatch(new CustomEvent('camera-change', { detail: { source } }));
+    this.element.dispatchEvent(new CustomEvent('camera-change', { detail: { source } }));
   }
 
   /** Requests a frame and discards the counts, because the set of drawn splats has changed. */
@@ -441,14 +399,6 @@ export class ElementCore
     this.#counts = undefined;
     this.view.requestFrame();
     this.element.requestUpdate();
-  }
-
-  reportMotionFrame(isWhole: boolean): void {
-    this.sources.reportMotionFrame(isWhole);
-  }
-
-  drawingFailed(error: unknown): void {
-    this.sources.fail(error);
   }
 
   /** Prepares effects and settings of a scene before its first frame. */
@@ -475,12 +425,8 @@ export class ElementCore
   }
 
   posterDismissed(): void {
-    this.dispatch(new Event('poster-dismissed'));
+    this.element.dispatchEvent(new Event('poster-dismissed'));
     this.sources.startPlaying();
-  }
-
-  act(action: CameraAction): boolean {
-    return this.behaviors.act(action);
   }
 
   /**
@@ -491,7 +437,7 @@ export class ElementCore
     // A click while walking selects a destination.
     if (this.attributes.navigation === 'walk') return;
     this.positionFromPoint(clientX, clientY).then((point) => {
-      if (point === null) this.act({ type: 'reset' });
+      if (point === null) this.behaviors.act({ type: 'reset' });
       else if (this.input.pan) this.behaviors.aimAt([point.x, point.y, point.z]);
     }, this.#warnOf);
   }
@@ -540,7 +486,7 @@ export class ElementCore
   #onVisibility(): void {
     this.sources.request();
     if (!this.isVisible) this.sources.suspend();
-    this.dispatch(new CustomEvent('model-visibility', { detail: { visible: this.isVisible } }));
+    this.element.dispatchEvent(new CustomEvent('model-visibility', { detail: { visible: this.isVisible } }));
     this.element.requestUpdate();
     this.view.requestFrame();
   }

@@ -1,7 +1,4 @@
-import type { Attributes } from './attributes.js';
-import type { A11yStrings } from './strings.js';
 import type { SharedDevice } from './gpu/shared-device.js';
-import type { DynamicState } from './dynamic/dynamic-model.js';
 import type { SceneLimits } from './loading/protocol.js';
 import type { SceneLoader } from './loading/scene-loader.js';
 
@@ -30,15 +27,12 @@ export interface Source {
 }
 
 /**
- * Interface of the element for its {@link ElementCore}: its attributes, and the parts of its shadow tree after the
- * first rendering.
+ * Interface of the element for its {@link ElementCore}: its source, and the parts of its shadow tree after the first
+ * rendering.
  */
 export interface ElementHost {
-  readonly attributes: Attributes;
   readonly services: Services;
   readonly source: Source & { readonly splatShader?: unknown };
-  readonly strings: A11yStrings;
-  readonly dynamicValues: Omit<DynamicState, 'timeSeconds'>;
   part<T extends HTMLElement>(selector: string): T | null;
   warn(sentence: string): void;
 }

@@ -7,11 +7,9 @@ import { visitorMessage, type ElementError } from './errors.js';
 import { SharedDevice } from './gpu/shared-device.js';
 import { SceneLoader } from './loading/scene-loader.js';
 import type { GeneratorInput } from './dynamic/inputs.js';
-import type { DynamicState } from './dynamic/dynamic-model.js';
 import type { SceneLimits } from './loading/protocol.js';
 import { CONTROL_PREFIX, readControls, readNumbers } from './dynamic/values.js';
 import { ElementCore } from './element-core.js';
-import type { ElementHost } from './element-host.js';
 import type { SceneStats } from './stats.js';
 import { template } from './template.js';
 import { ViewingMethods } from './viewing.js';
@@ -182,10 +180,7 @@ export class GaussianSplatElement extends ViewingMethods {
 
   static override styles = styles;
 
-  #attributes: Attributes;
   readonly #internals: ElementInternals | null;
-  #dynamicValues: Omit<DynamicState, 'timeSeconds'> = { pose: undefined, controls: {}, images: {} };
-  #strings: A11yStrings = {};
   /** Words in the language of the page. */
   #words: A11yStrings = {};
   #lang = '';
@@ -198,9 +193,13 @@ export class GaussianSplatElement extends ViewingMethods {
 
   constructor() {
     super();
-    this.#attributes = this.#readAttributes();
     this.#internals = (!isServer && this.attachInternals?.()) || null;
-    this.core = new ElementCore(this, GaussianSplatElement.#hostOf(this));
+    this.core = new ElementCore(this, this.#readAttributes(), {
+      source: this,
+      services: this.constructor as typeof GaussianSplatElement,
+      part: <T extends HTMLElement>(selector: string) => this.renderRoot?.querySelector<T>(selector) ?? null,
+      warn: (sentence) => this.#warn(sentence),
+    });
   }
 
   /** Whether the scene is shown. */
@@ -282,7 +281,7 @@ export class GaussianSplatElement extends ViewingMethods {
   /** Style sheets do not move to another document, and neither does the frame if its document has lost its window. */
   adoptedCallback(from: Document): void {
     if (this.shadowRoot) adoptStyles(this.shadowRoot);
-    if (from.defaultView === null) this.core.leaveWindowless();
+    if (from.defaultView === null) this.core.view.renewCanvas();
   }
 
   /** `moveBefore()` moves the element with its state: this callback replaces the two above. */
@@ -320,18 +319,18 @@ export class GaussianSplatElement extends ViewingMethods {
   }
 
   protected override render(): TemplateResult {
-    const { sources, reveal, behaviors, labels } = this.core;
+    const { attributes, strings, sources, reveal, behaviors, labels } = this.core;
     const { state, progress, hasImage } = sources;
     // If one of several scenes fails, the others stay visible.
-    const error = hasImage ? null : this.core.sources.error;
+    const error = hasImage ? null : sources.error;
     const { prompt, promptWiggles, announcer, motion } = behaviors;
     return template({
       label: this.alt ?? this.getAttribute?.('aria-label') ?? null,
       canMove: this.cameraControls && error === null,
-      navigation: this.#attributes.navigation,
+      navigation: attributes.navigation,
       walkKeys: this.core.walk.value?.keys,
       poster: this.poster,
-      posterLoading: this.#attributes.loading,
+      posterLoading: attributes.loading,
       showPoster: reveal.isCovered,
       onReveal: reveal.mayReveal ? null : this.#onReveal,
       isLoading: state === 'loading',
@@ -341,37 +340,18 @@ export class GaussianSplatElement extends ViewingMethods {
       prompt: !prompt?.isShown ? 'none' : promptWiggles ? 'wiggle' : 'basic',
       motionView: motion.value?.view,
       onReset: this.core.offersReset ? this.#onReset : null,
-      strings: this.#strings,
+      strings,
       spoken: error ? this.#spokenError(error) : (announcer.value?.text ?? ''),
       hotspots: labels.value?.names ?? [],
       handsView: this.core.handsView,
     });
   }
 
-  /** Interface of the element for its core. */
-  static #hostOf(element: GaussianSplatElement): ElementHost {
-    return {
-      source: element,
-      get attributes() {
-        return element.#attributes;
-      },
-      services: element.constructor as typeof GaussianSplatElement,
-      get strings() {
-        return element.#strings;
-      },
-      get dynamicValues() {
-        return element.#dynamicValues;
-      },
-      part: <T extends HTMLElement>(selector: string) => element.renderRoot?.querySelector<T>(selector) ?? null,
-      warn: (sentence) => element.#warn(sentence),
-    };
-  }
-
   /** The page's own text, if there is one; none for a poster that replaces the scene. */
   #spokenError(error: ElementError): string {
     const isUnsupported = error.code === 'unsupported';
     const own = this.#slotted(isUnsupported ? 'fallback' : 'error')?.textContent.trim();
-    return own || (isUnsupported && this.#hasPoster ? '' : visitorMessage(error, this.#strings));
+    return own || (isUnsupported && this.#hasPoster ? '' : visitorMessage(error, this.core.strings));
   }
 
   get #hasPoster(): boolean {
@@ -389,7 +369,7 @@ export class GaussianSplatElement extends ViewingMethods {
   };
 
   readonly #onReset = (): void => {
-    this.core.act({ type: 'reset' });
+    this.core.behaviors.act({ type: 'reset' });
     // The button is removed.
     this.focus({ preventScroll: true });
   };
@@ -404,10 +384,10 @@ export class GaussianSplatElement extends ViewingMethods {
 
   /** Attributes apply at once for code that calls a method right after setting one. */
   protected override applyAttributes(): void {
-    const before = this.#attributes;
-    this.#attributes = this.#readAttributes();
-    if (this.#set.size > 0 || JSON.stringify(before.camera) !== JSON.stringify(this.#attributes.camera)) {
-      this.core.camera.applySettings(this.#attributes.camera, this.#set);
+    const before = this.core.attributes.camera;
+    const { camera } = (this.core.attributes = this.#readAttributes());
+    if (this.#set.size > 0 || JSON.stringify(before) !== JSON.stringify(camera)) {
+      this.core.camera.applySettings(camera, this.#set);
       this.#set.clear();
     }
   }
@@ -419,7 +399,7 @@ export class GaussianSplatElement extends ViewingMethods {
   #readDynamicValues(): void {
     const pose = readNumbers(this.pose);
     if (pose === undefined && this.pose) this.#warn('<gaussian-splat>: pose expects numbers; the rest pose counts.');
-    this.#dynamicValues = {
+    this.core.dynamicValues = {
       pose,
       ...readControls(this.attributes, this.inputValues, (sentence) => this.#warn(sentence)),
     };
@@ -428,7 +408,7 @@ export class GaussianSplatElement extends ViewingMethods {
   #readStrings(): void {
     const strings = readSpokenStrings(this.a11y);
     if (strings === null) this.#warn('<gaussian-splat>: a11y expects a JSON object of words; the English ones count.');
-    this.#strings = { ...this.#words, ...strings };
+    this.core.strings = { ...this.#words, ...strings };
   }
 
   /** Uses the language of the page as soon as its strings are loaded. */

@@ -1,7 +1,7 @@
 /** Videos: recorded by the browser in real time, or drawn frame by frame as images. */
+import type { Lazy } from '@gaussian-splat/core';
 import type { CameraController } from './controllers/camera-controller.js';
 import type { PlaybackController } from './controllers/playback-controller.js';
-import type { Lazy } from './lazy.js';
 import { nothingToDraw, takeImage, type ImageHost } from './capture-image.js';
 import type { ImageOptions } from './viewing.js';
 import { frameCount, frameShares, type CameraPath, type PathName } from './views/camera-path.js';

@@ -9,10 +9,9 @@ import {
   type PlaybackEvent,
   type PlaybackHost,
 } from './controllers/playback-controller.js';
-import { SceneController, type Entrance, type SceneHost, type SceneState } from './controllers/scene-controller.js';
+import { SceneController, type Entrance, type SceneHost } from './controllers/scene-controller.js';
 import { SourceController, type SourceHost } from './controllers/source-controller.js';
 import type { ElementError } from './errors.js';
-import type { GaussianSplatEventMap } from './events.js';
 import type { ViewerFrame } from './camera/orbit.js';
 import type { SceneBounds } from './camera/settings.js';
 import type { LoadedGaussians } from './gpu/loaded-gaussians.js';
@@ -71,13 +70,13 @@ export interface EntryList {
 export interface SourceOwner {
   readonly element: ReactiveControllerHost & HTMLElement;
   readonly source: Source;
-  readonly dynamicValues: DynamicHost['dynamicValues'];
+  readonly dynamicValues: DynamicHost['owner']['dynamicValues'];
   /** False if the source follows the clock of its parent element. */
   readonly hasOwnClock: boolean;
   /** Attributes of a child, which take precedence over those of the element. */
   readonly overrides?: Partial<Attributes>;
   /** Opens a source that contains no splats, such as a mesh; undefined for splats. */
-  readonly open?: SceneHost['open'];
+  readonly open?: SceneHost['owner']['open'];
   /** Sets the transform of the source; absent if its frame is that of the world. */
   place?(member: WorldEntry, core: EntryCore): void;
   /** Converts a camera from the frame of the world to that of the source; absent if the frames are equal. */
@@ -109,7 +108,7 @@ export class SourceEntry implements SceneHost, SourceHost, PlaybackHost, Dynamic
     () => this.#updateDetail(),
   );
   /** The element that the entry belongs to, or belonged to last. */
-  #core: EntryCore | undefined;
+  core: EntryCore | undefined;
   #isIn = false;
   /** The loaded source in the world; undefined while it is not shown. */
   member: WorldEntry | undefined;
@@ -125,7 +124,7 @@ export class SourceEntry implements SceneHost, SourceHost, PlaybackHost, Dynamic
   constructor(owner: SourceOwner, core?: EntryCore) {
     this.owner = owner;
     this.element = owner.element;
-    this.#core = core;
+    this.core = core;
     this.#isIn = core !== undefined;
     this.ownClock = new PlaybackController(this);
     this.live = new DynamicWiring(this);
@@ -135,17 +134,9 @@ export class SourceEntry implements SceneHost, SourceHost, PlaybackHost, Dynamic
 
   // Interface for the element and for children.
 
-  get state(): SceneState {
-    return this.scene.state;
-  }
-
-  get error(): ElementError | null {
-    return this.scene.error;
-  }
-
   /** The clock of the source: its own, or that of the parent element. */
   get playback(): PlaybackController {
-    return this.owner.hasOwnClock || !this.#core ? this.ownClock : this.#core.sources.ownEntry.ownClock;
+    return this.owner.hasOwnClock || !this.core ? this.ownClock : this.core.sources.ownEntry.ownClock;
   }
 
   /** Duration of the animation in seconds; NaN for a source that does not move. */
@@ -155,7 +146,7 @@ export class SourceEntry implements SceneHost, SourceHost, PlaybackHost, Dynamic
 
   /** Whether the source is shown in full or as a preview. */
   get isShown(): boolean {
-    return this.member !== undefined && (this.state === 'ready' || this.scene.isPreview);
+    return this.member !== undefined && (this.scene.state === 'ready' || this.scene.isPreview);
   }
 
   /** Fulfills when the source and its levels of detail are neither loading nor pending. Never rejects. */
@@ -174,20 +165,20 @@ export class SourceEntry implements SceneHost, SourceHost, PlaybackHost, Dynamic
 
   /** Moves the entry with its loaded scene to another element; null removes it from its element. */
   attach(core: EntryCore | null): void {
-    if (this.#isIn && core === this.#core) return this.update();
-    if (this.#isIn) this.#core!.sources.remove(this);
+    if (this.#isIn && core === this.core) return this.update();
+    if (this.#isIn) this.core!.sources.remove(this);
     this.#isIn = core !== null;
     if (core === null) return;
-    this.#core = core;
+    this.core = core;
     core.sources.add(this);
     this.update();
     const { scene } = this.scene;
-    if (scene && !scene.isLost) void this.show(scene, 'again').catch((error: unknown) => this.scene.fail(error));
+    if (scene && !scene.place.isLost) void this.show(scene, 'again').catch((error: unknown) => this.scene.fail(error));
   }
 
   /** The element that the entry belongs to; null if there is none. */
   get parent(): Element | null {
-    return this.#isIn ? this.#core!.element : null;
+    return this.#isIn ? this.core!.element : null;
   }
 
   /** Reads the attributes of its owner and of the parent element again, which may request another source. */
@@ -256,18 +247,18 @@ export class SourceEntry implements SceneHost, SourceHost, PlaybackHost, Dynamic
 
   /** The clock of the source if it plays automatically, else undefined. */
   get player(): PlaybackController | undefined {
-    return this.#core && this.attributes.autoplay ? this.ownClock : undefined;
+    return this.core && this.attributes.autoplay ? this.ownClock : undefined;
   }
 
   /** Starts automatic playback if it is allowed, and if the source has neither played nor been paused before. */
   startPlaying(): void {
-    if (!this.#hasBegun && this.#core?.mayMove && this.player?.canPlay) this.ownClock.play();
+    if (!this.#hasBegun && this.core?.mayMove && this.player?.canPlay) this.ownClock.play();
   }
 
   /** Sets the transform of the source in the world. Called before each frame. */
   place(): void {
     // The getter `placement` may replace the splats of a member in the world.
-    if (this.member?.placement && this.#isIn) this.owner.place?.(this.member, this.#core!);
+    if (this.member?.placement && this.#isIn) this.owner.place?.(this.member, this.core!);
   }
 
   /**
@@ -299,43 +290,27 @@ export class SourceEntry implements SceneHost, SourceHost, PlaybackHost, Dynamic
   get attributes(): Attributes {
     const { overrides } = this.owner;
     // A child has attributes before it belongs to an element.
-    return overrides ? { ...(this.#core?.attributes as Attributes), ...overrides } : this.#core!.attributes;
+    return overrides ? { ...(this.core?.attributes as Attributes), ...overrides } : this.core!.attributes;
   }
 
   get services(): Services {
-    return this.#core?.services ?? NO_SERVICES;
-  }
-
-  get isInSight(): boolean {
-    return this.#core!.isInSight;
+    return this.core?.services ?? NO_SERVICES;
   }
 
   get isConnected(): boolean {
-    return this.#isIn && this.#core!.element.isConnected;
-  }
-
-  get wantsPreviews(): boolean {
-    return this.#core!.wantsPreviews;
+    return this.#isIn && this.core!.element.isConnected;
   }
 
   get memoryBudget(): number | undefined {
-    return this.#core?.memoryBudget;
-  }
-
-  get open(): SceneHost['open'] {
-    return this.owner.open;
+    return this.core?.memoryBudget;
   }
 
   get shown(): readonly LoadedGaussians[] {
-    return this.#isOwn ? this.#core!.sources.shown : [];
-  }
-
-  get dynamicValues(): DynamicHost['dynamicValues'] {
-    return this.owner.dynamicValues;
+    return this.#isOwn ? this.core!.sources.shown : [];
   }
 
   get dynamicRequest(): SceneHost['dynamicRequest'] {
-    const core = this.#core!;
+    const core = this.core!;
     return {
       element: this.element,
       runtimeLocation: this.services.runtimeLocation,
@@ -354,37 +329,29 @@ export class SourceEntry implements SceneHost, SourceHost, PlaybackHost, Dynamic
   // Notifications of the controllers.
 
   requestFrame(): void {
-    this.#core?.requestFrame();
+    this.core?.requestFrame();
   }
 
   splatsChanged(): void {
-    this.#core?.splatsChanged();
-  }
-
-  warn(sentence: string): void {
-    this.owner.warn(sentence);
-  }
-
-  dispatch(event: GaussianSplatEventMap[keyof GaussianSplatEventMap]): void {
-    this.element.dispatchEvent(event);
+    this.core?.splatsChanged();
   }
 
   playbackEvent(type: PlaybackEvent): void {
-    this.dispatch(new Event(type));
+    this.element.dispatchEvent(new Event(type));
     if (type !== 'play' && type !== 'pause') return;
     if (type === 'play') this.#hasBegun = true;
     // Custom states and the pause button of the element depend on the state of playback.
-    this.#core?.element.requestUpdate();
+    this.core?.element.requestUpdate();
   }
 
   async show(scene: LoadedGaussians, entrance: Entrance): Promise<void> {
     if (!this.#isIn) return;
     if (!this.#isOwn) this.ownClock.setDuration(this.duration);
-    await this.#core!.sources.show(this, scene, entrance, (member) => {
+    await this.core!.sources.show(this, scene, entrance, (member) => {
       this.leave();
       this.member = member;
       this.place();
-      this.live.notifyInputs(this.#isOwn ? this.#core!.inputs : this.inputs);
+      this.live.notifyInputs(this.#isOwn ? this.core!.inputs : this.inputs);
     });
   }
 
@@ -394,7 +361,7 @@ export class SourceEntry implements SceneHost, SourceHost, PlaybackHost, Dynamic
       this.ownClock.empty();
       this.live.notifyInputs([]);
     }
-    if (this.#isIn) this.#core!.sources.left(clear);
+    if (this.#isIn) this.core!.sources.left(clear);
   }
 
   /**
@@ -408,34 +375,36 @@ export class SourceEntry implements SceneHost, SourceHost, PlaybackHost, Dynamic
   }
 
   loadStarted(): void {
-    this.dispatch(new Event('loadstart'));
+    this.element.dispatchEvent(new Event('loadstart'));
   }
 
   progressed(...[loaded, total, share = total ? loaded / total : undefined]: Parameters<ProgressListener>): void {
     this.#bytes = [loaded, total];
     this.progress = share === undefined ? null : Math.min(1, share);
-    this.#core?.element.requestUpdate();
-    this.dispatch(new ProgressEvent('progress', { lengthComputable: total !== undefined, loaded, total: total ?? 0 }));
+    this.core?.element.requestUpdate();
+    this.element.dispatchEvent(
+      new ProgressEvent('progress', { lengthComputable: total !== undefined, loaded, total: total ?? 0 }),
+    );
   }
 
   previewShown({ gaussians }: LoadedGaussians): void {
-    this.dispatch(new CustomEvent('preview', { detail: { splats: gaussians.count } }));
+    this.element.dispatchEvent(new CustomEvent('preview', { detail: { splats: gaussians.count } }));
     this.progressed(...this.#bytes);
   }
 
   loaded(url: string): void {
     this.notifyLoaded(url);
     this.update();
-    this.#core?.sources.settledOne();
+    this.core?.sources.settledOne();
   }
 
   notifyLoaded(url: string): void {
-    for (const type of ['loadeddata', ...PLAYABLE] as const) this.dispatch(new Event(type));
-    this.dispatch(new CustomEvent('load', { detail: { url } }));
+    for (const type of ['loadeddata', ...PLAYABLE] as const) this.element.dispatchEvent(new Event(type));
+    this.element.dispatchEvent(new CustomEvent('load', { detail: { url } }));
   }
 
   notifyFailed(error: ElementError): void {
-    this.dispatch(new CustomEvent('error', { detail: error }));
+    this.element.dispatchEvent(new CustomEvent('error', { detail: error }));
   }
 
   emptied(): void {
@@ -444,34 +413,34 @@ export class SourceEntry implements SceneHost, SourceHost, PlaybackHost, Dynamic
     this.#hasBegun = this.#isForNext;
     this.ownClock.empty();
     this.ownClock.stopWaits();
-    this.dispatch(new Event('emptied'));
+    this.element.dispatchEvent(new Event('emptied'));
     // The other sources count as restored: the scene that replaces this one reports its own loss.
-    if (!this.#isOwn || this.state === 'empty') this.contextChanged('contextrestored');
+    if (!this.#isOwn || this.scene.state === 'empty') this.contextChanged('contextrestored');
     // The others may move without this one.
-    this.#core?.sources.changed();
+    this.core?.sources.changed();
   }
 
   failed(error: ElementError): void {
     this.progress = null;
     this.notifyFailed(error);
-    this.#core?.sources.settledOne();
+    this.core?.sources.settledOne();
   }
 
   contextChanged(type: 'contextlost' | 'contextrestored'): void {
-    this.#core?.sources.contextChanged(type, this);
+    this.core?.sources.contextChanged(type, this);
   }
 
   get #isOwn(): boolean {
-    return this.#core?.sources.ownEntry === this;
+    return this.core?.sources.ownEntry === this;
   }
 
   #updateDetail(): void {
-    this.#detail.value?.update(this.#isIn && this.state === 'ready' ? this.scene.scene : null);
+    this.#detail.value?.update(this.#isIn && this.scene.state === 'ready' ? this.scene.scene : null);
   }
 
-  readonly #warnOf = ({ message }: Error): void => this.warn(message);
+  readonly #warnOf = ({ message }: Error): void => this.owner.warn(message);
 
   #seenFrom(camera: Camera): Camera {
-    return this.owner.seenFrom?.(camera, this.member, this.#core!) ?? camera;
+    return this.owner.seenFrom?.(camera, this.member, this.core!) ?? camera;
   }
 }

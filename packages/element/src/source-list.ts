@@ -2,7 +2,7 @@ import { Lazy, type Camera } from '@gaussian-splat/core';
 import { World } from '@gaussian-splat/renderer';
 import { boundsOfWorld } from '@gaussian-splat/renderer/tools';
 import type { SceneBounds } from './camera/settings.js';
-import type { MotionHost } from './controllers/motion-controller.js';
+import type { MotionCore } from './controllers/motion-controller.js';
 import type { Entrance, SceneState } from './controllers/scene-controller.js';
 import type { ElementError } from './errors.js';
 import type { ViewerFrame } from './camera/orbit.js';
@@ -17,6 +17,7 @@ const STATES: readonly SceneState[] = ['ready', 'loading', 'waiting', 'failed'];
 
 /** The part of the element that the list uses. */
 export interface ListCore {
+  readonly element: EventTarget;
   readonly camera: Pick<CameraController, 'frame' | 'refine' | 'isTouched'>;
   readonly frame: ViewerFrame;
   requestFrame(): void;
@@ -27,7 +28,6 @@ export interface ListCore {
   /** Stops drawing. `clear` also clears the canvas; otherwise the last image stays. */
   stopDrawing(clear: boolean): void;
   warn(sentence: string): void;
-  dispatch(event: Event): void;
 }
 
 /**
@@ -108,7 +108,7 @@ export class SourceList implements EntryList {
     const show = async (): Promise<void> => {
       if (scene.model) await (await this.meshes.get()).prepare(scene);
       await this.#core.prepareFor(scene);
-      if (scene.isDestroyed || scene.isLost || entry.scene.scene !== scene || !this.#all.includes(entry)) return;
+      if (scene.isDestroyed || scene.place.isLost || entry.scene.scene !== scene || !this.#all.includes(entry)) return;
       scene.onChange = () => this.#core.requestFrame();
       for (const warning of scene.warnings) this.#core.warn(`<gaussian-splat>: ${warning}`);
       enter(new WorldEntry(this.world, scene));
@@ -181,9 +181,9 @@ export class SourceList implements EntryList {
   settledOne(): void {
     this.changed();
     // An element without a source of its own fires `load` or `error` when all children are shown or have failed.
-    const isOver = this.#all.every(({ state }) => state !== 'loading' && state !== 'waiting');
-    if (this.ownEntry.state !== 'empty' || !isOver || this.#isLoadReported) return;
-    const shown = this.#all.find(({ state }) => state === 'ready');
+    const isOver = this.#all.every(({ scene: { state } }) => state !== 'loading' && state !== 'waiting');
+    if (this.ownEntry.scene.state !== 'empty' || !isOver || this.#isLoadReported) return;
+    const shown = this.#all.find(({ scene }) => scene.state === 'ready');
     this.#isLoadReported = shown !== undefined;
     if (shown) this.ownEntry.notifyLoaded(shown.scene.url);
     else if (this.error) this.ownEntry.notifyFailed(this.error);
@@ -198,7 +198,7 @@ export class SourceList implements EntryList {
     if (type === 'contextlost') this.#lost.add(entry);
     else this.#lost.delete(entry);
     if (type === 'contextlost' ? before === 0 : before > 0 && this.#lost.size === 0)
-      this.#core.dispatch(new Event(type));
+      this.#core.element.dispatchEvent(new Event(type));
   }
 
   /**
@@ -221,9 +221,9 @@ export class SourceList implements EntryList {
   // State of all sources together.
 
   get state(): SceneState {
-    const { state } = this.ownEntry;
+    const { state } = this.ownEntry.scene;
     if (state !== 'empty' && state !== 'failed') return state;
-    return STATES.find((each) => this.#all.some((entry) => entry.state === each)) ?? state;
+    return STATES.find((each) => this.#all.some(({ scene }) => scene.state === each)) ?? state;
   }
 
   /**
@@ -231,9 +231,9 @@ export class SourceList implements EntryList {
    * if there is none.
    */
   get error(): ElementError | null {
-    const { error, state } = this.ownEntry;
+    const { error, state } = this.ownEntry.scene;
     if (error || state !== 'empty' || this.state !== 'failed') return error;
-    return this.#all.find((entry) => entry.error)?.error ?? null;
+    return this.#all.find(({ scene }) => scene.error)?.scene.error ?? null;
   }
 
   /** Fulfills when no source is loading or pending. Never rejects. */
@@ -243,14 +243,14 @@ export class SourceList implements EntryList {
 
   /** Mean loading progress of all sources, 0..1; null while it is unknown. */
   get progress(): number | null {
-    const wanted = this.#all.filter(({ state }) => state !== 'empty' && state !== 'failed');
-    const shares = wanted.map(({ state, progress }) => (state === 'ready' ? 1 : progress));
+    const wanted = this.#all.filter(({ scene: { state } }) => state !== 'empty' && state !== 'failed');
+    const shares = wanted.map(({ scene, progress }) => (scene.state === 'ready' ? 1 : progress));
     const known = shares.filter((share) => share !== null);
     return known.length > 0 ? known.reduce((sum, share) => sum + share, 0) / shares.length : null;
   }
 
   get hasImage(): boolean {
-    return this.#all.some(({ state, scene }) => state === 'ready' || scene.isPreview);
+    return this.#all.some(({ scene }) => scene.state === 'ready' || scene.isPreview);
   }
 
   get isPreview(): boolean {
@@ -285,7 +285,7 @@ export class SourceList implements EntryList {
   }
 
   /** Plays and pauses all sources that play automatically; undefined if there are none. */
-  get player(): MotionHost['player'] {
+  get player(): MotionCore['player'] {
     const clocks = this.#all.flatMap(({ player }) => player ?? []);
     if (clocks.length === 0) return undefined;
     const playable = clocks.filter(({ canPlay }) => canPlay);
@@ -299,7 +299,7 @@ export class SourceList implements EntryList {
 
   get stats(): SourceEntry['stats'][] {
     return this.#all.length > 1
-      ? this.#all.flatMap((entry) => (entry.state === 'empty' && entry === this.ownEntry ? [] : [entry.stats]))
+      ? this.#all.flatMap((entry) => (entry.scene.state === 'empty' && entry === this.ownEntry ? [] : [entry.stats]))
       : [];
   }
 
@@ -341,7 +341,8 @@ export class SourceList implements EntryList {
   #setDuration(): void {
     const { ownEntry } = this;
     // A scene that is about to be replaced is still shown, but its clock is that of the next scene.
-    if (ownEntry.scene.isOutgoing && (ownEntry.state === 'waiting' || ownEntry.state === 'loading')) return;
+    const { isOutgoing, state } = ownEntry.scene;
+    if (isOutgoing && (state === 'waiting' || state === 'loading')) return;
     // Sources that were lost with a device will be restored, and their playback then continues.
     if (this.#lost.size > 0) return;
     const clock = ownEntry.ownClock;

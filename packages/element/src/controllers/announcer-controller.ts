@@ -4,7 +4,7 @@ import type { A11yStrings } from '../strings.js';
 
 export interface AnnouncerHost {
   readonly viewName: ViewName;
-  readonly strings: A11yStrings;
+  readonly core: { readonly strings: A11yStrings };
   /** Whether the frame has keyboard focus. */
   readonly isFocused: boolean;
 }
@@ -62,7 +62,7 @@ export class AnnouncerController implements ReactiveController {
     const name = this.#of.viewName;
     if (!this.#of.isFocused || name === this.#spoken) return;
     this.#spoken = name;
-    this.say(this.#of.strings[name] ?? `View from ${name.replace('-', ' ')}`);
+    this.say(this.#of.core.strings[name] ?? `View from ${name.replace('-', ' ')}`);
   };
 
   /** Screen readers read the name and the keys of the frame on focus, so only later moves are announced. */

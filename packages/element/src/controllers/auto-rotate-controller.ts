@@ -4,14 +4,16 @@ import type { CameraController } from './camera-controller.js';
 import { MAX_MOVER_STEP_MS, type Mover } from './motion.js';
 
 export interface AutoRotateHost {
-  readonly attributes: Pick<Attributes, 'autoRotateDelay' | 'rotationPerSecond'>;
+  readonly core: {
+    readonly attributes: Pick<Attributes, 'autoRotateDelay' | 'rotationPerSecond'>;
+    requestFrame(): void;
+  };
   readonly camera: Pick<CameraController, 'turnBy'>;
   /**
    * Whether the camera may rotate: the attribute `auto-rotate` is set, the scene is visible, motion is not reduced or
    * stopped, and the frame has no keyboard focus.
    */
   readonly mayTurn: boolean;
-  requestFrame(): void;
 }
 
 /** Rotates the camera around the scene while no visitor interacts, as on a turntable. */
@@ -32,38 +34,34 @@ export class AutoRotateController implements ReactiveController, Mover {
   }
 
   hostUpdated(): void {
-    if (!this.#of.mayTurn) this.#stop();
+    if (!this.#of.mayTurn) this.hostDisconnected();
     else if (!this.#isTurning && this.#timer === undefined) this.rest();
-  }
-
-  hostDisconnected(): void {
-    this.#stop();
   }
 
   /** Stops the rotation, and starts it again after `autoRotateDelay` milliseconds without another call. */
   rest(): void {
-    this.#stop();
+    this.hostDisconnected();
     if (!this.#of.mayTurn) return;
-    this.#timer = setTimeout(() => this.start(), this.#of.attributes.autoRotateDelay);
+    this.#timer = setTimeout(() => this.start(), this.#of.core.attributes.autoRotateDelay);
   }
 
   /** Starts the rotation without a delay. */
   start(): void {
-    this.#stop();
+    this.hostDisconnected();
     if (!this.#of.mayTurn) return;
     this.#isTurning = true;
-    this.#of.requestFrame();
+    this.#of.core.requestFrame();
   }
 
   advance(now: number): boolean {
     if (!this.#isTurning) return false;
     if (!this.#of.mayTurn) {
-      this.#stop();
+      this.hostDisconnected();
       return false;
     }
     const stepMs = this.#lastStep === undefined ? 0 : Math.min(MAX_MOVER_STEP_MS, now - this.#lastStep);
     this.#lastStep = now;
-    const speed = this.#of.attributes.rotationPerSecond;
+    const speed = this.#of.core.attributes.rotationPerSecond;
     const step = (speed * stepMs) / 1000;
     // A change of the attribute requests the next frame.
     if (speed === 0) return false;
@@ -75,7 +73,7 @@ export class AutoRotateController implements ReactiveController, Mover {
     return false;
   }
 
-  #stop(): void {
+  hostDisconnected(): void {
     clearTimeout(this.#timer);
     this.#timer = undefined;
     this.#isTurning = false;

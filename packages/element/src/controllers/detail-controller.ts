@@ -34,7 +34,7 @@ export interface DetailHost {
   readonly memoryBudget: number | undefined;
   /** Requests another frame. */
   splatsChanged(): void;
-  warn(sentence: string): void;
+  readonly owner: { warn(sentence: string): void };
 }
 
 /**
@@ -130,11 +130,13 @@ export class DetailController {
         this.#host.splatsChanged();
       },
       (error) => {
-        if (scene.isLost || scene.isDestroyed || scene.gaussians !== gaussians) return;
+        if (scene.place.isLost || scene.isDestroyed || scene.gaussians !== gaussians) return;
         // If the code could not be loaded, the next update tries again.
         if (error instanceof GaussianSplatError && error.code === 'network/unreachable') this.#of = undefined;
         const reason = error instanceof Error ? error.message : String(error);
-        this.#host.warn(`<gaussian-splat>: the scene has no levels of detail, since building them failed: ${reason}`);
+        this.#host.owner.warn(
+          `<gaussian-splat>: the scene has no levels of detail, since building them failed: ${reason}`,
+        );
       },
     );
   }

@@ -5,11 +5,10 @@ import { MAX_MOVER_STEP_MS, type Mover } from './motion.js';
 export interface FlyHost {
   /** The radius of its bounds scales the speed. */
   readonly camera: Pick<CameraController, 'bounds'>;
-  readonly surface: HTMLElement | null;
+  readonly core: { readonly surface: HTMLElement | null; requestFrame(): void };
   readonly mayFly: boolean;
   /** Moves the camera along its own axes, in world units. */
   flyBy(right: number, up: number, forward: number): void;
-  requestFrame(): void;
 }
 
 type Direction = readonly [right: number, up: number, forward: number];
@@ -49,7 +48,7 @@ export class FlyController implements ReactiveController, Mover {
   }
 
   hostUpdated(): void {
-    const surface = this.#of.surface;
+    const { surface } = this.#of.core;
     if (!this.#of.mayFly || surface === null) return this.hostDisconnected();
     if (this.#listening !== undefined) return;
     this.#listening = new AbortController();
@@ -86,7 +85,7 @@ export class FlyController implements ReactiveController, Mover {
     this.#isFast = event.shiftKey;
     if (!event.repeat) this.#move(direction, FIRST_STEP_MS);
     this.#held.set(event.code, direction);
-    this.#of.requestFrame();
+    this.#of.core.requestFrame();
   };
 
   readonly #onUp = (event: KeyboardEvent): void => {

@@ -137,10 +137,6 @@ export class HotspotController implements ReactiveController {
     this.#collect();
   }
 
-  hostUpdated(): void {
-    this.#place();
-  }
-
   hostDisconnected(): void {
     this.#observer?.disconnect();
     for (const type of PANEL_EVENTS) this.#host.removeEventListener(type, this.#findPanels, true);
@@ -158,7 +154,7 @@ export class HotspotController implements ReactiveController {
   readonly #findPanels = (): void => {
     for (const hotspot of this.#hotspots.values())
       hotspot.hasPanel = hotspot.elements.some((element) => element.querySelector(labelParts.panel) !== null);
-    this.#place();
+    this.hostUpdated();
   };
 
   /**
@@ -168,14 +164,14 @@ export class HotspotController implements ReactiveController {
   frameDrawn(camera: Camera): void {
     this.#camera = camera;
     if (this.#hotspots.size === 0) return;
-    this.#place();
+    this.hostUpdated();
     void this.#look();
   }
 
   /** Hides all labels until the next frame, because the scene is gone. */
   forget(): void {
     this.#camera = undefined;
-    this.#place();
+    this.hostUpdated();
   }
 
   /** Returns the position of a hotspot; null for an unknown name, or for a hotspot without a position. */
@@ -224,7 +220,7 @@ export class HotspotController implements ReactiveController {
   /**
    * Moves the boxes to the positions of their points in the last frame. Hides the boxes of points behind the camera.
    */
-  #place(): void {
+  hostUpdated(): void {
     const boxes = this.#of.hotspotLayer?.children;
     if (boxes === undefined) return;
     // All reads precede all writes, because each read after a write would cause another layout.
@@ -299,7 +295,7 @@ export class HotspotController implements ReactiveController {
     }));
     const answers = await this.#of.probe(points);
     answers.forEach(({ transmittance }, i) => (asked[i].isOccluded = transmittance < HIDDEN_BELOW));
-    this.#place();
+    this.hostUpdated();
   }
 }
 

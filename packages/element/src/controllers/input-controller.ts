@@ -41,8 +41,10 @@ export interface InputHost {
   readonly hotspotLayer: HTMLElement | null;
   /** Interactions that the page allows. The controller reads them after every update of the element. */
   readonly input: InputOptions;
-  /** Applies a camera action. @returns False if the action has no effect, for example a zoom at the limit. */
-  act(action: CameraAction): boolean;
+  readonly behaviors: {
+    /** Applies a camera action. @returns False if the action has no effect, for example a zoom at the limit. */
+    act(action: CameraAction): boolean;
+  };
   /** Called for a double click or a double tap, with its position in CSS pixels of the viewport. */
   pick(clientX: number, clientY: number): void;
   /** Called for the space bar: stops or resumes automatic motion. Returns false if there is no automatic motion. */
@@ -97,18 +99,10 @@ export class InputController implements ReactiveController {
   }
 
   hostConnected(): void {
-    this.#sync();
+    this.hostUpdated();
   }
 
   hostUpdated(): void {
-    this.#sync();
-  }
-
-  hostDisconnected(): void {
-    this.#stop();
-  }
-
-  #sync(): void {
     this.#surface = this.#of.surface;
     const layer = this.#of.hotspotLayer;
     if (this.#surface === null || layer === null) return;
@@ -118,7 +112,7 @@ export class InputController implements ReactiveController {
     if (!enabled) setSelectable(layer, true);
     // Lit updates the element once more after its removal. A document listener that is added then would leak the
     // element.
-    if (!enabled || !this.#surface.isConnected) return this.#stop();
+    if (!enabled || !this.#surface.isConnected) return this.hostDisconnected();
     this.#listening ??= this.#listen(this.#surface, targets);
     // A wheel listener that may prevent scrolling slows the page, so there is one only if the wheel zooms.
     if (zoom && wheel !== 'none') this.#wheel ??= this.#listenToWheel(targets);
@@ -151,7 +145,7 @@ export class InputController implements ReactiveController {
     return listening;
   }
 
-  #stop(): void {
+  hostDisconnected(): void {
     this.#listening?.abort();
     this.#listening = undefined;
     this.#stopWheel();
@@ -288,7 +282,7 @@ export class InputController implements ReactiveController {
    */
   readonly #onWheel = (event: WheelEvent): void => {
     if (!this.#wheelZooms(event)) return;
-    if (this.#of.act(wheelOf(event)) || event.ctrlKey) event.preventDefault();
+    if (this.#of.behaviors.act(wheelOf(event)) || event.ctrlKey) event.preventDefault();
   };
 
   #wheelZooms(event: WheelEvent): boolean {
@@ -328,7 +322,7 @@ export class InputController implements ReactiveController {
   #perform(action: CameraAction): boolean {
     const { zoom, pan } = this.#of.input;
     if ((action.type === 'zoom' && !zoom) || (action.type === 'pan' && !pan)) return false;
-    this.#of.act(action);
+    this.#of.behaviors.act(action);
     return true;
   }
 }

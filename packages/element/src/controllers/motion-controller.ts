@@ -24,15 +24,20 @@ const SIGNS = {
   play: ['Start the motion', 'M8 5v14l11-7z'],
 } as const;
 
-export interface MotionHost {
+/** The part of the element that the control of automatic motion uses. */
+export interface MotionCore {
   readonly attributes: Pick<Attributes, 'autoRotate'>;
   /** Whether the scene is shown: in the viewport, and not covered by a poster. */
   readonly isOnShow: boolean;
   /** Plays and pauses all sources with `autoplay`, and an animated shader. Undefined if there are neither. */
   readonly player: Pick<PlaybackController, 'canPlay' | 'paused' | 'play' | 'pause'> | undefined;
   readonly strings: A11yStrings;
-  /** Starts the automatic rotation of the camera at once. */
-  startTurning(): void;
+}
+
+export interface MotionHost {
+  readonly core: MotionCore;
+  /** The automatic rotation of the camera; its `value` is undefined until its code is loaded. */
+  readonly autoRotate: { readonly value: { start(): void } | undefined };
 }
 
 /**
@@ -62,8 +67,8 @@ export class MotionController implements ReactiveController {
    * button.
    */
   get switch(): 'none' | 'pause' | 'play' {
-    if (!this.#of.isOnShow || this.#host.slot === 'media' || !(this.#canTurn || this.#canPlay)) return 'none';
-    const isPlaying = this.#canPlay && !this.#of.player!.paused;
+    if (!this.#of.core.isOnShow || this.#host.slot === 'media' || !(this.#canTurn || this.#canPlay)) return 'none';
+    const isPlaying = this.#canPlay && !this.#of.core.player!.paused;
     return isPlaying || (this.#canTurn && !this.#isHeld) ? 'pause' : 'play';
   }
 
@@ -71,7 +76,7 @@ export class MotionController implements ReactiveController {
   get view(): TemplateResult | undefined {
     const action = this.switch;
     if (action === 'none') return undefined;
-    const { strings } = this.#of;
+    const { strings } = this.#of.core;
     const [word, sign] = SIGNS[action];
     return cornerButton('pause-button', strings[action] ?? word, sign, () => this.toggle(), strings);
   }
@@ -81,23 +86,23 @@ export class MotionController implements ReactiveController {
     const action = this.switch;
     if (action === 'none') return false;
     this.#isHeld = action === 'pause';
-    if (this.#canPlay) this.#of.player![action]();
-    if (action === 'play') this.#of.startTurning();
+    if (this.#canPlay) this.#of.core.player![action]();
+    if (action === 'play') this.#of.autoRotate.value?.start();
     this.#host.requestUpdate();
     return true;
   }
 
   /** Forgets the visitor's choice when the page removes the attributes of automatic motion. */
   hostUpdated(): void {
-    if (!this.#of.attributes.autoRotate && !this.#of.player) this.#isHeld = false;
+    if (!this.#of.core.attributes.autoRotate && !this.#of.core.player) this.#isHeld = false;
   }
 
   get #canTurn(): boolean {
-    return this.#of.attributes.autoRotate && !prefersReducedMotion();
+    return this.#of.core.attributes.autoRotate && !prefersReducedMotion();
   }
 
   /** Whether the scene can be played; also with reduced motion, because the visitor may want to play it. */
   get #canPlay(): boolean {
-    return this.#of.player?.canPlay ?? false;
+    return this.#of.core.player?.canPlay ?? false;
   }
 }

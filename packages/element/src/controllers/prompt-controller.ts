@@ -4,13 +4,15 @@ import type { CameraController } from './camera-controller.js';
 import type { Mover } from './motion.js';
 
 export interface PromptHost {
-  readonly attributes: Pick<Attributes, 'interactionPromptThreshold'>;
+  readonly core: {
+    readonly attributes: Pick<Attributes, 'interactionPromptThreshold'>;
+    requestFrame(): void;
+  };
   readonly camera: Pick<CameraController, 'turnBy'>;
   /** Whether a prompt is useful: the scene is shown, and visitors can move it. */
   readonly mayPrompt: boolean;
   /** Whether the prompt swings the camera. */
   readonly promptWiggles: boolean;
-  requestFrame(): void;
 }
 
 /** Amplitude of the swing, radians. */
@@ -87,8 +89,8 @@ export class PromptController implements ReactiveController, Mover {
       this.#turned = 0;
       this.#set('shown');
       this.#timer = setTimeout(() => this.dismiss(), SHOWN_MS);
-      if (this.#of.promptWiggles) this.#of.requestFrame();
-    }, this.#of.attributes.interactionPromptThreshold);
+      if (this.#of.promptWiggles) this.#of.core.requestFrame();
+    }, this.#of.core.attributes.interactionPromptThreshold);
   }
 
   #set(state: 'idle' | 'shown' | 'done'): void {

@@ -3,8 +3,8 @@ import type { Attributes } from '../attributes.js';
 
 export interface RevealHost {
   readonly attributes: Pick<Attributes, 'reveal'>;
-  /** Whether a frame has been drawn that the element can show. */
-  readonly hasImage: boolean;
+  /** `hasImage`: whether a frame has been drawn that the element can show. */
+  readonly sources: { readonly hasImage: boolean };
   posterDismissed(): void;
 }
 
@@ -34,7 +34,7 @@ export class RevealController {
 
   /** Whether the poster covers the scene. */
   get isCovered(): boolean {
-    return !this.mayReveal || !this.#of.hasImage;
+    return !this.mayReveal || !this.#of.sources.hasImage;
   }
 
   dismiss(): void {

@@ -26,14 +26,14 @@ export type Entrance = 'new' | 'whole' | 'again';
 /** Interface of the element for the controller of its scene. */
 export interface SceneHost {
   readonly services: Services;
-  /** Whether a preview would be visible while a scene loads. */
-  readonly wantsPreviews: boolean;
+  /** `wantsPreviews`: whether a preview would be visible while a scene loads. */
+  readonly core: { readonly wantsPreviews: boolean } | undefined;
   /** Maximum GPU memory of the scene, in bytes; undefined if only the device limits it. */
   readonly memoryBudget: number | undefined;
   /** Parameters for opening a generator that the element provides, not the request: see {@link OpenOptions.live}. */
   readonly dynamicRequest: ReturnType<OpenOptions['live']>;
-  /** Opens sources; default: {@link openGaussians}. A replacement can open sources other than scenes of splats. */
-  readonly open?: typeof openGaussians;
+  /** `open` opens sources other than scenes of splats; default: {@link openGaussians}. */
+  readonly owner: { readonly open?: typeof openGaussians | undefined };
   /** Shows a scene. Resolves when its first frame is drawn. */
   show(scene: LoadedGaussians, entrance: Entrance): Promise<void>;
   /** Called before the current scene is destroyed. If `clear` is true, its last frame must disappear, too. */
@@ -342,8 +342,9 @@ export class SceneController implements ReactiveController {
   }
 
   async #open(request: SceneRequest, signal: AbortSignal, isNew: boolean, onProgress: ProgressListener): Promise<void> {
-    const { services, memoryBudget, wantsPreviews } = this.#of;
-    const onPreview = isNew && wantsPreviews ? (preview: LoadedGaussians) => this.#showPreview(preview) : undefined;
+    const { services, memoryBudget, core, owner } = this.#of;
+    const onPreview =
+      isNew && core!.wantsPreviews ? (preview: LoadedGaussians) => this.#showPreview(preview) : undefined;
     const beforeUpload = (byteLength: number): void => {
       if (signal.aborted) return;
       const isSmall = this.isPreview && byteLength >= MIN_GROWTH * (this.#scene?.gaussians.byteLength ?? 0);
@@ -352,7 +353,7 @@ export class SceneController implements ReactiveController {
     };
     this.#setReleasable(true);
     const scene = await openScene(request, {
-      open: this.#of.open,
+      open: owner.open,
       device: services.sharedDevice,
       loader: services.sceneLoader,
       frameUrl: (url) => this.#of.services.urlModifier?.(url) ?? url,
@@ -362,11 +363,11 @@ export class SceneController implements ReactiveController {
     if (signal.aborted) return scene.destroy();
     const entrance = !isNew ? 'again' : this.#isPreview ? 'whole' : 'new';
     this.#replace(scene, false);
-    await Promise.race([this.#of.show(scene, entrance), scene.lost]);
+    await Promise.race([this.#of.show(scene, entrance), scene.place.lost]);
     if (signal.aborted) return;
-    if (scene.isLost) throw new DeviceLostError(await scene.lost);
+    if (scene.place.isLost) throw new DeviceLostError(await scene.place.lost);
     this.#host.requestUpdate();
-    void scene.lost.then((loss) => {
+    void scene.place.lost.then((loss) => {
       if (this.#scene !== scene) return;
       // If another scene will replace this one, the load of that scene recovers on its own.
       if (this.isOutgoing) this.#drop(false);

@@ -75,11 +75,7 @@ export class SizeController implements ReactiveController {
   }
 
   hostConnected(): void {
-    this.#observe();
-  }
-
-  hostUpdated(): void {
-    this.#observe();
+    this.hostUpdated();
   }
 
   hostDisconnected(): void {
@@ -89,7 +85,7 @@ export class SizeController implements ReactiveController {
     this.#resolution = undefined;
   }
 
-  #observe(): void {
+  hostUpdated(): void {
     const canvas = this.#canvasOf();
     // A canvas that replaces another must be observed again.
     if (canvas !== this.#canvas) this.hostDisconnected();

@@ -11,8 +11,8 @@ export interface SourceHost {
   /** Maximum GPU memory of the scene, in bytes; undefined if only the device limits it. */
   readonly memoryBudget: number | undefined;
   readonly scene: Pick<SceneController, 'want' | 'see' | 'isOther'>;
-  /** Whether the scene would be visible if it were loaded. */
-  readonly isInSight: boolean;
+  /** `isInSight`: whether the scene would be visible if it were loaded. */
+  readonly core: { readonly isInSight: boolean } | undefined;
   /** Whether the element is in the page. An element outside the page requests no scene. */
   readonly isConnected: boolean;
 }
@@ -47,11 +47,11 @@ export class SourceController {
 
   /** Requests the scene of the current source. Loading starts if the source is eager, visible or needed by a script. */
   request(): void {
-    const { attributes, isInSight, isConnected, scene } = this.#host;
+    const { attributes, core, isConnected, scene } = this.#host;
     const request = this.#requestOf(this.#source);
     // A script that plays the scene does not load the one that replaces it.
     if (isConnected) scene.want(request, false);
-    const isSeen = this.#isWanted || isInSight;
+    const isSeen = this.#isWanted || core!.isInSight;
     if (isConnected) scene.want(request, attributes.loading === 'eager' || isSeen);
     scene.see(isSeen);
   }

@@ -15,8 +15,23 @@ export interface ViewHost extends FrameSource {
     Attributes,
     'quality' | 'maxShDegree' | 'order' | 'filter' | 'maxPixelRatio' | 'frameBudget'
   >;
-  /** The loaded scenes that are drawn. */
-  readonly shown: readonly LoadedGaussians[];
+  readonly sources: FrameSource['sources'] & {
+    /** The loaded scenes that are drawn. */
+    readonly shown: readonly LoadedGaussians[];
+    /** Called once in each frame before drawing, with the frame's camera, so that animated scenes advance. */
+    advance(camera: Camera, now: number): void;
+    /** Called for each timed frame of a motion. `isWhole`: whether frames in motion are drawn at full quality. */
+    reportMotionFrame(isWhole: boolean): void;
+    /** Called when drawing has failed permanently. */
+    fail(error: unknown): void;
+  };
+  readonly behaviors: {
+    /**
+     * Called once in each frame before the camera steps, so that automatic motions advance. `now` is
+     * requestAnimationFrame's clock, ms.
+     */
+    advance(now: number): void;
+  };
   readonly camera: CameraController;
   readonly size: SizeController;
   readonly scheduler: FrameScheduler;
@@ -25,20 +40,9 @@ export interface ViewHost extends FrameSource {
   readonly isVisible: boolean;
   /** Time constant of the camera's damped motion, ms; 0 if the camera jumps to its goal. */
   readonly decayMs: number;
-  /**
-   * Called once in each frame before the camera steps, so that automatic motions advance. `now` is
-   * requestAnimationFrame's clock, ms.
-   */
-  beforeFrame(now: number): void;
-  /** Called once in each frame before drawing, with the frame's camera, so that animated scenes advance. */
-  advanceScene(camera: Camera, now: number): void;
   /** Called once in each frame after its commands were submitted, with the frame's camera. */
   afterFrame(camera: Camera): void;
   cameraChanged(source: CameraChangeSource): void;
-  /** Called for each timed frame of a motion. `isWhole`: whether frames in motion are drawn at full quality. */
-  reportMotionFrame(isWhole: boolean): void;
-  /** Called when drawing has failed permanently. */
-  drawingFailed(error: unknown): void;
 }
 
 interface MotionEnd {
@@ -89,7 +93,7 @@ export class ViewController implements FrameClient {
         frameBudget: () => host.attributes.frameBudget,
         requestFrame: () => this.requestFrame(),
         mayFade: () => !this.#backend?.filter,
-        onFrameTimed: (isWhole) => host.reportMotionFrame(isWhole),
+        onFrameTimed: (isWhole) => host.sources.reportMotionFrame(isWhole),
       }));
   }
 
@@ -133,7 +137,7 @@ export class ViewController implements FrameClient {
       this.#backend?.destroy();
       const backend = scene.openBackend(this.#host, {
         onIncomplete: () => this.requestFrame(),
-        onError: (error) => this.#backend === backend && this.#host.drawingFailed(error),
+        onError: (error) => this.#backend === backend && this.#host.sources.fail(error),
       });
       this.#backend = backend;
     }
@@ -182,17 +186,17 @@ export class ViewController implements FrameClient {
     const pixels = this.#pixelsOf(backend);
     // A canvas without a size is not drawn. The size observer requests a frame when the canvas has a size.
     if (pixels === null) return this.#finishUnseen();
-    this.#host.beforeFrame(now);
+    this.#host.behaviors.advance(now);
     const source = camera.step(now, this.#host.decayMs);
     try {
       const request = this.#frameRequest(backend, pixels);
       if (request === null)
-        return void why(({ noContext }) => noContext()).then((error) => this.#host.drawingFailed(error));
-      this.#host.advanceScene(request.camera, now);
+        return void why(({ noContext }) => noContext()).then((error) => this.#host.sources.fail(error));
+      this.#host.sources.advance(request.camera, now);
       this.#render(backend, request, now, source !== null);
       this.#host.afterFrame(request.camera);
     } catch (error) {
-      return this.#host.drawingFailed(error);
+      return this.#host.sources.fail(error);
     }
     if (camera.isMoving) this.requestFrame();
     if (source !== null) this.#host.cameraChanged(source);
@@ -208,7 +212,7 @@ export class ViewController implements FrameClient {
   drawNow(size?: PixelSize, background?: CanvasFrame['background']): HTMLCanvasElement | null {
     const backend = this.#backend;
     const canvas = this.#host.canvas;
-    if (backend === null || backend.isLost || this.#first !== undefined || canvas === null) return null;
+    if (backend === null || backend.place.isLost || this.#first !== undefined || canvas === null) return null;
     const own = this.#pixelsOf(backend);
     if (own === null) return null;
     this.applyRendering(backend);
@@ -224,7 +228,7 @@ export class ViewController implements FrameClient {
    */
   get #isDrawable(): boolean {
     const { canvas, isVisible } = this.#host;
-    if (this.#backend?.isLost !== false || canvas?.ownerDocument.defaultView === null) return false;
+    if (this.#backend?.place.isLost !== false || canvas?.ownerDocument.defaultView === null) return false;
     return this.#first !== undefined || isVisible;
   }
 
@@ -277,7 +281,7 @@ export class ViewController implements FrameClient {
   /** Applies the settings of the page to a backend, for its next frames. */
   applyRendering(backend: Backend): void {
     const { quality, maxShDegree: shDegree, filter, order: choice } = this.#host.attributes;
-    const trainedOrder = this.#host.shown.some(({ order }) => order) ? 'pixel' : 'center';
+    const trainedOrder = this.#host.sources.shown.some(({ order }) => order) ? 'pixel' : 'center';
     const order = choice === 'auto' ? trainedOrder : choice;
     const trained = filter === 'auto' ? undefined : filter;
     backend.setRendering({ quality: quality === 'auto' ? 'default' : quality, shDegree, order, filter: trained });

@@ -20,9 +20,9 @@ export async function buildLevels(
   memoryBudget: number | undefined,
   signal: AbortSignal,
 ): Promise<DetailedGaussians | undefined> {
-  const { device, gaussians } = scene;
-  if (!(await (await loadFirstUse()).selectsLevels(device))) return undefined;
-  const packed = await readPacked(device, gaussians, () => {
+  const { place, gaussians } = scene;
+  if (!(await (await loadFirstUse()).selectsLevels(place.device))) return undefined;
+  const packed = await readPacked(place.device, gaussians, () => {
     signal.throwIfAborted();
     // A sequence frees the splats when it replaces them.
     if (scene.gaussians !== gaussians) throw new Error('other splats are shown');
@@ -34,7 +34,7 @@ export async function buildLevels(
   const levels = await loader.ask<PackedLevels | undefined>({ type: 'levels', packed }, signal, nothing, { transfer });
   if (levels === undefined) return undefined;
   const left = memoryBudget === undefined ? undefined : memoryBudget - gaussians.byteLength;
-  const detailed = await DetailedGaussians.upload(device, gaussians, levels, { memoryBudget: left });
+  const detailed = await DetailedGaussians.upload(place.device, gaussians, levels, { memoryBudget: left });
   if (!signal.aborted) return detailed;
   detailed.destroy();
   throw signal.reason;

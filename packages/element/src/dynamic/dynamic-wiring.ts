@@ -1,22 +1,24 @@
 import { Lazy, type Camera } from '@gaussian-splat/core';
-import { credentialsOf } from '../attributes.js';
+import { credentialsOf, type Attributes } from '../attributes.js';
 import type { PlaybackController } from '../controllers/playback-controller.js';
 import { toElementError } from '../errors.js';
-import type { GaussianSplatEventMap } from '../events.js';
 import type { LoadedGaussians } from '../gpu/loaded-gaussians.js';
-import type { ElementHost } from '../element-host.js';
+import type { Services } from '../element-host.js';
 import type { DynamicListeners, DynamicState } from './dynamic-model.js';
 import type { Backend } from '../gpu/backend.js';
 import type { PostHost } from './post-controller.js';
 
 /** Interface of the element for its models. */
-export interface DynamicHost extends Pick<ElementHost, 'attributes' | 'services' | 'dynamicValues'> {
+export interface DynamicHost {
+  readonly attributes: Attributes;
+  readonly services: Services;
+  /** `dynamicValues`: inputs that the page has set, besides the time. */
+  readonly owner: { readonly dynamicValues: Omit<DynamicState, 'timeSeconds'> };
   readonly playback: PlaybackController;
   /** The loaded scenes that are drawn. */
   readonly shown: readonly LoadedGaussians[];
   requestFrame(): void;
   readonly element: HTMLElement;
-  dispatch(event: GaussianSplatEventMap[keyof GaussianSplatEventMap]): void;
 }
 
 /** Connects the models of an element, which are generators and post-processors, with its state and its events. */
@@ -89,13 +91,14 @@ export class DynamicWiring implements PostHost {
 
   /** Fires `inputs-change` after the current task, unless there are no inputs and there were none before. */
   notifyInputs(inputs: { readonly length: number } = [0]): void {
-    if (inputs.length + this.#inputs > 0) queueMicrotask(() => this.#host.dispatch(new Event('inputs-change')));
+    if (inputs.length + this.#inputs > 0)
+      queueMicrotask(() => this.#host.element.dispatchEvent(new Event('inputs-change')));
     this.#inputs = inputs.length;
   }
 
   /** Inputs that the page has set for the models, and the current time of playback. */
   get state(): DynamicState {
-    return { ...this.#host.dynamicValues, timeSeconds: this.#host.playback.currentTime };
+    return { ...this.#host.owner.dynamicValues, timeSeconds: this.#host.playback.currentTime };
   }
 
   get listeners(): DynamicListeners {
@@ -130,10 +133,10 @@ export class DynamicWiring implements PostHost {
     // The loss of the device has events of its own.
     if (error.code === 'device-lost' || error.message === this.#lastFault) return;
     this.#lastFault = error.message;
-    this.#host.dispatch(new CustomEvent('generator-error', { detail: error }));
+    this.#host.element.dispatchEvent(new CustomEvent('generator-error', { detail: error }));
   }
 
   #fallBack(reason: string): void {
-    this.#host.dispatch(new CustomEvent('generator-fallback', { detail: { reason } }));
+    this.#host.element.dispatchEvent(new CustomEvent('generator-fallback', { detail: { reason } }));
   }
 }

@@ -13,9 +13,8 @@ import type { ViewerFrame } from '../camera/orbit.js';
 import type { SceneBounds } from '../camera/settings.js';
 import { SplatChild } from '../composition/child.js';
 import { matrixOfFrame, transposed } from '../composition/placing.js';
-import type { MotionHost } from '../controllers/motion-controller.js';
+import type { MotionCore } from '../controllers/motion-controller.js';
 import { MAX_MOVER_STEP_MS, prefersReducedMotion, type Mover } from '../controllers/motion.js';
-import type { GaussianSplatEventMap } from '../events.js';
 import type { LoadedGaussians } from '../gpu/loaded-gaussians.js';
 import type { WorldEntry } from '../world-entry.js';
 import type { SourceEntry } from '../source-entry.js';
@@ -37,13 +36,12 @@ export interface EffectsHost {
     readonly isPreview: boolean;
     readonly progress: number | null;
   };
-  readonly behaviors: { add(mover: Mover): void };
+  readonly behaviors: { readonly movers: Mover[] };
   requestFrame(): void;
-  dispatch(event: GaussianSplatEventMap[keyof GaussianSplatEventMap]): void;
   warn(sentence: string): void;
 }
 
-type Player = NonNullable<MotionHost['player']>;
+type Player = NonNullable<MotionCore['player']>;
 
 /** Applies the cuts of children, the reveal effect, and the page's shader to the splats of all scenes. */
 export class Effects implements Mover {
@@ -69,7 +67,7 @@ export class Effects implements Mover {
     this.#host = host;
     showers.set(host.element, this);
     defineCuts();
-    host.behaviors.add(this);
+    host.behaviors.movers.push(this);
     host.element.addController({ hostUpdated: () => this.#update() });
     // Without a scene no frame is drawn.
     host.element.addEventListener('emptied', () => this.#freeRemoved());
@@ -87,7 +85,7 @@ export class Effects implements Mover {
    * Returns the interface with which the button for automatic motion plays and pauses `other` together with an animated
    * shader. Returns `other` itself if the shader is not animated.
    */
-  playerWith(other: MotionHost['player']): MotionHost['player'] {
+  playerWith(other: MotionCore['player']): MotionCore['player'] {
     if (!this.#shader?.animated) return other;
     const players: Player[] = [this.#player, ...(other?.canPlay ? [other] : [])];
     return {
@@ -130,12 +128,8 @@ export class Effects implements Mover {
     for (const { owner, member } of entries) if (member) this.#modify(member, owner.element, shared);
   }
 
-  get #isReducing(): boolean {
-    return prefersReducedMotion();
-  }
-
   get #isRevealing(): boolean {
-    return this.#reveal.kind !== 'none' && this.#revealed < 1 && !this.#isReducing;
+    return this.#reveal.kind !== 'none' && this.#revealed < 1 && !prefersReducedMotion();
   }
 
   /** Progress of the reveal effect, 0..1: that of the page, or else by time. */
@@ -192,11 +186,11 @@ export class Effects implements Mover {
       if (modifier) this.#forget(member, modifier);
       return;
     }
-    const program = this.#programs.get(scene.device);
+    const program = this.#programs.get(scene.place.device);
     if (!program) return void this.#compile(scene).then(() => this.#host.requestFrame());
     if (modifier?.program !== program) {
       modifier?.destroy();
-      this.#modifiers.set(member, (modifier = new SplatModifier(scene.device, program)));
+      this.#modifiers.set(member, (modifier = new SplatModifier(scene.place.device, program)));
     }
     if (modifier.write(changes, placement) || placement.modifier !== modifier) placement.modifier = modifier;
   }
@@ -219,7 +213,7 @@ export class Effects implements Mover {
 
   #compile(scene: LoadedGaussians): Promise<void> {
     if (scene.renderer === 'webgl') return Promise.resolve();
-    const { device } = scene;
+    const { device } = scene.place;
     const before = this.#compiling.get(device) ?? Promise.resolve();
     const compiling = before.then(() => this.#compileNow(device, scene));
     this.#compiling.set(device, compiling);
@@ -245,7 +239,7 @@ export class Effects implements Mover {
     this.#shader = null;
     this.#refused = shader;
     this.#host.warn(error.message);
-    this.#host.dispatch(new CustomEvent('shader-error', { detail: error }));
+    this.#host.element.dispatchEvent(new CustomEvent('shader-error', { detail: error }));
     this.#host.requestFrame();
   }
 
@@ -262,7 +256,7 @@ export class Effects implements Mover {
     const before = this.#shader;
     this.#refused = null;
     this.#shader = shader;
-    if (shader?.animated && !before?.animated) this.#isPlaying = !this.#isReducing;
+    if (shader?.animated && !before?.animated) this.#isPlaying = !prefersReducedMotion();
     // The button for automatic motion was rendered earlier in this update, so it needs another one.
     if (shader?.animated !== before?.animated) this.#host.element.requestUpdate();
     this.#host.requestFrame();

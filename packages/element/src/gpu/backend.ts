@@ -48,8 +48,6 @@ export interface DeviceOwner {
 /** A scene that can be drawn, with its device and backend. */
 export interface Drawable {
   readonly place: DeviceOwner;
-  /** @throws GaussianSplatError `unsupported/webgl` without WebGPU. */
-  readonly device: GPUDevice;
   /** Number of submissions into which the work of a frame is divided. */
   readonly submissions: number;
   /** Creates a backend that draws on the device of this scene. */
@@ -58,9 +56,11 @@ export interface Drawable {
 
 /** Provides the current content of frames. */
 export interface FrameSource {
-  readonly world: World;
-  /** Settings of the levels of detail of all frames, also at rest. */
-  readonly levels: LodSettings;
+  readonly sources: {
+    readonly world: World;
+    /** Settings of the levels of detail of all frames, also at rest. */
+    readonly levels: LodSettings;
+  };
   /**
    * Updates the world. Called before each frame.
    * @returns A key of the content, which changes whenever the frame would differ.
@@ -112,7 +112,6 @@ export interface Backend {
   /** Factor of the width and of the height, 0..1, by which frames are reduced to limit overdraw. */
   readonly pixelShare: number;
   readonly isDestroyed: boolean;
-  readonly isLost: boolean;
   /** Whether {@link prepare} was called for the current settings. */
   readonly isPrepared: boolean;
   /** Filter between the renderer and the canvas; undefined for unprocessed frames. */

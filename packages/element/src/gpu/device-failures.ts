@@ -31,9 +31,9 @@ const LOSS_MS = 200;
  * Returns whether a failure has resulted from the end of drawing, or from a lost device. Waits up to {@link LOSS_MS}
  * for the report of a loss.
  */
-export async function isGone(backend: Pick<Backend, 'isDestroyed' | 'isLost'>): Promise<boolean> {
-  if (!backend.isDestroyed && !backend.isLost) await delay(LOSS_MS);
-  return backend.isDestroyed || backend.isLost;
+export async function isGone(backend: Pick<Backend, 'isDestroyed' | 'place'>): Promise<boolean> {
+  if (!backend.isDestroyed && !backend.place.isLost) await delay(LOSS_MS);
+  return backend.isDestroyed || backend.place.isLost;
 }
 
 export const delay = (ms: number): Promise<void> => new Promise((resolve) => setTimeout(resolve, ms));

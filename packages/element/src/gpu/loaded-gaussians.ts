@@ -2,7 +2,7 @@ import type { GaussianScene, StreamProgress } from '@gaussian-splat/renderer';
 import { QueueClock } from '@gaussian-splat/renderer/tools';
 import type { SceneBounds } from '../camera/settings.js';
 import type { Timeline } from '../dynamic/dynamic-model.js';
-import type { FrameSource, LodSettings, Backend, BackendEvents, Drawable, DeviceOwner } from './backend.js';
+import type { FrameSource, LodSettings, Backend, BackendEvents, Drawable } from './backend.js';
 import type { DeviceLease } from './shared-device.js';
 import { WebGpuBackend } from './webgpu-backend.js';
 
@@ -58,11 +58,14 @@ export class LoadedGaussians implements Drawable {
   warnings: readonly string[];
   /** Called when another frame is required: a part has arrived, or a view has no feedback pass yet. */
   onChange: () => void = () => undefined;
-  readonly #lease: DeviceLease;
+  /** Lease of the device, which is released with the scene. */
+  readonly place: DeviceLease;
   #gaussians: OwnedGaussians;
   #levels: OwnedLevels | undefined;
   #detail: LodSettings;
   readonly #life = new AbortController();
+  /** Signal that is aborted when the scene is destroyed. */
+  readonly signal = this.#life.signal;
 
   constructor(
     lease: DeviceLease,
@@ -83,7 +86,7 @@ export class LoadedGaussians implements Drawable {
       warnings?: readonly string[] | undefined;
     } = {},
   ) {
-    this.#lease = lease;
+    this.place = lease;
     this.#gaussians = gaussians;
     this.#bounds = bounds;
     this.submissions = submissions;
@@ -150,29 +153,6 @@ export class LoadedGaussians implements Drawable {
     return new WebGpuBackend(this, contents, events);
   }
 
-  /** @throws GaussianSplatError `unsupported/webgl` without WebGPU. */
-  get device(): GPUDevice {
-    return this.#lease.device;
-  }
-
-  get place(): DeviceOwner {
-    return this.#lease;
-  }
-
-  get isLost(): boolean {
-    return this.#lease.isLost;
-  }
-
-  /** Resolves when the device is lost. */
-  get lost(): Promise<GPUDeviceLostInfo> {
-    return this.#lease.lost;
-  }
-
-  /** Signal that is aborted when the scene is destroyed. */
-  get signal(): AbortSignal {
-    return this.#life.signal;
-  }
-
   get isDestroyed(): boolean {
     return this.signal.aborted;
   }
@@ -185,6 +165,6 @@ export class LoadedGaussians implements Drawable {
     this.model?.dispose();
     this.#levels?.destroy();
     this.#gaussians.destroy();
-    this.#lease.release();
+    this.place.release();
   }
 }

@@ -85,7 +85,7 @@ export async function openGaussians(request: SceneRequest, options: OpenOptions)
   await assertWebGpu();
   const open = isGenerator(request) ? openDynamicScene : isStreamed(request) ? openStreamedScene : openLoadedScene;
   const scene = await withLease(options.device, (lease) => open(request, options, lease));
-  chooseAtRest(scene.device);
+  chooseAtRest(scene.place.device);
   return scene;
 }
 

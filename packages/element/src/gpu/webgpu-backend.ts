@@ -36,13 +36,14 @@ export class WebGpuBackend implements Backend {
   #drawnSize = '';
   #layout = 0;
 
-  constructor({ place, device, submissions }: Drawable, contents: FrameSource, events: BackendEvents) {
+  constructor({ place, submissions }: Drawable, contents: FrameSource, events: BackendEvents) {
+    const device = place.context as GPUDevice;
     this.place = place;
     this.device = device;
     this.#submissions = submissions;
     this.#contents = contents;
     this.#events = events;
-    this.viewpoint = new Viewpoint(device, contents.world, {
+    this.viewpoint = new Viewpoint(device, contents.sources.world, {
       settings: this.#settings(),
       limitsOverdraw: true,
       onIncomplete: () => {
@@ -64,10 +65,6 @@ export class WebGpuBackend implements Backend {
 
   get isDestroyed(): boolean {
     return this.#isDestroyed;
-  }
-
-  get isLost(): boolean {
-    return this.place.isLost;
   }
 
   setRendering(rendering: Rendering): void {
@@ -93,7 +90,7 @@ export class WebGpuBackend implements Backend {
 
   /** Returns the settings of a frame. `settings` are those of frames in motion; undefined at rest. */
   #settings(settings?: Partial<PerFrameSettings>): FrameSettings {
-    const { detail = 0, splatBudget = 0 } = this.#contents.levels;
+    const { detail = 0, splatBudget = 0 } = this.#contents.sources.levels;
     const { quality, shDegree, order } = this.#rendering;
     // The allowed error is the larger one of the page's setting and of dynamic quality.
     const max = Math.max(detail, settings?.detail ?? 0);
@@ -114,7 +111,7 @@ export class WebGpuBackend implements Backend {
   }
 
   prepare(settings: readonly Partial<PerFrameSettings>[]): void {
-    if (this.isLost || this.#isDestroyed) return;
+    if (this.place.isLost || this.#isDestroyed) return;
     this.#isPrepared = true;
     this.viewpoint.prepare(
       settings.map((each) => this.#settings(each)),
@@ -136,7 +133,7 @@ export class WebGpuBackend implements Backend {
   render(request: CanvasFrame, content: string, onTime?: (time: WorkTime) => void): void {
     const frame = frameOf(request);
     const size = sizeOf(frame);
-    const { layout } = this.#contents.world;
+    const { layout } = this.#contents.sources.world;
     if (layout === this.#layout && size === this.#drawnSize) return this.#renderOnce(frame, content, onTime);
     this.#drawnSize = size;
     void this.#withRefusal(() => this.#renderOnce(frame, content, onTime)).then(async (error) => {
@@ -152,7 +149,7 @@ export class WebGpuBackend implements Backend {
   }
 
   #draw(frame: Frame, content: string): void {
-    this.#layout = this.#contents.world.layout;
+    this.#layout = this.#contents.sources.world.layout;
     const settings = this.#settings(frame.settings);
     const { filter } = this.#rendering;
     const draw = (drawn: Frame): void => {
@@ -211,7 +208,7 @@ export class WebGpuBackend implements Backend {
 
   /** World, settings and filter of frames at rest. */
   get view(): Counted['view'] {
-    return { world: this.#contents.world, settings: this.#settings(), filter: this.#rendering.filter };
+    return { world: this.#contents.sources.world, settings: this.#settings(), filter: this.#rendering.filter };
   }
 
   /** Resolves when all submitted work is done, or the device is lost. */

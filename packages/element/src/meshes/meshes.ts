@@ -61,7 +61,7 @@ export class Meshes {
 
   /** Compiles the materials of a model, after creating the layer of the scene's device if there is none. */
   prepare(scene: LoadedGaussians, model = scene.model): Promise<void> {
-    const { device } = scene;
+    const { device } = scene.place;
     if (model) this.#coming.set(model, scene);
     const prepare = async (): Promise<void> => {
       if (this.#layer?.device !== device) {
@@ -93,7 +93,7 @@ export class Meshes {
     const request = { url, credentials: credentialsOf(attributes.crossorigin), limits: services.sceneLimits };
     const mesh = await fetchMesh(services.sceneLoader, limited(request, { memoryBudget }), signal);
     for (const warning of mesh.warnings) this.#core.warn(`<gaussian-splat>: ${warning}`);
-    const model = await openModel(mesh, url, { device: scene.device, signal, memoryBudget });
+    const model = await openModel(mesh, url, { device: scene.place.device, signal, memoryBudget });
     await this.prepare(scene, model);
     if (signal.aborted) model.dispose();
     signal.throwIfAborted();

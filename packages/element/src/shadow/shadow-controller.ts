@@ -23,7 +23,7 @@ export interface ShadowHost {
   readonly services: { readonly sceneLoader: SceneLoader };
   readonly frame: ViewerFrame;
   readonly camera: { view(width: number, height: number): Camera };
-  readonly behaviors: { add(mover: Mover): void };
+  readonly behaviors: { readonly movers: Mover[] };
   readonly isImmersed: boolean;
   readonly view: { readonly backend: Backend | null };
   readonly sources: {
@@ -102,7 +102,7 @@ export class ShadowController implements ReactiveController, Mover {
   constructor(core: ShadowHost) {
     this.#core = core;
     core.element.addController(this);
-    core.behaviors.add(this);
+    core.behaviors.movers.push(this);
     // Without a scene no frame is drawn that would remove the shadow.
     core.element.addEventListener('emptied', () => core.view.backend === null && this.#remove());
   }
@@ -119,7 +119,7 @@ export class ShadowController implements ReactiveController, Mover {
     const { view, isImmersed } = this.#core;
     const { backend } = view;
     if (this.#shown && this.#shown.context !== backend?.place.context) this.#remove();
-    if (!backend || backend.isLost || isImmersed) return false;
+    if (!backend || backend.place.isLost || isImmersed) return false;
     // Waits for the end of the task, because this frame may still cut or move splats.
     queueMicrotask(() => this.#follow(backend, now));
     this.#fade();
@@ -127,7 +127,7 @@ export class ShadowController implements ReactiveController, Mover {
   }
 
   #follow(backend: Backend, now: number): void {
-    if (backend.isLost || backend.isDestroyed) return;
+    if (backend.place.isLost || backend.isDestroyed) return;
     const key = this.#contentKey();
     if (key === '') {
       if (this.#shown) this.#core.requestFrame();
@@ -168,7 +168,7 @@ export class ShadowController implements ReactiveController, Mover {
     const begin = performance.now();
     this.#make(backend)
       .catch((error: Error) => {
-        if (!backend.isLost && !backend.isDestroyed) this.#warn(error);
+        if (!backend.place.isLost && !backend.isDestroyed) this.#warn(error);
       })
       .finally(() => {
         this.#isBusy = false;
@@ -187,7 +187,7 @@ export class ShadowController implements ReactiveController, Mover {
     const taker = await this.#taker(backend);
     try {
       const map = await takeShadow({ center: toViewer(frame, center), radius, frame }, taker.take);
-      if (map === null || backend.isLost || backend.isDestroyed) return this.#clear();
+      if (map === null || backend.place.isLost || backend.isDestroyed) return this.#clear();
       const rows = shadowSplats(map, intensity, softness);
       if (rows.length === 0) return this.#clear();
       const packed = await packSplats(rows, services.sceneLoader, scene.signal);

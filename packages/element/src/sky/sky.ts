@@ -22,7 +22,7 @@ export interface SkyHost {
   readonly attributes: Pick<Attributes, 'skyboxImage' | 'crossorigin'>;
   readonly frame: ViewerFrame;
   readonly view: { readonly backend: Backend | null };
-  readonly behaviors: { add(mover: Mover): void };
+  readonly behaviors: { readonly movers: Mover[] };
   requestFrame(): void;
   warn(sentence: string): void;
 }
@@ -39,7 +39,7 @@ export class Sky implements ReactiveController, Mover {
   constructor(host: SkyHost) {
     this.#host = host;
     host.element.addController(this);
-    host.behaviors.add(this);
+    host.behaviors.movers.push(this);
     // Without a scene nothing is drawn, so that the sky must not wait for a frame to be freed.
     host.element.addEventListener('emptied', () => host.view.backend === null && this.#free());
     this.hostUpdated();
@@ -60,7 +60,7 @@ export class Sky implements ReactiveController, Mover {
    */
   advance(): boolean {
     const { backend } = this.#host.view;
-    if (!backend || backend.isLost || !(backend.place.context instanceof WebGL2RenderingContext)) return false;
+    if (!backend || backend.place.isLost || !(backend.place.context instanceof WebGL2RenderingContext)) return false;
     const { beneath } = backend as WebGlBackend;
     const sky = this.#image && this.#glOn(backend.place.context, this.#image);
     beneath.sky = sky && ((camera) => sky.draw(camera, this.#host.frame));

@@ -6,7 +6,6 @@ import type { Behaviors } from '../behaviors.js';
 import type { CameraPose } from '../camera/orbit.js';
 import type { CameraController } from '../controllers/camera-controller.js';
 import { prefersReducedMotion, type Mover } from '../controllers/motion.js';
-import type { GaussianSplatEventMap } from '../events.js';
 import { languageOf, type A11yStrings, type ViewString } from '../strings.js';
 import { fail, poseOfView, type CameraView } from './camera-view.js';
 import { Flight } from './flight.js';
@@ -46,7 +45,6 @@ export interface TourHost {
   readonly isOnShow: boolean;
   warn(sentence: string): void;
   requestFrame(): void;
-  dispatch(event: GaussianSplatEventMap['view-change']): void;
 }
 
 const DURATION_MS = 1_200;
@@ -108,7 +106,7 @@ export class Tour implements ReactiveController, Mover {
   constructor(element: ReactiveControllerHost & HTMLElement, of: TourHost) {
     this.#element = element;
     this.#of = of;
-    of.behaviors.add(this);
+    of.behaviors.movers.push(this);
     element.addController(this);
     element.addEventListener('click', this.#onClick);
     this.hostUpdated();
@@ -241,7 +239,7 @@ export class Tour implements ReactiveController, Mover {
     this.#show();
     if (index < 0) return;
     const { name } = this.#views[index];
-    this.#of.dispatch(new CustomEvent('view-change', { detail: { name, index } }));
+    this.#element.dispatchEvent(new CustomEvent('view-change', { detail: { name, index } }));
   }
 
   async #load(source: object | string | null): Promise<ViewList> {

@@ -102,7 +102,7 @@ export class WalkController implements ReactiveController, Mover {
 
   hostUpdated(): void {
     const { attributes, surface } = this.#of;
-    if (attributes.navigation !== 'walk' || surface === null || !surface.isConnected) return this.#stop();
+    if (attributes.navigation !== 'walk' || surface === null || !surface.isConnected) return this.hostDisconnected();
     this.#ask();
     this.#joystick.isShown = attributes.cameraControls && this.#walker !== undefined && isTouchScreen();
     if (!attributes.cameraControls || this.#isRefused) return this.#deafen();
@@ -117,10 +117,6 @@ export class WalkController implements ReactiveController, Mover {
     this.#host.addEventListener('click', this.#onSceneClick, { signal });
     this.#gamepads.listen(signal);
     surface.after(this.#joystick.element);
-  }
-
-  hostDisconnected(): void {
-    this.#stop();
   }
 
   advance(now: number): boolean {
@@ -325,7 +321,7 @@ export class WalkController implements ReactiveController, Mover {
     this.#joystick.remove();
   }
 
-  #stop(): void {
+  hostDisconnected(): void {
     this.#deafen();
     this.#forget();
   }

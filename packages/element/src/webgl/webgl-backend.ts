@@ -47,6 +47,7 @@ export class WebGlBackend implements Backend {
   readonly filter = undefined;
   readonly isPrepared = true;
   readonly scene: GlLoaded;
+  readonly place: DeviceOwner;
   /** Functions that draw the sky and the shadow, in this order, into the context's canvas beneath the splats. */
   readonly beneath: { sky?: Beneath | undefined; shadow?: Beneath | undefined } = {};
   readonly #sorter: DepthSorter;
@@ -77,6 +78,7 @@ export class WebGlBackend implements Backend {
 
   constructor(scene: GlLoaded, events: BackendEvents) {
     this.scene = scene;
+    this.place = scene.place;
     let resolveOrdered: () => void;
     this.#ordered = new Promise((resolve) => (resolveOrdered = resolve));
     this.#shown = new Promise((resolve) => (this.#resolveShown = resolve));
@@ -95,10 +97,6 @@ export class WebGlBackend implements Backend {
     });
   }
 
-  get place(): DeviceOwner {
-    return this.scene.place;
-  }
-
   get device(): GPUDevice {
     throw cannotShow('a post-processor');
   }
@@ -111,10 +109,6 @@ export class WebGlBackend implements Backend {
 
   get byteLength(): number {
     return this.scene.frames.byteLength;
-  }
-
-  get isLost(): boolean {
-    return this.scene.isLost;
   }
 
   get isDestroyed(): boolean {
@@ -139,7 +133,7 @@ export class WebGlBackend implements Backend {
   }
 
   render(frame: CanvasFrame, _: string, onTime?: (time: WorkTime) => void): void {
-    if (this.isLost) return;
+    if (this.place.isLost) return;
     const view = this.#viewOf(frame);
     if (this.#sorted === undefined || !isSameImage(view, this.#sorted)) {
       // A script that reads the image in the same task cannot wait for the worker.
@@ -166,12 +160,12 @@ export class WebGlBackend implements Backend {
   async renderFirst(frame: CanvasFrame): Promise<void> {
     this.#ask(this.#viewOf(frame));
     // A backend that is destroyed meanwhile gets no order, and the next scene waits for the end of this frame.
-    await Promise.race([this.#ordered, this.#shown, this.scene.lost]);
-    if (this.isLost || this.#isDestroyed) return;
+    await Promise.race([this.#ordered, this.#shown, this.place.lost]);
+    if (this.place.isLost || this.#isDestroyed) return;
     const begin = performance.now();
     await this.#paintInParts(frame);
     this.#wholeMs = performance.now() - begin;
-    if (!this.isLost && !this.#isDestroyed) this.#show(frame);
+    if (!this.place.isLost && !this.#isDestroyed) this.#show(frame);
   }
 
   /**
@@ -189,7 +183,7 @@ export class WebGlBackend implements Backend {
       const painted = this.#painted;
       await whenDrawn(this.scene.lease.gl).catch(() => undefined);
       // A frame that was drawn meanwhile is newer.
-      if (this.isLost || this.#isDestroyed || painted !== this.#painted) return;
+      if (this.place.isLost || this.#isDestroyed || painted !== this.#painted) return;
       const ms = performance.now() - begin;
       if (ms < SHORT_PART_MS) atMost *= 4;
       else if (ms > LONG_PART_MS) atMost /= 2;
@@ -198,8 +192,8 @@ export class WebGlBackend implements Backend {
 
   async probe(points: readonly ProbePoint[]): Promise<ProbeAnswer[]> {
     // Each race stays in the memory of its promises, and labels ask ten times a second.
-    if (!this.#isShown) await Promise.race([this.#shown, this.scene.lost]);
-    return this.isLost || this.#isDestroyed ? [] : this.scene.frames.probe(points);
+    if (!this.#isShown) await Promise.race([this.#shown, this.place.lost]);
+    return this.place.isLost || this.#isDestroyed ? [] : this.scene.frames.probe(points);
   }
 
   async readCounts(): Promise<ReadCounts> {
@@ -231,7 +225,7 @@ export class WebGlBackend implements Backend {
 
   #setOrder({ view, order, count, covered, askedAt }: SortedSplats): void {
     // A newer order was sorted on the main thread meanwhile.
-    if (this.isLost || this.#isDestroyed || askedAt < this.#sortedAt) return;
+    if (this.place.isLost || this.#isDestroyed || askedAt < this.#sortedAt) return;
     this.#sorted = view;
     this.#sortedAt = askedAt;
     this.#listed = count;

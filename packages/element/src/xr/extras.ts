@@ -1,8 +1,8 @@
 /**
  * Code for the attributes `vr`, `ar`, `measure`, `shadow-intensity` and `skybox-image`. Loaded if one of these is set.
  */
+import { Lazy } from '@gaussian-splat/core';
 import { css, type ReactiveControllerHost } from 'lit';
-import { Lazy } from '../lazy.js';
 import type { ShadowHost } from '../shadow/shadow-controller.js';
 import type { Sky, SkyHost } from '../sky/sky.js';
 import type { XrHost } from './xr-host.js';

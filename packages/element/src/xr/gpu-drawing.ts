@@ -13,13 +13,15 @@ const HANDHELD_SPLATS = 400_000;
 
 /** Returns the page's backend if it draws with WebGPU; undefined otherwise, and if its device is lost. */
 export function gpuOf({ view: { backend } }: XrHost): WebGpuBackend | undefined {
-  return backend && 'viewpoint' in backend && !backend.isLost ? (backend as WebGpuBackend) : undefined;
+  return backend && 'viewpoint' in backend && !backend.place.isLost ? (backend as WebGpuBackend) : undefined;
 }
 
 /** Draws a session with WebGPU: all scenes of the page, in the buffers of the page's own frames. */
 export class GpuDrawing implements XrDrawing {
   readonly isOfPage = true;
   readonly isOpen = true;
+  readonly clipDepth: XrDrawing['clipDepth'];
+  readonly renderState: object;
   onLost: (what: string) => void = () => undefined;
   readonly #core: XrHost;
   readonly #backend: WebGpuBackend;
@@ -34,6 +36,7 @@ export class GpuDrawing implements XrDrawing {
     this.#core = core;
     this.#backend = backend;
     this.#target = target;
+    ({ clipDepth: this.clipDepth, renderState: this.renderState } = target);
     this.#stereo = new Stereo(backend.device);
     // The device outlives the session, and its promise keeps all that waits for it alive.
     const own = new WeakRef(this);
@@ -41,16 +44,8 @@ export class GpuDrawing implements XrDrawing {
     target.onLost = (what) => this.onLost(what);
   }
 
-  get clipDepth(): XrDrawing['clipDepth'] {
-    return this.#target.clipDepth;
-  }
-
-  get renderState(): object {
-    return this.#target.renderState;
-  }
-
   get isLost(): boolean {
-    return this.#backend.isLost || this.#backend.isDestroyed;
+    return this.#backend.place.isLost || this.#backend.isDestroyed;
   }
 
   open(): Promise<void> {
@@ -76,7 +71,7 @@ export class GpuDrawing implements XrDrawing {
   }
 
   draw(eyes: readonly XrEye[], background: XrColor, between: XrBetween, scale: number, now: number): void {
-    this.#core.advanceScene(unscaled(eyes[0].camera), now);
+    this.#core.sources.advance(unscaled(eyes[0].camera), now);
     this.#core.view.applyRendering(this.#backend);
     this.#core.prepareFrame();
     const { viewpoint, view } = this.#backend;

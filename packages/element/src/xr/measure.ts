@@ -90,7 +90,7 @@ export class Measure implements ReactiveController {
 
   hostUpdated(): void {
     const { attributes, isOnShow, strings, sources } = this.#core;
-    if (!attributes.measure || !isOnShow) return this.#stop();
+    if (!attributes.measure || !isOnShow) return this.hostDisconnected();
     const { url } = sources.ownEntry.scene;
     if (url !== this.#url) this.#ends = [];
     this.#url = url;
@@ -99,10 +99,6 @@ export class Measure implements ReactiveController {
     this.#button.lang = languageOf(strings) ?? '';
     this.#button.setAttribute('aria-pressed', String(this.#listening !== undefined));
     if (!this.#button.isConnected) this.#place.append(this.#button);
-  }
-
-  hostDisconnected(): void {
-    this.#stop();
   }
 
   #word(key: ExtraWord): string {
@@ -157,7 +153,7 @@ export class Measure implements ReactiveController {
     this.#say('');
   }
 
-  #stop(): void {
+  hostDisconnected(): void {
     this.#button.remove();
     if (this.#listening) this.#put();
   }

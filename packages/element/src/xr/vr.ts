@@ -84,7 +84,7 @@ async function drawingOf(core: XrHost, session: XrSession, source: XrShown): Pro
     if (!backend) throw unsupported('WebGPU in the page, which the session has asked for', 'none');
     return new GpuDrawing(core, backend, new BindingTarget(session, backend.device));
   }
-  const isForWebGl = source.request !== null && core.world.placements.length === 1;
+  const isForWebGl = source.request !== null && core.sources.world.placements.length === 1;
   if (!backend || isForWebGl) return GlDrawing.open(session, core, source);
   return new GpuDrawing(core, backend, await CopyTarget.open(session, backend.device));
 }

@@ -1,4 +1,4 @@
-import type { Camera } from '@gaussian-splat/core';
+import type { Camera, Lazy } from '@gaussian-splat/core';
 import type { World } from '@gaussian-splat/renderer';
 import type { Attributes } from '../attributes.js';
 import type { ViewerFrame } from '../camera/orbit.js';
@@ -7,7 +7,6 @@ import type { AnnouncerController } from '../controllers/announcer-controller.js
 import type { CameraController } from '../controllers/camera-controller.js';
 import type { Backend } from '../gpu/backend.js';
 import type { LoadedGaussians } from '../gpu/loaded-gaussians.js';
-import type { Lazy } from '../lazy.js';
 import type { SceneRequest } from '../loading/protocol.js';
 import type { SceneLoader } from '../loading/scene-loader.js';
 import type { A11yStrings } from '../strings.js';
@@ -27,17 +26,17 @@ export interface XrHost {
     /** All displayed scenes. */
     readonly shown: readonly LoadedGaussians[];
     readonly isPreview: boolean;
+    /** The world with all displayed scenes. */
+    readonly world: World;
+    /** Advances moving scenes to the time of a frame. @param now requestAnimationFrame's clock, ms. */
+    advance(camera: Camera, now: number): void;
     /** Stops the clocks of moving scenes until the next frame, so that the time until then does not count. */
     suspend(): void;
     readonly ownEntry: {
       readonly scene: { readonly scene: LoadedGaussians | null; readonly isOutgoing: boolean; readonly url: string };
     };
   };
-  /** The world with all displayed scenes. */
-  readonly world: World;
   readonly view: { readonly backend: Backend | null; applyRendering(backend: Backend): void };
-  /** Advances moving scenes to the time of a frame. @param now requestAnimationFrame's clock, ms. */
-  advanceScene(camera: Camera, now: number): void;
   /** Updates the world before a frame. Returns a text that changes whenever the frame would change. */
   prepareFrame(): string;
   readonly reveal: { dismiss(): void };

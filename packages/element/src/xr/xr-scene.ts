@@ -48,7 +48,7 @@ export interface XrSceneSource extends XrShown {
  * context.
  */
 export async function contextFor(shown: LoadedGaussians | null): Promise<XrContext> {
-  if (shown instanceof GlLoaded && !shown.isLost && (await becomesCompatible(shown.lease.gl)))
+  if (shown instanceof GlLoaded && !shown.place.isLost && (await becomesCompatible(shown.lease.gl)))
     return { gl: shown.lease.gl, isOwn: false };
   const gl = document.createElement('canvas').getContext('webgl2', {
     ...{ alpha: true, antialias: false, depth: false, stencil: false, xrCompatible: true },
