@@ -1,6 +1,6 @@
 /**
  * A streamed SOG costs no more than its bytes allow: one account for all files, and a message to the page that is as long as the index.
- * SECURITY.md: "A scene costs what it weighs".
+ * SECURITY.md: "The size of a file bounds its cost".
  */
 import assert from 'node:assert/strict';
 import { createServer, type Server } from 'node:http';

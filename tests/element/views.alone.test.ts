@@ -1,6 +1,6 @@
 /**
  * Views in all the forms that pages and files have them, and the ways between them.
- * SECURITY.md: "The page lives on".
+ * SECURITY.md: "The page keeps working".
  */
 import assert from 'node:assert/strict';
 import { test } from 'node:test';

@@ -1,6 +1,6 @@
 /**
  * The cost of a file is bounded by its bytes, however often it names the same thing: SECURITY.md gives the figures. Damaged bytes cannot show that; here references are multiplied.
- * SECURITY.md: "A scene costs what it weighs", "Pages set their own limits".
+ * SECURITY.md: "The size of a file bounds its cost", "Pages set their own limits".
  */
 import assert from 'node:assert/strict';
 import { spawnSync } from 'node:child_process';

@@ -1,6 +1,6 @@
 /**
  * Clips: the reader returns the written values, splats appear and disappear, and an index is checked before it is used.
- * SECURITY.md: "A scene costs what it weighs".
+ * SECURITY.md: "The size of a file bounds its cost".
  */
 import assert from 'node:assert/strict';
 import { test } from 'node:test';

@@ -1,6 +1,6 @@
 /**
  * Frames that splats cover thousands of times: they are bounded on the GPU before they are drawn, and the next ones have fewer pixels. All others are the same, bit by bit.
- * SECURITY.md: "A scene that asks for too much harms itself".
+ * SECURITY.md: "An oversized scene affects only itself".
  */
 import assert from 'node:assert/strict';
 import { after, test } from 'node:test';

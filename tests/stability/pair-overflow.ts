@@ -8,7 +8,7 @@
  *
  * Passes: with ten times the room demanded, the frame has no corrupt pixel: it is that of the nearest splats that fit; dropped pairs are counted;
  * the next frame has room for all.
- * SECURITY.md: "A scene that asks for too much harms itself".
+ * SECURITY.md: "An oversized scene affects only itself".
  */
 import { test } from 'node:test';
 import assert from 'node:assert/strict';

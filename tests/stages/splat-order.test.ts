@@ -1,4 +1,4 @@
-/** The order that a worker finds for the WebGL renderer, against a plain sort. SECURITY.md: "A scene that asks for too much harms itself". */
+/** The order that a worker finds for the WebGL renderer, against a plain sort. SECURITY.md: "An oversized scene affects only itself". */
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import {

@@ -1,4 +1,4 @@
-/** SECURITY.md: "The page lives on". */
+/** SECURITY.md: "The page keeps working". */
 import '@gaussian-splat/element';
 import { GaussianSplatElement, SharedDevice } from '@gaussian-splat/element';
 import { itInLab } from '../../support/extent-in-pages.js';

@@ -1,6 +1,6 @@
 /**
  * Loads that never end, and workers that die: no other load waits for them.
- * SECURITY.md: "No visitor waits for a stranger's scene".
+ * SECURITY.md: "An untrusted scene delays no other scene".
  */
 import { GaussianSplatElement } from '@gaussian-splat/element';
 import {

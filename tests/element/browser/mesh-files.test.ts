@@ -1,7 +1,7 @@
 /**
  * Mesh files are untrusted data, as scene files are. SECURITY.md: "Pages set their own limits", "Manifests name files of their own server", "Downloads end", "A scene that asks for too much
  * harms itself".
- * SECURITY.md: "A scene that asks for too much harms itself".
+ * SECURITY.md: "An oversized scene affects only itself".
  */
 import '@gaussian-splat/element/scenes.js';
 import { GaussianSplatElement } from '@gaussian-splat/element';

@@ -1,6 +1,6 @@
 /**
  * Pages whose scripts have replaced browser APIs, and browsers that lack some of them: the scene is shown, or an error names the cause. Each page is a frame with the CDN build.
- * SECURITY.md: "The page lives on".
+ * SECURITY.md: "The page keeps working".
  */
 import { itInLab } from '../../support/extent-in-pages.js';
 import { assert, assertEqual, COMPASS, nextEvent } from './support/harness.js';
