@@ -3,7 +3,10 @@ import wc from 'eslint-plugin-wc';
 import tseslint from 'typescript-eslint';
 import { retiredNames } from './scripts/words/names.mjs';
 
-/** Who may know whom (docs/architecture.md). A package may import the packages listed, and no other of ours. */
+/**
+ * Allowed imports (docs/architecture.md). A package may import the listed packages, and no other package of this
+ * repository.
+ */
 const MAY_IMPORT = {
   core: [],
   formats: ['core'],

@@ -19,7 +19,10 @@ const otherOrigin = await startOtherOrigin();
 /** Chromium hides float16 in shaders on NVIDIA under Linux; elsewhere this does nothing. */
 const FLOAT16_FLAG = '--enable-dawn-features=vulkan_enable_f16_on_nvidia';
 
-/** Pages that run at once. SwiftShader draws on the processor, but pages wait more than they draw; the groups are those of scripts/lib/test-files.mjs. */
+/**
+ * Number of pages at once. SwiftShader draws on the CPU, but pages mostly wait; the groups are those of
+ * scripts/lib/test-files.mjs.
+ */
 const CONCURRENCY = { timing: 1, concurrent: 2, dense: 1 };
 const group = process.env.TEST_GROUP ?? 'timing';
 const named = process.env.TEST_FILES?.split(' ').filter(Boolean);
@@ -40,7 +43,7 @@ export default {
   concurrentBrowsers: 1,
   browserStartTimeout: 240_000,
   testsFinishTimeout: 2_400_000,
-  // What hangs is found by the limits of `until`, which are shorter.
+  // The limits of `until` find tests that hang, because they are shorter.
   testFramework: { config: { ui: 'bdd', timeout: 900_000 } },
   testRunnerHtml: (framework) =>
     `<!doctype html><html><body><script>STABILITY = ${JSON.stringify(process.env.STABILITY ?? 'fast')}; TESTS = ${JSON.stringify(process.env.TESTS ?? 'fast')}</script><script type="module" src="${framework}"></script></body></html>`,

@@ -1,4 +1,7 @@
-/** Measures a streamed scene: a flight over it, frame after frame, and how far its picture is from one with more splats. */
+/**
+ * Measures a streamed scene: a flight of consecutive frames, and the PSNR of its frames against frames with more
+ * splats.
+ */
 import { checkManifest, MemoryLedger, PassTimer, StreamedGaussians, Viewpoint, World } from '@gaussian-splat/renderer';
 import { compare } from './detail/at-rest.js';
 import { flightCamera } from './detail/flight-path.js';
@@ -21,7 +24,7 @@ const quality = query.get('pace') ?? 'display';
 
 /** How much of the curve is flown in these seconds: with 0.5 the first half, half as fast. */
 const speed = number('speed', 1);
-/** Places of the flight that are looked at at rest, by the share of the curve before them. */
+/** Positions on the flight that are measured at rest, as fractions of the curve. */
 const views = (query.get('views') ?? '0.1,0.3,0.5,0.9').split(',').filter(Boolean).map(Number);
 
 /** Seconds that a view may take to have all its pages, and after which everything is reported as far as it has come. */
@@ -34,7 +37,7 @@ const say = (text) => {
 };
 
 const progress = new Progress(limit, say);
-/** Grows while there is something to measure; what stands in it is reported, whatever happens. */
+/** Grows during the measurement; its content is reported even if the measurement fails. */
 const report = {
   ...{ width, height, detail, splatBudget: splats, megabytes, warm, seconds, speed, limit, pace: quality },
   ...{ warmUp: [], flight: [], atRest: [] },
@@ -73,9 +76,9 @@ const turn = () =>
   new Promise((resolve) => (quality === 'free' ? setTimeout(resolve) : requestAnimationFrame(resolve)));
 
 /**
- * Draws for so many seconds.
+ * Draws for a number of seconds.
  * @param rows gets a row for each second
- * @param cameraOf gets the share, 0 to 1, of the seconds that have passed
+ * @param cameraOf gets the fraction, 0 to 1, of the elapsed time
  */
 async function fly(all, rows, what, duration, cameraOf) {
   const timer = all.device.features.has('timestamp-query') ? new PassTimer(all.device) : undefined;
@@ -131,7 +134,7 @@ async function measure() {
   await compare(all, views, report.atRest);
 }
 
-/** The report in the page, for scripts, and to whoever has asked for it. */
+/** The report: in the page, for scripts, and for the URL of the request. */
 async function publish() {
   const text = JSON.stringify(report, null, 1);
   document.getElementById('json').textContent = text;

@@ -62,7 +62,7 @@ async function judge(subjects, entry, moments, references) {
       views.push(compareImages(pixels, references.images[i], camera));
       if (hasImages) images.push(await pngOfCovered(withoutAlpha(pixels), references.images[i], camera));
       const { ignoredOptions = [] } = await subject.facts();
-      // An option that nobody reads would show the default's figures under another name.
+      // An unknown option would publish the default's figures under another name.
       if (ignoredOptions.length > 0)
         return { error: `the renderer has no option ${ignoredOptions.join(', ')}`, ignoredOptions };
     }
@@ -84,7 +84,8 @@ async function collect(run) {
   const cameras = along(run.frames);
   const views = spread(along(PATH_FRAMES), Number(query.get('views') ?? 4));
   const kind = query.get('reference') ?? 'auto';
-  // Times first: reading pictures back lets a GPU fall asleep. Each beside the default, in turns: a GPU's clock changes within a run.
+  // Times are measured first, because read-backs of frames let a GPU clock down. Each alternates with the default,
+  // because a GPU's clock changes within a run.
   const standard = await subjects.open({ ...DEFAULTS, ...common });
   await visit(standard, cameras, { ...run, phases: [] });
   const measured = await visitInTurns(

@@ -20,7 +20,7 @@ const DEFAULT_MODELS = `../generators/skull/model.onnx,../generators/plant/model
 
 setRuntimeLocation(new URL('../cdn/onnxruntime/', document.baseURI).href);
 
-/** A state that differs from one run to the next in whatever a model may depend on. */
+/** A state in which everything that a model may depend on differs from one run to the next. */
 function stateAt(run, model) {
   const turn = (2 * Math.PI * run) / RUNS;
   const [c, s] = [Math.cos(turn), Math.sin(turn)];

@@ -1,4 +1,7 @@
-/** The page of pictures in motion: elements in a page, steps of the load, and whether they keep in time. See docs/benchmark.md. */
+/**
+ * The page for frames in motion: elements in a page, steps of the load, and whether they stay within the budget. See
+ * docs/benchmark.md.
+ */
 import { fetchScene, readScene } from '@gaussian-splat/formats';
 import { QUALITY_LEVELS } from '../packages/element/dist/dynamic-quality/quality-levels.js';
 import { showError, showProgress } from './page/show.js';
@@ -15,10 +18,13 @@ import { sendReport } from './run/report.js';
 import { quantile } from './run/summary.js';
 import { placeCopies } from './scene/placement.js';
 
-/** Seconds of motion at a size before it is known what the whole picture takes there, and the sizes, of the usual sides. */
+/**
+ * Seconds of motion at each size that determine the time of the full frame, and the sizes as multiples of the usual
+ * sides.
+ */
 const CALIBRATION_SECONDS = 1;
 const CALIBRATION_SIDES = [0.5, 1.5];
-/** Names of all levels, the true image first. */
+/** Names of all levels, the accurate frame first. */
 const NAMES = QUALITY_LEVELS.map(({ name }) => name);
 
 /** Address of the scene: that of the file, or of as many splats of copies side by side. */
@@ -39,7 +45,7 @@ function work(burner, { stage, plan, now }) {
   if (plan.warm > 0) setTimeout(() => burner.burn(plan.warm), GAP_BEGINS);
 }
 
-/** What the whole picture takes at a size, right after motion: the clock of a GPU that rests is another one. */
+/** Time of the full frame at a size right after motion, because a GPU at rest has another clock. */
 async function wholeTimeAt({ stage, plan, motion }, side) {
   stage.resize(side * plan.width, side * plan.height);
   await move(stage, CALIBRATION_SECONDS, motion);
@@ -61,7 +67,7 @@ async function resizeFor(load, bench) {
 /** Visits to the first size, after which its time is known: GPUs that were idle run slower at first. */
 const VISITS = 4;
 
-/** What the whole picture takes at first: the median of the last visits. */
+/** Time of the full frame at first: the median of the last visits. */
 async function firstTime(bench) {
   const times = [];
   for (let visit = 0; visit < VISITS; visit++) times.push((await wholeTimeAt(bench, 1)).milliseconds);
@@ -137,7 +143,7 @@ if (location.search.length > 1) {
     Object.assign(report, await measure(report.plan, report.steps));
     showSteps(report.steps, report);
   } catch (error) {
-    // What was measured before is reported all the same.
+    // Earlier measurements are reported even if a later one fails.
     report.error = String(error.stack ?? error);
     showError(error);
   }

@@ -1,16 +1,19 @@
-/** The page of first pictures: pages of two lines in frames, as on a first visit and on later ones. See docs/benchmark.md. */
+/**
+ * The page for first frames: pages of two lines in iframes, as on a first visit and on later ones. See
+ * docs/benchmark.md.
+ */
 import { element, showError, showProgress } from './page/show.js';
 import { sendReport } from './run/report.js';
 
 /** Begins the keys under which pages keep what they know: what suits a GPU, and what comparing a generator with the CPU has shown. */
 const KEPT = 'gaussian-splat ';
 const PROOF = 'gaussian-splat proof ';
-/** Milliseconds that a picture may take, and that the search for what suits the GPU may take once the page is at rest. */
+/** Time limits in ms: for a frame, and for autotuning once the page is at rest. */
 const LONGEST = 60_000;
 const LONGEST_SEARCH = 20_000;
 const LONGEST_COMPARISON = 30_000;
 
-/** What is measured, from the page's address. */
+/** Configurations to measure, from the page's address. */
 function readPlan(query) {
   const [visits, width, height] = [
     ['visits', 4],
@@ -30,7 +33,7 @@ const proofs = () => kept().filter((key) => key.startsWith(PROOF));
 const choices = () => kept().filter((key) => !key.startsWith(PROOF));
 const forget = (keys) => keys.forEach((key) => localStorage.removeItem(key));
 
-/** A page of two lines that tells when there is something to see. */
+/** A page of two lines that reports when its scene is visible. */
 function pageOf({ scene, width, height }, attributes) {
   const attribute = (text) => text.replaceAll('&', '&amp;').replaceAll('"', '&quot;');
   return `<!doctype html><meta charset="utf-8"><title>A visit</title>
@@ -42,12 +45,15 @@ function pageOf({ scene, width, height }, attributes) {
   const tell = (what, message) => parent.postMessage({ what, message }, self.origin);
   splat.addEventListener('preview', () => tell('preview'));
   splat.addEventListener('error', ({ detail }) => tell('error', detail?.message ?? 'no scene'));
-  // The picture is on show with the next one of the display.
+  // The frame is visible at the next refresh of the display.
   splat.addEventListener('load', () => requestAnimationFrame(() => requestAnimationFrame(() => tell('shown'))));
 </script>`;
 }
 
-/** Opens such a page. @returns milliseconds to its first preview, if there is one, and to the whole picture, and its frame, open still */
+/**
+ * Opens such a page. @returns milliseconds to its first preview, if any, and to the complete frame, and its iframe,
+ * which stays open
+ */
 function visit(plan, attributes = '') {
   const srcdoc = pageOf(plan, attributes);
   const frame = element('iframe', { title: 'A visit', width: plan.width, height: plan.height, srcdoc });
@@ -131,7 +137,7 @@ async function visitCompared(plan) {
   return visits;
 }
 
-/** Of all visits but the first of each kind, which fetch and compile. */
+/** Times of all visits except the first of each kind, which fetch and compile. */
 function compared(visits) {
   const shown = [false, true].map((kind) =>
     visits

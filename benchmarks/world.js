@@ -20,7 +20,7 @@ const STEP = 0.002;
 /** Frames until what moves is where it was. */
 const THERE_AND_BACK = 40;
 
-/** What is measured, from the page's address. */
+/** Pairs to measure, from the page's address. */
 function readPlan(query) {
   const whole = (name, usual) => {
     const value = Number(query.get(name) ?? usual);
@@ -38,7 +38,7 @@ function readPlan(query) {
   };
 }
 
-/** Deals the copies out to so many scenes, so that all of them lie among one another. */
+/** Distributes the copies among a number of scenes, so that their regions overlap. */
 const dealt = (copies, scenes) =>
   Array.from({ length: scenes }, (_, k) => copies.filter((_, i) => i % scenes === k)).filter(
     ({ length }) => length > 0,
@@ -50,7 +50,7 @@ const moved = (frame) => {
   return [1, 0, 0, x, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1];
 };
 
-/** What is measured beside what. Each makes its two subjects, and says which scenes they draw. */
+/** Pairs of subjects to compare. Each creates its two subjects, and reports the scenes that they draw. */
 const CASES = [
   { name: 'two scenes', of: 2, beside: 'one scene of as many splats', besideOf: 1 },
   { name: `${MANY} scenes`, of: MANY, beside: 'one scene of as many splats', besideOf: 1 },
@@ -97,7 +97,7 @@ class Measurement {
     this.cameras = camerasAlong({ path, width, height, frames, radius });
   }
 
-  /** The splats as so many scenes, uploaded once. */
+  /** The splats as a number of scenes, uploaded once. */
   async scenes(count) {
     if (!this.#uploads.has(count)) {
       const each = [];
@@ -140,7 +140,9 @@ class Measurement {
     }
   }
 
-  /** What the frame takes in which a scene comes, goes, or all are reordered, beside the frames before it. */
+  /**
+   * Time of the frame in which a scene is added or removed, or all are reordered, beside that of the previous frames.
+   */
   async changes() {
     showProgress('scenes that come, go and change places');
     const scenes = await this.scenes(MANY);
@@ -194,7 +196,7 @@ class Measurement {
     }
   }
 
-  /** Bytes between the stages of one of the scenes by itself. */
+  /** Bytes of intermediate buffers of one of the scenes alone. */
   async #alone(scene) {
     const { width, height, options } = this.#plan;
     const how = { width, height, settings: settings('default', options) };

@@ -133,7 +133,7 @@ async function checkWithWebGpu(tab, version, origin) {
 }
 
 async function checkRecovery(tab) {
-  await check('a lost device: back with the same picture', async () => {
+  await check('a lost device: restored with the same frame', async () => {
     await tab.open('/engines/page.html');
     const same = await tab.evaluate(`(async () => {
       await show({ src: '/fixtures/compass.ply' });

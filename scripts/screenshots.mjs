@@ -56,7 +56,7 @@ async function image(tab, url, width) {
 async function settle(tab, place) {
   await tab
     .waitForFunction(isSettled, undefined, { timeout: 1000 * Number(values.seconds), polling: 250 })
-    .catch(() => console.log(`${place}: not everything in sight was loaded`));
+    .catch(() => console.log(`${place}: not all visible content was loaded`));
 }
 
 /** Scrolls to every scene, one after the other: scenes load when they are visible, as all images of the page do. */

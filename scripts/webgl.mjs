@@ -82,7 +82,7 @@ async function checkAll(browser, evaluate) {
     `show({ src: '/scenes/skull.spz', 'camera-controls': '' }).then((element) => JSON.stringify([element.stats.renderer, element.loaded, !!navigator.gpu]))`,
   );
   const [renderer, isLoaded, hasWebGpu] = JSON.parse(reported);
-  check('the element chooses by itself', reported, isLoaded && renderer === (hasWebGpu ? 'webgpu' : 'webgl'));
+  check('the element chooses automatically', reported, isLoaded && renderer === (hasWebGpu ? 'webgpu' : 'webgl'));
   const ages = JSON.parse(await evaluate(`orderAges({ src: '/scenes/skull.spz', renderer: 'webgl' }, 6000)`));
   const rates = `${ages.perSecond.toFixed(0)} frames a second with ${ages.moving}`;
   check(

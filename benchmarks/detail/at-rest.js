@@ -1,11 +1,12 @@
-/** Views of a streamed scene at rest: what they settle to, and how far that is from a picture of more splats. */
+/** Views of a streamed scene at rest: their final state, and its PSNR against a frame with more splats. */
 import { readPixels } from '../run/read-pixels.js';
 import { flightCamera } from './flight-path.js';
 import { drawn, rounded } from './second.js';
 
 /**
- * Draws one view until nothing more comes, or its time is up: a pool that is too small for a view goes on exchanging pages for a while.
- * @returns seconds taken, and pages on their way at the end: 0 if the view has all that it gets
+ * Draws one view until no more pages arrive, or until a time limit, because a pool that is too small for a view keeps
+ * exchanging pages for a while.
+ * @returns seconds taken, and pages in transit at the end: 0 if the view has all pages that it can get
  */
 async function settle({ device, viewpoint, scene, target, turn, progress, settleSeconds }, camera, settings) {
   const start = performance.now();
@@ -20,7 +21,7 @@ async function settle({ device, viewpoint, scene, target, turn, progress, settle
   return { seconds: rounded(took()), coming: scene.progress.coming };
 }
 
-/** PSNR over the pixels that either picture covers; `identical` for the same picture twice, `empty` where neither covers any. */
+/** PSNR over the pixels that either frame covers; `identical` for equal frames, `empty` if neither covers any. */
 function psnr(a, b) {
   let [sum, count] = [0, 0];
   for (let i = 0; i < a.length; i += 4) {
@@ -33,8 +34,8 @@ function psnr(a, b) {
 }
 
 /**
- * The picture of each view within the budget against one of a quarter of the error and four times the budget.
- * @param shares of the flight's curve, before each view
+ * Compares the frame of each view within the budget with one of a quarter of the error and four times the budget.
+ * @param shares fractions of the flight's curve, before each view
  * @param views gets a row for each
  */
 export async function compare(all, shares, views) {

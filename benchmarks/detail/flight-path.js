@@ -2,8 +2,8 @@
 import { lookAt } from '@gaussian-splat/core';
 
 /**
- * Low over the scene, along a curve that turns, now and then up to where all of it is in sight.
- * @param share of the curve, 0 to 1
+ * Flight at a low height along a curve that turns, and at times up to a point from which the whole scene is visible.
+ * @param share fraction of the curve, 0 to 1
  */
 export function flightCamera(share, { bounds, width, height }) {
   const { center, min, max } = bounds;

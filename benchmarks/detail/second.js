@@ -1,4 +1,4 @@
-/** What the frames of one second took, for the benchmark of streamed scenes. */
+/** Frame times of one second, for the benchmark of streamed scenes. */
 import { within } from '../run/bounded.js';
 import { degreesBetween } from './flight-path.js';
 
@@ -6,7 +6,7 @@ import { degreesBetween } from './flight-path.js';
 const FRAME_SECONDS = 20;
 /** Milliseconds that a frame may take at 60 a second, and between two frames where one was left out. */
 const [FRAME_MS, LATE_MS] = [1000 / 60, 1500 / 60];
-/** Frames between two looks at whether a frame lacked anything. */
+/** Number of frames between two checks for missing pages. */
 const LOOK = 8;
 /** Frames that the GPU may be given before it is done with the first of them: what browsers let a page that draws for a display do. */
 const IN_FLIGHT = 2;
@@ -130,7 +130,7 @@ export class Second {
     };
   }
 
-  /** Sends for what the GPU knows of the frames since the last look. */
+  /** Requests the pages that the feedback passes since the last call have found. */
   #look() {
     this.#looks.push(this.#all.viewpoint.stats());
     if (this.#timer) this.#passes.push(this.#timer.read());

@@ -9,7 +9,7 @@ const SHADER = `
     for (var i = 0u; i < rounds; i++) { x = fma(x, 0.999, 0.001); x = fma(x, 1.001, -0.001); }
     out[id.x % 64u] = x;
   }`;
-/** What is known of the GPU's pace once a submission takes as long, ms. */
+/** Estimated GPU speed, once a submission takes this long, ms. */
 const TELLING_MS = 20;
 /** Frames that may be on their way: a page that submits more than the GPU can do would only fall behind. */
 const IN_FLIGHT = 2;
@@ -47,7 +47,7 @@ export class Burner {
     return Math.round(this.#perMs);
   }
 
-  /** Keeps the GPU at work for about so many ms, unless it is behind already. */
+  /** Keeps the GPU busy for about the given milliseconds, unless it is already late. */
   burn(milliseconds) {
     const rounds = Math.round(this.#perMs * milliseconds);
     if (rounds < 1 || this.#flying >= IN_FLIGHT) return;
@@ -75,7 +75,7 @@ export class Burner {
     return performance.now() - begun;
   }
 
-  /** What a submission of nothing takes is the browser's answer. */
+  /** The duration of an empty submission is the browser's latency. */
   async #findRate() {
     await this.#time(1);
     const min = await this.#time(1);

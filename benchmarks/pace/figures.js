@@ -1,7 +1,10 @@
 /** From the frames of a step of the load to its figures: pure. */
 import { quantile } from '../run/summary.js';
 
-/** What is asked of a step, ms: in time from here on, at most one reversal until there. */
+/**
+ * Requirements for a step, ms: the time after which frames stay within the budget, with at most one reversal until
+ * then.
+ */
 export const [IN_TIME_AFTER, QUIET_UNTIL] = [1_000, 5_000];
 
 const rounded = (value) => (value === undefined ? null : Number(value.toFixed(3)));
@@ -24,9 +27,10 @@ export function levelsOf(frames) {
 
 /**
  * Figures of one element.
- * @param frames {{at: number, interval: number, moving: string, target: number, span: number | null}[]} each frame of the display: ms after the step, ms since the
- * frame before, the level of pictures in motion, what a frame may take, and what one took that became known since
- * @param ladder names of all levels, the true image first
+ * @param frames {{at: number, interval: number, moving: string, target: number, span: number | null}[]} each frame of
+ * the display: ms after the step, ms since the previous frame, the level of frames in motion, the frame budget, and the
+ * duration of a frame that was measured since
+ * @param ladder names of all levels, the accurate frame first
  */
 export function figuresOf(frames, levels) {
   const late = frames.filter(({ at }) => at >= IN_TIME_AFTER);
@@ -35,7 +39,7 @@ export function figuresOf(frames, levels) {
   return {
     target: rounded(frames.at(-1)?.target),
     timed: shares.length,
-    /** Of what a frame may take. */
+    /** Ratio to the frame budget. */
     span: { p50: rounded(quantile(shares, 0.5)), p95: rounded(quantile(shares, 0.95)) },
     reversals: reversals(early.map(({ moving }) => levels.indexOf(moving))),
     levels: levelsOf(frames),
@@ -56,7 +60,7 @@ export function summarize(ofElements, frames) {
   };
 }
 
-/** dB between two pictures of 8 bits over the pixels that either covers; `identical`, or `empty` where neither covers any. */
+/** PSNR of two images of 8 bits over the pixels that either covers; `identical`, or `empty` if neither covers any. */
 export function decibels(a, b) {
   let [sum, count] = [0, 0];
   for (let i = 0; i < a.length; i += 4) {
@@ -69,10 +73,10 @@ export function decibels(a, b) {
   return sum === 0 ? 'identical' : rounded(-10 * Math.log10(sum / count / 255 ** 2));
 }
 
-/** Fewest pixels of a picture: what is smaller has all its splats in a tile or two, and takes the longer for it. */
+/** Minimum pixels of a frame: in smaller frames all splats are in one or two tiles, which take longer. */
 const MIN_PIXELS = 128 ** 2;
 
-/** Pixels of a picture that takes a time, by what two sizes took (`fixed + perPixel * pixels`). */
+/** Number of pixels of a frame that takes a given time, from the times of two sizes (`fixed + perPixel * pixels`). */
 export function pixelsFor(milliseconds, [a, b], max) {
   const perPixel = (b.milliseconds - a.milliseconds) / (b.pixels - a.pixels);
   if (!(perPixel > 0)) return max;

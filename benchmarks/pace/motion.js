@@ -24,7 +24,10 @@ export async function move(stage, seconds, { speed, onFrame = () => undefined })
   return rows;
 }
 
-/** `span` is what a frame took, ms from when it could begin until the GPU was done, where one has become known since the last look; null where none has. */
+/**
+ * `span` is the duration of the last measured frame, ms from its earliest start until the GPU was done; null if no
+ * frame was measured since the last call.
+ */
 function readQuality(element, lastOf) {
   const { moving, drawn, targetMs, lastMs } = element.stats?.dynamicQuality ?? {};
   const isNew = lastMs !== null && lastOf.has(element) && lastMs !== lastOf.get(element);

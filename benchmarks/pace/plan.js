@@ -1,12 +1,12 @@
-/** What to do to the page, from its address: sizes, and steps of load one after the other. */
+/** Changes to the page, from its address: sizes, and consecutive steps of the load. */
 
 /**
  * Changes of the load; each is one number.
- * @property distance of the camera, as a multiple of that from which the scene fills the picture
- * @property size of the elements' sides, as a multiple of `width` and `height`
- * @property elements that are on show
- * @property load the elements become as large as takes this multiple of the target, were all drawn whole
- * @property burn time that other work of the page takes of the GPU in each frame, as a multiple of the target
+ * @property distance distance of the camera, as a multiple of that at which the scene fills the frame
+ * @property size size of the elements' sides, as a multiple of `width` and `height`
+ * @property elements number of visible elements
+ * @property load size of the elements: their full frames together take this multiple of the target
+ * @property burn GPU time of other work of the page in each frame, as a multiple of the target
  */
 export const CHANGES = ['distance', 'size', 'elements', 'load', 'burn'];
 
@@ -33,32 +33,32 @@ export function readPlan(query) {
   };
   return {
     scene: query.get('scene') ?? '../scenes/skull.spz',
-    /** The scene is repeated on the ground up to so many; 0: as it is. */
+    /** Number of splats that copies of the scene on the ground reach; 0: one copy. */
     splats: number(query.has('n') ? 'n' : 'splats', 0),
     /** Bands of color that repeated splats keep at most: millions of them make a smaller file. */
     degree: number('degree', 3),
-    /** Of the camera at first, as in the steps. */
+    /** Initial values of the camera, as in the steps. */
     distance: number('distance', 1),
     /** Device pixels. */
     width: number('width', 960),
     height: number('height', 540),
     /** Longest side that a step may lead to, device pixels. */
     most: number('most', 8192),
-    /** What pictures in motion may take, as a multiple of what the whole one takes at first; 0: as the display says. */
+    /** Budget of frames in motion, as a multiple of the first full frame's time; 0: that of the display. */
     budget: number('budget', 0),
     /** Milliseconds of other work for the GPU in the second half of each frame: what is idle most of the time runs at a fraction of its clock. */
     warm: number('warm', 0),
-    /** Of each step, before the camera rests. */
+    /** Seconds of each step, before the camera rests. */
     seconds: number('seconds', 6),
-    /** Of motion under the load as it was, before each step. */
+    /** Seconds of motion under the initial load, before each step. */
     before: number('before', 1),
-    /** Seconds after which no further step is begun. */
+    /** Seconds after which no further step starts. */
     limit: number('limit', 600),
     /** Degrees a second. */
     speed: number('speed', 28.6),
     /** Other attributes of the elements. */
     attributes: JSON.parse(query.get('attributes') ?? '{}'),
-    /** Compares the picture at rest with `toBlob()`. */
+    /** Compares the frame at rest with `toBlob()`. */
     compares: query.get('compare') !== '0',
     /** Keeps the times of all frames of the first element in the report. */
     keepsFrames: query.get('keep') === '1',

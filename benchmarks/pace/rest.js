@@ -1,15 +1,18 @@
-/** When the true image is on show after the cameras have come to rest, and whether it is the one that `toBlob()` hands out. */
+/**
+ * Time at which the accurate frame is visible after the cameras have stopped, and its comparison with the image of
+ * `toBlob()`.
+ */
 import { quantile } from '../run/summary.js';
 import { decibels } from './figures.js';
 
-/** Ms that it may take, and between two looks: looking all the time would keep a processor from drawing. */
+/** Maximum duration, and interval between two checks, ms. Constant checks would take CPU time from drawing. */
 const [LIMIT, LOOK] = [20_000, 1];
-/** Longest side of what is compared, in pixels from the middle of the picture. */
+/** Longest side of the compared area, in pixels around the middle of the frame. */
 const CROP = 1024;
 
 const wait = (milliseconds) => new Promise((resolve) => setTimeout(resolve, milliseconds));
 
-/** The last picture of a motion, as it was submitted, for each element. */
+/** The last submitted frame of a motion, for each element. */
 const lastDrawn = (elements) =>
   Promise.all(
     elements.map(
@@ -22,8 +25,8 @@ const lastDrawn = (elements) =>
 
 /**
  * Moves the cameras a last time and waits.
- * @returns ms from the last picture that was drawn in motion until the GPU was done with the true images of all elements, what they took, their median, and
- * how the first one on show compares with `toBlob()`
+ * @returns ms from the last frame in motion until the GPU was done with the accurate frames of all elements, their
+ * times, the median, and the comparison of the first visible one with `toBlob()`
  */
 export async function comeToRest(stage, { compares }) {
   const { elements } = stage;
@@ -41,9 +44,10 @@ export async function comeToRest(stage, { compares }) {
 }
 
 /**
- * Waits for the true images of all elements.
- * @returns when the GPU was done with them, and what the first element's canvas showed: it can be read in the task that draws it only, by callbacks that come after the
- * element's, so this one is asked for again and again
+ * Waits for the accurate frames of all elements.
+ * @returns time at which the GPU was done with them, and the content of the first element's canvas, which can be read
+ * only in the task that draws it, by callbacks that follow the element's. This callback is therefore requested in every
+ * frame
  */
 async function trueImages(elements) {
   const isWhole = ({ stats }) => stats.dynamicQuality.drawn === 'whole';
@@ -72,7 +76,7 @@ async function submittedWorkDone(element) {
   return performance.now();
 }
 
-/** The middle of a picture over black, RGBA of 8 bits. */
+/** The middle of a frame over black, RGBA of 8 bits. */
 function pixelsOf(image) {
   const [width, height] = [image.width, image.height].map((side) => Math.min(CROP, side));
   const context = new OffscreenCanvas(width, height).getContext('2d', { willReadFrequently: true });

@@ -1,4 +1,4 @@
-/** Elements on show in a page, one over the other, so that all of them draw: their size, their number, their cameras. */
+/** Visible elements of a page, stacked, so that all of them draw: their size, their number, their cameras. */
 
 /** Seconds that a scene may take to load. */
 const LOADING_SECONDS = 120;
@@ -31,12 +31,12 @@ export class Stage {
     this.show(1);
   }
 
-  /** What a picture in motion may take, ms on the GPU. */
+  /** Budget of a frame in motion, ms on the GPU. */
   set frameBudget(milliseconds) {
     for (const element of this.#elements) element.frameBudget = milliseconds;
   }
 
-  /** The elements on show. */
+  /** The visible elements. */
   get elements() {
     return this.#elements.slice(0, this.#shown);
   }
@@ -45,7 +45,7 @@ export class Stage {
     return { elements: this.#shown, ...this.#size, distance: this.distance };
   }
 
-  /** Shows the first so many. */
+  /** Shows the first `count` elements. */
   show(count) {
     if (count > this.#elements.length) throw new RangeError(`there are ${this.#elements.length} elements`);
     this.#shown = count;

@@ -37,7 +37,7 @@ const COLUMNS = [
   ['bytes a splat', ({ bytes }) => bytes?.perSplat ?? ''],
 ];
 
-/** What the bars compare. */
+/** Quantity that the bars compare. */
 const costOf = ({ burst, wall }) => burst?.p50 ?? wall?.p50;
 
 export function showResults(results, report) {

@@ -28,6 +28,6 @@ export function cameraToWorldGl({ worldToCamera: m }) {
 /** Vertical field of view in degrees. */
 export const verticalFov = ({ height, fy }) => (360 / Math.PI) * Math.atan(height / (2 * fy));
 
-/** Nearest and farthest distance that the peers are told to draw, in world units; the paths keep clear of both. */
+/** Near and far planes of the peers, in world units; no path reaches either. */
 export const NEAR = 0.05;
 export const FAR = 1000;

@@ -17,7 +17,7 @@ window.openSubject = async ({ ply, parity, antialiased, width, height }) => {
   const settings = app.scene.gsplat;
   settings.renderer = pc.GSPLAT_RENDERER_RASTER_GPU_SORT;
   if (parity) {
-    // What changes the picture for speed, off; what the scene was trained with, on.
+    // Approximations that change the frame are disabled; the filter of the scene's training is enabled.
     settings.minPixelSize = 0;
     settings.minContribution = 0;
     settings.dataFormat = pc.GSPLATDATA_LARGE;
@@ -37,7 +37,7 @@ window.openSubject = async ({ ply, parity, antialiased, width, height }) => {
       timer.recording = false;
     },
     finish: () => state.device.queue.onSubmittedWorkDone(),
-    /** Colors are only evaluated anew when the camera has moved far enough: it gets every chance to do so. */
+    /** Colors are evaluated again only after a minimum camera movement: the frame gets every chance to do so. */
     async capture(view) {
       subject.draw(movedAside(view), false);
       await subject.finish();
@@ -47,7 +47,7 @@ window.openSubject = async ({ ply, parity, antialiased, width, height }) => {
       }
       return readPixels(state.device, state.texture);
     },
-    /** The next frame, whatever is not up to date yet. */
+    /** The next frame, even if some of its state is out of date. */
     async snapshot(view) {
       subject.draw(view, false);
       await subject.finish();

@@ -6,12 +6,12 @@ import { cameraToWorldGl, FAR, holdAnimationFrames, NEAR, verticalFov } from './
 
 holdAnimationFrames();
 
-/** How long to wait for the worker, and how far Spark lets the camera move or turn (cosine) before it sorts anew. */
+/** Time limit for the worker, and the movement and rotation (cosine) of the camera above which Spark sorts again. */
 const TIMEOUT_MS = 60_000;
 const SAME_PLACE = 2e-3;
 const SAME_DIRECTION = 0.999;
 
-/** Spark without the shortcuts that change the picture, and with the blur that the scene was trained with. */
+/** Spark without approximations that change the frame, and with the filter of the scene's training. */
 const parityOptions = (antialiased) => ({
   preBlurAmount: antialiased ? 0 : 0.3,
   blurAmount: antialiased ? 0.3 : 0,
@@ -52,7 +52,7 @@ window.openSubject = async ({ ply, parity, antialiased, width, height }) => {
       draw(view);
       return readGl(gl);
     },
-    /** The next frame, in whatever order there is. */
+    /** The next frame, in the latest order. */
     async snapshot(view) {
       draw(view);
       return readGl(gl);

@@ -1,6 +1,7 @@
 /**
- * Makes any WebGPU renderer of this page measurable: its device gets timestamps, every pass of a timed frame is noted, and
- * its canvas is replaced by one texture that stays, so that neither a compositor nor a display sets the pace.
+ * Makes any WebGPU renderer of this page measurable: its device gets timestamps, every pass of a timed frame is
+ * recorded, and its canvas is replaced by one permanent texture, so that neither a compositor nor a display limits the
+ * rate.
  */
 
 const MAX_QUERIES = 4096;

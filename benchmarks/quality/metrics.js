@@ -9,11 +9,11 @@ const EQUAL_DB = 150;
 const decibels = (value) => round(Math.min(EQUAL_DB, value), 3);
 
 /**
- * Compares [height, width, 4] premultiplied pixels over black with a reference. Both are clamped to 0..1 first: what is
- * brighter than white looks white to everybody, and peers hand out 8 bits only.
- *
+ * Compares [height, width, 4] premultiplied pixels over black with a reference. Both are first clamped to 0..1, because
+ * displays clip brighter colors, and peers return 8 bits only.
  * @returns psnr in dB over covered pixels and `psnrAll` over all; `psnrShown` after rounding to 8 bits; `p999` and
- * `worst`, the 99.9th percentile and the largest of the differences, in 1/255; `ssim` over the box around what is covered.
+ * `worst`, the 99.9th percentile and the largest of the differences, in 1/255; `ssim` over the box around the covered
+ * pixels.
  */
 export function compareImages(pixels, reference, { width, height }) {
   const color = withoutAlpha(pixels);

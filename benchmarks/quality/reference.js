@@ -22,7 +22,7 @@ export async function makeReferences({ device, scene, cameras, kind = 'auto', on
   return { ...made, milliseconds: Math.round(performance.now() - start) };
 }
 
-/** The oracle's images, on as many threads as there are views and processors. */
+/** The oracle's images, on one thread for each view, up to the number of CPU cores. */
 async function drawByOracle(cloud, cameras) {
   const images = new Array(cameras.length);
   const threads = Math.min(cameras.length, Math.max(1, navigator.hardwareConcurrency ?? 1));

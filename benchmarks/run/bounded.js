@@ -1,6 +1,6 @@
 /** Waits that end, and know what they waited for: a page that measures always has something to report. */
 
-/** Rejects, with the name of what did not come, after so many seconds. */
+/** Rejects, with the name of the missing result, after a number of seconds. */
 export function within(seconds, what, promise) {
   let timer;
   const late = new Promise((_, reject) => {
@@ -9,7 +9,7 @@ export function within(seconds, what, promise) {
   return Promise.race([promise, late]).finally(() => clearTimeout(timer));
 }
 
-/** What a page does at the moment, for whoever has to say it, and when it must have ended. */
+/** The current step of a page, for error messages, and the time by which it must end. */
 export class Progress {
   #what = 'the start';
   #since = performance.now();
@@ -36,12 +36,12 @@ export class Progress {
     return Math.max(0, (this.#end - performance.now()) / 1000);
   }
 
-  /** What began last, and how long ago. */
+  /** Name of the last step, and milliseconds since its start. */
   toString() {
     return `${this.#what}, for ${((performance.now() - this.#since) / 1000).toFixed(1)} s`;
   }
 
-  /** Waits for a promise, at most so many seconds or until everything must have ended. */
+  /** Waits for a promise, up to a number of seconds or the time limit of the page. */
   wait(what, promise, seconds = Infinity) {
     this.begin(what);
     return within(Math.min(seconds, Math.max(0.001, this.left)), what, promise);

@@ -1,6 +1,5 @@
 /**
- * What to measure, from the page's address: one configuration or a list of them.
- *
+ * Configurations to measure, from the page's address: one or a list.
  * A configuration's fields, all optional: `name`; `scene` (URL), `splats` (0: as the file has), `layout` (ground,
  * overhead), `visible` (splats on the ground if overhead), `mode` (scene, classic, antialiased); `width`, `height`, `path`,
  * `distance` (of the path from the scene, 1: usual), `resolutionScale`; `options` (of the Renderer) and `pack` (of

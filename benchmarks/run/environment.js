@@ -16,7 +16,7 @@ export async function openDevice() {
   const canTime = adapter.features.has('timestamp-query');
   const features = new Set([...(descriptor.requiredFeatures ?? []), ...(canTime ? ['timestamp-query'] : [])]);
   const device = await adapter.requestDevice({ ...descriptor, requiredFeatures: [...features] });
-  // What `auto` means, as the element would find out; never from an earlier visit.
+  // Resolves `auto` as the element would, but never from an earlier visit.
   const variants = await autotune(device, { store: null });
   const errors = [];
   const note = (message) => errors.length < 20 && errors.push(message.slice(0, 300));

@@ -1,4 +1,7 @@
-/** Tells which options a renderer really looks at, so that no figure is published under the name of a lever that is not there. */
+/**
+ * Reports the options that a renderer reads, so that no figure is published under the name of an option that does not
+ * exist.
+ */
 
 /**
  * Options that note which of their properties are read.

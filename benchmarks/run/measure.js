@@ -1,11 +1,10 @@
 /**
- * Measures whatever can draw: our renderer and others alike.
- *
+ * Measures any renderer, ours and others alike.
  * A subject is
- *   draw(camera, timed)   draws and submits one frame; `timed` asks for timestamps
- *   finish()              promise: the GPU has done all that was submitted
- *   readTimes?()          promise of the passes [{label, begin, end}] in ms of each timed frame since the last call
- *   settle?(camera)       promise: an asynchronous depth order has caught up with this camera
+ * draw(camera, timed)   draws and submits one frame; `timed` asks for timestamps
+ * finish()              promise: the GPU has done all submitted work
+ * readTimes?()          promise of the passes [{label, begin, end}] in ms of each timed frame since the last call
+ * settle?(camera)       promise: an asynchronous depth order is that of this camera
  */
 
 import { spanOf } from './summary.js';
@@ -18,7 +17,7 @@ const READ_EVERY = 50;
 const IN_A_ROW = 40;
 /** Frames that may be in flight when a GPU is made to work. */
 const BUSY_IN_FLIGHT = 16;
-/** Empty submissions of which the fastest tells what waiting for nothing takes. */
+/** Number of empty submissions, the fastest of which is the latency of the wait. */
 const EMPTY = 8;
 /** Milliseconds of work before a visit measures: GPUs that were idle run at a fraction of their clock. */
 const BUSY_MS = 400;
@@ -28,8 +27,8 @@ const TURN = 10;
 
 /**
  * One visit to a subject: warm-up, then each phase over all cameras. Times in milliseconds.
- * @param how.standard another subject, warm already, that draws the same in turns: `ratios` then holds the subject's times as shares of the
- * standard's, a number for each burst, and `standard` what the standard took.
+ * @param how.standard another subject, already warm, that draws the same frames alternately: `ratios` then has the
+ * subject's times as ratios to the standard's, a number for each burst, and `standard` the standard's times.
  */
 export async function visit(subject, cameras, { warmUp, phases = PHASES, busyMs = BUSY_MS, standard }) {
   for (let i = 0; i < warmUp; i++) await drawAndWait(subject, cameras[i % cameras.length]);
@@ -67,8 +66,8 @@ const meanWall = (frames) => mean(wallsOf(frames));
 const meanSpan = (frames) => mean(frames.map(spanOf).filter((span) => span !== undefined));
 
 /**
- * How a burst of frames of a subject is timed, how one of the standard beside it, and what a burst took for each frame: the mean, since a lever may save in
- * most frames and pay in some.
+ * Timing of a burst of frames of a subject and of the standard beside it. A burst's time per frame is the mean, because
+ * an option may save time in most frames and cost time in some.
  */
 const KINDS = {
   burst: {

@@ -61,7 +61,7 @@ export class OwnRenderer {
     }
   }
 
-  /** What only this configuration can say about itself, after it has drawn. */
+  /** Facts that only this configuration can report after it has drawn. */
   async facts() {
     const scene = this.#gaussians.reduce((sum, { byteLength }) => sum + byteLength, 0);
     const splats = this.#gaussians.reduce((sum, { count }) => sum + count, 0);

@@ -59,8 +59,8 @@ export class BenchScene {
   }
 
   /**
-   * The scene on the GPU, packed as asked.
-   * @returns {Promise<{buffers: GaussianBuffers[], ignored: string[]}>} with the pack options that nobody looked at.
+   * The scene on the GPU, packed with the given options.
+   * @returns {Promise<{buffers: GaussianBuffers[], ignored: string[]}>} with the pack options that were not read.
    */
   upload(pack) {
     const key = JSON.stringify(pack);

@@ -1,10 +1,10 @@
-/** Opens whatever a configuration asks for: our renderer, or another one. */
+/** Opens the renderer of a configuration: ours or a peer. */
 import { OwnRenderer } from './own-renderer.js';
 import { openPeer } from './peer.js';
 
 /**
- * Subjects of one scene. Ours are made anew for each visit, so that none holds memory while another is measured; peers take
- * seconds to open, so they stay, idle, until `dispose`.
+ * Subjects of one scene. Ours are created again for each visit, so that none holds memory while another is measured;
+ * peers take seconds to open, so they stay, idle, until `dispose`.
  */
 export class Subjects {
   #device;

@@ -1,6 +1,6 @@
 /** Few numbers out of many. */
 
-/** The value that the given share of samples (0..1) does not exceed; undefined without samples. */
+/** The quantile of samples for a fraction, 0..1; undefined without samples. */
 export function quantile(values, share) {
   if (values.length === 0) return undefined;
   const sorted = [...values].sort((a, b) => a - b);
@@ -30,7 +30,7 @@ export function summarizeStages(frames) {
   return Object.fromEntries(labels.map((label) => [label, summarize(frames.map((passes) => total(passes, label)))]));
 }
 
-/** Times as shares of the standard's (see `visit`), medians over all bursts; undefined where nothing was measured beside one. */
+/** Times as ratios to the standard's (see `visit`), medians over all bursts; undefined without a standard. */
 function summarizeRatios(visits) {
   if (visits.every(({ ratios }) => ratios === undefined)) return undefined;
   const all = (name) => visits.flatMap(({ ratios }) => ratios?.[name] ?? []);
@@ -42,7 +42,7 @@ function summarizeRatios(visits) {
   };
 }
 
-/** What the standard took over all visits to all subjects, as a result of its own. */
+/** Times of the standard over all visits to all subjects, as a separate result. */
 export function summarizeStandard(results) {
   const all = (name) => results.flatMap(({ visits }) => visits.flatMap(({ standard }) => standard?.[name] ?? []));
   const spans = all('passes').map(spanOf);

@@ -74,7 +74,7 @@ export function countAllocations(device) {
     return createBuffer(descriptor);
   };
   return {
-    /** What was asked for since the last call. */
+    /** Requests since the last call. */
     take() {
       const taken = work;
       work = { buffers: 0, bytes: 0 };

@@ -1,6 +1,6 @@
 /**
- * Fixed camera paths, so that every machine and every renderer draws the same frames. A path is a function of the frame's
- * number: time goes on by 1/60 s a frame, whatever the frame rate.
+ * Fixed camera paths, so that every machine and every renderer draws the same frames. A path is a function of the
+ * frame's index: time advances by 1/60 s a frame, independent of the frame rate.
  */
 import { lookAt } from '@gaussian-splat/core';
 import { LONE_RADIUS } from './placement.js';

@@ -18,14 +18,12 @@ function grid(copies, height) {
 }
 
 /**
- * Where the copies of a scene of `base` splats stand so that they make `count` splats (0: the scene as it is).
- *
+ * Positions of copies of a scene of `base` splats that have `count` splats together (0: one copy).
  * `ground`: all on the ground plane; the more splats, the more of them in view.
- * `overhead`: the first `visible` splats on the ground, all others so high above it that no path but `zoom` ever sees
- * them. It asks what splats cost that are not in view.
- *
+ * `overhead`: the first `visible` splats on the ground, all others so high above it that only the path `zoom` shows
+ * them. It measures the cost of splats outside the view.
  * @returns {{radius: number, copies: {offset: number[], length: number}[]}} the orbit's radius in world units, and for
- * each copy its offset in world units and how many of its splats are kept.
+ * each copy its offset in world units and its number of splats.
  */
 export function placeCopies({ base, count, layout = 'ground', visible = count }) {
   if (count === 0) count = base;

@@ -41,8 +41,8 @@ export function tileCloud(cloud, copies) {
 
 /**
  * Uploads the copies, a few million splats at a time, without ever holding them all in memory.
- * @param pack options of packGaussians, and `detail`: levels of detail
- * It is handed on as it is: whoever asks for unread options watches that very object.
+ * @param pack options of packGaussians, and `detail`: levels of detail. The same object is passed on, because its reads
+ * are watched to find unread options.
  * @returns {Promise<GaussianBuffers[]>} to be drawn together.
  */
 export async function uploadTiled(device, cloud, copies, pack = {}) {

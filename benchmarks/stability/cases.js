@@ -1,6 +1,7 @@
 /**
- * Rows of the stability catalog that any viewer of a page can be put through: a scene, views, and what is asked of the pictures. The names are those of
- * tests/stability. Views are centerd pinholes, since peers take no others.
+ * Rows of the stability catalog that any viewer of a page can draw: a scene, views, and the requirements for the
+ * frames. The names are those of tests/stability. Cameras are pinholes with a central principal point, because peers
+ * support no others.
  */
 import { cloudOf, repeat } from '../../tests/support/clouds.ts';
 import { seededRandom } from '../../tests/support/random.ts';
@@ -15,7 +16,7 @@ const view = (eye, target, fovXDegrees = 60) => cameraAt(eye, target, { ...SIZE,
 const color = (random) => [random.uniform(0, 1), random.uniform(0, 1), random.uniform(0, 1)];
 const sizes = (random, low, high) => [0, 1, 2].map(() => random.logUniform(low, high));
 
-/** dB that pictures of 8 bits must reach where 59 are asked for before rounding, which alone costs 58.9. */
+/** PSNR that frames of 8 bits must reach if 59 dB are required before rounding, which alone limits it to 58.9. */
 const ON_DISPLAY = 55;
 
 function ball(seed, count = 3000) {
@@ -97,7 +98,7 @@ function turned(camera, degrees) {
 
 /** All cases; each is made when it is its turn. */
 export const CASES = [
-  // What the rows are to be held against: a peer that has its own idea of a splat is far from the reference everywhere.
+  // Reference of the rows: for a peer with another definition of a splat, all rows would differ from the oracle.
   () => still('-', 'an ordinary scene, for comparison', ball(1, 1500), [view([0, 0, -4], [0, 0, 0])]),
   () => {
     const { cloud, cameras } = room();
@@ -170,5 +171,5 @@ function scaledTo(camera) {
   };
 }
 
-/** What the oracle draws: without the splats that nobody can draw. */
+/** Splats for the oracle: without those that cannot be drawn. */
 export const truthOf = ({ cloud, truth, views, truthViews }) => ({ cloud: truth ?? cloud, views: truthViews ?? views });

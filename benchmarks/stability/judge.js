@@ -18,7 +18,7 @@ export async function judge(subject, one, references) {
   return { ...worst, unit: 'dB', passes: worst.figure >= one.least };
 }
 
-/** The first picture of a new direction: nobody waits for an order that is late. */
+/** The first frame of a new direction, without waiting for a late order. */
 async function judgeTurn(subject, { views: [before, after], least: min }, references) {
   await subject.capture(before);
   const image = await subject.snapshot(after);

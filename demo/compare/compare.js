@@ -62,7 +62,7 @@ async function measure() {
     const { decibels, worst } = await differenceOf(left, right);
     const rows = sides.map((element, i) => [
       byId(`${element.id}-name`).textContent,
-      times[i].isEnough ? String(Number(times[i].median.toPrecision(2))) : 'too slow to tell',
+      times[i].isEnough ? String(Number(times[i].median.toPrecision(2))) : 'too slow to measure',
       decibels === Infinity ? 'the same' : decibels.toFixed(1),
       String(worst),
     ]);

@@ -58,7 +58,7 @@ export async function askForLevel(scene, say, signal) {
     const point = await pickPoint(scene, signal);
     signal.throwIfAborted();
     if (point === null) {
-      say('Nothing of the scene is there. Another point?');
+      say('There is nothing of the scene at this point. Choose another point.');
       continue;
     }
     points.push(point);

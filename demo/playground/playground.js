@@ -197,7 +197,7 @@ async function label() {
   try {
     const point = await pickPoint(scene, asking.signal);
     if (point !== null) children.addLabel(point);
-    else byId('copied').textContent = 'Nothing of the scene is there. Press the button again.';
+    else byId('copied').textContent = 'There is nothing of the scene at this point. Press the button again.';
   } catch {
     // Another button was pressed, or another scene is shown.
   }

@@ -34,7 +34,7 @@ export function fillCostCard(list, facts, element) {
     showMemory();
   });
   if (!element.loaded) return;
-  places.warmUp.textContent = 'was there before this card';
+  places.warmUp.textContent = 'was loaded before this card';
   showMemory();
 }
 

@@ -72,7 +72,7 @@ async function turning(element) {
 /** When the next frame was submitted. */
 function nextFrame(element) {
   return new Promise((resolve, reject) => {
-    const timer = setTimeout(() => reject(new Error('No frame came: is the scene in sight?')), 20_000);
+    const timer = setTimeout(() => reject(new Error('No frame was drawn: is the scene in the viewport?')), 20_000);
     const finish = () => {
       clearTimeout(timer);
       resolve(performance.now());

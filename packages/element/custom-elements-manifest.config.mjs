@@ -6,7 +6,7 @@ import { customElementJetBrainsPlugin } from 'custom-element-jet-brains-integrat
 import { customElementVsCodePlugin } from 'custom-element-vs-code-integration';
 import { tableOfAttributes } from './scripts/attributes.mjs';
 
-/** What people import is the compiled module. */
+/** Pages import the compiled module. */
 const published = (path) => path?.replace(/^src\//, 'dist/').replace(/\.ts$/, '.js');
 
 /**
@@ -68,7 +68,7 @@ const ENTRIES = [
   'src/composition/splat-mesh.ts',
   'src/effects/splat-cut.ts',
 ];
-/** The life cycle of Lit and of the platform is inherited as well, and nobody's concern. */
+/** Members of the life cycle of Lit and of the platform are inherited, but are no part of the documented interface. */
 const LIFE_CYCLE = [
   'core',
   'connectedMoveCallback',

@@ -16,7 +16,10 @@ import { shortShaders } from './scripts/shader-plugin.mjs';
 import { transform } from 'esbuild';
 import { workerAsText } from './scripts/worker-text.mjs';
 
-/** Of the package's own modules these stay as they are: they find files by their own address, are the worker's, or are made here. */
+/**
+ * These modules of the package stay separate: they find files by their own address, belong to the worker, or are
+ * generated here.
+ */
 const KEPT = /\/element\/dist\/(loading\/(worker-sources|spawn-worker|scene-worker)|meshes\/three)\.js$/;
 
 const path = (name) => fileURLToPath(new URL(name, import.meta.url));
@@ -115,7 +118,7 @@ const copyOthers = {
   },
 };
 
-/** What is in a chunk; where its module says it least, the name of the package. */
+/** Name of a chunk's content; the package's name if the module's name is not specific. */
 const NAMES = { index: 'generator', dist: 'generator', meta: 'sog-meta', lod: 'sog-levels', bundle: 'sog-bundle' };
 const nameOf = ({ name }) => NAMES[name] ?? name;
 
@@ -147,12 +150,14 @@ export default [
   },
   {
     input: { 'gaussian-splat.min': path('./dist/index.js') },
-    // Where workers are refused, the element imports the worker's module; it is the same file, not a copy.
+    // If workers are forbidden, the element imports the worker's module, which is the same file, not a copy.
     external: (id) => id.endsWith('scene-worker.js'),
-    // What generators need is a chunk of its own, loaded when the first is shown; it finds the runtime beside itself.
+    // The code for generators is a separate chunk, loaded for the first generator. It loads the runtime from its own
+    // folder.
     preserveEntrySignatures: 'allow-extension',
     plugins: [workerBeside, threeBeside, ...plugins, copyOthers],
-    // What two chunks share and is smaller than a request for it goes where the page has it already.
+    // Code that two chunks share, and that is smaller than a request for it, is added to a chunk that the page always
+    // loads.
     output: {
       ...output,
       chunkFileNames: (chunk) => `${nameOf(chunk)}-[hash].js`,

@@ -26,9 +26,9 @@ import { peakBytes } from './peak.mjs';
 const USAGE = `usage: npm run lab:attack -- [FOLDER (default ../shared/cases/attack)] [--only PATTERN] [--renderer webgl] [--seconds N (default 40)]
 
 Reads every scene file of a folder in Node, and shows each in Chromium, files named mesh-* and csp-* as meshes, with an honest scene of 400 splats (honest.ply of the folder, or of
-../attack) half a second later, and again when it is removed; both with a heap of 300 MB. A folder within the folder is a streamed scene. Prints the result, the time, the most memory of
+../attack) half a second later, and again when it is removed; both with a heap of 300 MB. A folder within the folder is a streamed scene. Prints the result, the time, the maximum memory of
 the page's process and of the GPU's (on Linux) above an empty page, and the requests to another origin. Ends with an error if one crashes, ends without a named error, takes more than
-400 MB of a process, keeps the page's thread for more than 100 ms at once, asks another origin, or delays the honest scene by more than a second.`;
+400 MB of a process, blocks the main thread for more than 100 ms at once, asks another origin, or delays the honest scene by more than a second.`;
 const HEAP = '--max-old-space-size=300';
 const MAX_PEAK = 400e6;
 const MAX_WAIT_MS = 1_000;
@@ -153,7 +153,7 @@ for (const file of files) {
   if (!isNamed) faults.push(`${file}: no named error (${result})`);
   for (const [what, bytes] of Object.entries({ page: peak, GPU: gpuPeak }))
     if (bytes > MAX_PEAK) faults.push(`${file}: ${megabytes(bytes)} of the process of the ${what}`);
-  if (task > MAX_TASK_MS) faults.push(`${file}: a task of ${task} ms on the page's thread`);
+  if (task > MAX_TASK_MS) faults.push(`${file}: a task of ${task} ms on the main thread`);
   for (const [when, took, came] of [
     ['beside it', beside, besideResult],
     ['later', later, laterResult],

@@ -12,7 +12,7 @@ const USAGE = `usage: npm run lab:bench -- [options]
   --path NAME       orbit (default), among, dolly, yaw, snap, zoom or strafe
   --frames N        frames of each visit (default 5)
   --rounds N        visits to each configuration, in alternating order (default 3)
-  --scene FILE      a scene of yours instead of the one that ships
+  --scene FILE      your own scene instead of the included one
   --list FILE       JSON array of configurations to compare; default: ours, PlayCanvas and Spark
   --no-peers        ours alone
   --beside FOLDER   another checkout, built, whose renderer is measured in turns with this one

@@ -11,10 +11,10 @@ import { root } from '../lib/run.mjs';
 const USAGE = `usage: npm run lab:load -- FILE ... [options]
 
   FILE             scenes: .ply, .compressed.ply, .spz, .sog. node scripts/tile-scene.mjs makes large ones
-  --viewers A,B    of ours, spark, playcanvas (default all); each file is opened by each in a browser of its own
-  --rounds N       so often each, the least time counts (default 2)
-  --seconds N      that a load may take (default 120)
-  --out FILE       the figures as JSON`;
+  --viewers A,B    from ours, spark, playcanvas (default all); each opens each file in a separate browser
+  --rounds N       loads of each; the minimum time counts (default 2)
+  --seconds N      time limit of a load (default 120)
+  --out FILE       file for the figures, as JSON`;
 
 const { values, positionals } = parseArgs({
   allowPositionals: true,

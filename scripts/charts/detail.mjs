@@ -29,7 +29,7 @@ const detailed = await GaussianBuffers.upload(device, packWithDetail(cloud));
 
 console.log(
   `| distance | exact: drawn, for one that contributes | ${numbers(values.detail)
-    .map((px) => `${px} px: dB, drawn for one that contributes to the exact picture`)
+    .map((px) => `${px} px: PSNR in dB, only of splats that contribute to the exact frame`)
     .join(' | ')} |`,
 );
 console.log(

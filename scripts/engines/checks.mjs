@@ -134,7 +134,7 @@ export async function checkParts(tab, renderer) {
       `x ${points.join(', ')}, expected 1`,
     );
   });
-  await check('a scene without a size is there when it is shown', async () => {
+  await check('a scene without a size is loaded when it is shown', async () => {
     await found(`${shown({ hidden: '', loading: 'eager' })};
       element.hidden = false;
       await delay(3000);
@@ -205,7 +205,7 @@ export async function checkHands(tab, { renderer, hasTouch = true }) {
 
 /** A restored WebGL context draws the same image. */
 export async function checkLostContext(tab) {
-  await check('a lost context: back with the same picture', async () => {
+  await check('a lost context: restored with the same frame', async () => {
     const isSame = await tab.evaluate(`(async () => {
       await show({ src: '/fixtures/compass.ply', renderer: 'webgl' });
       const before = element.toDataURL();

@@ -39,7 +39,7 @@ async function until(condition, what, limitMs = 20_000) {
   const end = performance.now() + limitMs;
   while (!condition()) {
     if (performance.now() > end)
-      throw new Error(`waited ${limitMs} ms for ${what}; told: ${(window.told ?? []).join('; ')}`);
+      throw new Error(`waited ${limitMs} ms for ${what}; reported: ${(window.told ?? []).join('; ')}`);
     await delay(20);
   }
 }

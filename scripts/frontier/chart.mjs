@@ -59,7 +59,7 @@ function makeScales(points, { width, height, margin }) {
 function drawTitle({ environment, scene }, { margin, isSmall, font }) {
   const about = `${adapterName(environment.adapter)}, ${scene.width}×${scene.height}, ${scene.splats.toLocaleString('en')} splats`;
   const left = isSmall ? font : margin.left;
-  const lines = isSmall ? [`${about}.`, 'Left is faster, up is truer.'] : [`${about}. Left is faster, up is truer.`];
+  const lines = isSmall ? [`${about}.`, 'Left is faster, up is more accurate.'] : [`${about}. Left is faster, up is more accurate.`];
   return [
     words(left, 26, isSmall ? 'Time of a frame against accuracy' : 'Time of a frame against accuracy of its image', {
       'font-size': 1.15 * font + (isSmall ? 0 : 4),
@@ -150,14 +150,14 @@ function wholeCaption({ environment, scene, reference, run, standard }) {
   const against = reference.kind === 'oracle' ? 'the float64 oracle' : 'our compute rasterizer in float32';
   return [
     `Orange: ours (${versions.commit}); blue: PlayCanvas ${versions.playcanvas}, Spark ${versions.spark}. Milliseconds of a frame of 40 in a row, queue drained once.`,
-    `Dashed: nothing else is both faster and truer; bold: those, and the qualities. ${scene.views} views of the path “${scene.path}”, covered pixels, against ${against}.`,
+    `Dashed: nothing else is both faster and more accurate; bold: those, and the qualities. ${scene.views} views of the path “${scene.path}”, covered pixels, against ${against}.`,
     `Scene ${scene.scene.split('/').at(-1)}, ${scene.antialiased ? 'antialiased' : 'classic'}; ${run.rounds} × ${run.frames} frames${standard ? ', each beside the default in turns' : ''}; ${browser}; ${date.slice(0, 10)}.`,
   ];
 }
 
 function smallCaption({ environment }) {
   return [
-    `Orange: ours, pale: single levers; blue: others. ${environment.date.slice(0, 10)}.`,
+    `Orange: ours, pale: single settings; blue: others. ${environment.date.slice(0, 10)}.`,
     'Milliseconds of a frame of 40 in a row.',
   ];
 }

@@ -15,13 +15,13 @@ const USAGE = `usage: npm run lab:frontier -- [options]
   --size WxH        image size (default 480x270)
   --splats N        splats; 0, the default, is the scene as it is
   --path NAME       camera path (default orbit)
-  --distance F      of the path from the scene; default 0.5, where it fills the image's height
+  --distance F      of the path from the scene; default 0.5, at which it fills the image's height
   --views N         views that are compared with the reference (default 4)
   --frames N        frames of each visit (default 5)
   --rounds N        visits to each configuration, in alternating order (default 2)
   --only REGEX      only configurations whose name matches
-  --scene FILE      a scene of yours instead of the one that ships
-  --query TEXT      anything else for the page's address, for example "reference=renderer"
+  --scene FILE      your own scene instead of the included one
+  --query TEXT      further parameters for the page's address, for example "reference=renderer"
   --python FILE     measures LPIPS, too, with a Python that has packages/cli/src/lib/gate/requirements.txt
   --from FILE       draws a report that the page posted on another machine; with images=1 in the page's address, LPIPS too
   --adapter NAME    the GPU's name, where the browser tells no more than its vendor
@@ -135,10 +135,10 @@ function describe(report) {
   const passed = tiers.map((tier) => [tier.name, passing(tier, points).map(({ name }) => name)]);
   return [
     ...lines,
-    `* nothing is both faster and truer; ${area.toFixed(2)} decades x dB within 16.6 ms and above 36 dB`,
+    `* nothing is both faster and more accurate; ${area.toFixed(2)} decades x dB within 16.6 ms and above 36 dB`,
     ...passed.map(
       ([name, by]) =>
-        `  ${name}: ${by.length > 0 ? `passed by ${by.join(', ')}` : 'nothing is as fast, as true and as small, and clearly better in one of these'}`,
+        `  ${name}: ${by.length > 0 ? `passed by ${by.join(', ')}` : 'nothing is as fast, as accurate and as small, and clearly better in one of these'}`,
     ),
   ].join('\n');
 }

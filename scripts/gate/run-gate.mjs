@@ -18,12 +18,12 @@ const USAGE = `usage: npm run lab:gate -- [options]
   --data FOLDER    the captured scenes and their photographs (default ../shared/data)
   --scene NAME=PLY,CAMERAS,IMAGES  another scene: its trained file, cameras.json of the training, and the folder of its
                    photographs, with paths relative to --data. Repeatable. Scenes that are not in --data keep their figures
-  --jobs N         how many files are made at a time (default 1)
-  --work FOLDER    where files that are made are kept (default bench-results/gate)
+  --jobs N         files that are generated at a time (default 1)
+  --work FOLDER    folder for generated files (default bench-results/gate)
   --out FILE       the figures (default docs/frontier/gate.json)
-  --every N        every so many-th photograph is compared, those that trainers hold out (default 8)
-  --db A,B         dB of our SOG and our pages to try, from the smallest file to the largest (default 40,42,44,46,48,50)
-  --kept           of what takes long to make only what is in --work
+  --every N        compares every Nth photograph, which trainers hold out (default 8)
+  --db A,B         PSNR targets of our SOG and our pages in dB, from the smallest file to the largest (default 40,42,44,46,48,50)
+  --kept           uses only the generated files in --work, and makes no others
   --python FILE    a Python with packages/cli/src/lib/gate/requirements.txt (default python3)
 `;
 

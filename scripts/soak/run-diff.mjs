@@ -12,8 +12,8 @@ import { summaryLine } from './summary.mjs';
 
 const USAGE = `usage: npm run lab:soak -- [--minutes N (default 120)] [--seed S] [--out FILE] [--max-mib N (default 6144)]
 
-Every five minutes a line that begins with "summary:" tells how far it has come, and FILE holds the report so far. Ends with an error once the
-browser's processes hold more memory than --max-mib together (on Linux, which tells).`;
+Every five minutes a line that begins with "summary:" reports the progress, and FILE has the report until then. Ends with an error once the
+browser's processes hold more memory than --max-mib together (on Linux only).`;
 const ANCHOR = { x: 0, y: 0, width: 160, height: 120 };
 /** Actions between two checks of the ledger. */
 const EPOCH = 30;

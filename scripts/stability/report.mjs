@@ -38,7 +38,7 @@ const CHARTS = [
   {
     file: 'zoom',
     row: 'S21',
-    title: 'Zooming out: to the same picture drawn 8 times as large',
+    title: 'Zooming out: to the same image drawn 8 times as large',
     x: 'times smaller',
     log: true,
   },
@@ -50,7 +50,6 @@ export function writeReport({ runs, pages }) {
   const file = join(folder, 'figures.json');
   const published = JSON.parse(readFileSync(file, 'utf8'));
   const data = {
-    rows: readHeaders(),
     runs: mergeRuns([...published.runs, ...runs]),
     pages: mergePages([...published.pages, ...pages]),
   };
@@ -60,7 +59,7 @@ export function writeReport({ runs, pages }) {
   const text = readFileSync(page, 'utf8');
   const begin = text.indexOf(MARK);
   if (begin < 0) throw new Error(`docs/stability.md has no line ${MARK}, behind which the report goes`);
-  writeFileSync(page, `${text.slice(0, begin)}${MARK}\n\n${markdown(data)}`);
+  writeFileSync(page, `${text.slice(0, begin)}${MARK}\n\n${markdown({ rows: readHeaders(), ...data })}`);
 }
 
 const MARK = '<!-- figures -->';

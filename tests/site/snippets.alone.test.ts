@@ -167,7 +167,7 @@ describe('what documents tell people to write', { skip }, () => {
     writeFileSync(join(made.folder, 'index.html'), 'mine');
     const { stdout } = makePage(made.folder);
     assert.equal(readFileSync(join(made.folder, 'index.html'), 'utf8'), 'mine');
-    assert.match(stdout, /is there already[\s\S]*<script type="module"[\s\S]*<gaussian-splat src=/);
+    assert.match(stdout, /exists and was not changed[\s\S]*<script type="module"[\s\S]*<gaussian-splat src=/);
   });
 
   it('the program around the renderer draws on its canvas', { timeout: 200_000 }, async () => {

@@ -57,7 +57,7 @@ function firstOf(results, standard) {
 
 /** As it is usually called: makers and models say the same thing twice. */
 function adapterName({ vendor, architecture, description }) {
-  if (architecture === 'swiftshader') return 'SwiftShader, a processor';
+  if (architecture === 'swiftshader') return 'SwiftShader, on a CPU';
   return description?.toLowerCase().startsWith(vendor)
     ? description
     : [vendor, architecture, description].filter(Boolean).join(' ');

@@ -2,13 +2,15 @@
 import { readFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { latestOf, titleOf } from '../../../scripts/stability/figures.mjs';
+import { readHeaders } from '../../../scripts/stability/headers.mjs';
 import { isWhole, linesOf, subjectsOf } from '../../../scripts/stability/tables.mjs';
 import { root } from '../../../scripts/lib/run.mjs';
 
 const CHARTS = { S1: 'popping', S7: 'distance', S8: 'key-bits', S21: 'zoom' };
 
 export default function stability() {
-  const { rows, runs, pages } = JSON.parse(readFileSync(join(root, 'docs/stability/figures.json'), 'utf8'));
+  const { runs, pages } = JSON.parse(readFileSync(join(root, 'docs/stability/figures.json'), 'utf8'));
+  const rows = readHeaders();
   const charts = Object.entries(CHARTS).filter(([id]) => runs.some(({ rows }) => rows[id]?.curves.length > 0));
   return {
     charts: charts.map(([row, file]) => ({ row, file, title: rows.find(({ id }) => id === row).title })),

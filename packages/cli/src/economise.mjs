@@ -204,7 +204,7 @@ async function openJudge(device, cloud, { photographs, python }) {
   return judge;
 }
 
-/** Returns the bytes of a scene, with those of the files that it names. */
+/** Returns the size of a scene and of the files that it names, in bytes. */
 async function bytesOf(scene) {
   const { found } = await filesBeside(scene);
   return [basename(scene), ...found].reduce((sum, file) => sum + statSync(join(dirname(scene), file)).size, 0);

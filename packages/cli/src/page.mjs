@@ -38,7 +38,7 @@ async function writeFolder(scene, folder, page) {
   await copyElement(scene, join(folder, 'cdn'));
   const tag = tagOf(await copyScene(scene, folder), titleOf(scene));
   if (existsSync(page))
-    console.log(`\n${page} is there already and stays as it is. Paste into it:\n\n${SCRIPT}\n${tag}`);
+    console.log(`\n${page} exists and was not changed. Paste into it:\n\n${SCRIPT}\n${tag}`);
   else writeFileSync(page, htmlOf(SCRIPT, tag, titleOf(scene)));
 }
 
@@ -50,7 +50,7 @@ const MAX_SINGLE = 384e6;
  * name, because the name identifies some formats.
  */
 async function writeSingle(scene, page) {
-  if (existsSync(page)) throw new CommandError(`${page} is there already. With --single name a folder without one.`);
+  if (existsSync(page)) throw new CommandError(`${page} exists. With --single name a folder without an index.html.`);
   const { found, missing } = await filesBeside(scene);
   if (isJson(scene) || found.length + missing.length > 0 || isModel(scene))
     throw new CommandError(
@@ -113,7 +113,7 @@ async function copyElement(scene, target) {
 
 /**
  * Copies the scene and the files that it refers to, and returns its path relative to the page. A scene described by a JSON
- * file is copied with its folder, because such scenes have the same file names.
+ * file is copied with its folder, because different scenes use the same file names.
  */
 async function copyScene(scene, folder) {
   const [name, from] = [basename(scene), dirname(scene)];

@@ -35,8 +35,8 @@ const SAMPLE_LIMIT = 65_536;
  */
 const OF_SUBJECT = 0.999;
 /**
- * Maximum ratio of two distances for an isolated subject: one contains all centers of the subject, the other 99 % of
- * them. It is 1 to 1.3 in six such captures, and 2.9 in a capture with surroundings.
+ * Maximum ratio of two radii of an isolated subject: of all its centers, and of 99 % of them. The ratio is 1 to 1.3 in
+ * six such captures, and 2.9 in a capture with surroundings.
  */
 const ENDS_WITHIN = 1.5;
 

@@ -198,7 +198,7 @@ export interface DealtViewOptions extends Omit<ViewOptions, 'seed'> {
   readonly scored?: number;
 }
 
-/** Seeds of the three kinds of views, with which scoring views never coincide with other views. */
+/** Seeds of the three kinds of views, chosen so that scoring views never coincide with others. */
 const [SEARCHED_SEED, HELD_OUT_SEED, SCORED_SEED] = [1, 2, 10];
 
 /**

@@ -4,8 +4,9 @@ import './gaussian-splat.min.js';
 /** Attributes that are addresses. */
 const ADDRESSES = ['src', 'poster', 'views', 'skybox-image', 'walk-map', 'ios-src'];
 /**
- * Attributes that a link may set. Absent are those that name further models, send cookies to other servers, or put words into the page: whoever wrote the link is a
- * stranger to this page.
+ * Attributes that a link may set. Attributes that name further models, send cookies to other servers, or set texts are
+ * excluded, because the author of the link is
+ * untrusted.
  */
 const ALLOWED = [
   ...ADDRESSES,
@@ -20,7 +21,7 @@ const ALLOWED = [
   ...['vr', 'ar', 'ar-modes', 'ar-placement', 'ar-scale'],
 ];
 
-/** What a `<splat-scene>` has in the element's place. */
+/** Attributes of a `<splat-scene>` in place of those of the element. */
 const OF_SCENE = ['src', 'up', 'crop', 'pose'];
 
 const query = new URLSearchParams(location.search);
@@ -36,7 +37,7 @@ function allowed(name) {
   if (isWeb && [location.origin, ...origins].includes(url.origin)) return url.href;
   const found = query.get(name).slice(0, 200);
   throw new Error(
-    `${name}: expected a file of ${[location.origin, ...origins].join(' or ')}, found "${found}". Whoever runs this page lists other origins in embed.html.`,
+    `${name}: expected a file of ${[location.origin, ...origins].join(' or ')}, found "${found}". The owner of this page lists other origins in embed.html.`,
   );
 }
 
@@ -73,7 +74,10 @@ function show() {
   offerFullScreen(document.querySelector('button'));
 }
 
-/** A frame shows no button of the page around it. The whole page gets large, so that its button, which also ends it, stays in sight. */
+/**
+ * An iframe covers the page's own buttons. The whole page goes full screen, so that its button, which also ends full
+ * screen, stays visible.
+ */
 function offerFullScreen(button) {
   button.hidden = !document.fullscreenEnabled;
   button.addEventListener('click', () =>

@@ -1,9 +1,12 @@
-/** What is made from the tables in src/attributes.ts, src/composition/attributes.ts and src/effects/attributes.ts: the attributes of the manifest, and rows of documents. */
+/**
+ * Generates the attributes of the manifest and rows of documents from the tables in src/attributes.ts,
+ * src/composition/attributes.ts and src/effects/attributes.ts.
+ */
 import { readFileSync, writeFileSync } from 'node:fs';
 import { fileURLToPath } from 'node:url';
 
 const path = (name) => fileURLToPath(new URL(name, import.meta.url));
-/** Of each tag: the table of its attributes, and the document that has their rows. */
+/** For each tag: the table of its attributes, and the document that has their rows. */
 const TABLES = {
   'gaussian-splat': {
     table: 'ATTRIBUTES',
@@ -48,7 +51,7 @@ export function tableOfAttributes() {
         return;
       if (!/^([A-Z_]*ATTRIBUTES|PLACED)$/.test(node.name.getText())) return;
       const entries = node.initializer.properties.flatMap((entry) => {
-        // What several tables have in common stands in one before them.
+        // Common rows of several tables are listed once, in a table of their own.
         if (ts.isSpreadAssignment(entry)) return found.get(entry.expression.getText());
         const [{ comment, tags = [] }] = ts.getJSDocCommentsAndTags(entry).filter(ts.isJSDoc);
         const tagged = (wanted) => tags.find(({ tagName }) => tagName.text === wanted)?.comment;
@@ -69,7 +72,7 @@ export function tableOfAttributes() {
           ...entries.map((entry) => ({ kind: 'field', privacy: 'public', ...entry, attribute: kebab(entry.name) })),
           ...element.members.filter(({ name }) => !names.has(name)),
         ];
-        // An attribute is text, whatever else its property takes.
+        // An attribute is text, even if its property accepts other types.
         const written = ({ text }) => ({ text: text.replace(' | readonly number[]', '') });
         element.attributes = entries.map((entry) => ({
           ...entry,

@@ -1,10 +1,10 @@
-/** Shortens the shaders in a bundle: see short-wgsl.mjs. The packages keep theirs readable, for whoever looks for a fault in one. */
+/** Shortens the shaders in a bundle: see short-wgsl.mjs. The packages keep readable shaders for debugging. */
 import { readFileSync } from 'node:fs';
 import { fileURLToPath } from 'node:url';
 import { shortened } from './short-wgsl.mjs';
 
 const FOLDER = fileURLToPath(new URL('../../renderer/dist/generated/', import.meta.url));
-/** Where scripts/build-shaders.mjs and the compiler put the pieces that shaders are joined of. */
+/** Modules in which scripts/build-shaders.mjs and the compiler store the pieces of shaders. */
 export const SHADER_FILES = [
   'shaders.js',
   'auxiliary-shaders.js',

@@ -3,7 +3,7 @@
  * name is the same in all of them. Names that never meet, as those in two functions, may become the same one.
  */
 
-/** Words of the language that would be taken for names of ours where we declare the same. */
+/** Words of the language that would be mistaken for our names if a shader declared the same name. */
 const WORDS = 'main storage uniform workgroup private function read write read_write default'.split(' ');
 /** Fields of vectors, and of what built-in functions return. */
 const BUILT_IN_FIELD = /^\.([xyzw]{1,4}|[rgba]{1,4}|fract|exp|whole|old_value|exchanged)$/;
@@ -15,7 +15,7 @@ const ENTRY_POINT = /@(?:vertex|fragment|compute)\b[^{}]*?\bfn\s+(\w+)/g;
 const STRUCT = /\bstruct\s+\w+\s*\{[^}]*\}/g;
 /** A name, with its dot if it is a field's; or an attribute, whose words are the language's. */
 const NAME = /@(?:builtin|interpolate)\([^)]*\)|@\w+|\.?\b[A-Za-z_]\w*\b/g;
-/** Those first that the language's own words are full of: they take the fewest bits. */
+/** Characters that are frequent in the language's own words come first, because they take the fewest bits. */
 const LETTERS = [...'etanrisoldcufmphgvbwyxkjzqTSCEPADRIBMNLOFGVHUWXKYJZQ'];
 /** Letters, then letters with a digit or a capital behind them: no word of the language is like that. */
 const SHORT_NAMES = ['', ...'0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZ'].flatMap((end) =>

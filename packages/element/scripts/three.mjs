@@ -1,4 +1,4 @@
-/** What the element takes of three.js, for src/meshes/three.d.ts. */
+/** Exports of three.js that the element uses, for src/meshes/three.d.ts. */
 export {
   AnimationMixer,
   Box3,

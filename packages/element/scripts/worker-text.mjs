@@ -1,7 +1,10 @@
 /** The chunks of the worker's code as modules that export their text, and the list of them: see src/loading/worker-sources.ts. */
 import { basename } from 'node:path';
 
-/** What a chunk calls for another. No name that the code has: one of its own would be called. */
+/**
+ * Prefix of the functions that one chunk calls in another. No name in the code has it, because such a name would be
+ * called instead.
+ */
 const LOAD = 'gaussianSplatChunk';
 
 /** For an output of Rollup in the format `cjs`, whose `require` and `exports` the worker brings. */
@@ -42,7 +45,7 @@ export const workerAsText = {
   },
 };
 
-/** What has to be there before a chunk, those first that others need. */
+/** Chunks that must be loaded before a chunk, dependencies first. */
 function needsOf(fileName, bundle, found = new Set([fileName])) {
   for (const each of bundle[fileName].imports) {
     if (found.has(each)) continue;

@@ -20,7 +20,7 @@ export interface PathRequest {
   readonly attributes?: Partial<Record<'cameraOrbit' | 'cameraTarget' | 'fieldOfView' | 'up', string>> & {
     readonly orthographic?: boolean;
   };
-  /** Bounds of the scene in its own frame: `boundsOf` of its cloud, with the up direction of the file. */
+  /** Bounds of the scene in its own coordinates: `boundsOf` of its cloud, with the up direction of the file. */
   readonly bounds: SceneBounds;
   /** Width of a frame, pixels. */
   readonly width: number;

@@ -96,7 +96,7 @@ function withFilters(host: ImageHost, drawn: HTMLCanvasElement): HTMLCanvasEleme
   if (filter === '') return drawn;
   const context = paper(drawn.width, drawn.height);
   if (!('filter' in context)) {
-    host.warn('<gaussian-splat> toBlob(): this browser cannot apply CSS filters to an image; it is without them.');
+    host.warn('<gaussian-splat> toBlob(): this browser cannot apply CSS filters to an image, so the image is without them.');
     return drawn;
   }
   context.filter = filter;

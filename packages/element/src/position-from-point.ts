@@ -65,7 +65,7 @@ export async function positionFromPoint(
 
 /**
  * Returns the element that contains a surface, and the splat or the mesh and material that was hit. `eye` and `place`
- * are in the frame of the world.
+ * are in world coordinates.
  */
 function whose(
   { element, sources, camera }: QueryHost,

@@ -33,7 +33,7 @@ export interface EntryCore {
   readonly camera: { frame(bounds: SceneBounds): void };
   /** The camera at the default size of an element, for a generator that runs before the image has a size. */
   readonly firstView: Camera;
-  /** Rotation from the frame of the world to viewer space. */
+  /** Rotation from world coordinates to viewer space. */
   readonly frame: ViewerFrame;
   readonly wantsPreviews: boolean;
   /** Whether the scene would be visible if it were loaded. */
@@ -79,7 +79,7 @@ export interface SourceOwner {
   readonly open?: SceneHost['owner']['open'];
   /** Sets the transform of the source; absent if its frame is that of the world. */
   place?(member: WorldEntry, core: EntryCore): void;
-  /** Converts a camera from the frame of the world to that of the source; absent if the frames are equal. */
+  /** Converts a camera from world coordinates to those of the source; absent if they are equal. */
   seenFrom?(camera: Camera, member: WorldEntry | undefined, core: EntryCore): Camera;
   warn(sentence: string): void;
 }

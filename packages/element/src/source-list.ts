@@ -263,7 +263,7 @@ export class SourceList implements EntryList {
     return { detail: max(({ detail }) => detail), splatBudget: max(({ splatBudget }) => splatBudget) };
   }
 
-  /** Bounds of all sources in the frame of the world; null while nothing is shown. */
+  /** Bounds of all sources in world coordinates; null while nothing is shown. */
   get bounds(): SceneBounds | null {
     this.place();
     const bounds = boundsOfWorld(this.world);

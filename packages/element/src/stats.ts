@@ -44,7 +44,7 @@ export interface SceneStats {
   /** Settings for frames at rest and in motion. */
   readonly dynamicQuality: DynamicQualityReport;
   /**
-   * Up direction in the scene's frame according to its file, a unit vector; null if the file has none. With several
+   * Up direction in scene coordinates according to its file, a unit vector; null if the file has none. With several
    * scenes, that of the first.
    */
   readonly up: Vector3 | null;
@@ -54,9 +54,9 @@ export interface SceneStats {
    */
   readonly warnings: readonly string[];
   /**
-   * For each streamed scene the pages on the GPU and all pages, their splats and bytes, the largest error of a missing
-   * page in pixels, and the limit (`transit`, `memory`, `failure` or null): what a view at rest rests at. `reasons` has
-   * the same in a sentence.
+   * State of each streamed scene: pages on the GPU and all pages, their splats and bytes, and the largest error of a
+   * missing page in pixels. `limit` is why this error does not decrease: `transit`, `memory`, `failure`, or null.
+   * `reasons` has a sentence about it.
    */
   readonly streamed: readonly StreamProgress[];
   /** State of the element's own scene, then of each child; empty for an element without children. */

@@ -40,8 +40,9 @@ def activated(model: onnx.ModelProto, written: dict[str, AnyArray]) -> dict[str,
 
 
 def parts(written: dict[str, AnyArray] | AnyArray) -> dict[str, Doubles]:
-    """What a file wrote, packed (or the rows alone) or split, by what it holds; covariances also of scales and
-    rotations."""
+    """Rows that a file wrote, packed (or the rows alone) or split, by their content; covariances also of scales and
+    rotations.
+    """
     if not isinstance(written, dict) or "gaussians" in written:
         rows = np.asarray(written["gaussians"] if isinstance(written, dict) else written, np.float64)
         return {

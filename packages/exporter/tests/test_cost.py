@@ -1,4 +1,4 @@
-"""What a run costs: counted by hand on small graphs, and held for the families that ship."""
+"""Cost of a run: counted by hand on small graphs, and tested for the included families."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def test_shapes_in_between_cost_nothing_and_slow_kernels_are_named() -> None:
     made.output("y", (y.reshape(54) + 1.0))
     nodes = cost_of(made.model({})).nodes
     assert [node.dispatches for node in nodes] == [0, 1, 1, 0, 1]
-    assert "looked up by itself" in nodes[1].remark and nodes[4].remark == ""
+    assert "looked up separately" in nodes[1].remark and nodes[4].remark == ""
 
 
 def test_unknown_sizes_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

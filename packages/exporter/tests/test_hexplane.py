@@ -103,7 +103,7 @@ def assert_matches(given: Cloud, model: Deformation, time: float) -> None:
 
 @pytest.mark.parametrize("time", [0.0, 0.37, 1.0])
 def test_gaussians_at_a_time(time: float) -> None:
-    """Some of the cloud lies outside the box, where planes go on with their border."""
+    """Some Gaussians lie outside the box, for which planes continue with their border values."""
     assert (np.abs(small().positions) > 1.5).any()
     assert_matches(small(), deformation(), time)
 

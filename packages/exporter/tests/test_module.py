@@ -91,7 +91,7 @@ class Arm(torch.nn.Module):  # type: ignore[misc]
 
 def test_a_small_addend_survives(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     layout = gs.split("positions", "covariances", "colors", "opacities")
-    # With a default elsewhere than zero the rest pose is tried all the same.
+    # The rest pose is tried even if defaults are not zero.
     for rest in (None, [0.1] * 3):
         inputs = {"pose": gs.pose(["hip"], [-1], rest=rest)}
         report = gs.export_module(Arm(), inputs, layout, out=tmp_path / "arm.onnx")
@@ -303,7 +303,7 @@ def test_a_module_that_takes_batches(tmp_path: Path) -> None:
 
 
 class Falling(torch.nn.Module):  # type: ignore[misc]
-    """Goes on from the heights that it wrote last."""
+    """Continues from the heights of its last run."""
 
     def forward(self, t: Any, heights: Any) -> Any:
         lower = heights - 0.01 + 0 * t
@@ -396,7 +396,7 @@ def test_a_dict_with_names_of_its_own(tmp_path: Path) -> None:
 
 
 class Given(torch.nn.Module):  # type: ignore[misc]
-    """Writes what it is told to; the positions follow the time and a slider."""
+    """Writes its inputs; the positions follow the time and a slider."""
 
     def __init__(self, **changes: Any) -> None:
         super().__init__()
@@ -490,7 +490,7 @@ def test_types_that_pages_cannot_cast_are_refused(tmp_path: Path) -> None:
 
 
 class Branching(Given):
-    """What PyTorch's own exporter refuses, and TorchScript's bakes in."""
+    """Operations that PyTorch's own exporter refuses, and that TorchScript's bakes in."""
 
     def forward(self, t: Any, k: Any) -> Any:
         given = super().forward(t, k)

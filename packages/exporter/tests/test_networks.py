@@ -192,7 +192,9 @@ def test_pixel_aligned_gaussians(views: int, widened: float) -> None:
 
 
 def test_the_plane_sweep_sees_the_right_depth() -> None:
-    """Two cameras in front of one textured plane: with features that are the picture itself, its depth wins."""
+    """Two cameras in front of one textured plane: if the features are the image itself, the depth of the plane has the
+    lowest cost.
+    """
     model = feed_forward()
     rng = np.random.default_rng(0)
     texture = rng.normal(size=(3, 60, 60))

@@ -1,5 +1,6 @@
-"""Trainers, for a few steps on tiny pictures, through to files that keep the contract and agree with PyTorch's own
-forward pass. Needs PyTorch: npm run test:exporter -- --torch."""
+"""Runs trainers for a few steps on tiny images, up to files that conform to the contract and agree with PyTorch's own
+forward pass. Needs PyTorch: npm run test:exporter -- --torch.
+"""
 
 from __future__ import annotations
 
@@ -164,7 +165,7 @@ def test_feed_forward(views: Path, tmp_path: Path, count: int) -> None:
     import shots
 
     scene = make_views.scene_of(views / "scene.ply", "cpu")
-    # Solid, and larger: pictures are few pixels wide.
+    # Solid and enlarged, because the images are only a few pixels wide.
     scene = replace(scene, opacities=torch.full_like(scene.opacities, 0.95), covariances=scene.covariances * 6)
     rng = np.random.default_rng(0)
     learned, kept = (shots.draw_shots([scene], n, SIZE, count, 2, rng) for n in (12, 4))

@@ -1,4 +1,5 @@
 """Writes a file for each rule of the GPU, and one beside it that only just keeps it:
+
 python -m tests.write_rules ../../tests/fixtures/rules
 
 Both checkers find in them what tests/fixtures/gpu-findings.json says (test_placement.py,
@@ -96,7 +97,7 @@ def loop() -> onnx.ModelProto:
 
 
 def rules() -> dict[str, onnx.ModelProto]:
-    """By a name that says what is wrong, or `kept-` and what is just right."""
+    """Names describe the fault, or are `kept-` and a valid value at its limit."""
     shape = {"shape": ints(16)}
     eye = {"v": np.ones(4, np.float32), "m": np.ones((4, 1), np.float32)}
     return {

@@ -1,8 +1,7 @@
-"""Trains an avatar on a body that pose and shape drive: python avatar.py BODY OUT [--steps 12000] [--count 40000]
+"""Trains an avatar on a body with pose and shape parameters: python avatar.py BODY OUT [--steps 12000] [--count 40000]
 
-BODY is the folder of MakeHuman's files (CC0). There are no photographs of this body: the pictures to learn from are
-drawn from its own mesh by `painted.py`, in random poses and shapes. OUT/avatar.npz is what `gaussian-export avatar`
-reads.
+BODY is the folder of MakeHuman's files (CC0). There are no photographs of this body: `painted.py` draws the
+training images from its mesh, in random poses and shapes. OUT/avatar.npz is the input of `gaussian-export avatar`.
 """
 
 from __future__ import annotations
@@ -24,7 +23,7 @@ from show import sheet
 SIZE = 512
 SH_C0 = 0.28209479177387814
 HELD_OUT = 16
-# Pictures to learn from, and points on the surface that make them.
+# Training images, and the surface points from which they are drawn.
 BANK, SAMPLES = 640, 6_000_000
 # Standard deviation of each joint's turn about each axis, radians, by the beginning of its name.
 BENDS = {"root": 0.0, "pelvis": 0.1, "spine": 0.12, "neck": 0.2, "head": 0.2, "clavicle": 0.1, "upperarm": 0.45}
@@ -52,7 +51,7 @@ class Rig(nn.Module):
             self.register_buffer(name, torch.tensor(getattr(body, name), dtype=torch.float32))
 
     def forward(self, points: Tensor, weights: Tensor, directions: Tensor, pose: Tensor, shape: Tensor) -> list[Tensor]:
-        """Where points (N,3) go (N,3), and the matrix (N,3,3) that carries each one's surroundings."""
+        """Returns the posed points (N,3), and the matrix (N,3,3) that transforms the neighborhood of each."""
         points, joints = points + directions @ shape, self.joints + self.joint_directions @ shape
         turns, frames = axis_angle_matrices(pose), list[Tensor]()
         bottom = torch.tensor([[0.0, 0, 0, 1]], device=points.device)
@@ -164,7 +163,7 @@ class Truth(nn.Module):
 
     @torch.no_grad()
     def forward(self, case: Case) -> Tensor:
-        """The picture (4,H,W)."""
+        """The image (4,H,W)."""
         pose, shape, camera = case
         placed, _ = self.rig(self.vertices, self.weights, self.directions, pose, shape)
         drawn: Tensor = self.painted(placed, camera)
@@ -175,21 +174,21 @@ Pairs = list[tuple[Tensor, Tensor]]
 
 
 def held_out_cases(body: Body, where: str, size: int) -> list[Case]:
-    """What is measured on: the whole body, in poses and shapes of their own."""
+    """Test set: the whole body, in poses and shapes of its own."""
     return [random_case(np.random.default_rng(10_000 + i), body, where, size, near=False) for i in range(HELD_OUT)]
 
 
 def train(
     body: Body, pace: Pace, count: int, number: int, size: int, bank: int = BANK, samples: int = SAMPLES
 ) -> tuple[Avatar, Pairs]:
-    """The model, and pictures (4,H,W) as drawn and as they should be, in poses and shapes that it did not see."""
+    """Returns the model, and images (4,H,W) as drawn and as references, in held-out poses and shapes."""
     rng, where = seed(number), device()
     model, truth = Avatar(body, count, rng).to(where), Truth(body, samples, rng).to(where)
     rates = {"positions": 2e-4, "log_scales": 5e-3, "rotations": 2e-3, "opacity_logits": 3e-2, "colors": 5e-3}
     groups = [{"params": [getattr(model, name)], "lr": rate} for name, rate in rates.items()]
     cases = [random_case(rng, body, where, size, near=True) for _ in range(bank)]
     pictures = [(truth(case) * 255).round().byte() for case in cases]
-    print(f"{bank} pictures to learn from", flush=True)
+    print(f"{bank} training images", flush=True)
 
     def loss_at(index: int, progress: float) -> Tensor:
         pose, shape, camera = cases[index]

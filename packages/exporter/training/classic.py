@@ -1,8 +1,8 @@
 """Trains a plain 3DGS: python classic.py VIEWS.npz POINTS.npy OUT [--steps 15000] [--count 80000] [--degree 2]
 
-The measure that other models are held against: same pictures, same loss, same steps. With CUDA the strategy is gsplat's
-MCMC, which grows to `count` Gaussians; without, the points are all there is. OUT is what `gaussian-export classic`
-reads.
+This is the baseline for the other models: same images, same loss, same steps. With CUDA the strategy is gsplat's
+MCMC, which grows to `count` Gaussians; without CUDA the number of points stays fixed. OUT is the input of
+`gaussian-export classic`.
 """
 
 from __future__ import annotations

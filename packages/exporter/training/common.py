@@ -1,4 +1,4 @@
-"""What every trainer does alike: pictures with their cameras, held-out views, the loop, the record of a training."""
+"""Common code of all trainers: images with their cameras, held-out views, the loop, the record of a training."""
 
 from __future__ import annotations
 
@@ -22,9 +22,10 @@ HELD_OUT_EVERY = 8
 
 @dataclass
 class Views:
-    """Pictures (V,4,H,W), premultiplied, 0..1, with cameras: view matrices (V,4,4), intrinsics (V,3,3) in pixels. What
-    else changes from one picture to the next lies in `extra`, by name: times (V), poses (V,J,3), shapes (V,B); of
-    photographs also valid and doubtful (V,1,H,W), see `losses.Photograph`."""
+    """Images (V,4,H,W), premultiplied, 0..1, with cameras: view matrices (V,4,4), intrinsics (V,3,3) in pixels. Other
+    properties of the images are in `extra`, by name: times (V), poses (V,J,3), shapes (V,B); for photographs also
+    valid and doubtful (V,1,H,W), see `losses.Photograph`.
+    """
 
     pictures: Tensor
     views: Tensor
@@ -32,12 +33,12 @@ class Views:
     extra: dict[str, Tensor]
 
     def camera(self, index: int) -> Camera:
-        """The camera of one picture."""
+        """The camera of one image."""
         height, width = self.pictures.shape[2:]
         return Camera(self.views[index], self.intrinsics[index], width, height)
 
     def save(self, path: Path) -> None:
-        """As .npz, pictures as bytes."""
+        """Saves as .npz, images as bytes."""
         arrays = {name: value.cpu().numpy() for name, value in self.extra.items()}
         bytes_ = (self.pictures.clamp(0, 1) * 255).round().byte().cpu().numpy()
         views, intrinsics = self.views.cpu().numpy(), self.intrinsics.cpu().numpy()
@@ -88,7 +89,7 @@ class Pace:
             self.done += 1
 
     def part(self, share: float) -> Pace:
-        """A pace for this share of it."""
+        """Learning rate at this fraction of the training."""
         return Pace(max(int(self.steps * share), 1), None if self.seconds is None else self.seconds * share)
 
 
@@ -96,7 +97,7 @@ Optimizers = Sequence[torch.optim.Optimizer]
 
 
 def decayed(optimizers: Optimizers, progress: float, decay: float) -> None:
-    """Sets each group's rate to its share of what it began with: a group's own `decay`, or this one, at the end."""
+    """Multiplies each group's initial rate by a factor: at the end its own `decay`, or this one."""
     for optimizer in optimizers:
         for group in optimizer.param_groups:
             first = group.setdefault("first_lr", group["lr"])
@@ -112,8 +113,9 @@ def fit(
     decay: float = 0.05,
     after: Callable[[int, float], None] | None = None,
 ) -> None:
-    """Trains on pictures in random order, each once before any comes again. `loss_at` takes a picture's number and the
-    progress; `after`, with the step and the progress, sees gradients before they are cleared."""
+    """Trains on images in random order, each once per epoch. `loss_at` gets an image's index and the progress; `after`
+    gets the step and the progress, and is called before gradients are cleared.
+    """
     order: list[int] = []
     for step, progress in enumerate(pace):
         order = order or rng.permutation(np.asarray(trained)).tolist()
@@ -135,7 +137,7 @@ Draw = Callable[[int], Tensor]
 
 @torch.no_grad()
 def held_out_psnr(views: Views, draw: Draw) -> float:
-    """Mean over held-out pictures, on black; `draw` gives one as (4,H,W)."""
+    """Mean over held-out images, on black; `draw` returns one as (4,H,W)."""
     _, held = split(len(views.pictures))
     return float(np.mean([psnr(draw(i)[:3], views.pictures[i, :3]) for i in held]))
 
@@ -175,7 +177,7 @@ def plain(value: object) -> object:
 
 
 class Record:
-    """What a training was and how well it went, written as record.json."""
+    """Settings and results of a training, written as record.json."""
 
     def __init__(self, given: argparse.Namespace):
         """Starts the clock."""

@@ -1,11 +1,11 @@
-"""Makes the picture that a shipped example is held against:
+"""Makes the reference image of an included example:
 
-    python example_view.py HELD_OUT.npz INDEX OUT [--size 256] [--given 2]
-
-HELD_OUT is what a trainer left beside its record. OUT/view.png has the picture, on black; its alpha is 255 where the
-picture counts (inside the outline, nothing in the way, no doubt) and 0 elsewhere. OUT/view.json has the camera, as `npm
-run render` takes it, and the time, pose or shape. `--given`: the pictures before INDEX are those that a feed-forward
-generator is given; they are written as OUT/image.png and OUT/image_2.png, its controls into view.json. Needs OpenCV.
+python example_view.py HELD_OUT.npz INDEX OUT [--size 256] [--given 2]
+HELD_OUT is the file that a trainer wrote beside its record. OUT/view.png has the image, on black; its alpha is 255
+for compared pixels (inside the outline, not occluded, not doubtful) and 0 elsewhere. OUT/view.json has the camera
+in the format of `gaussian-splat render`, and the time, pose or shape. `--given`: the images before INDEX are the
+inputs of a feed-forward generator; they are written as OUT/image.png and OUT/image_2.png, its controls into
+view.json. Needs OpenCV.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ import numpy as np
 
 
 def view_of(archive: dict[str, np.ndarray], index: int, size: int) -> tuple[np.ndarray, dict[str, object]]:
-    """The picture (size,size,4) as bytes, blue first, and what view.json holds."""
+    """Returns the image (size,size,4) as bytes, blue first, and the content of view.json."""
     picture = archive["pictures"][index]
     counts = picture[3] > 250
     if "valid" in archive:
@@ -39,7 +39,7 @@ def view_of(archive: dict[str, np.ndarray], index: int, size: int) -> tuple[np.n
 
 
 def given_pictures(archive: dict[str, np.ndarray], index: int, count: int, out: Path) -> dict[str, object]:
-    """Writes the `count` pictures before one; returns what view.json holds of them. Cameras are seen from the first."""
+    """Writes the `count` images before one; returns their content of view.json. Cameras are relative to the first."""
     names = ["image", "image_2"][:count]
     rows = range(index - count, index)
     for name, row in zip(names, rows, strict=True):
@@ -62,7 +62,7 @@ def main(argv: Sequence[str] | None = None) -> None:
     parser.add_argument("index", type=int)
     parser.add_argument("out", type=Path)
     parser.add_argument("--size", type=int, default=256)
-    parser.add_argument("--given", type=int, default=0, choices=(0, 1, 2), help="pictures before it that were given")
+    parser.add_argument("--given", type=int, default=0, choices=(0, 1, 2), help="number of given images before it")
     given = parser.parse_args(argv)
     given.out.mkdir(parents=True, exist_ok=True)
     with np.load(given.held_out) as opened:

@@ -1,8 +1,9 @@
 """Trains a feed-forward generator: python feed_forward.py OUT SCENE.ply [SCENE.ply ...] [--unseen SCENE.ply]
 
-Scenes are drawn from all round (shots.py). `--count` is how many pictures go in: 1 or 2. A step takes some shots, makes
-Gaussians of the given pictures of each, and draws them for other cameras. It is measured on shots of their own, of the
-same scenes and of one that it never saw (`--unseen`). OUT is the folder that `gaussian-export feed-forward` reads.
+Scenes are drawn from all directions (shots.py). `--count` is the number of input images: 1 or 2. A step takes some
+shots, makes Gaussians from the given images of each, and draws them for other cameras. The test set has other shots
+of the same scenes and of one that is not in the training (`--unseen`). OUT is the input of `gaussian-export
+feed-forward`.
 """
 
 from __future__ import annotations
@@ -33,22 +34,22 @@ REFINEMENT = 0.2
 SMALLEST, LARGEST = 0.2, 4.2
 NEAREST = 1e-3
 EPSILON = 1e-5
-# Where opacity and size begin, before their sigmoids: nearly opaque, and a pixel wide.
+# Initial opacity and size, before their sigmoids: nearly opaque, and a pixel wide.
 OPAQUE, SLIM = 1.0, -1.5
 RATE, LAST_RATE = 1e-3, 0.02
-# Shares of the training: rates rise; depths and opacities are learned before anything is drawn.
+# Fractions of the training: warm-up of the rates; depths and opacities are learned before anything is drawn.
 WARM_UP, BEFORE_DRAWING = 0.02, 0.12
-# What depths and opacities count beside the pictures, at the beginning and at the end.
+# Weights of depths and opacities relative to the images, at the beginning and at the end.
 DEPTH_WEIGHT, COVERAGE_WEIGHT = (2.0, 0.2), (0.5, 0.02)
 # A pixel has a depth where this much of it is covered.
 SOLID = 0.6
-# Pictures drawn of every shot besides the given ones; shots that are kept for measuring, of each scene.
+# Number of images drawn of every shot besides the given ones; number of test shots of each scene.
 TARGETS, HELD_OUT = 3, 12
 
 
 @dataclass
 class Shape:
-    """What config.json holds."""
+    """Content of config.json."""
 
     width: int
     height: int
@@ -60,8 +61,9 @@ class Shape:
 
 @dataclass
 class Made:
-    """What the network makes of V pictures: Gaussians in the first camera's frame (V*H*W); opacities before the sigmoid
-    and inverse depths of the pixels (V,1,H,W); those before refinement (V,1,h,w)."""
+    """Output of the network for V images: Gaussians in the axes of the first camera (V*H*W); opacities before the
+    sigmoid and inverse depths of the pixels (V,1,H,W); those before refinement (V,1,h,w).
+    """
 
     splats: Splats
     logits: Tensor
@@ -96,7 +98,7 @@ class Generator(nn.Module):
         self.depth = layers(sweep, coarse, coarse, coarse, coarse, shape.depths)
         self.head = layers(coarse + fine + 4, fine, fine, sum(HEAD), kernels=(1,))
         with torch.no_grad():
-            # What a plane sweep says stands at first, and every Gaussian begins like every other.
+            # The plane sweep determines the initial depths, and all Gaussians start with equal values.
             self.depth[-1].weight.mul_(0.1)
             self.head[-1].weight.mul_(0.1)
             self.head[-1].bias[1] = OPAQUE
@@ -104,7 +106,7 @@ class Generator(nn.Module):
         self.register_buffer("candidates", torch.linspace(1 / shape.near, 1 / shape.far, shape.depths))
 
     def encode(self, images: Tensor) -> tuple[Tensor, Tensor]:
-        """Fine and coarse features of pictures (V,3,H,W)."""
+        """Fine and coarse features of images (V,3,H,W)."""
         x, fine = images * 2 - 1, None
         for layer in self.encoder:
             x = F.relu(layer(x))
@@ -112,7 +114,7 @@ class Generator(nn.Module):
         return (x if fine is None else fine), x
 
     def rays(self, k: Tensor, width: int, height: int) -> Tensor:
-        """Directions with z = 1 through pixel centers (H*W,3); k: fx, fy, cx, cy as shares of width and height."""
+        """Directions with z = 1 through pixel centers (H*W,3); k: fx, fy, cx, cy as fractions of width and height."""
         v, u = torch.meshgrid(
             (torch.arange(height, device=k.device) + 0.5) / height,
             (torch.arange(width, device=k.device) + 0.5) / width,
@@ -133,14 +135,14 @@ class Generator(nn.Module):
         return (alike / channels**0.5).reshape(1, -1, height, width)
 
     def costs(self, coarse: Tensor, k: Tensor, pose: Tensor) -> Tensor:
-        """(2,D,h,w): the sweep of each picture against the other."""
+        """(2,D,h,w): the sweep of each image against the other."""
         centerd = coarse - coarse.mean(1, keepdim=True)
         even = centerd / (centerd.square().mean(1, keepdim=True) + EPSILON).sqrt()
         poses = (pose, torch.linalg.inv(pose))
         return torch.cat([self.sweep(even[i : i + 1], even[1 - i :][:1], k, poses[i]) for i in range(2)])
 
     def forward(self, images: Tensor, k: Tensor, pose: Tensor | None) -> Made:
-        """images (V,3,H,W); pose (4,4): first camera to the second, None with one picture."""
+        """images (V,3,H,W); pose (4,4): first camera to the second, None with one image."""
         fine, coarse = self.encode(images)
         cost = None if pose is None else self.costs(coarse, k, pose)
         x = coarse if cost is None else torch.cat([cost, coarse], 1)
@@ -157,7 +159,7 @@ class Generator(nn.Module):
         return Made(placed[0] if pose is None else joined(*placed, pose), x[:, 1:2], inverse, guess)
 
     def place(self, image: Tensor, x: Tensor, inverse: Tensor, k: Tensor) -> Splats:
-        """One picture's Gaussians in its own camera's frame."""
+        """One image's Gaussians in the axes of its own camera."""
         _, opacity, size, turn, tint = x.flatten(1).T.split(HEAD, 1)
         depth = 1 / inverse.flatten()[:, None]
         scales = (torch.sigmoid(size) * (LARGEST - SMALLEST) + SMALLEST) * depth / (k[0] * self.shape.width)
@@ -175,7 +177,7 @@ class Generator(nn.Module):
 
 
 def joined(first: Splats, second: Splats, pose: Tensor) -> Splats:
-    """Both pictures' Gaussians in the first one's frame."""
+    """Both images' Gaussians in the axes of the first camera."""
     back = torch.linalg.inv(pose)
     turn = back[:3, :3]
     return Splats(
@@ -187,13 +189,13 @@ def joined(first: Splats, second: Splats, pose: Tensor) -> Splats:
 
 
 def shares(intrinsics: Tensor, width: int, height: int) -> Tensor:
-    """fx, fy, cx, cy as shares of width and height."""
+    """fx, fy, cx, cy as fractions of width and height."""
     k = intrinsics
     return torch.stack([k[0, 0] / width, k[1, 1] / height, k[0, 2] / width, k[1, 2] / height])
 
 
 def make(model: Generator, shot: Shot) -> Made:
-    """Gaussians of a shot's given pictures."""
+    """Gaussians of a shot's given images."""
     height, width = shot.pictures.shape[2:]
     count = model.shape.views
     pose = shot.camera(1).view if count == 2 else None
@@ -219,7 +221,7 @@ def known_loss(model: Generator, made: Made, shot: Shot) -> tuple[Tensor, Tensor
 
 
 def loss_of_shot(model: Generator, shot: Shot, progress: float) -> Tensor:
-    """Pictures, and what is known of the scene, which counts less as time goes."""
+    """Loss of images, and of known depths and opacities, whose weight decreases with time."""
     made = make(model, shot)
     depth, coverage = known_loss(model, made, shot)
     late = min(max((progress - BEFORE_DRAWING) / (1 - BEFORE_DRAWING), 0), 1)
@@ -227,7 +229,7 @@ def loss_of_shot(model: Generator, shot: Shot, progress: float) -> Tensor:
     loss = weights[0] * depth + weights[1] * coverage
     if progress < BEFORE_DRAWING:
         return loss
-    # A given picture is drawn, too: in it every Gaussian is where it belongs, whatever its depth.
+    # A given image is drawn, too: in it every Gaussian is at its pixel for any depth.
     drawn = [0, *range(model.shape.views, len(shot.pictures))]
     found = pictures(made.splats, [shot.camera(i) for i in drawn])
     return loss + torch.stack([loss_of(f, shot.pictures[i]) for f, i in zip(found, drawn, strict=True)]).mean()
@@ -277,8 +279,9 @@ def tinted(shot: Shot, rng: np.random.Generator) -> Shot:
 
 @torch.no_grad()
 def measure(model: Generator, shots: Sequence[Shot]) -> dict[str, float]:
-    """Means over the middle views of shots. PSNR on black: of what is drawn, inside the outline, and of the nearest
-    given picture as it is, which is what a page without a generator could show; depth: the mean relative error."""
+    """Means over the middle views of shots. PSNR on black, inside the outline: of the drawn images, and of the nearest
+    given image unchanged, which is the best without a generator; depth: the mean relative error.
+    """
     rows = []
     for each in shots:
         shot, middle = each.unpacked(), model.shape.views
@@ -301,7 +304,7 @@ def measure(model: Generator, shots: Sequence[Shot]) -> dict[str, float]:
 
 @torch.no_grad()
 def show(path: Path, model: Generator, shots: Sequence[Shot]) -> None:
-    """Middle views as they are and as they are drawn; with cameras, given pictures first, for example_view.py."""
+    """Middle views as references and as drawn; with cameras, given images first, for example_view.py."""
     full = [shot.unpacked() for shot in shots]
     middle = model.shape.views
     drawn = [pictures(make(model, shot).splats, [shot.camera(middle)])[0] for shot in full]
@@ -316,7 +319,7 @@ def main(argv: Sequence[str] | None = None) -> None:
     parser.add_argument("out", type=Path)
     parser.add_argument("scenes", type=Path, nargs="+")
     parser.add_argument("--unseen", type=Path, help="a scene to measure on, and not to train on")
-    parser.add_argument("--count", type=int, default=2, choices=(1, 2), help="pictures that go in")
+    parser.add_argument("--count", type=int, default=2, choices=(1, 2), help="number of input images")
     parser.add_argument("--size", type=int, default=256, help="pixels of their sides, a multiple of 4")
     parser.add_argument("--shots", type=int, default=3000, help="how many are drawn to learn from")
     parser.add_argument("--at-once", type=int, default=4, help="shots to a step")
@@ -332,7 +335,7 @@ def main(argv: Sequence[str] | None = None) -> None:
     held = drawn(given.scenes, HELD_OUT * len(given.scenes), 1)
     unseen = drawn([given.unseen], HELD_OUT, 1) if given.unseen else []
     shots = drawn(given.scenes, given.shots, TARGETS)
-    print(f"{len(shots)} shots of {len(shots[0].pictures)} pictures", flush=True)
+    print(f"{len(shots)} shots of {len(shots[0].pictures)} images", flush=True)
     model = train(shots, pace, given.seed, given.at_once)
     model.save(given.out)
     known, unknown = measure(model, held), measure(model, unseen) if unseen else {}

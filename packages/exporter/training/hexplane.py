@@ -91,7 +91,7 @@ class Moving(nn.Module):
         return Splats(moved(self.positions, self.pos_deform), full, colors, opacities)
 
     def roughness(self) -> Tensor:
-        """What planes should have little of: steps between neighbors, and, along time, changes of steps."""
+        """Regularization of planes: steps between neighbors, and, along time, changes of steps."""
         total = torch.zeros((), device=self.positions.device)
         for planes in self.grids:
             for plane, (_, second) in zip(planes, PLANES, strict=True):

@@ -1,4 +1,4 @@
-"""How pictures are compared: PSNR, structural similarity, and photographs of which parts are unknown."""
+"""Comparisons of images: PSNR, structural similarity, and photographs with unknown parts."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from torch import Tensor
 from torch.nn import functional as F  # noqa: N812
 
 SSIM_WEIGHT = 0.2
-# Coverage where nobody knows what is there: little enough to give way wherever another view knows.
+# Weight of coverage in unknown pixels: small enough that any view that shows them decides.
 DOUBT_WEIGHT = 0.1
 
 
 def psnr(found: Tensor, wanted: Tensor) -> float:
-    """Decibels between pictures in 0..1."""
+    """PSNR of images in 0..1."""
     return float(-10 * torch.log10((found.clamp(0, 1) - wanted).square().mean() + 1e-12))
 
 
@@ -26,7 +26,7 @@ def gaussian_window(width: int, device: torch.device, sigma: float = 1.5) -> Ten
 
 
 def ssim(a: Tensor, b: Tensor, width: int = 11) -> Tensor:
-    """Structural similarity of pictures (3,H,W) in 0..1 (Wang et al. 2004, an 11x11 window of sigma 1.5)."""
+    """Structural similarity of images (3,H,W) in 0..1 (Wang et al. 2004, an 11x11 window of sigma 1.5)."""
     stack = torch.stack([a, b, a * a, b * b, a * b])
     window = gaussian_window(width, a.device)
     mean_a, mean_b, aa, bb, ab = F.conv2d(stack, window, padding=width // 2, groups=3)
@@ -37,12 +37,12 @@ def ssim(a: Tensor, b: Tensor, width: int = 11) -> Tensor:
 
 
 def difference(found: Tensor, wanted: Tensor) -> Tensor:
-    """What Gaussians are trained with: L1 and a fifth of structural similarity."""
+    """Loss of the training: L1 and a fifth of structural similarity."""
     return (1 - SSIM_WEIGHT) * (found - wanted).abs().mean() + SSIM_WEIGHT * (1 - ssim(found, wanted))
 
 
 def loss_of(found: Tensor, wanted: Tensor) -> Tensor:
-    """Pictures (4,H,W), premultiplied, over a random background: only coverage that is right looks right."""
+    """Images (4,H,W), premultiplied, over a random background, so that wrong coverage is visible."""
     background = torch.rand(3, 1, 1, device=found.device)
     return difference(
         found[:3] + background * (1 - found[3:]),
@@ -52,8 +52,9 @@ def loss_of(found: Tensor, wanted: Tensor) -> Tensor:
 
 @dataclass
 class Photograph:
-    """picture (4,H,W): colors of the object and, where it is dark and nobody can tell object from room (doubtful),
-    those of the photograph; coverage. valid (1,H,W): 0 where something else is in the way. doubtful (1,H,W)."""
+    """`picture` (4,H,W): colors of the object and, for dark pixels that cannot be assigned to object or room (doubtful),
+    those of the photograph; coverage. valid (1,H,W): 0 for occluded pixels. doubtful (1,H,W).
+    """
 
     picture: Tensor
     valid: Tensor

@@ -1,12 +1,11 @@
-"""Makes the pictures that trainers learn from.
+"""Makes the training images.
 
-    python make_views.py photos MASKS SPARSE OUT [--size 512]    photographs, masked by scripts/scene/masks.py
-    python make_views.py orbit SCENE.ply OUT [--count 96]        a captured scene, drawn from all round
-    python make_views.py sway SCENE.ply OUT [--count 200]        the same, bending to and fro as time goes
-    python make_views.py wind SCENE.ply OUT [--count 400]        a potted plant whose leaves the wind moves
-
-OUT.npz holds pictures and cameras, OUT.npy points on the surface to start from. Drawn scenes have plain colors
-(harmonics of degree 0), and are moved to the origin and scaled to a radius of 1.
+python make_views.py photos MASKS SPARSE OUT [--size 512]    photographs, masked by scripts/scene/masks.py
+python make_views.py orbit SCENE.ply OUT [--count 96]        a captured scene, drawn from all directions
+python make_views.py sway SCENE.ply OUT [--count 200]        the same, bending to and fro over time
+python make_views.py wind SCENE.ply OUT [--count 400]        a potted plant whose leaves move in the wind
+OUT.npz holds images and cameras, OUT.npy initial points on the surface. Drawn scenes have plain colors (harmonics
+of degree 0), and are moved to the origin and scaled to a radius of 1.
 """
 
 from __future__ import annotations
@@ -100,7 +99,7 @@ def orbit_camera(index: int, count: int, size: int, where: str) -> Camera:
 
 @torch.no_grad()
 def drawn(scene: Splats, count: int, size: int, kind: str) -> Views:
-    """Pictures of a scene from all round; of one that moves each at a time of its own."""
+    """Images of a scene from all directions; of an animated one, each at a different time."""
     where = str(scene.positions.device)
     cameras = [orbit_camera(i, count, size, where) for i in range(count)]
     times = np.linspace(0, 1, count)[np.random.default_rng(0).permutation(count)]

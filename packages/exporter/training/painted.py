@@ -1,6 +1,5 @@
-"""Pictures of a mesh that is dressed and lit by rule: what the avatar learns from, as there are no photographs of it.
-
-Millions of points on the surface, each with its color, fall into pixels; the nearest stays.
+"""Images of a mesh with procedural clothes and light: the training set of the avatar, because there are no photographs
+of it. Millions of colored points on the surface are projected to pixels; the nearest one is kept.
 """
 
 from __future__ import annotations
@@ -58,7 +57,7 @@ def normals_of(body: Body) -> np.ndarray:
 
 
 def ripple(at: np.ndarray, waves: float, rng: np.random.Generator) -> np.ndarray:
-    """Smooth noise (N), about -1 to 1, of so many waves to the meter."""
+    """Smooth noise (N), about -1 to 1, with the given number of waves per meter."""
     directions = rng.normal(size=(6, 3)) * waves * 2 * np.pi
     return np.sin(at @ directions.T + rng.uniform(0, 2 * np.pi, 6)).mean(1) * 1.6
 
@@ -115,7 +114,7 @@ class Painted(nn.Module):
     """The dressed surface."""
 
     def __init__(self, body: Body, samples: int, rng: np.random.Generator):
-        """`samples`: how many points; a picture of the whole body at 1024 pixels needs some millions."""
+        """`samples`: number of points; an image of the whole body at 1024 pixels needs some millions."""
         super().__init__()
         chosen, share = surface_points(body, samples, rng, np.ones(len(body.triangles)))
         at = interpolated(body, body.vertices, chosen, share)

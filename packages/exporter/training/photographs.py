@@ -11,7 +11,7 @@ from losses import Photograph
 
 
 class Exposures(nn.Module):
-    """A gain for each picture and channel: the flash was nearer to the object in some photographs than in others."""
+    """A gain for each image and channel: the flash was nearer to the object in some photographs than in others."""
 
     def __init__(self, count: int):
         """All gains 1."""
@@ -19,14 +19,15 @@ class Exposures(nn.Module):
         self.log_gains = nn.Parameter(torch.zeros(count, 3))
 
     def exposed(self, picture: Tensor, index: int) -> Tensor:
-        """The picture (4,H,W) as brightly as the photograph. Gains and colors could trade a common factor: the mean
-        gain is 1."""
+        """The image (4,H,W) with the brightness of the photograph. Gains and colors could trade a common factor, so
+        the mean gain is 1.
+        """
         gain = torch.exp(self.log_gains[index] - self.log_gains.mean(0))
         return torch.cat([picture[:3] * gain[:, None, None], picture[3:]])
 
 
 def photograph(views: Views, index: int) -> Photograph:
-    """One of them; pictures that nothing is known to be wrong with are valid everywhere."""
+    """One photograph; images without masks are valid everywhere."""
     picture = views.pictures[index]
     whole, none = torch.ones_like(picture[3:]), torch.zeros_like(picture[3:])
     extra = views.extra

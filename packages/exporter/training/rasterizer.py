@@ -1,4 +1,4 @@
-"""Pictures of Gaussians that can be differentiated: gsplat where there is a CUDA device, a list of pairs elsewhere."""
+"""Differentiable rendering of Gaussians: gsplat on a CUDA device, a list of pairs elsewhere."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class Splats:
 
 @dataclass
 class Camera:
-    """view (4,4) world to camera, OpenCV axes; intrinsics (3,3) in pixels; size of the picture in pixels."""
+    """view (4,4) world to camera, OpenCV axes; intrinsics (3,3) in pixels; size of the image in pixels."""
 
     view: Tensor
     intrinsics: Tensor
@@ -84,7 +84,7 @@ def with_z(splats: Splats, camera: Camera) -> Tensor:
 
 
 def with_gsplat(splats: Splats, cameras: Sequence[Camera], mode: str) -> Tensor:
-    """By gsplat's CUDA rasterizer; alpha is the last channel."""
+    """Draws with gsplat's CUDA rasterizer; alpha is the last channel."""
     from gsplat import rasterization
 
     color, alpha, _ = rasterization(
@@ -107,8 +107,9 @@ def with_gsplat(splats: Splats, cameras: Sequence[Camera], mode: str) -> Tensor:
 
 @dataclass
 class Ellipses:
-    """Gaussians on the picture, near to far: centers (N,2) in pixels, covariances (N,3) xx, xy, yy, opacities (N), and
-    numbers of the Gaussians that they are of (N)."""
+    """Gaussians in the image, near to far: centers (N,2) in pixels, covariances (N,3) xx, xy, yy, opacities (N), and
+    their indices among all Gaussians (N).
+    """
 
     centers: Tensor
     covariances: Tensor
@@ -117,7 +118,7 @@ class Ellipses:
 
 
 def projected(splats: Splats, camera: Camera) -> Ellipses:
-    """What is in front of the camera and not transparent."""
+    """Selects Gaussians in front of the camera that are not transparent."""
     turn, shift = camera.view[:3, :3], camera.view[:3, 3]
     at = splats.positions @ turn.T + shift
     order = torch.argsort(at[:, 2].detach(), stable=True)
@@ -167,7 +168,7 @@ def listed(splats: Splats, camera: Camera, values: Tensor) -> Tensor:
 
 
 def transmittance(alpha: Tensor, pixel: Tensor) -> Tensor:
-    """What is left of the light before each entry, of entries that lie pixel by pixel, near to far."""
+    """Transmittance before each entry. Entries are grouped by pixel, near to far."""
     # In double: one sum runs through all pixels.
     logs = torch.log1p(-alpha.double())
     before = logs.cumsum(0) - logs

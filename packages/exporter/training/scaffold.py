@@ -1,8 +1,8 @@
 """Trains a Scaffold-GS: python scaffold.py VIEWS.npz POINTS.npy OUT [--steps 15000] [--count 16000]
 
-POINTS (N,3) lie on or near the surface; anchors are the voxels they fall into. Until half of the training, anchors that
-nobody sees are dropped and new ones made where Gaussians are pulled most, up to `count`. OUT is the folder that
-`gaussian-export scaffold` reads.
+POINTS (N,3) lie on or near the surface; anchors are the voxels that contain them. In the first half of the
+training, invisible anchors are dropped and new ones are added at Gaussians with large gradients, up to `count`. OUT
+is the input of `gaussian-export scaffold`.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from show import held_out_sheet
 FEATURES = 32
 OFFSETS = 5
 ROWS = ["anchors", "features", "offsets", "log_scales"]
-# Growth: between these shares of the training, once in so many steps.
+# Growth: between these fractions of the training, once in this number of steps.
 GROW_FROM, GROW_UNTIL, GROW_EVERY = 0.03, 0.5, 100
 LEAST_OPACITY = 0.005
 VOLUME_WEIGHT = 0.01
@@ -113,7 +113,7 @@ class Growth:
         self.watch, self.last = self.fresh(), 0.0
 
     def fresh(self) -> Watch:
-        """Begins to watch anew."""
+        """Resets the statistics."""
         return Watch(*self.model.offsets.shape[:2], self.model.anchors.device)
 
     def after(self, splats: Splats, step: int, progress: float) -> None:
@@ -134,7 +134,7 @@ class Growth:
         since, self.last = progress - self.last, progress
         share = since / max(GROW_UNTIL - progress, since)
         wanted = self.watch.wanted()[: 8 * room]
-        # Voxels shrink as training goes on: coarse structure first.
+        # Voxels shrink during the training: coarse structure first.
         width = self.voxel * (4 if progress < GROW_UNTIL / 3 else 2 if progress < GROW_UNTIL * 2 / 3 else 1)
         chosen = free_cells(splats.positions.detach()[wanted], model.anchors[kept], width, max(room, 0))
         parents = wanted[chosen[: int(np.ceil(room * share))]]

@@ -1,7 +1,6 @@
-"""Small sets of pictures of captured scenes, with depth: what a feed-forward generator learns from.
-
-A shot is two cameras that look at a scene from 7 to 24 degrees apart, and further ones between and beside them. Scenes
-are drawn once, before the training.
+"""Small sets of images of captured scenes, with depth: the training set of a feed-forward generator. A shot is two
+cameras 7 to 24 degrees apart that see a scene, and further ones between and beside them. Scenes are drawn once,
+before the training.
 """
 
 from __future__ import annotations
@@ -29,8 +28,9 @@ NEAR, FAR = 1.6, 6.4
 
 @dataclass
 class Shot:
-    """pictures (T,4,H,W) premultiplied, 0..1; depths (G,1,H,W) of the given ones, world units, 0 where there is
-    nothing; views (T,4,4) world to camera; intrinsics (3,3) of all. The first G pictures are given to the network."""
+    """`pictures` (T,4,H,W) premultiplied, 0..1; depths (G,1,H,W) of the given ones, world units, 0 in empty pixels;
+    views (T,4,4) world to camera; intrinsics (3,3) of all. The first G images are given to the network.
+    """
 
     pictures: Tensor
     depths: Tensor
@@ -46,7 +46,7 @@ class Shot:
         return replace(self, pictures=self.pictures.float() / 255, depths=self.depths.float())
 
     def camera(self, index: int) -> Camera:
-        """Seen from the first picture's camera: its frame is the world's."""
+        """The world has the axes of the first image's camera."""
         height, width = self.pictures.shape[2:]
         return Camera(self.views[index] @ torch.linalg.inv(self.views[0]), self.intrinsics, width, height)
 
@@ -84,7 +84,7 @@ def random_views(rng: np.random.Generator, targets: int) -> np.ndarray:
 
 @torch.no_grad()
 def draw_shot(scene: Splats, size: int, given: int, targets: int, rng: np.random.Generator) -> Shot:
-    """Pictures of `size` by `size` pixels."""
+    """Images of `size` by `size` pixels."""
     where = scene.positions.device
     views = torch.tensor(random_views(rng, targets)).float().to(where)
     if given == 1:

@@ -1,4 +1,4 @@
-"""Pictures to look at of what was trained: as they should be above, as drawn below."""
+"""Comparison images of a training: references above, drawn images below."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ MOST = 6
 
 @torch.no_grad()
 def held_out_sheet(path: Path, views: Views, draw: Draw) -> None:
-    """Some held-out pictures: PATH.png to look at, PATH.npz with their cameras."""
+    """Some held-out images: PATH.png to view, PATH.npz with their cameras."""
     _, held = split(len(views.pictures))
     chosen = held[:: max(len(held) // MOST, 1)][:MOST]
     sheet(path.with_suffix(".png"), [views.pictures[i] for i in chosen], [draw(i) for i in chosen])
@@ -25,7 +25,7 @@ def held_out_sheet(path: Path, views: Views, draw: Draw) -> None:
 
 
 def sheet(path: Path, wanted: Sequence[Tensor], found: Sequence[Tensor], background: float = 1.0) -> None:
-    """Writes a PNG of two rows; pictures (4,H,W), premultiplied, or (3,H,W). Without OpenCV it says so and does not."""
+    """Writes a PNG of two rows; images (4,H,W), premultiplied, or (3,H,W). Without OpenCV it prints a message."""
     try:
         import cv2
     except ImportError:

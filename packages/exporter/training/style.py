@@ -1,8 +1,8 @@
 """Trains a post-processor: python style.py OUT VIEWS.npz [VIEWS.npz ...] [--kind oil|denoise]
 
-`oil` imitates a Kuwahara filter, which takes hundreds of reads for each pixel, with a small network; `denoise` takes
-added noise off. `--count` is the number of channels, a multiple of 4. No weights of anybody else are needed. OUT is the
-folder that `gaussian-export image-filter` reads.
+`oil` imitates a Kuwahara filter, which takes hundreds of reads for each pixel, with a small network; `denoise`
+removes added noise. `--count` is the number of channels, a multiple of 4. No third-party weights are needed. OUT is
+the input of `gaussian-export image-filter`.
 """
 
 from __future__ import annotations
@@ -76,25 +76,26 @@ def kuwahara(image: Tensor, radius: int) -> Tensor:
 
 
 def pair(kind: str, image: Tensor) -> tuple[Tensor, Tensor]:
-    """What goes in and what should come out."""
+    """Input and expected output."""
     if kind == "oil":
         return image, kuwahara(image, RADIUS)
     return (image + NOISE * torch.randn_like(image)).clamp(0, 1), image
 
 
 def backed(pictures: Tensor, backgrounds: Tensor) -> Tensor:
-    """Premultiplied pictures (B,4,H,W) over plain backgrounds (B,3): black around a scene teaches little."""
+    """Premultiplied images (B,4,H,W) over plain backgrounds (B,3), because black backgrounds teach little."""
     return pictures[:, :3] + (1 - pictures[:, 3:]) * backgrounds[:, :, None, None]
 
 
 def train(
     scenes: list[Tensor], kind: str, pace: Pace, channels: int, number: int, halvings: int = 1
 ) -> tuple[Filter, dict[str, float]]:
-    """The network of pictures (V,4,H,W), a tensor for each size; its PSNR on held-out ones, and what leaving them as
-    they are would score."""
+    """The network for images (V,4,H,W), a tensor for each size; its PSNR on held-out ones, and the PSNR of the
+    unchanged images.
+    """
     rng = seed(number)
     where = scenes[0].device
-    # What is taken off the picture is learned for both: a sigmoid never reaches white.
+    # Both kinds learn the difference from the image, because a sigmoid never reaches white.
     model = Filter("noise", channels, halvings).to(where)
     optimizer = torch.optim.Adam(model.parameters(), lr=2e-3)
     for step, progress in enumerate(pace):
@@ -118,7 +119,7 @@ def train(
 
 @torch.no_grad()
 def measured(model: Filter, kind: str, scenes: list[Tensor]) -> dict[str, float]:
-    """PSNR of held-out pictures over white, filtered and as they are."""
+    """PSNR of held-out images over white, filtered and unchanged."""
     found, untouched = [], []
     for pictures in scenes:
         rows, columns = (side // 2 * 2 for side in pictures.shape[2:])

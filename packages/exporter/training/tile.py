@@ -108,7 +108,7 @@ def main(argv: Sequence[str] | None = None) -> None:
     else:
         cloud, deformation = random_hexplane() if is_random else read_hexplane(given.checkpoint)
         tables = {name: repeated(getattr(cloud, name), count) for name in vars(cloud) if name != "positions"}
-        # Beyond the planes their border goes on, at the same cost.
+        # Outside the planes their border values continue, at the same cost.
         larger = replace(cloud, positions=aside(cloud.positions, count), **tables)
         written = export_hexplane(larger, deformation, FACTS, COMPACT)
     print(f"{given.out}: {save(written, given.out):,} bytes")

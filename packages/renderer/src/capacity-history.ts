@@ -105,7 +105,7 @@ export class CapacityHistory {
     return pixels === this.#whole.pixels ? this.#whole.need : NOTHING;
   }
 
-  /** Estimates the need of the same view at rest, by the ratio from the last change between motion and rest. */
+  /** Estimates the need of the same view at rest, from the ratio measured when motion last ended or began. */
   wholeNeedBy({ pixels, wholePixels, isWhole, used }: Omit<CountSample, 'at'>): Capacity {
     if (isWhole) return used;
     const { pixels: seen, need } = this.#ratio;

@@ -109,7 +109,7 @@ export class TensorBindings {
   }
 }
 
-/** Returns the bytes of a live count: 8 for int64, whose lower half is first, otherwise 4. */
+/** Returns the size of a count of valid rows in bytes: 8 for int64, whose lower half is first, otherwise 4. */
 export const countBytes = ({ countDtype }: GaussianLayout): number => (countDtype === 'int64' ? 8 : 4);
 
 /** Alignment of the offsets of bindings in bytes: the largest that a device may require. */

@@ -47,7 +47,7 @@ export function modelMemory(header: OnnxHeader): ModelMemory {
   return { weightBytes, largestKnownTensorBytes, unknownTensors };
 }
 
-/** Returns the bytes of a tensor; undefined if its type or a dimension is unknown. */
+/** Returns the size of a tensor in bytes; undefined if its type or a dimension is unknown. */
 function bytesOf(dtype: OnnxDtype | undefined, dims: readonly (number | null)[] | undefined): number | undefined {
   const bits = dtype && BITS[dtype];
   if (bits === undefined || dims === undefined) return undefined;

@@ -5,14 +5,14 @@ import type { Tracks } from './tracks.js';
 const MIN_TURN = 0.15;
 /** A change of the natural logarithm of a scale. */
 const MIN_GROWTH = 0.15;
-/** A change of a constant coefficient. */
+/** Minimum change of a constant SH coefficient that counts as a jump. */
 const MIN_COLOR = 0.1;
 /** Minimum ratio of a jump to the change in the previous or next pair of frames. */
 const JUMP = 4;
 
 /**
- * Divides tracks at jumps of rotation, scales or color. Such a track continues with another splat, which no
- * curve approximates. A further splat needs fewer bytes than such a motion.
+ * Divides tracks at jumps of rotation, scales or color, because the track continues with another splat there. No curve
+ * approximates a jump, and a further splat needs fewer bytes.
  */
 export function cutTracks(tracks: Tracks): Tracks {
   const { frames, of } = tracks;

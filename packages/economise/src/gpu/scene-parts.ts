@@ -10,7 +10,7 @@ const FLOAT_BYTES = 4;
 /** A block of the scene, and the buffers with results for its splats. */
 export interface ScenePart {
   readonly page: GaussianBlock;
-  /** Slot of the part's first splat, which is a multiple of 256. */
+  /** Slot of the block's first splat, which is a multiple of 256. */
   readonly first: number;
   /** Number of splats rounded up to chunks of 256, which is the length of a row in the buffers below. */
   readonly row: number;

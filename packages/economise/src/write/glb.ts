@@ -16,7 +16,7 @@ const SPLATS = {
   projection: 'perspective',
 };
 
-/** A glTF primitive: the splats that keep one degree. */
+/** A glTF primitive with the splats of one SH degree. */
 interface Primitive {
   readonly degree: number;
   readonly splats: Uint32Array;

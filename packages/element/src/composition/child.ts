@@ -331,7 +331,7 @@ export const cores = new WeakMap<Element, ChildCore>();
 const interactions = new WeakMap<Element, Lazy<Interaction>>();
 
 /**
- * Loads the code for clicks on children when the first child of an element is interactive, and updates it afterwards.
+ * Loads the code for clicks on children when the first child becomes interactive. Later calls update its state.
  */
 function interactionChanged(child: SplatChild): void {
   const parent = child.parentElement;

@@ -32,7 +32,7 @@ const BELOW = 0.005;
 /** Minimum opacity of a visible splat, 0..255. */
 const MIN_CODE = 1;
 
-/** The caster of the shadow: a sphere in viewer space, and the rotation from the scene's frame to viewer space. */
+/** The caster of the shadow: a sphere in viewer space, and the rotation from scene coordinates to viewer space. */
 export interface Subject {
   readonly center: Vector3;
   readonly radius: number;

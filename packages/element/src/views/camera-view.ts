@@ -14,7 +14,7 @@ export interface OrbitView {
   readonly fieldOfView?: string;
 }
 
-/** A camera of a trainer's `cameras.json`: in the scene's own frame, OpenCV axes (x right, y down, z forward). */
+/** A camera of a trainer's `cameras.json`: in scene coordinates, OpenCV axes (x right, y down, z forward). */
 export interface TrainerView {
   /** Position of the eye, world units. */
   readonly position: readonly number[];
@@ -28,7 +28,7 @@ export interface TrainerView {
   readonly fy?: number;
 }
 
-/** A camera as a matrix in the scene's own frame, with OpenCV axes: 16 numbers row by row, or four rows of four. */
+/** A camera as a matrix in scene coordinates, with OpenCV axes: 16 numbers row by row, or four rows of four. */
 export interface MatrixView {
   readonly worldToCamera: readonly number[] | readonly (readonly number[])[];
   /**

@@ -37,7 +37,7 @@ export class ArLabels {
     });
   }
 
-  /** Moves the labels to the projections of their points. @param camera Camera in the scene's own frame. */
+  /** Moves the labels to the projections of their points. @param camera Camera in scene coordinates. */
   place(camera: Camera, frame: ViewerFrame): void {
     if (this.#labels.length === 0) return;
     const { clientWidth, clientHeight } = this.#layer.parentElement!;

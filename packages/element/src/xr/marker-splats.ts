@@ -51,7 +51,7 @@ export class MarkerSplats {
 
   /**
    * Draws the markers over the current image.
-   * @param toWorld Transform from the markers' own frame to the world of the camera.
+   * @param toWorld Transform from the coordinates of the markers to the world of the camera.
    */
   draw(camera: Camera, target: Rectangle, toWorld: Matrix4): void {
     const renderer = this.#renderer;

@@ -37,7 +37,7 @@ export interface VrStart {
   readonly eye: Vector3;
   /** Azimuth of the viewing direction, radians. */
   readonly heading: number;
-  /** Transform from the scene's frame to viewer space in meters, 4x4, row-major. */
+  /** Transform from scene coordinates to viewer space in meters, 4x4, row-major. */
   readonly toViewer: Float64Array;
   /** Whether the space's origin is on the floor instead of at the eyes. */
   readonly isFloor: boolean;
@@ -102,7 +102,7 @@ export class VrRig {
   /**
    * Advances the pose to a frame.
    * @param seconds Time since the previous frame.
-   * @returns the transform from the scene's frame to the session's space, 4x4, row-major
+   * @returns the transform from scene coordinates to the session's space, 4x4, row-major
    */
   place(frame: XrFrame, pose: XrPose, space: XrSpace, seconds: number): Float64Array {
     const { x, z } = pose.transform.position;

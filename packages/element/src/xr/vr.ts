@@ -25,7 +25,7 @@ const MIN_AREA = 4;
 export const unitOf = (core: XrHost): number | undefined =>
   readAttribute('unit', core.attributes.unit, optionalLengthGrammar, (sentence) => core.warn(sentence));
 
-/** Returns the transform from the scene's frame to viewer space in meters, 4x4, row-major. */
+/** Returns the transform from scene coordinates to viewer space in meters, 4x4, row-major. */
 export const metersOf = ([x, y, z]: ViewerFrame, unit: number): Float64Array =>
   Float64Array.from([
     ...x.map((v) => v * unit),

@@ -9,7 +9,7 @@ export interface XrEye {
   readonly at: XrViewport;
   /** Camera of the view in the reference space of the session, meters. */
   readonly room: Camera;
-  /** Camera of the view in the scene's own frame. */
+  /** Camera of the view in scene coordinates. */
   readonly camera: Camera;
 }
 
@@ -30,7 +30,7 @@ export interface XrBetween {
 export interface XrMarker {
   /**
    * Draws the marker over the current image of a view.
-   * @param toWorld Transform from the marker's own frame to the reference space.
+   * @param toWorld Transform from the coordinates of the marker to the reference space.
    */
   draw(eye: XrEye, toWorld: Matrix4): void;
 }

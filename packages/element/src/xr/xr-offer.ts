@@ -21,7 +21,7 @@ export interface XrKind {
   /** Returns the options for `requestSession`. Called in the click handler. */
   options(): object;
   /**
-   * Omits options that a browser may have refused from the next {@link options}.
+   * Makes the next {@link options} omit those that the browser may have refused.
    * @returns whether there are such options
    */
   simplify?(): boolean;

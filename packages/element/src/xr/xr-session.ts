@@ -25,7 +25,7 @@ export interface XrGuide extends XrBetween {
   /**
    * Advances to a frame.
    * @param seconds Time since the previous frame.
-   * @returns the transform from the scene's own frame to the reference space, 4x4, row-major; null while the scene is
+   * @returns the transform from scene coordinates to the reference space, 4x4, row-major; null while the scene is
    * not placed
    */
   place(frame: XrFrame, pose: XrPose, seconds: number): Float64Array | null;

@@ -103,7 +103,7 @@ def add_common(family: Command) -> None:
     facts.add_argument("--ignore", type=lambda text: text.split(","), default=[], metavar="NAMES", help=what)
     written = family.add_argument_group("output")
     written.add_argument(
-        "--layout", choices=get_args(Layout), help="default: split; of classic packed, but for float16"
+        "--layout", choices=get_args(Layout), help="default: split; for classic packed, except with float16"
     )
     written.add_argument("--weights", choices=get_args(Weights), default="float32", help="compact: in 16 bits")
     written.add_argument(
@@ -291,7 +291,7 @@ def _feed_forward(given: argparse.Namespace, facts: Facts, options: Options) -> 
 
 
 def _feed_forward_options(family: Command) -> None:
-    what = "squared pixels added to every Gaussian, against gaps where it is seen larger than its pictures; default 0"
+    what = "squared pixels added to every Gaussian, against gaps if it is viewed larger than its training images; default 0"
     family.add_argument("--widen", type=float, default=0.0, help=what)
 
 
@@ -337,7 +337,7 @@ FAMILIES: dict[str, tuple[Callable[[Command], None], str, Export]] = {
     "avatar": (_avatar_options, "a skinned avatar: one .npz file, or Gaussians and --smplx", _avatar),
     "feed-forward": (
         _feed_forward_options,
-        "pictures to Gaussians: a folder of config.json and model.pth",
+        "images to Gaussians: a folder of config.json and model.pth",
         _feed_forward,
     ),
     "image-filter": (_image_filter_options, "style or denoising: a folder of config.json and model.pth", _image_filter),

@@ -159,7 +159,7 @@ class _Values:
             raise ExportError(
                 "graph/invalid",
                 where=f"value {name}",
-                expected="sizes that the file alone tells",
+                expected="sizes that the file alone determines",
                 found="a size that is known in a run only",
                 remedy="export with fixed shapes",
             )
@@ -222,4 +222,4 @@ def _broadcast(left: Dims, right: Dims) -> str:
         if a != b:
             break
         shared *= a
-    return "" if shared % 4 == 0 else "broadcast, each number looked up by itself"
+    return "" if shared % 4 == 0 else "broadcast, each number looked up separately"

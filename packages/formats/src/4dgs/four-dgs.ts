@@ -106,7 +106,7 @@ export class FourDgs {
     return this.cloudOf(splats, rows, seconds);
   }
 
-  /** Returns a cloud of the given rows at a time in seconds. Rows that are not visible then have opacity 0. */
+  /** Returns a cloud of the given rows at a time in seconds. Rows that are invisible at that time have opacity 0. */
   cloudOf(splats: ChangingSplats, rows: readonly number[], seconds: number): GaussianCloud {
     const { shDegree, cutoff } = this.scene.header;
     const pick = (values: Float32Array, width: number): Float32Array => {

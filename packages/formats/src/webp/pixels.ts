@@ -145,7 +145,7 @@ function decode(
   bits.position = position;
 }
 
-/** Returns the distance of a code in pixels, 1 or more. The codes 1 to 120 are neighbors in two dimensions. */
+/** Converts a distance code to pixels, 1 or more. The codes 1 to 120 are neighbors in two dimensions. */
 function distanceOf(code: number, width: number): number {
   if (code > NEIGHBORS.length / 2) return code - NEIGHBORS.length / 2;
   const k = 2 * (code - 1);

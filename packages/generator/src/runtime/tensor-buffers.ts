@@ -3,7 +3,7 @@
 /** Bytes of one element by element type. */
 export const ELEMENT_BYTES: Readonly<Record<string, number>> = { float32: 4, int32: 4, float16: 2, int64: 8 };
 
-/** Returns the bytes of a GPU buffer for a tensor: a multiple of 16, because the runtime copies in such units. */
+/** Returns the size in bytes of a GPU buffer for a tensor: a multiple of 16, because the runtime copies in such units. */
 export function bufferBytes(dtype: string, elements: number): number {
   return Math.max(16, Math.ceil((elements * ELEMENT_BYTES[dtype]) / 16) * 16);
 }

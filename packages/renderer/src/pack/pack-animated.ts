@@ -113,7 +113,7 @@ function packBases(cloud: GaussianCloud, { lives, frames }: Motions, origin: Vec
   return words;
 }
 
-/** Returns the bytes of GPU memory of each buffer of a part. */
+/** Returns the size in GPU memory of each buffer of a part, in bytes. */
 export function animationBytes({
   rows,
   planes,

@@ -29,7 +29,7 @@ export interface PairBuffers {
 /** Rounds a number of pairs up to whole groups, because `bin_index` writes the bits of whole groups. */
 const wholeGroups = (pairs: number): number => PROJECT_GROUP * Math.ceil(pairs / PROJECT_GROUP);
 
-/** Returns the bytes of each of the two ping-pong buffers. */
+/** Returns the size of each of the two ping-pong buffers in bytes. */
 export const releasableBytesOf = ({ capacity, pairCapacity }: Room): number =>
   WORD_BYTES * Math.max(wholeGroups(pairCapacity), capacity);
 

@@ -69,5 +69,5 @@ export const projectStage = (device: GPUDevice, reading = PACKED): Stage<Geometr
 
 const VECTOR_BYTES = 16;
 
-/** Returns the bytes of a buffer for the prefix sums of `length` numbers and their total, in whole vectors of four. */
+/** Returns the size in bytes of a buffer for the prefix sums of `length` numbers and their total, in whole vectors of four. */
 export const scanBytes = (length: number): number => VECTOR_BYTES * Math.ceil((4 * (length + 1)) / VECTOR_BYTES);

@@ -25,7 +25,7 @@ const LARGEST_BUFFER = 1 << 27;
  */
 const STAGING = { share: 1 / 32, max: 24e6 } as const;
 
-/** Returns the bytes of GPU memory of one slot. */
+/** Returns the size of one slot in GPU memory, in bytes. */
 export function slotBytes(format: PageFormat): number {
   return 4 * pageLayout(format, SLOT_CHUNKS).total;
 }
@@ -37,7 +37,7 @@ export interface PoolSize {
   readonly blocks: number;
 }
 
-/** Returns the bytes of GPU memory of the slots and staging blocks. */
+/** Returns the size of the slots and staging blocks in GPU memory, in bytes. */
 export const poolBytes = (format: PageFormat, { slots, blocks }: PoolSize): number =>
   slots * slotBytes(format) + blocks * BLOCK_BYTES;
 

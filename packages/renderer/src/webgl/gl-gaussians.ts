@@ -14,7 +14,7 @@ const FRAME_WORDS = 9;
 /** Properties of a scene that frames need, without its splats. */
 export type GlGaussianFacts = Omit<PackedGaussians, 'geometry' | 'sh' | 'chunks' | 'details' | 'leafCount'>;
 
-/** Returns the bytes of GPU memory of a packed scene, including the data that frames keep for each splat. */
+/** Returns the size of a packed scene in GPU memory, in bytes, including the data that frames keep for each splat. */
 export const glBytes = ({ count, geometry, sh }: PackedGaussians): number =>
   geometry.byteLength + sh.byteLength + 4 * FRAME_WORDS * count;
 

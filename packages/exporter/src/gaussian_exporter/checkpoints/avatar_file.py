@@ -43,7 +43,7 @@ _FOLDERS = (
     ("**/mlp_ckpt", "GauHuman", "its network moves SMPL"),
     ("**/offset.ply", "LAM", "skin.glb and animation.glb beside offset.ply are a mesh of FLAME"),
     ("**/smplx_params*", "an avatar of SMPL-X (ExAvatar, LHM)", "its network moves SMPL-X"),
-    ("**/transforms_train.json", "a data set", "it holds pictures, not an avatar"),
+    ("**/transforms_train.json", "a data set", "it holds images, not an avatar"),
 )
 
 

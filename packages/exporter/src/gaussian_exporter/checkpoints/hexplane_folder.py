@@ -38,7 +38,7 @@ _SWITCHES = {
 def read_hexplane(folder: Path, ignored: Sequence[str] = ()) -> tuple[Cloud, Deformation]:
     """Reads the latest iteration."""
     point_cloud = latest_iteration(existing(folder, "the folder of a 4DGaussians training"))
-    why = "it says which heads of the network are used (no_do, no_dshs), which no file of weights tells"
+    why = "it names the heads of the network in use (no_do, no_dshs), which no file of weights contains"
     settings = _DEFAULTS | require_cfg_args(folder, why)
     for name, what in _REFUSED.items():
         if settings.get(name):

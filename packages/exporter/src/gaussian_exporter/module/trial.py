@@ -82,7 +82,7 @@ def tried(
             if values is tries[0]:
                 remedy = next(_remedies(module, inputs, layout, batched, torch))
             else:
-                remedy = "narrow the ranges of its inputs, or mend what it says"
+                remedy = "narrow the ranges of its inputs, or fix the cause in this message"
             shapes = ", ".join(f"{n} {[1, *r.shape] if batched else list(r.shape)}" for n, r in inputs.items())
             raise ExportError(
                 "argument/value",
