@@ -74,7 +74,7 @@ test('an address says what to measure', async () => {
   assert.equal(readRun(new URLSearchParams('frames=7')).frames, 7);
 });
 
-test('an option that nobody reads is told', () => {
+test('an unknown option is reported', () => {
   const { options, unread } = watchOptions({ rasterizer: 'tiles', warp: 9 });
   assert.equal(options.rasterizer, 'tiles');
   assert.deepEqual(unread(), ['warp']);
@@ -139,7 +139,7 @@ test('beside a standard a clock that changes within the run changes nothing', as
   assert.ok(Math.abs(b.ms / a.ms - 1.5) < 0.02, `${a.ms} and ${b.ms} ms`);
 });
 
-test('a lever that saves in most frames and pays in some is charged for both', async () => {
+test('a setting that saves time in most frames and costs time in some is charged for both', async () => {
   const burstOf = (pays: number) =>
     onOwnClock(async (clock) => {
       const cameras = Array.from({ length: 80 }, (_, i) => i);
@@ -157,7 +157,7 @@ test('a lever that saves in most frames and pays in some is charged for both', a
   assert.equal((await burstOf(21)).ratio.burst.p50, 1.5);
 });
 
-test('a line is passed by what is as fast, as true and as small, and clearly better in one of these', () => {
+test('a line is exceeded by results that are as fast, as accurate and as small, and clearly better in one of these', () => {
   const line = { name: 'line', ms: 2, psnr: 60, bytes: 100 };
   const others = [
     { name: 'twin', ms: 1.99, psnr: 60.01, bytes: 100 },
@@ -250,7 +250,7 @@ test('the chart names every configuration that worked and no other', () => {
   const small: string = drawChart(report, 'small');
   assert.match(small, /viewBox="0 0 460 /);
   assert.match(small, />one<\/text>/);
-  assert.doesNotMatch(small, />two<\/text>/, 'levers have no names there');
+  assert.doesNotMatch(small, />two<\/text>/, 'settings have no names there');
 });
 
 test('points that lie on one another share a label, and no label covers another', () => {

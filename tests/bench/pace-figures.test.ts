@@ -54,7 +54,7 @@ test('spans count from a second after the step on, levels until five', () => {
   assert.deepEqual([all.span.p95, all.reversals, all.timed, all.interval.p95], [0.875, 1, 3, 10]);
 });
 
-test('pictures: identical, empty, or so many dB where either shows something', () => {
+test('images: identical, empty, or a PSNR if either shows something', () => {
   const [black, gray] = [Uint8Array.of(0, 0, 0, 255, 0, 0, 0, 255), Uint8Array.of(10, 10, 10, 255, 0, 0, 0, 255)];
   assert.equal(decibels(gray, gray), 'identical');
   assert.equal(decibels(black, black), 'empty');

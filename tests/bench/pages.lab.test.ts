@@ -38,7 +38,7 @@ test('the benchmark page measures a list in one report', { timeout: 180_000 }, a
   if (report.environment.timestamps) {
     assert.ok(ours.span.p50 > 0 && playcanvas.span.p50 > 0);
     assert.ok('compose' in half.stages && 'rasterize' in ours.stages);
-    assert.ok(ours.span.p50 <= ours.wall.p95, 'the GPU is not busy for longer than anybody waits');
+    assert.ok(ours.span.p50 <= ours.wall.p95, 'the GPU is not busy for longer than the time limit');
   }
   await assert.rejects(runPage('bench/index.html', { ...SMALL, paths: 'nowhere' }), /path: expected orbit/);
 });
@@ -66,7 +66,7 @@ test('the frontier page compares with the oracle', { timeout: 180_000 }, async (
 });
 
 test(
-  'the page of first pictures: a first visit, what is chosen after it, and a later one',
+  'the page of first frames: a first visit, the variants chosen after it, and a later one',
   { timeout: 180_000 },
   async () => {
     const report = await runPage('bench/start.html', { visits: '2', width: '64', height: '48' });
@@ -82,7 +82,7 @@ test(
 );
 
 test(
-  'the page of pictures in motion: real elements, a step, figures of it and the true image',
+  'the page of frames in motion: real elements, a step, its figures and the accurate frame',
   { timeout: 180_000 },
   async () => {
     const query = {

@@ -47,7 +47,7 @@ test('a figures file says who measured, and when; without that it is refused', (
   assert.throws(() => parse(figure('S1', 'a', 60)), /expected a line of the adapter first/);
 });
 
-test('of each row the latest run of an adapter counts, in whatever order files are given', () => {
+test('the latest run of an adapter counts for each row, in any order of files', () => {
   const old = parse(
     { date: '2026-01-01T00:00:00Z', adapter: { ...card, description: 'NVIDIA: 570' } },
     ...[figure('S1', 'a', 60), figure('S1', 'gone', 60), figure('S2', 'b', 61)],
@@ -87,7 +87,7 @@ test('the table of rows has a column for each adapter, and shows short recipes a
   assert.match(describeRuns(runs, [{ id: 'S1' }]), /NVIDIA H200 \(NVIDIA: 580, 2026-01-01\): failed: S1\./);
 });
 
-test('reports of the page: one column of ours for each adapter, and a run without peers does not take theirs away', () => {
+test('reports of the page: one of our columns for each adapter, and a run without peers keeps theirs', () => {
   const page = (adapter: string, ...subjects: string[]) => ({
     adapter,
     rows: [

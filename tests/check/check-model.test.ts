@@ -178,7 +178,7 @@ test('a model on a server, with its sidecar and its weights', async () => {
 });
 
 test(
-  'real decoders of Octree-GS are no generators by themselves, and the checker says why',
+  'real decoders of Octree-GS alone are not generators, and the checker explains why',
   { skip: needsSharedData },
   async () => {
     for (const name of ['color', 'cov', 'opacity']) {
@@ -191,7 +191,7 @@ test(
   },
 );
 
-test('--draft writes the contract that a file lacks, asks what no header tells, and never writes over one', () => {
+test('--draft writes the contract that a file lacks, asks about properties that no header has, and never overwrites one', () => {
   const path = join(folder, 'drafted.onnx');
   const header = fixtureBytes('split.onnx');
   writeFileSync(path, header);

@@ -41,7 +41,7 @@ function install(name: string): void {
   for (const [command, file] of Object.entries(bin)) symlinkSync(join(target, file), join(modules, '.bin', command));
 }
 
-test('packed and installed, gaussian-check runs a model and tells good from bad', () => {
+test('packed and installed, gaussian-check runs a model and distinguishes good from bad', () => {
   for (const name of ['core', 'generator', 'check']) install(name);
   // Packages of others are those of this checkout.
   for (const name of readdirSync(join(root, 'node_modules'))) {

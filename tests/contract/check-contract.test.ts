@@ -6,7 +6,7 @@ import { fixtureHeader, fixtureNames, fixtureSidecar } from '../support/generato
 import { assertHelpful, brief, headerWith, PACKED, SPLIT, SPLIT_OUTPUTS, tensor } from './support.js';
 
 for (const name of fixtureNames().filter((file) => !['subgraphs.onnx', 'faulty-cast.onnx'].includes(file))) {
-  test(`${name} keeps its contract as far as the header tells`, async () => {
+  test(`${name} keeps its contract as far as the header shows`, async () => {
     const header = await fixtureHeader(name);
     const { contract } = resolveContract({ header, sidecar: fixtureSidecar(name) });
     assert.deepEqual(checkContract(header, contract), []);
@@ -47,7 +47,7 @@ const CASES: readonly [what: string, header: OnnxHeader, contract: Contract, fau
     PACKED,
     ['missing-tensor gaussians'],
   ],
-  ['outputs that nobody uses', headerWith([TIME], [GAUSSIANS, tensor('more', [1])]), PACKED, []],
+  ['unused outputs', headerWith([TIME], [GAUSSIANS, tensor('more', [1])]), PACKED, []],
   ['a wrong width', headerWith([TIME], [tensor('gaussians', [10, 14])]), PACKED, ['shape gaussians']],
   ['a batch of one', headerWith([tensor('time', [1, 1])], [tensor('gaussians', [1, 10, 13])]), PACKED, []],
   ['a batch of two', headerWith([TIME], [tensor('gaussians', [2, 10, 13])]), PACKED, ['shape gaussians']],
@@ -94,7 +94,7 @@ const CASES: readonly [what: string, header: OnnxHeader, contract: Contract, fau
   ['flat axis-angles', fed([1, 72]), withInput({ role: 'pose', format: 'axis-angle' }), []],
   ['rotation matrices', fed([1, 24, 3, 3]), withInput({ role: 'pose', format: 'matrix' }), []],
   ['flat matrices of no number of joints', fed([10]), withInput({ role: 'pose', format: 'matrix' }), ['shape x']],
-  ['pictures of two views', fed([1, 2, 3, 8, 8]), withInput({ role: 'image' }), []],
+  ['images of two views', fed([1, 2, 3, 8, 8]), withInput({ role: 'image' }), []],
   ['a picture with alpha', fed([1, 4, 8, 8]), withInput({ role: 'image' }), []],
   [
     'a state',
@@ -148,7 +148,7 @@ const CASES: readonly [what: string, header: OnnxHeader, contract: Contract, fau
   ],
   ['a symbolic control', fed(['k']), withInput({ role: 'control', range: [0, 9], default: 3 }), ['shape x']],
   ['a control of text', fed([1], 'string'), withInput({ role: 'control', range: [0, 9], default: 3 }), ['dtype x']],
-  ['a picture of open size', fed([1, 3, 'h', 'w']), withInput({ role: 'image' }), []],
+  ['an image of open size', fed([1, 3, 'h', 'w']), withInput({ role: 'image' }), []],
   ['a gray picture', fed([1, 1, 8, 8]), withInput({ role: 'image' }), ['shape x']],
   ['a newer opset', { ...ready, opsets: new Map([['ai.onnx', 27]]) }, PACKED, ['opset opset of ai.onnx']],
   ['an old opset', { ...ready, opsets: new Map([['ai.onnx', 6]]) }, PACKED, ['opset opset of ai.onnx']],

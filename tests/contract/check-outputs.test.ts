@@ -97,7 +97,7 @@ test('20,000 true covariances, needles and discs among them, pass in float32 and
   assert.deepEqual(check(asHalf(gaussians)), []);
 });
 
-test('covariances with one negative eigenvalue are found, whatever their size', () => {
+test('covariances with one negative eigenvalue are found at any size', () => {
   const random = seededRandom(12);
   for (let i = 0; i < 500; i++) {
     const covariance = randomCovariance(random, true);

@@ -129,7 +129,7 @@ test('lists within lists, where a contract has something else, are faults with a
     assert.throws(() => parseContract(contract), ContractError);
 });
 
-test('matrices, controls and pictures may be several', () => {
+test('there may be several matrices, controls and images', () => {
   const control = { role: 'control', range: [0, 1], default: 0 };
   const matrices = { a: { role: 'view' }, b: { role: 'view', axes: 'RUB' } };
   const inputs = { ...matrices, c: control, d: control, e: { role: 'image' }, f: { role: 'image' } };

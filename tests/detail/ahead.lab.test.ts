@@ -69,7 +69,7 @@ test('while a camera comes nearer, pages come before it needs them', async (t) =
     await new Promise((resolve) => setTimeout(resolve, 5));
     for (const page of residents(scene)) if (!needed.has(page)) ahead.add(page);
   }
-  console.log(`${ahead.size} of ${residents(scene).size} pages were there before they were needed`);
+  console.log(`${ahead.size} of ${residents(scene).size} pages were resident before they were needed`);
   assert.ok(ahead.size > 0);
   // Half a second further, none that would be in vain.
   for (const page of ahead)

@@ -74,7 +74,7 @@ test('views that come and go soon keep the room that the largest of them needs',
   assert.ok(rooms.size <= 8, `${rooms.size - 1} times other room in 100 turns`);
 });
 
-test('pictures of fewer pixels do not take the room that the whole one at rest needs', () => {
+test('frames of fewer pixels do not take the memory that the full frame at rest needs', () => {
   const { monitor, room } = watch({ visible: 4e6, pairs: 6e6 }, () => MIN_CAPACITY);
   const whole = { visible: 3.5e6, pairs: 5e6 };
   const smaller = { visible: 3e6, pairs: 1e6 };
@@ -96,7 +96,7 @@ function needAt(view: number, { pixels, isWhole }: SampledFrame): Capacity {
 }
 
 for (const pixels of [4_000_000, 1_960_000, 250_000]) {
-  test(`a camera that comes nearer in pictures of ${pixels} pixels has room for the whole one at any time`, () => {
+  test(`a camera that comes nearer in frames of ${pixels} pixels has memory for the full frame at any time`, () => {
     const { monitor, room } = watch({ visible: 2e6, pairs: 2.5e6 }, () => MIN_CAPACITY);
     const see = (view: number, photo: SampledFrame): void => {
       monitor.isDue(true, photo);
@@ -115,7 +115,7 @@ for (const pixels of [4_000_000, 1_960_000, 250_000]) {
   });
 }
 
-test('where no whole picture was seen yet, one of more pixels than those in motion has some room', () => {
+test('before the first full frame, one of more pixels than those in motion has some memory', () => {
   const { monitor, room } = watch({ visible: 1e6, pairs: 1e6 }, () => MIN_CAPACITY);
   monitor.isDue(true, { pixels: 250_000, wholePixels: 4_000_000, isWhole: false });
   monitor.judge({ visible: 5e5, pairs: 9e5 }, false);

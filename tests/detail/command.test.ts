@@ -91,7 +91,7 @@ test(
   },
 );
 
-test('arguments that make no sense are told of in a line, without a trace of the program, and at once', () => {
+test('invalid arguments are reported in a line, without a stack trace, and at once', () => {
   const scene = sceneOf(300);
   const out = join(folder, 'never');
   const cases: [RegExp, ...string[]][] = [

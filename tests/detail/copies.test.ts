@@ -30,7 +30,7 @@ function moved(words: Uint32Array, firsts: readonly number[], stride: number, by
   return new Uint32Array(floats.buffer);
 }
 
-test('whatever came and went, each slot has the words of its page in its file, all positions moved to its place once', async () => {
+test('after any arrivals and evictions, each slot has the words of its page in its file, all positions moved to its place once', async () => {
   const device = await anyDevice();
   const list = listPages(folder.manifest);
   const slotWords = SLOT_CHUNKS * (BOX + DETAILS + GEOMETRY + SH);

@@ -47,7 +47,7 @@ test('a camera that moves and turns evenly is foreseen exactly, half a second an
   assert.ok(apart(slow.ahead(200), at(700)) < 1e-9);
 });
 
-test('a camera whose matrix is written over for every frame is foreseen as one that is made anew', () => {
+test('a camera whose matrix is overwritten for every frame is predicted like one with new matrices', () => {
   const worldToCamera = new Float64Array(16);
   const motion = watched(500, (time) => {
     worldToCamera.set(cameraAt([1, 2, 3], 0.002 * time).worldToCamera);
@@ -152,7 +152,7 @@ test('a frame uploads what an eighth of its time is enough for at first, and a l
   close(paced(60, () => 1, 4).at(-1)!.bytes, 0.25e6);
 });
 
-test('a frame that comes late halves the share, one after a rest does not, and one that uploads little does not raise it', () => {
+test('a late frame halves the fraction, one after a rest does not, and one that uploads little does not raise it', () => {
   const interval = 1000 / 60;
   const late = paced(61, (frame) => (frame === 60 ? 2 : 1) * interval, 1);
   close(late[60].share, Math.max(UPLOAD_SHARE.min, late[59].share / 2));
@@ -192,7 +192,7 @@ test('a clock that ticks once a millisecond gives the same share on average', ()
   close(uploaded, Math.min(allowed, (500 * 5e6) / 1.3), 0.2);
 });
 
-test('in a flight, what is in view is off by less where pages are wished for ahead of the camera', async () => {
+test('in a flight, the view has a smaller error if pages are requested ahead of the camera', async () => {
   const places = Array.from({ length: 144 }, (_, k) => [14 * (k % 12), 0, 14 * Math.floor(k / 12)] as const);
   const { manifest, files } = detailFolder(pebbles(4_000), places);
   const pages = new FlightPages(manifest, (file) => files.get(file)!);

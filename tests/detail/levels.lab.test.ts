@@ -102,7 +102,7 @@ test('in a flight over a small pool, with levels that come late, in any order, o
   [renderer, scene, target].forEach((owner) => owner.destroy());
 });
 
-test('a scene that has room for all is, without an error, the picture of the scene that was loaded whole', async () => {
+test('a streamed scene with all pages is drawn without an error as the scene that was loaded completely', async () => {
   const device = await anyDevice();
   const folder = lodFolder(pebbles(12_000), {
     levels: 4,
@@ -135,7 +135,7 @@ test('a scene that has room for all is, without an error, the picture of the sce
   [streaming, loaded, scene, whole].forEach((owner) => owner.destroy());
 });
 
-test('a file that is missing, and a run beyond its file, are told by name, and what stands for them stays', async () => {
+test('a missing file, and a run beyond its file, are reported by name, and the coarser splats in their place stay', async () => {
   const device = await anyDevice();
   const folder = lodFolder(pebbles(8_000), { levels: 3, boxes: 2 });
   const text = new TextDecoder().decode(folder.index);
@@ -192,7 +192,7 @@ test(
       return file;
     };
     const opened = await openLod(device, sharedFile(`${folder}lod-meta.json`), counting);
-    console.log(`${bytes} bytes before the first picture of ${opened.levels.scene.splats} splats`);
+    console.log(`${bytes} bytes before the first frame of ${opened.levels.scene.splats} splats`);
     assert.ok(bytes < 70_000 && opened.levels.scene.splats === 500_000);
     opened.scene.destroy();
     const text = new TextDecoder().decode(sharedFile(`${folder}lod-meta.json`));

@@ -58,7 +58,7 @@ function checkPages(found: DetailManifest): void {
   assert.ok(above.every((times, page) => times === (page === 0 ? 0 : 1)));
 }
 
-test('whatever is changed in a manifest, it is refused with a name, or each of its pages is below one chunk', () => {
+test('after any change a manifest is refused with a name, or each of its pages is below one chunk', () => {
   const random = randomSource(11);
   const texts = manifests.map((manifest) => JSON.stringify(manifest));
   for (const text of texts) checkPages(checkManifest(JSON.parse(text), 'detail.json'));
@@ -81,7 +81,7 @@ test('whatever is changed in a manifest, it is refused with a name, or each of i
   assert.ok(taken > 100 && refused > 1000);
 });
 
-test('a manifest tells how geometry is stored by its version, and readers of either take no other', () => {
+test('the version of a manifest determines how geometry is stored, and readers of either reject the other', () => {
   const [exact, quantized] = manifests;
   assert.deepEqual(
     [exact.version, exact.geometry, quantized.version, quantized.geometry],

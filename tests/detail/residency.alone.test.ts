@@ -55,7 +55,7 @@ test('missing pages are named in the order of what doing without them costs', ()
   assert.ok(residency.slots.count > 200);
 });
 
-test('a page at hand comes before those that are needed up to four times as much, and keeps none of them away where it finds no room', () => {
+test('a cached page comes before those that are needed up to four times as much, and without a free slot evicts none of them', () => {
   const list = pageTree(17);
   const isCached = (page: number): boolean => page === 16;
   const residency = new Residency(list, 2, isCached);
@@ -76,7 +76,7 @@ test('a page at hand comes before those that are needed up to four times as much
   assert.ok(residency.begin(2) && residency.settle(2));
 });
 
-test('with room for all, everything that a view wishes for is there in the end', () => {
+test('with slots for all, every page that a view requests is resident in the end', () => {
   const list = pageTree(3000);
   const residency = opened(list, 3000);
   const looks = settle(list, residency, (page) => (page % 7 === 0 ? 0 : 0.3));

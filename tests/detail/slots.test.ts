@@ -50,7 +50,7 @@ function check(list: PageList, residency: Residency): number {
   return residents.reduce((sum, page) => sum + list.slots[page], 0);
 }
 
-test('whatever is wished for, comes or fails, pages are there whole or not at all, and what is above them is', () => {
+test('with any requests, arrivals and failures, pages are complete or absent, and their ancestors are resident', () => {
   const random = randomSource(21);
   const list = randomBoxes(60, random);
   const slots = list.slots[0] + 30;

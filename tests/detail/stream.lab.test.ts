@@ -36,7 +36,7 @@ const viewFrom = (distance: number, angle = 0.4, target: Vector3 = [0, 0, 0]): C
 const openAll = async (source: DetailFolder, memoryBudget?: number): Promise<StreamedGaussians> =>
   StreamedGaussians.open(await anyDevice(), source.manifest, { fetchPage: source.fetchPage, memoryBudget });
 
-test('a scene that has room for all its pages becomes the picture of the scene that was loaded whole', async () => {
+test('a scene with slots for all its pages is drawn as the scene that was loaded completely', async () => {
   const device = await anyDevice();
   const whole = await GaussianBuffers.upload(device, packWithDetail(cloud));
   const scene = await openAll(folder);
@@ -204,7 +204,7 @@ test('a view that turns to the scene lacks nothing, though hardly anything was v
   [renderer, scene, target].forEach((owner) => owner.destroy());
 });
 
-test('whatever is wished for, comes or fails, what is above a page is there, and no page twice', () => {
+test('with any requests, arrivals and failures, the ancestors of a page are resident, and no page is there twice', () => {
   const random = randomSource(5);
   const list = listPages(folder.manifest);
   const residency = new Residency(list, 5);
@@ -229,7 +229,7 @@ test('whatever is wished for, comes or fails, what is above a page is there, and
   }
 });
 
-test('a page that does not come is told of, and what stands for it stays on show', async () => {
+test('a page that does not arrive is reported, and its parent stays visible', async () => {
   const errors: unknown[] = [];
   const device = await anyDevice();
   const scene = await StreamedGaussians.open(device, folder.manifest, {
@@ -371,7 +371,7 @@ async function largestChange(arrivalMs: number): Promise<{ decibels: number; fra
   return { decibels: min, frames, pages };
 }
 
-test('pages that come fade in: no picture differs by 40 dB from the one before; without the fade they pop', async () => {
+test('arriving pages fade in: consecutive frames have a PSNR above 40 dB; without the fade they pop', async () => {
   const [faded, popping] = [await largestChange(1), await largestChange(0)];
   console.log(`${faded.pages} pages, largest change: ${JSON.stringify(faded)}; at once ${JSON.stringify(popping)}`);
   assert.ok(faded.pages > 3 && faded.pages === popping.pages);

@@ -123,7 +123,7 @@ test('what is sent for is what is needed most of all that can come', () => {
   assert.deepEqual(all.server.log, expected.slice(0, MAX_FETCHES));
 });
 
-test('pages that two looks do not wish for are given up where they are, and may be asked for again', async () => {
+test('pages that two feedback passes do not request are canceled, and may be requested again', async () => {
   const all = pool(300, 300, 200);
   all.look(() => 0.5);
   await all.server.answer();
@@ -132,8 +132,8 @@ test('pages that two looks do not wish for are given up where they are, and may 
   assert.equal(fetching, MAX_FETCHES);
   const stale = all.server.open.splice(0);
   all.look(() => 0);
-  assert.equal(all.traffic.next(), undefined, 'nothing is placed that the last look does not wish for');
-  assert.equal(all.traffic.underWay, 2 * MAX_FETCHES, 'one look alone gives nothing up: another view may look in turn');
+  assert.equal(all.traffic.next(), undefined, 'no page is placed that the last feedback pass does not request');
+  assert.equal(all.traffic.underWay, 2 * MAX_FETCHES, 'one feedback pass alone cancels nothing, because another view may follow');
   all.look(() => 0);
   assert.equal(all.traffic.underWay, 0);
   assert.equal(all.traffic.abandoned, 2 * MAX_FETCHES);
@@ -153,7 +153,7 @@ test('pages that two looks do not wish for are given up where they are, and may 
   assert.equal(all.residency.slots.count, 201, 'the root and what is below it');
 });
 
-test('pages that fail are told of once, make room for others, and nothing comes of a closed scene', async () => {
+test('failing pages are reported once and free their slots, and a closed scene reports nothing', async () => {
   const all = pool(300, 300, 200);
   all.look(() => 0.5);
   const failed = all.server.open.splice(0);
@@ -214,7 +214,7 @@ test('a page that fails again and again is asked for after 4 s, then 8 s, and so
   all.traffic.close();
 });
 
-test('a page that never comes is told once, and given up after eight tries', async () => {
+test('a page that never arrives is reported once, and abandoned after eight attempts', async () => {
   let now = 0;
   const all = pool(2, 2, 16, () => now);
   for (let minute = 0; minute < 120; minute++) {
@@ -228,7 +228,7 @@ test('a page that never comes is told once, and given up after eight tries', asy
   all.traffic.close();
 });
 
-test('in a small pool, whatever comes in whatever order, what is above a page is there, and views at rest come to rest', async () => {
+test('in a small pool, with any order of arrivals, the ancestors of a page are resident, and views at rest settle', async () => {
   const all = pool(2000, 120);
   const random = randomSource(6);
   for (let view = 0; view < 12; view++) {

@@ -43,7 +43,7 @@ function command(...args: string[]): { status: number | null; said: string } {
   return { status, said: stdout + stderr };
 }
 
-test('files that it reads are none that it writes, by whatever name', () => {
+test('input files are never output files, under any name', () => {
   symlinkSync(scene, join(folder, 'link.ply'));
   linkSync(scene, join(folder, 'twin.ply'));
   const cases = [

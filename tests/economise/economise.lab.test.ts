@@ -86,7 +86,7 @@ test('what a splat is said to cost is what the image lacks without it', async ()
   }
 });
 
-test('fewer bands, set anew, come nearer to the colors than those that stay would', async () => {
+test('fewer bands, fitted again, are nearer to the colors than the truncated ones', async () => {
   const count = 400;
   const numbers = 27;
   const sh = scene.sh.slice(0, numbers * count);
@@ -104,11 +104,11 @@ test('fewer bands, set anew, come nearer to the colors than those that stay woul
   };
   const set = Float32Array.from({ length: 12 * count }, (_, k) => lowered[1].of(Math.floor(k / 12))[k % 12]);
   const [plain, again] = [await figure(cut), await figure(set)];
-  console.log(`degree 1 instead of 2: ${plain.toFixed(1)} dB, set anew ${again.toFixed(1)} dB`);
+  console.log(`degree 1 instead of 2: ${plain.toFixed(1)} dB, fitted again ${again.toFixed(1)} dB`);
   assert.ok(again > plain + 2, `${again} dB, without ${plain} dB`);
 });
 
-test('splats that nobody sees contribute nothing, and go without a trace', async () => {
+test('invisible splats contribute nothing, and are removed without a trace', async () => {
   const scores = await scored;
   const median = (of: Float32Array): number => of.slice().sort()[of.length >> 1];
   const inside = scores.contribution.filter((_, i) => i % 3 === 0);
@@ -131,7 +131,7 @@ test('degrees go where color does not depend on the view, at any price', async (
 });
 
 // Far above: no camera looks there.
-test('splats that no view looked at keep their colors, as they keep their place', async () => {
+test('splats outside all views keep their colors, as they keep their position', async () => {
   const positions = scene.positions.map((value, k) => (k < 30 && k % 3 === 1 ? value - 1000 : value));
   const cloud = { ...scene, positions };
   const { degrees, kept } = reduce(cloud, await scoreSplats(cloud, fewer.scored, cpuScorer(cloud)), {
@@ -381,7 +381,7 @@ test('splats come in the order of what they contribute over their area, equal on
   );
 });
 
-test('a file in this order is a coarse picture while it arrives', async () => {
+test('a file in this order is a coarse image while it arrives', async () => {
   const reduced = reduce(scene, await scored, {});
   const bytes = await encodingsFor('a.ply')[0].write(reduced);
   const part = await readPrefix(bytes.subarray(0, Math.floor(0.6 * bytes.length)), { name: 'a.ply' });

@@ -147,7 +147,7 @@ test('a scene in parts is scored as one in a single part', async () => {
   }
 });
 
-test('views that are looked at a few at once add up to the same', async () => {
+test('views that are scored a few at a time add up to the same', async () => {
   const few = await GpuEvaluator.create(device, scene, views, { viewsAtOnce: 5 });
   assert.deepEqual(await few.rank(), ranking);
   const found = await few.scores();
@@ -158,7 +158,7 @@ test('views that are looked at a few at once add up to the same', async () => {
   }
 });
 
-test('errors are those of the pictures', async () => {
+test('errors are those of the images', async () => {
   const cloud = { ...scene, opacities: scene.opacities.map((value, i) => (i % 9 === 0 ? 0.5 * value : value)) };
   const studio = new Studio(device, 'reference');
   const [before, now] = [await studio.draw(scene, views.heldOut), await studio.draw(cloud, views.heldOut)];
@@ -171,7 +171,7 @@ test('errors are those of the pictures', async () => {
   assert.deepEqual(await evaluator.compare(scene, 'heldOut'), [0, 0]);
 });
 
-test('views that show nothing tell of no error', async () => {
+test('empty views report no error', async () => {
   const [first] = views.heldOut;
   const worldToCamera = first.worldToCamera.map((value, k) => (k >= 4 && k < 12 ? -value : value));
   const turned = { ...views, scored: [first], heldOut: [first, { ...first, worldToCamera }] };
@@ -187,7 +187,7 @@ const median = (values: Float32Array, share: number): number =>
 
 for (const [name, cutOf] of [
   ['by contribution', () => ({ minContribution: median(ranking.contribution, 0.2) })],
-  ['by what the pictures would lack', () => ({ removalPrice: median(ranking.removalError, 0.15) })],
+  ['by the loss in the images', () => ({ removalPrice: median(ranking.removalError, 0.15) })],
   ['of bands of color', () => ({ colorPrice: Math.fround(1e-9) })],
   ['of both', () => ({ minContribution: median(ranking.contribution, 0.1), colorPrice: Math.fround(1e-10) })],
 ] as const satisfies readonly (readonly [string, () => Cut])[]) {
@@ -208,7 +208,7 @@ for (const [name, cutOf] of [
 }
 
 // Far above: no camera looks there.
-test('splats that no view looked at keep their colors, as they keep their place', async () => {
+test('splats outside all views keep their colors, as they keep their position', async () => {
   const cloud = {
     ...scene,
     positions: scene.positions.map((value, k) => (k < 30 && k % 3 === 1 ? value - 1000 : value)),
@@ -251,7 +251,7 @@ test('the asked figure is met by the written file', async () => {
   assert.ok(result.seconds.score > 0 && result.seconds.search > 0);
 });
 
-test('pairs are merged by its scores, and what that costs is measured on its pictures', async () => {
+test('pairs are merged by its scores, and the cost is measured on its images', async () => {
   const merging = new MergingEvaluator(evaluator, scene, { views: views.scored, maxError: 1e-3 });
   assert.deepEqual(await merging.rank(), ranking);
   const [mergePrice] = merging.mergePrices.slice(-1);

@@ -117,7 +117,7 @@ test('twins are merged first: means and covariances are those of both', async ()
   assert.ok(checked > 100, `${checked} checked`);
 });
 
-test('the cover is kept: alpha of the pictures stays what it was', async () => {
+test('coverage is preserved: alpha of the images stays the same', async () => {
   const { reduced } = await atMerges(200);
   const images = await cpuPainter.draw(reduced.cloud, views.heldOut);
   const sum = (image: Float32Array): number => image.reduce((all, value, k) => all + (k % 4 === 3 ? value : 0), 0);

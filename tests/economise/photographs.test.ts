@@ -37,7 +37,7 @@ test("cameras of training's cameras.json find their photographs", () => {
   assert.deepEqual([...worldToCamera].slice(0, 12), [0, 1, 0, -2, 0, 0, 1, -3, 1, 0, 0, -1]);
 });
 
-test('views name their photographs; every so many-th judges', () => {
+test('views name their photographs; every Nth is held out', () => {
   writeFileSync(join(folder, 'v.png'), '');
   const K = [
     [50, 0, 20],

@@ -147,7 +147,7 @@ const UNLIMITED = 1e38;
 const STEP = 1e-2;
 
 for (const antialiased of [false, true]) {
-  test(`derivatives are those of plain code's pictures${antialiased ? ', antialiased' : ''}`, async () => {
+  test(`derivatives are those of the reference code${antialiased ? ', antialiased' : ''}`, async () => {
     const count = 40;
     const whole = { ...ball(count), antialiased };
     const cloud = disturbed(whole);

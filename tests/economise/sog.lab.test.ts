@@ -90,7 +90,7 @@ test('where it is known how splats are seen, what they show from there is nearer
   assert.ok(fitting < 0.6 * plain, `${fitting} and ${plain}`);
 });
 
-test('each step makes as much of the error as it has numbers, whatever errors are', async () => {
+test('each step has a fraction of the error in proportion to its numbers, for any errors', async () => {
   const weights = { a: 4, b: 0.01, c: 1 };
   const errorOf = (steps: Readonly<Record<'a' | 'b' | 'c', number>>): number =>
     weights.a * steps.a ** 2 + weights.b * steps.b ** 2 + weights.c * steps.c ** 2;

@@ -11,7 +11,7 @@ test('visitors stand upright in a scene that names its direction up', () => {
     const { scored, searched, heldOut } = dealtViewsOfVisitors(bounds, 40, up);
     const along = ([x, y, z]: Vector3, [a, b, c]: Vector3 = up ?? [0, -1, 0]): number => a * x + b * y + c * z;
     const heights = [...scored, ...searched, ...heldOut].map(({ worldToCamera: m }) => {
-      assert.ok(along([m[4], m[5], m[6]]) < 0, 'the picture stands on its feet');
+      assert.ok(along([m[4], m[5], m[6]]) < 0, 'the image is upright');
       const eye = eyeOf(m).map((value, axis) => value - bounds.center[axis]) as unknown as Vector3;
       return along(eye) / Math.hypot(...eye);
     });

@@ -5,7 +5,7 @@ import { GaussianSplatError } from '@gaussian-splat/core';
 import { unrecoverable } from '../../packages/element/src/gpu/device-recovery.js';
 import { DeviceLostError } from '../../packages/element/src/gpu/device-failures.js';
 
-test('a lost device is told of in the words of the browser, and what to do about it', () => {
+test('a lost device is reported with the words of the browser and a remedy', () => {
   const info = { reason: 'unknown', message: 'DXGI_ERROR_DEVICE_HUNG.' } as GPUDeviceLostInfo;
   const none = new GaussianSplatError('unsupported/no-adapter', {
     ...{ where: 'this browser', expected: 'a graphics adapter for WebGPU', found: 'none', remedy: 'update' },

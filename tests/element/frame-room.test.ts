@@ -10,7 +10,7 @@ test('two seconds of frames, fewer of short sequences', () => {
   assert.equal(new FrameRoom(300, 0.1).frames, 2);
 });
 
-test('no more than 256 MB, by the largest frame so far, but two always', () => {
+test('no more than 256 MB, by the largest frame until then, but always two', () => {
   const room = new FrameRoom(300, 24);
   room.note(MB / 2);
   assert.equal(room.frames, 48);

@@ -73,7 +73,7 @@ const cloudOf = (places: readonly number[][]): Places => ({
   origin: [10, -20, 5],
 });
 
-test('somebody who stands alone is shown from head to feet, whatever the shape of the picture, and a few specks far off change nothing', () => {
+test('a single standing person is shown from head to feet at any aspect ratio, and a few distant specks change nothing', () => {
   const alone = standing(20_000);
   const specks = Array.from({ length: 12 }, (_, i) => [40 + i, 3 * i, -25]);
   for (const places of [alone, [...alone, ...specks]]) {

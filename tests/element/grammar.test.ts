@@ -197,7 +197,7 @@ test('times are at most what timers can wait: longer ones would be over at once'
   assert.deepEqual([autoRotateDelay, interactionPromptThreshold, interpolationDecay], [2 ** 31 - 1, 2 ** 31 - 1, 7]);
 });
 
-test('crossorigin as of <img>', () => {
+test('crossorigin is parsed as on <img>', () => {
   const credentials = (crossorigin: string): string =>
     credentialsOf(readAttributes({ ...ABSENT, crossorigin }, assert.fail).crossorigin);
   assert.deepEqual(['', 'anonymous', 'use-credentials'].map(credentials), ['same-origin', 'same-origin', 'include']);

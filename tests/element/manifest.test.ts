@@ -207,7 +207,7 @@ check('the table of the guide is what the build makes of it, with an example tha
     attributeRows: (attributes: unknown) => string;
   };
   const guide = readFileSync(`${folder}../../docs/guide/attributes.md`, 'utf8');
-  assert.ok(guide.includes(`\n\n${attributeRows(element?.attributes)}\n\n`), 'npm run build writes it anew');
+  assert.ok(guide.includes(`\n\n${attributeRows(element?.attributes)}\n\n`), 'npm run build writes it again');
   const { readAttributes } = (await import(`${folder}dist/attributes.js`)) as {
     readAttributes: (raw: object, warn: (sentence: string) => void) => Record<string, unknown>;
   };

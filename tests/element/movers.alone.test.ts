@@ -44,7 +44,7 @@ test('auto-rotation turns back at the limits, and stops where it may go nowhere'
   const fixed = framed({ minCameraOrbit: '5deg auto auto', maxCameraOrbit: '5deg auto auto' });
   const stuck = rotating(fixed);
   stuck.advance(0);
-  assert.equal(stuck.advance(16), false, 'it goes on though nothing moves');
+  assert.equal(stuck.advance(16), false, 'it continues although nothing moves');
   assert.equal(fixed.step(16, 0), null);
 });
 

@@ -97,7 +97,7 @@ test('theta 0 looks from the +z side of viewer space, theta 90 from the +x side,
   near(cross(right, up), backward);
 });
 
-test('the target lands in the middle and what is up in the scene is up in the picture', () => {
+test('the target is in the middle, and up in the scene is up in the frame', () => {
   for (const up of UPS) {
     const frame = viewerFrame(up);
     const camera = cameraOfPose(
@@ -114,7 +114,7 @@ test('the target lands in the middle and what is up in the scene is up in the pi
   }
 });
 
-test("the framing distance makes a ball touch the picture's nearer edge", () => {
+test("the framing distance makes a ball touch the frame's nearer edge", () => {
   for (const aspect of [0.3, 1, 2.5]) {
     const distance = framingDistance(2, 0.9, aspect);
     const half = Math.min(0.45, Math.atan(Math.tan(0.45) * aspect));
@@ -138,14 +138,14 @@ test('automatic settings frame the middle of the scene in viewer space', () => {
   near([given.x, given.y, given.z], [1, 7, 3]);
 });
 
-test('automatic limits give way to what the attributes ask for outright', () => {
+test('automatic limits are extended to explicit attributes', () => {
   const above = settings({ cameraOrbit: '0deg 0deg 1000m' });
   const camera = new OrbitCamera(poseOf(above, BOUNDS, 1));
   camera.limits = limitsOf(above, BOUNDS, 1);
   assert.deepEqual([camera.goal.phi, camera.goal.radius], [0, 1000]);
 });
 
-test('limits of the file replace automatic ones, and give way to those of the attributes', () => {
+test('limits of the file replace automatic ones, and are replaced by those of the attributes', () => {
   const bounds = { ...BOUNDS, orbit: { minPhi: 0.8, maxPhi: 1.2, minRadius: 20 } };
   const steered = (given: Parameters<typeof settings>[0]): OrbitCamera => {
     const camera = new OrbitCamera(poseOf(settings(given), bounds, 1));
@@ -284,7 +284,7 @@ test('a new aspect reframes, unless a person has chosen the distance', () => {
   assert.equal(controller.orbit.radius, framingDistance(2, controller.fieldOfView.radians, 2));
 });
 
-test('a camera that flies or walks stays where it is while the picture gets another shape', () => {
+test('a camera that flies or walks stays in place if the aspect ratio changes', () => {
   const controller = new CameraController(settings(), () => undefined);
   controller.frame(BOUNDS);
   controller.setAspect(2);
@@ -357,7 +357,7 @@ test('labels are at the projections of their points, in perspective and in ortho
   }
 });
 
-test('the box of a scene has all of its corners, whatever is up', () => {
+test('the box of a scene has all of its corners, for any up direction', () => {
   const { min, max } = BOUNDS;
   for (const up of UPS) {
     const frame = viewerFrame(up);

@@ -76,7 +76,7 @@ const kinds: Record<string, { readonly make: (random: Random) => Load; readonly 
         ),
       ),
   },
-  'but for other work beside whole pictures': {
+  'except for other work beside full frames': {
     make: (random) =>
       always(
         disturbed(
@@ -87,7 +87,7 @@ const kinds: Record<string, { readonly make: (random: Random) => Load; readonly 
         ),
       ),
   },
-  'small pictures take longer': {
+  'small frames take longer': {
     make: (random) => {
       const growth = random(1.02, 1.15);
       const from = Math.floor(random(3, 8));
@@ -98,11 +98,11 @@ const kinds: Record<string, { readonly make: (random: Random) => Load; readonly 
   },
   'a step of an H200, close up': { make: stepped(STEEP, 0.3, 3) },
   'a step of an H200, from afar': { make: stepped(FLAT, 0.3, 3) },
-  'a picture too small for the GPU': { make: stepped(SMALL, 0.5, 3) },
+  'a frame too small for the GPU': { make: stepped(SMALL, 0.5, 3) },
   'a wide GPU': { make: stepped(WIDE, 0.3, 1.6) },
   // The time of the lowest level relative to the fastest.
   'a wide GPU, too slow': { make: stepped(WIDE, 1.7, 4), excess: 1.09 },
-  'a wide GPU, other work beside whole pictures': {
+  'a wide GPU, other work beside full frames': {
     make: (random) => step(disturbed(times(WIDE, random(0.3, 1.6))), disturbed(times(WIDE, random(0.3, 1.6)))),
   },
   'a part that no level makes cheaper': {
@@ -171,7 +171,7 @@ Object.entries(kinds).forEach(([name, { make, excess = 1.081 }], k) => {
   });
 });
 
-test('a load that comes and goes: the pace learns to keep to the highest', () => {
+test('a load that comes and goes: the level settles at the highest load', () => {
   let turnedTwice = 0;
   for (let i = 0; i < RUNS; i++) {
     const random = within(50_000 + i);
@@ -202,7 +202,7 @@ test('levels that take something else every tenth of a second: two changes of di
   assert.ok(max <= 2, `${max} changes of direction`);
 });
 
-test('the low clock of an idle GPU at the beginning of a gesture does not make the picture less', () => {
+test('the low clock of an idle GPU at the beginning of a gesture does not make the frame smaller', () => {
   for (let i = 0; i < RUNS; i++) {
     const random = within(60_000 + i);
     const [length, rest, wake, usual] = [random(1_000, 3_000), random(400, 1_500), random(40, 110), random(0.2, 0.8)];

@@ -20,7 +20,7 @@ function gpuOf(seed: number): { random: Random; gpu: Omit<Gpu, 'load'> } {
 
 /** Draws with a GPU that takes 0.6 ms for a frame, plus an additional time, ms, for those that start at a time. */
 function draw(name: string, moreOf: (random: Random) => (now: number) => number): void {
-  test(`a scene of ${FAST_MS} ms is drawn whole on a page of 60 Hz, whatever ${name}`, () => {
+  test(`a scene of ${FAST_MS} ms is drawn in full on a page of 60 Hz, for any ${name}`, () => {
     for (let i = 0; i < RUNS; i++) {
       const { random, gpu } = gpuOf(i + 1);
       const more = moreOf(random);

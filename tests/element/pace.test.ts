@@ -66,7 +66,7 @@ test('a wide GPU, where fewer pixels win little: load steps are kept to as on ot
   );
 });
 
-test('a picture becomes so small that fewer pixels take longer than all: the true image comes back, though no climb looked cheap enough', () => {
+test('a frame becomes so small that fewer pixels take longer than all: the accurate frame comes back, though no higher level seemed fast enough', () => {
   for (const [load, fixed] of [
     [0.48, 0],
     [0.58, 0],
@@ -88,7 +88,7 @@ test('a picture becomes so small that fewer pixels take longer than all: the tru
   }
 });
 
-test('a level down that makes frames longer is taken back at once, and the pace does not go there again for long', () => {
+test('a lower level that makes frames longer is reverted at once, and is not tried again for long', () => {
   for (const latency of [0, 1, 2, 3]) {
     const gpu = { hertz: 60, fixed: 0, shares: () => SMALL, noise: 0.06, spikes: 0, latency, seed: 12 };
     const { frames } = run({ ...gpu, load: (now) => (now < 2_000 ? 0.5 : 1.5) }, 8_000);
@@ -117,7 +117,7 @@ test('where the first levels win next to nothing and those far below much, these
   }
 });
 
-test('where no level wins anything the picture stays whole, or comes back to it at once and stays', () => {
+test('if no level gains anything the frame stays full, or returns to it at once and stays', () => {
   for (const [load, latency] of [
     [1.3, 0],
     [2.5, 2],
@@ -144,7 +144,7 @@ test('levels that are each a little dearer than the one below are not climbed on
   );
 });
 
-test('noise and spikes: no picture of the display is missed in the usual frame, and the level stays quiet', () => {
+test('noise and spikes: the usual frame misses no refresh of the display, and the level stays constant', () => {
   fc.assert(
     fc.property(fc.record({ ...anyGpu, load: fc.double({ min: 0.2, max: 3, noNaN: true }) }), ({ load, ...gpu }) => {
       const { frames } = run({ ...gpu, load: () => load, noise: 0.2, spikes: 1.5 }, 20_000);
@@ -159,7 +159,7 @@ test('noise and spikes: no picture of the display is missed in the usual frame, 
   );
 });
 
-test('a fast GPU draws the true image, whatever the display, single slow frames or not', () => {
+test('a fast GPU draws the accurate frame, on any display, with single slow frames or not', () => {
   for (const hertz of [60, 120, 144]) {
     const { frames } = run({ hertz, load: () => 0.3, fixed: 0.2, noise: 0.2, spikes: 3, latency: 2, seed: 9 }, 30_000);
     assert.ok(frames.every(({ level }) => level === 0));
@@ -231,7 +231,7 @@ test('when the load is gone the whole image comes back within a second, without 
   assert.ok(after.filter(({ at }) => at > 6_000).every(({ level }) => level === 0));
 });
 
-test('a level that costs more than the ladder says is tried again once in two minutes', () => {
+test('a level that costs more than the table predicts is tried again once in two minutes', () => {
   // The first level down makes the frame more than twice as fast, although the levels promise less.
   const targetMs = 13.3;
   let quality = INITIAL_QUALITY;
@@ -271,7 +271,7 @@ test('frames of another level say nothing', () => {
   );
 });
 
-test('what the true image took at rest is what the pace comes back to where less takes longer', () => {
+test('if lower levels take longer, the level returns by the time of the accurate frame at rest', () => {
   const targetMs = 13.3;
   let [quality, now] = [INITIAL_QUALITY, 0];
   const draw = (level: number, milliseconds: number): void => {

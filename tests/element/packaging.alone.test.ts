@@ -51,7 +51,7 @@ test(
 const ELSEWHERE: Readonly<Record<string, string>> = {
   'manifests of streamed scenes': 'JSON that gaussian-splat detail wrote',
   'pages of streamed scenes': 'gs.requests.staging',
-  'the stage that notes their wishes': 'page_feedback',
+  'the stage that records their page requests': 'page_feedback',
   sequences: 'a path with {0001} in it',
   'headers of .ksplat': 'a .ksplat section header',
   'what is said of files that are no scene': 'a git-LFS pointer, which only names the real file',

@@ -22,7 +22,7 @@ function clock(
   return { playback, events, frames: () => frames };
 }
 
-test('play() begins anew where the time was set to the end', () => {
+test('play() starts from the beginning if the time was set to the end', () => {
   const { playback } = clock();
   playback.currentTime = 4;
   playback.play();
@@ -42,7 +42,7 @@ test('in reverse, play() begins at the end', () => {
   assert.equal(playback.currentTime, 4);
 });
 
-test('a rate of 0 stands: no frame is asked for, and no time has passed when it goes on', () => {
+test('a rate of 0 stands: no frame is requested, and no time has passed when it continues', () => {
   const { playback, frames } = clock();
   playback.play();
   for (const now of [0, 1000]) playback.tick(now);
@@ -100,7 +100,7 @@ test('a listener of seeked that seeks decides the time, and one that pauses stop
   assert.deepEqual(events.slice(-2), ['timeupdate', 'pause'], 'neither a second pause nor an end');
 });
 
-test('a pause ends the wait: the next play() waits anew, and another scene does not go on from it', () => {
+test('a pause ends the wait: the next play() waits again, and another scene does not continue from it', () => {
   const { playback, events } = clock();
   const count = (type: PlaybackEvent): number => events.filter((each) => each === type).length;
   playback.play();

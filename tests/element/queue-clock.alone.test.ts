@@ -93,7 +93,7 @@ class Page {
   }
 }
 
-test('a frame takes what its work takes: alone, behind others, and behind the work of somebody else on the queue', async (context) => {
+test("a frame's time is that of its work: alone, behind others, and behind other work on the queue", async (context) => {
   const page = new Page(context);
   const clock = await page.clock();
   const times: WorkTime[] = [];
@@ -139,7 +139,7 @@ test('the clock of WebGL: frames that are drawn before the last is done take wha
   });
 });
 
-test('a frame that is told of late, since the thread was busy, took something between what it can have and what it seems to', async (context) => {
+test('a frame that is reported late, because the thread was busy, took a time between its minimum and its measured one', async (context) => {
   const page = new Page(context);
   const clock = await page.clock();
   for (const work of [0.6, 8, 25, 60]) {

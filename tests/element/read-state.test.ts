@@ -52,14 +52,14 @@ test('a control that is a tensor of Gaussians in the next model can still be set
   assert.deepEqual([read({ controls: { scales: [4] } }).controls, reported], [{ scales: 4 }, []]);
 });
 
-test('a text for a control is told as it was written, capital letters of the input or not', () => {
+test('a text for a control is reported as it was written, capital letters of the input or not', () => {
   const { read, messages: reported } = readerOf({ Amount: control(0, 1) });
   assert.deepEqual(read({ images: { amount: 'much' } }).controls, {});
   assert.equal(reported.length, 1);
   assert.match(reported[0], /control Amount: expected numbers, found much/);
 });
 
-test('a pose is told where no model takes one, once', () => {
+test('a pose is reported if no model takes one, once', () => {
   const { read, messages: reported } = readerOf({ amount: control(0, 1) });
   for (let i = 0; i < 2; i++) read({ pose: [1, 2, 3] });
   assert.equal(reported.length, 1);

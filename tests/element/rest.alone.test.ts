@@ -39,7 +39,7 @@ const took = (
 ): void => quality.sample(plan, { doneAt: now + milliseconds, lowerBound: milliseconds, upperBound: milliseconds });
 
 for (const wholeMs of [20, 100, 200, 214]) {
-  test(`a true image of ${wholeMs} ms is on show 300 ms after rest, and not begun before 50 ms`, (context) => {
+  test(`an accurate frame of ${wholeMs} ms is visible 300 ms after rest, and not started before 50 ms`, (context) => {
     context.mock.timers.enable({ apis: ['setTimeout'] });
     let asked = false;
     const quality = qualityOf({ requestFrame: () => (asked = true) });
@@ -59,7 +59,7 @@ for (const wholeMs of [20, 100, 200, 214]) {
     assert.ok(waited >= 50 && waited <= 150, `begun after ${waited} ms`);
     // The hand stopped up to an interval before its last input was drawn.
     const shown = INTERVAL + waited + INTERVAL + wholeMs;
-    assert.ok(shown <= 300, `on show after ${shown} ms`);
+    assert.ok(shown <= 300, `visible after ${shown} ms`);
     assert.equal(
       quality.plan({ now: now + waited, pixels: PIXELS, hasChanged: false, goesOn: false }).level,
       0,
@@ -71,12 +71,12 @@ for (const wholeMs of [20, 100, 200, 214]) {
   });
 }
 
-test('true images that can not be in time are begun as soon as rest can be told, those of unknown time as late as may be', () => {
+test('accurate frames that cannot be in time start as soon as rest is detected, those of unknown duration as late as possible', () => {
   assert.equal(waitForRest(900, INTERVAL), 50);
   assert.equal(waitForRest(0, INTERVAL), 150);
 });
 
-test('what a frame may take is what the page says, else a share of the display that elements divide', () => {
+test('the frame budget is that of the page, else a fraction of the display interval that elements divide', () => {
   const scheduler = { displayInterval: INTERVAL, clients: 2 } as FrameScheduler;
   let budget = Infinity;
   const quality = qualityOf({ scheduler: () => scheduler, frameBudget: () => budget });
@@ -142,7 +142,7 @@ test('an element that draws now and then leaves others all but their whole time;
     image();
   }
   assert.ok(Math.abs(quality.targetMs / (0.4 * INTERVAL) - 1) < 0.03, `${quality.targetMs} ms`);
-  assert.ok(levels.at(-1)! > 0, 'half of the time is too little for the whole picture');
+  assert.ok(levels.at(-1)! > 0, 'half of the time is too little for the full frame');
   // A window that is resized draws all of its elements, frame after frame; then one is turned.
   const still = Array.from({ length: 8 }, () => ({ drawFrame: ignored }));
   for (let k = 0; k < 60; k++) {
@@ -160,7 +160,7 @@ test('an element that draws now and then leaves others all but their whole time;
   restore();
 });
 
-test('pictures that are small already are not made smaller, whatever they take', () => {
+test('frames that are already small are not made smaller, for any duration', () => {
   const quality = qualityOf();
   const levelOf = (pixels: number): number => {
     for (let now = 1000; now < 3000; now += INTERVAL) {
@@ -179,11 +179,11 @@ test('pictures that are small already are not made smaller, whatever they take',
   }
   assert.ok(
     scaleOf(levelOf(1024 ** 2)) < scaleOf(levelOf(128 ** 2)),
-    'a picture that shrinks takes what was chosen back',
+    'a frame that shrinks resets the chosen level',
   );
 });
 
-test('an element of another size is measured anew: that fewer pixels won nothing of a small picture says nothing of a large one', () => {
+test('an element of another size is measured again: a small frame that gains nothing from fewer pixels predicts nothing for a large one', () => {
   let now = 1000;
   const quality = qualityOf();
   const move = (seconds: number, pixels: number, takes: (level: number) => number): number => {
@@ -233,7 +233,7 @@ test('an element that becomes smaller in motion shows as many pixels as before a
   quality.stop();
 });
 
-test('a scene that changes in every other picture of the display is in motion in those between, and rests as a camera does', (context) => {
+test('a scene that changes in every other refresh of the display is in motion in those between, and rests as a camera does', (context) => {
   context.mock.timers.enable({ apis: ['setTimeout'] });
   const asked: number[] = [];
   let now = 1000;
@@ -252,19 +252,19 @@ test('a scene that changes in every other picture of the display is in motion in
   }
   const between = levels.slice(60).filter((_, k) => k % 2 === 1);
   assert.ok(Math.min(...between) > 0, `levels ${levels.slice(60).join(' ')}`);
-  assert.deepEqual(asked, [], 'no rest is looked for between');
+  assert.deepEqual(asked, [], 'no check for rest between');
   // The last change: later draws do not delay rest.
   for (let waited = 0; asked.length === 0 && waited < 300; waited += INTERVAL) {
     assert.ok(frame(false) > 0, 'not yet at rest');
     context.mock.timers.tick(INTERVAL);
     now += INTERVAL;
   }
-  assert.ok(asked.length === 1, 'rest is looked for');
+  assert.ok(asked.length === 1, 'rest is checked');
   assert.equal(frame(false), 0, 'the true image');
   quality.stop();
 });
 
-test('a change that comes while the true image of a pause is drawn belongs to the motion before', (context) => {
+test('a change during the accurate frame of a pause belongs to the motion before', (context) => {
   context.mock.timers.enable({ apis: ['setTimeout'] });
   const quality = qualityOf();
   const plan = (now: number, hasChanged: boolean): FramePlan =>
@@ -275,13 +275,13 @@ test('a change that comes while the true image of a pause is drawn belongs to th
     took(quality, frame, frame.level === 0 ? 300 : 60, now);
   }
   context.mock.timers.tick(200);
-  assert.equal(plan(now, false).level, 0, 'the true image is begun');
+  assert.equal(plan(now, false).level, 0, 'the accurate frame is started');
   // It takes 300 ms, and that is not known yet.
-  assert.ok(plan(now + 310, true).level > 0, 'the hand goes on');
+  assert.ok(plan(now + 310, true).level > 0, 'the gesture continues');
   quality.stop();
 });
 
-test('what was measured before the page chose a quality is not told, and not believed afterwards', () => {
+test('measurements before the page chose a quality are not reported, and not used afterwards', () => {
   let isOn = true;
   const quality = qualityOf({ isOn: () => isOn });
   const frame = { pixels: PIXELS, hasChanged: true, goesOn: true };
@@ -313,7 +313,7 @@ test('what a frame took that was drawn in another size says nothing', () => {
   quality.stop();
 });
 
-test('levels of detail are built once pictures have moved slowly for 1.5 s, rests not counted', async (context) => {
+test('levels of detail are built once frames have moved slowly for 1.5 s, rests not counted', async (context) => {
   context.mock.timers.enable({ apis: ['setTimeout'] });
   let now = 5_000;
   context.mock.method(performance, 'now', () => now);
@@ -354,5 +354,5 @@ test('levels of detail are built once pictures have moved slowly for 1.5 s, rest
   pass(4_000);
   assert.equal(await move(1_000), 0);
   pass(4_000);
-  assert.equal(await move(1_000), 1, 'two seconds of slow pictures in two gestures');
+  assert.equal(await move(1_000), 1, 'two seconds of slow frames in two gestures');
 });

@@ -19,7 +19,7 @@ test('it is read once for all that ask, then and later', async () => {
   assert.equal(times, 2);
 });
 
-test('one that gives up leaves it to the others; the last that does ends it, and the next reads anew', async () => {
+test('one canceled reader leaves it to the others; the last one ends it, and the next reads again', async () => {
   const reads = new SharedReads<string>(() => 10);
   const signals: AbortSignal[] = [];
   const finish: ((value: string) => void)[] = [];

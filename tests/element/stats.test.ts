@@ -13,7 +13,7 @@ const scene = {
   place: { context: {} },
 } as unknown as LoadedGaussians;
 
-test('splats for which the device has no room are told of, after they were counted', () => {
+test('splats beyond the capacity of the device are reported, after they were counted', () => {
   const quality = { moving: 'whole' } as unknown as StatsContext['dynamicQuality'];
   const context = {
     quality: 'default',
@@ -29,7 +29,7 @@ test('splats for which the device has no room are told of, after they were count
   assert.match(whyOf(1200), /^1200 splats are not drawn: the GPU allows no buffer/);
 });
 
-test('what the self-test found wrong is told of', () => {
+test('failures of the self-test are reported', () => {
   const { context } = scene.place;
   faultsOf(context).push('The self-test finds errors of this GPU: parallel prefix sums.');
   const quality = { moving: 'whole' } as unknown as StatsContext['dynamicQuality'];

@@ -103,7 +103,7 @@ test('a camera that flies keeps its eye all the way while it looks around, and c
   );
 });
 
-test('a camera that flies turns by itself about its eye, at rest and on its way', async () => {
+test('a flying camera turns about its eye, at rest and in motion', async () => {
   const { OrbitCamera } = await load<OrbitCameraModule>('orbit-camera');
   const { eyeOfPose } = await load<OrbitModule>('orbit');
   fc.assert(

@@ -55,7 +55,7 @@ test('words of the attributes: what is left out stays, percents and auto mean wh
   near([aimed.fieldOfView], [Math.PI / 6], 'field of view');
 });
 
-test('a camera of a trainer, and its matrix, have their eye and their direction, whatever is up', () => {
+test('a camera of a trainer, and its matrix, have their eye and their direction, for any up direction', () => {
   const point = fc.tuple(
     ...[0, 1, 2].map(() => fc.double({ min: -9, max: 9, noNaN: true })),
   ) as unknown as fc.Arbitrary<Vector3>;
@@ -219,7 +219,7 @@ function framed(): CameraController {
   return camera;
 }
 
-test('a flight arrives at its end, and gives way to whoever moves the camera, but not to a new shape of the picture', async (t) => {
+test('a flight arrives at its end, and is interrupted by camera input, but not by a new aspect ratio', async (t) => {
   t.mock.timers.enable({ apis: ['setTimeout'] });
   const way = (camera: CameraController) => {
     const from = camera.goal;
@@ -302,7 +302,7 @@ test('a path of many keyframes costs each frame next to nothing, however wound i
   assert.ok(user < 1e6, `${user / 1e3} ms for the path and a thousand frames`);
 });
 
-test('views that somebody else has written: long numbers are read in linear time', () => {
+test('third-party views: long numbers are read in linear time', () => {
   const before = process.cpuUsage();
   for (const grammar of [orbitGrammar('auto'), targetGrammar, fieldOfViewGrammar, ATTRIBUTES.detail.grammar!])
     assert.equal(grammar.parse(`${'9'.repeat(200_000)}!`), null);

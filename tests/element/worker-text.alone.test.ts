@@ -44,7 +44,7 @@ test('each chunk names what it needs and what it loads later, and nothing else',
   assert.deepEqual(
     names.filter((name) => !reached.has(name)),
     [],
-    'asked for by nobody',
+    'requested by no caller',
   );
 });
 

@@ -208,7 +208,7 @@ test('a streamed scene at each level, in both dialects', async () => {
   }
 });
 
-test('a streamed scene at all its levels tells which splats show what', async () => {
+test('a streamed scene at all its levels reports the visible splats of each', async () => {
   const all = { version: 1, lodLevels: 3, environment: 'env/meta.json', filenames, tree };
   const { count, levelRuns } = await readScene(streamed(all), { name: 'a.zip', level: 'all' });
   assert.equal(count, 43);

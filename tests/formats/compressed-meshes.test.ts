@@ -208,7 +208,7 @@ test('damaged and excessive files are refused by name', async () => {
   await assert.rejects(other.decode({ ...small!, width: 32 }, 'a'), /32 x 16 pixels.*decode\/corrupt/);
 });
 
-test('whatever bit of a compressed file is wrong, the error has a name', async () => {
+test('for any wrong bit of a compressed file, the error has a name', async () => {
   const file = fixture('draco.glb');
   const start = file.length - 564;
   const outcomes = new Set<string>();

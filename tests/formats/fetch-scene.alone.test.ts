@@ -197,7 +197,7 @@ test('an outage of a second, and one that does not end', async (context) => {
   requests = 0;
   downUntil = Infinity;
   await expectFailure(`${base}/resumable`, 'network/interrupted', /byte 70,000: expected 300,000 bytes/);
-  assert.equal(requests, 4, 'the first, and three that nobody answered');
+  assert.equal(requests, 4, 'the first, and three without a response');
 });
 
 test('a connection on which nothing comes for half a minute counts as broken', async (context) => {
@@ -228,7 +228,7 @@ test('a connection on which nothing comes for half a minute counts as broken', a
   assertSameNumbers(await fetched, CONTENT);
 });
 
-test('a connection that breaks to a server that knows no ranges is begun again, as long as that gets farther', async () => {
+test('a connection that breaks to a server without ranges is started again, as long as it makes progress', async () => {
   requests = 0;
   assertSameNumbers(await fetchScene(`${base}/anew`), CONTENT);
   assert.equal(requests, 2);
@@ -244,7 +244,7 @@ test('a file that has changed meanwhile is not patched together', async () => {
   );
 });
 
-test('where the HTTP stack hides a break, the length tells', async (context) => {
+test('if the HTTP stack hides a break, the length shows it', async (context) => {
   const short = () => new Response(CONTENT.slice(0, 10), { headers: { 'Content-Length': '20' } });
   context.mock.method(globalThis, 'fetch', async () => short());
   await expectFailure(

@@ -193,7 +193,7 @@ test('a buffer of 50 MB written as text', async () => {
   assertSameCloud(await readScene(file, { name: 'a' }), await readScene(writeGlb(json, buffer), { name: 'a' }));
 });
 
-test('JSON is known as glTF in whatever order its keys come', async () => {
+test('JSON is recognized as glTF in any order of its keys', async () => {
   const { json, buffer } = buildGltf([[{ cloud: smallCloud(400, 3) }]], [{ mesh: 0 }], [0]);
   const inside = await readScene(writeGlb(json, buffer), { name: 'a' });
   const { asset, buffers, ...rest } = json;

@@ -104,7 +104,7 @@ test('an ASCII PLY cut before its last value is refused', async () => {
   }
 });
 
-test('random bytes are read or refused by name, whatever they are called', async () => {
+test('random bytes are read or refused by name, under any file name', async () => {
   const start = fc.constantFrom(
     '',
     'ply\n',

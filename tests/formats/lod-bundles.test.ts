@@ -62,7 +62,7 @@ test('box by box, with one request for a bundle', async () => {
   (await read(folder.index, folder.files)).forEach((cloud, k) => assertSameCloud(found[k], cloud));
 });
 
-test('a bundle without a scene, or a damaged one, is told by its name', async () => {
+test('a bundle without a scene, or a damaged one, is reported by its name', async () => {
   const with1 = (bytes: Uint8Array) => ({
     name: 'lod-meta.json',
     openFile: (path: string) => (path === '1_0.sog' ? Promise.resolve(bytes) : open(path)),

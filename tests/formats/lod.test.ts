@@ -158,7 +158,7 @@ test('a run is the part of its file, and runs that are asked for together share 
   assertSameCloud(await files.read(runs[2], server.fetch), found[2]);
 });
 
-test('so many bytes are kept, of the files used last; the last file however large', async () => {
+test('a limited number of bytes is kept, of the files used last; the last file at any size', async () => {
   const server = new Server(folder);
   const bytesOf = async (run: SogRun): Promise<number> => {
     const { positions, scales, rotations, opacities, sh } = await new SogFiles().open(run, server.fetch);
@@ -187,7 +187,7 @@ test('so many bytes are kept, of the files used last; the last file however larg
   assert.equal(server.described.length, 1);
 });
 
-test('two files are read at a time, and those that everybody has given up are not read at all', async () => {
+test('two files are read at a time, and those that all callers have canceled are not read at all', async () => {
   const server = new Server(folder);
   let go!: () => void;
   server.waits = new Promise((resolve) => (go = resolve));
@@ -219,7 +219,7 @@ test('two files are read at a time, and those that everybody has given up are no
   assert.equal(await outcome(middle, new AbortController()), 'read');
 });
 
-test('a run beyond its file, a file that is missing and a run without anything to draw are told by name, and may be asked for again', async () => {
+test('a run beyond its file, a missing file and a run without visible splats are reported by name, and may be requested again', async () => {
   const refusal = async (work: Promise<unknown>, where = 'meta.json'): Promise<GaussianSplatError> => {
     const error = await work.then(
       () => assert.fail('no error'),
@@ -253,7 +253,7 @@ test('a run beyond its file, a file that is missing and a run without anything t
   assert.equal((await refusal(broken)).code, 'network/status');
 });
 
-test('the coarsest level of a large scene is on show before any other is fetched, also where the whole scene is read', async () => {
+test('the coarsest level of a large scene is visible before any other is fetched, also if the whole scene is read', async () => {
   const large = lodFolder(smallCloud(60_000, 0), { levels: 2, boxes: 2, environment: sky });
   const log: string[] = [];
   let [previewed, fetched] = [0, 0];

@@ -170,7 +170,7 @@ const SERVERS: Readonly<Record<string, [outcome: string, answer: Answer]>> = {
   '429 twice': ['right', (response) => (requests < 3 ? void response.writeHead(429).end() : whole(response))],
   '429 for ever': ['network/status', (response) => void response.writeHead(429, { 'Retry-After': '9999' }).end()],
   '503 for ever': ['network/status', (response) => void response.writeHead(503).end()],
-  'a part that nobody asked for': [
+  'an unexpected part': [
     'network/status',
     (response) =>
       void response

@@ -212,7 +212,7 @@ test('a PLY with numbers that look activated says so, and only such a one', asyn
   );
 });
 
-test('opacities of a PLY that are integers are shares of the largest', async () => {
+test('opacities of a PLY that are integers are fractions of the largest', async () => {
   const { opacities, warnings } = await readScene(
     sharpLike(
       opacitiesOf('uchar', 60, (i) => 4 * i),

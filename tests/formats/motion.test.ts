@@ -104,7 +104,7 @@ test('frames of other splats are refused by name when written, files of others w
   await refused({ bytes: new TextEncoder().encode('<!doctype html><html>') }, /page|HTML/i);
 });
 
-test('whatever a file announces is charged before it is there, and hostile ones end in named errors', async () => {
+test('announced sizes are charged before allocation, and hostile ones end in named errors', async () => {
   const whole = inflateRawSync(written);
   const changed = (change: (view: DataView) => void): Uint8Array => {
     const copy = new Uint8Array(whole);

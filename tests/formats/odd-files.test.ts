@@ -105,7 +105,7 @@ test('archives without files, and those of one volume that say so, are known as 
   }
 });
 
-test('the index of a large streamed scene is known in whatever order its keys come', () => {
+test('the index of a large streamed scene is recognized in any order of its keys', () => {
   const filenames = Array.from({ length: 3000 }, (_, k) => `${k}_0/meta.json`);
   const tree = { children: Array.from({ length: 2000 }, (_, k) => ({ lods: { 0: { file: k } } })) };
   for (const index of [

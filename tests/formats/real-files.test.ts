@@ -196,7 +196,7 @@ describe('other real files', { skip: needsSharedData }, () => {
     });
   }
 
-  test('skull.ply against a reading of its bytes that shares no code with the reader', async () => {
+  test('skull.ply against a parser that has no code in common with the reader', async () => {
     const bytes = sharedFile('scenes/skull.ply');
     const cloud = await readScene(bytes);
     const header = Buffer.from(bytes.subarray(0, 4096)).toString('latin1').split('end_header\n')[0];

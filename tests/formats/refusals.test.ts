@@ -45,7 +45,7 @@ for (const [what, bytes, code, message, name = 'file'] of KINDS) {
   });
 }
 
-test('pages and pointers in place of a part of a scene are told as such', async () => {
+test('pages and pointers in place of a part of a scene are reported as such', async () => {
   const files = writeSog(smallCloud(40, 1));
   const lod = text(
     JSON.stringify({

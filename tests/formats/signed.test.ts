@@ -94,7 +94,7 @@ test('a query goes to no other server, and changes none that is there', () => {
   assert.equal(partUrl('b.webp', 'https://x.test/a/scene.json').href, 'https://x.test/a/b.webp');
 });
 
-test('what a scene names is on its own server, whatever it is called', () => {
+test('the files of a scene are on its own server, under any name', () => {
   const bound = { min: [0, 0, 0], max: [1, 1, 1] };
   const addressOf = (path: string): string => {
     const index = { lodLevels: 1, filenames: [path], tree: { bound, lods: { 0: { file: 0, count: 1 } } } };

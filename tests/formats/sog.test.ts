@@ -133,7 +133,7 @@ function huge(): Uint8Array {
   );
 }
 
-test('where version 2 does not say how many bands it has, the width of their texture tells, as PlayCanvas reads it', async () => {
+test('if version 2 does not declare its number of bands, the width of their texture determines it, as in PlayCanvas', async () => {
   const files = writeSog(cloud);
   const read = async (changed: SogFiles) =>
     readScene(changed['meta.json'], { name: 'meta.json', openFile: folder(changed) });

@@ -104,7 +104,7 @@ test('what must be read whole is said to', async () => {
   await assert.rejects(readSplats(files['a.spz'], { first: 0, end: 1 }, 'a.spz'), { code: 'argument/value' });
 });
 
-test('the beginning of a PLY tells where its rows lie', async () => {
+test('the header of a PLY determines the position of its rows', async () => {
   const bytes = writePly([{ name: 'vertex', columns: plyOf(1) }]);
   const { rows, count } = (await splatRanges(bytes, 'a.ply'))!;
   assert.deepEqual(await splatRanges(bytes.subarray(0, rows!.start), 'a.ply'), { count, shDegree: 1, rows });

@@ -41,7 +41,7 @@ test('the same bytes at an odd address give the same cloud', async () => {
   assertSameCloud(await readScene(shifted), await readScene(file));
 });
 
-test('the format is told by the extension, the media type or plausible numbers', () => {
+test('the format is recognized by the extension, the media type or plausible numbers', () => {
   const file = writeSplat(rawSplats(100, 0));
   const odd = Uint8Array.from(file);
   odd.fill(255, 0, 32);

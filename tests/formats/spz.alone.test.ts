@@ -250,7 +250,7 @@ test('gzip of something else is named', async () => {
   await expectRefusal(gzip('NGSP'), 'decode/truncated', /SPZ header of 16 bytes, found 4/);
 });
 
-test('damaged gzip streams are told from cut ones', async () => {
+test('damaged gzip streams are distinguished from truncated ones', async () => {
   const file = writeSpz(rawSplats(2000, 1), { version: 3 });
   await expectRefusal(file.subarray(0, file.length >> 1), 'decode/truncated', /cut after/);
   const damaged = Uint8Array.from(file);

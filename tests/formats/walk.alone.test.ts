@@ -150,8 +150,8 @@ test('a room of boxes: the floor, the gallery above it and the stairs between ar
   const gallery = floorAt(map, 0, -3.7, 2.2);
   assert.ok(gallery !== undefined && Math.abs(gallery - 2.2) < 0.03, `the gallery is at ${gallery} m`);
   assert.ok(floorAt(map, 0, -3.7, 0) !== undefined, 'there is a floor below the gallery');
-  assert.equal(floorAt(map, 0, -2.5, 0), undefined, 'nobody stands in the table');
-  assert.equal(floorAt(map, 3.95, 2, 0), undefined, 'nobody stands in the wall');
+  assert.equal(floorAt(map, 0, -2.5, 0), undefined, 'a walker never stands in the table');
+  assert.equal(floorAt(map, 3.95, 2, 0), undefined, 'a walker never stands in the wall');
   assert.equal(wander(map, isOutside).out, 0);
   const up = wayTo(map, [0, ground!, 2], [0, gallery!, -3.7]);
   assert.ok(up.length > 40, `the way up goes through the door and over the stairs: ${up.length} cells`);

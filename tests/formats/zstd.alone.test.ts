@@ -87,7 +87,7 @@ function oneSequence(
   return [literals.length << 3, ...Buffer.from(literals), 1, 0x54, codes.literal, codes.offset, codes.match, bits];
 }
 
-test('a match repeats what is there, and cannot begin before it', async () => {
+test('a match repeats existing output, and cannot begin before it', async () => {
   // Offset value 1 is the last offset, which is 1 at the start of a frame.
   const repeat = frameOf(4, oneSequence('A', { literal: 1, offset: 0, match: 0 }, 0b1));
   assertSameNumbers(await decompress(repeat, 4), Buffer.from('AAAA'));

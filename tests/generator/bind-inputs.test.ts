@@ -157,12 +157,12 @@ test('poses, shapes and controls: set, or the default of the contract, or at res
   assert.deepEqual(bind(control, [2], { controls: { x: [4.6, 5] } }, { dtype: 'int32' }).data, Int32Array.of(5, 5));
 });
 
-test('Gaussians and pictures come from elsewhere', () => {
+test('Gaussians and images come from elsewhere', () => {
   const header = headerWith([tensor('image', [1, 3, 8, 8])], [tensor('gaussians', [1, 13])]);
   assert.deepEqual(bindInputs(header, { ...PACKED, inputs: { image: { role: 'image' } } }, {}), {});
 });
 
-test('the same inputs are told from others: then nothing needs to run', () => {
+test('equal inputs are recognized: then nothing needs to run', () => {
   const header = headerWith([tensor('t', [1]), tensor('v', [4, 4])], [tensor('gaussians', [1, 13])]);
   const contract: Contract = { ...PACKED, inputs: { t: { role: 'time', unit: 'seconds' }, v: { role: 'view' } } };
   const at = (state: GeneratorState): Record<string, InputNumbers> =>

@@ -84,7 +84,7 @@ test('numbers that are none on one side alone are a difference, and on both are 
   assert.ok(!isDifferent(compareOutputs([part(nan, nan)], SLICES)));
 });
 
-test('a picture is compared as a whole, float16 with room for its rounding', () => {
+test('an image is compared as a whole, float16 with a tolerance for its rounding', () => {
   const halves = (value: number): Uint8Array => new Uint8Array(new Uint16Array(64).fill(value).buffer);
   const image = (found: number, expected: number): OutputDifference => ({
     tensor: 'out',

@@ -16,7 +16,7 @@ const model = Buffer.from(
   'latin1',
 );
 
-test('the location of external data is the path of a file, whatever its characters mean in a URL', async () => {
+test('the location of external data is the path of a file, also with characters that have a meaning in a URL', async () => {
   const files: Record<string, Uint8Array> = { '/model.onnx': model };
   files[`/${encodeURIComponent(NAME)}`] = fixtureBytes('external.weights');
   const server = createServer((request, response) => {
@@ -51,7 +51,7 @@ test('an address that is none has the code of one', async () => {
   });
 });
 
-test('a sidecar that another server lets nobody read counts as missing, unless the model needs one', async () => {
+test('a sidecar that another server forbids to read counts as missing, unless the model needs one', async () => {
   const server = createServer((request, response) => {
     const name = (request.url ?? '').slice(1);
     if (name.endsWith('.onnx')) response.end(fixtureBytes(name));

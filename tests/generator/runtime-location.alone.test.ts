@@ -20,7 +20,7 @@ test('no built package names a folder as bundlers read the name of a file', { sk
   assert.deepEqual(found, []);
 });
 
-test('the runtime is looked for beside its module', () => {
+test('the runtime is loaded from the folder of its module', () => {
   assert.equal(folderBeside('https://cdn.example/a/gaussian-splat.min.js'), 'https://cdn.example/a/onnxruntime/');
   assert.equal(folderBeside('file:///a/load-runtime.js'), 'file:///a/onnxruntime/', 'in Node');
 });

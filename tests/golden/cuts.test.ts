@@ -109,7 +109,7 @@ async function drawn({ cloud, camera, sceneToWorld }: Case, cuts: readonly Splat
 for (const scene of SCENES) {
   for (const [shape, make] of Object.entries(SHAPES)) {
     for (const edge of [undefined, 0.05, 'hard'] as const) {
-      test(`${scene.name}: ${shape}, edge ${edge ?? 'of the splats'}: 59 dB from the oracle`, async () => {
+      test(`${scene.name}: ${shape}, edge ${edge ?? 'of the splats'}: 59 dB against the oracle`, async () => {
         const { cloud, camera, sceneToWorld, size } = scene;
         const cut = { ...make(size), edge: edge === 0.05 ? 0.05 * size : edge };
         const cuts = [cut];

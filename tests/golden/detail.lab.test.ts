@@ -59,7 +59,7 @@ test('levels that are added to a scene on the GPU draw what the same levels in o
 });
 
 for (const rasterizer of ['quads', 'tiles'] as const) {
-  test(`${rasterizer}: without a lever of detail the picture is the same, byte for byte, moving and turning`, async () => {
+  test(`${rasterizer}: without a setting of detail the frame is the same, byte for byte, moving and turning`, async () => {
     const { device, plain, detailed } = await uploaded(pebbles(5_000));
     const accumulation = rasterizer === 'tiles' ? 'rgba32float' : 'rgba16float';
     const renderers = [0, 1].map(() => new Renderer(device, { ...serial, rasterizer, accumulation }));
@@ -102,7 +102,7 @@ const HELD: readonly (readonly [farther: number, detail: number, decibels: numbe
   [2, 2, 24, 0.25],
 ];
 
-test('from afar fewer splats are drawn, and the picture stays', async () => {
+test('from a distance fewer splats are drawn, and the frame stays the same', async () => {
   const { device, plain, detailed, away } = await skull();
   const renderer = new Renderer(device, serial);
   for (const [farther, detail, decibels, share] of HELD) {
@@ -137,7 +137,7 @@ async function largestPop(detailFade: number): Promise<number> {
   return min;
 }
 
-test('levels fade: at 1 % nearer a frame no picture differs by 55 dB from the one before, and some do without the fade', async () => {
+test('levels fade: at 1 % nearer a frame consecutive frames have a PSNR above 55 dB, and some have less without the fade', async () => {
   const [faded, popping] = [await largestPop(0.5), await largestPop(0)];
   console.log(
     `largest change by levels from frame to frame: ${faded.toFixed(1)} dB; without a fade ${popping.toFixed(1)} dB`,

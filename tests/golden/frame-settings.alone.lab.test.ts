@@ -100,7 +100,7 @@ for (const rasterizer of ['quads', 'tiles'] as RasterizerName[]) {
   });
 }
 
-test('a smaller picture is enlarged the same by a compute shader as by drawing', async () => {
+test('a smaller frame is enlarged the same by a compute shader as by drawing', async () => {
   const device = await serialDevice();
   const gaussians = await GaussianBuffers.upload(device, packGaussians(cloud));
   const tiles = new Renderer(device, { rasterizer: 'tiles' });
@@ -120,13 +120,13 @@ test('a smaller picture is enlarged the same by a compute shader as by drawing',
   gaussians.destroy();
 });
 
-test('a lever out of range is refused', async () => {
+test('a setting out of range is refused', async () => {
   const renderer = new Renderer(await serialDevice());
   assert.throws(() => renderer.prepare([{ resolutionScale: 0 }], 'rgba8unorm'), { code: 'argument/value' });
   renderer.destroy();
 });
 
-test('values that a lever does not know are refused', async () => {
+test('unknown values of a setting are refused', async () => {
   const device = await serialDevice();
   const renderer = new Renderer(device);
   const refused = (settings: object) => [

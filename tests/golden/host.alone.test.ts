@@ -235,7 +235,7 @@ test('bad requests are named', async () => {
     ['a view without its format', () => viewpoint.draw(camera, { target: {} as GPUTexture }), 'FrameTarget.target'],
     ['depth of several samples', () => host(texture('depth32float', { sampleCount: 4 })), 'HostDepth.texture'],
     ['depth in colors', () => host(texture('rgba8unorm')), 'HostDepth.texture'],
-    ['depth that nobody may read', () => host(texture('depth32float', { usage: 0x10 })), 'HostDepth.texture'],
+    ['depth that cannot be read', () => host(texture('depth32float', { usage: 0x10 })), 'HostDepth.texture'],
     ['no depth', () => new SceneDepth(device, {}), 'SceneDepth'],
     [
       'median depth of quads',

@@ -119,7 +119,7 @@ async function foretold(
 }
 
 test(
-  'a whole frame tells what fewer pixels lose, and of small subjects that it is too much',
+  'a full frame shows the loss by fewer pixels, and for small subjects that it is too large',
   { skip: needsSharedData },
   async () => {
     const cloud = await readScene(sharedFile('formats/playbot3.ply'));

@@ -36,7 +36,7 @@ for (const rasterizer of RASTERIZERS) {
     assert.deepEqual(
       await renderer.probe([{ x: 1, y: 1 }]),
       [],
-      'before the first frame there is nothing to look into',
+      'before the first frame there is nothing to probe',
     );
     const random = randomSource(3);
     for (const [i, camera] of [near, turned, turned].entries()) {

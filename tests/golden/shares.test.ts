@@ -122,7 +122,7 @@ const sorted = ({ geometry }: PackedGaussians): Float64Array => {
   return sums.sort();
 };
 
-test('a layout by the first share of a file in spatial order keeps neighbors together', () => {
+test('a layout by the first shard of a file in spatial order keeps neighbors together', () => {
   const shuffled = scene({ count: 100_000, shDegree: 0 });
   const order = Array.from({ length: shuffled.count }, (_, i) => i).sort(
     (a, b) => shuffled.positions[3 * a] - shuffled.positions[3 * b],

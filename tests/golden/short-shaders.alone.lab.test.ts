@@ -85,7 +85,7 @@ function isField(tokens: readonly Token[], at: number, isInStruct: boolean): boo
   return tokens[at - 1].lexeme === '.' || (isInStruct && tokens[at + 1].lexeme === ':');
 }
 
-test('token by token they are the same but for names, each has one other, and two in a declaration stay two', () => {
+test('token by token they are the same except for names, each has one other, and two in a declaration stay two', () => {
   assert.equal(forms.short.length, forms.readable.length);
   assert.ok(forms.readable.length > 35, `${forms.readable.length} stages`);
   const shortOf = new Map<string, string>();
@@ -155,7 +155,7 @@ test('Dawn takes every one of them', async () => {
   device.destroy();
 });
 
-test('every variant of theirs gives the known answer', async () => {
+test('every variant passes the self-test', async () => {
   const own = new Map(forms.short.map((stage) => [stage.name, stage.code]));
   // In this process the renderer has those of the bundle from here on; a device of its own has none of the others yet.
   for (const stage of stagesIn(stages)) stage.code = own.get(stage.name)!;

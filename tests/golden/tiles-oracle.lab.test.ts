@@ -160,7 +160,7 @@ for (const [what, cameras, pauseMs] of [
     300,
   ],
 ] as const) {
-  test(`tiles: a single picture that is ${what} is looked at, and told of where it lacks room`, async () => {
+  test(`tiles: a single frame that is ${what} is read back, and its missing capacity is reported`, async () => {
     const device = await anyDevice();
     const gaussians = await GaussianBuffers.upload(device, packGaussians(crowd));
     let reported = 0;

@@ -26,7 +26,7 @@ test('serial and parallel stages draw the same bytes, moving and turning', async
   assert.ok((await renderers[1].stats()).visible > 1000);
 });
 
-test('every variant gives the known answer, and a wrong rule does not', async () => {
+test('every variant passes the self-test, and a wrong rule does not', async () => {
   const device = await nodeDevice();
   for (const threads of ['parallel', 'serial'] as const) {
     for (const rasterizer of ['quads', 'tiles'] as const) {
@@ -69,7 +69,7 @@ test('the scenes that variants are timed with are copies of a few spheres', () =
   }
 });
 
-test('the choice is made once, kept for the adapter, and made anew from a damaged store', async () => {
+test('autotuning runs once, is stored for the adapter, and runs again after a damaged store', async () => {
   const adapter = await requestNodeAdapter();
   const entries = new Map<string, string>();
   const store = storeOf(entries);
@@ -143,7 +143,7 @@ function storeOf(entries: Map<string, string>) {
   };
 }
 
-test('a first picture is drawn with what is likely, if it is right and quick; what is best is looked for in pauses', async () => {
+test('a first frame is drawn with likely variants, if they are correct and fast; the best ones are searched in pauses', async () => {
   const entries = new Map<string, string>();
   const store = storeOf(entries);
   const device = await deviceLikeAny();
@@ -159,7 +159,7 @@ test('a first picture is drawn with what is likely, if it is right and quick; wh
   const choosing = autotune(device, { store, pause: () => new Promise((resolve) => pauses.push(resolve)) });
   await new Promise((resolve) => setTimeout(resolve, 200));
   assert.equal(pauses.length, 1);
-  assert.equal(pipelines, atFirst, 'nothing goes on before the pause');
+  assert.equal(pipelines, atFirst, 'nothing continues before the pause');
   const letGo = setInterval(() => pauses.pop()?.(), 1);
   const chosen = await choosing;
   clearInterval(letGo);
@@ -170,7 +170,7 @@ test('a first picture is drawn with what is likely, if it is right and quick; wh
   device.destroy();
 
   const later = await deviceLikeAny();
-  const pause = () => assert.fail('nothing is looked for');
+  const pause = () => assert.fail('nothing is searched');
   assert.deepEqual(
     await pickInitialVariants(later, { store, maxFrameMs: 0, pause }),
     chosen,
@@ -191,7 +191,7 @@ test('what is likely is not drawn with where it is slow', { skip: onlyInFull }, 
   device.destroy();
 });
 
-test('nor where the adapter says that it is a processor', async (t) => {
+test('nor if the adapter is a software adapter', async (t) => {
   const processor = await newDevice();
   if (!processor.adapterInfo.isFallbackAdapter) return t.skip('this adapter is a GPU');
   const entries = new Map<string, string>();

@@ -13,6 +13,6 @@ test('they were translated from this WGSL', () => {
   );
 });
 
-test('translated anew they are the same', { skip: hasNaga() ? false : `naga ${NAGA} is not here` }, async () => {
+test('translated again they are the same', { skip: hasNaga() ? false : `naga ${NAGA} is not here` }, async () => {
   assert.equal(readFileSync(WEBGL_SHADERS, 'utf8'), await webglShaders());
 });

@@ -125,7 +125,7 @@ const asClouds = (placed: Case['placed']): PlacedCloud[] =>
 
 for (const rasterizer of RASTERIZERS) {
   for (const { name, size, placed, camera = view(size) } of CASES) {
-    test(`${rasterizer}: two scenes, ${name}: 59 dB from the oracle`, async () => {
+    test(`${rasterizer}: two scenes, ${name}: 59 dB against the oracle`, async () => {
       const device = await serialDevice();
       const { world, free } = await worldOf(device, placed);
       const viewpoint = new Viewpoint(device, world, { settings: settings('default', { rasterizer }) });
@@ -219,7 +219,7 @@ const VARIANTS: readonly Variant[] = [
 const placedPair: Case['placed'] = [{}, { sceneToWorld: all(move(0.8, 0.1, 0.4), turn(2.1)) }];
 
 for (const rasterizer of RASTERIZERS) {
-  test(`${rasterizer}: a bar through two scenes hides what is behind it, whatever its depth is stored as`, async () => {
+  test(`${rasterizer}: a bar through two scenes occludes what is behind it, for any depth format`, async () => {
     const device = await serialDevice();
     const { world, free } = await worldOf(device, placedPair);
     const viewpoint = new Viewpoint(device, world, { settings: settings('default', { rasterizer }) });
@@ -327,7 +327,7 @@ test('no steps on a wall that a plane cuts at 1, 10 and 100 units', async () => 
   }
 });
 
-test('a picture of one scene that moves is that of a camera that moves the other way', async () => {
+test('a frame of one scene that moves is that of a camera that moves the other way', async () => {
   const device = await serialDevice();
   const { world, free } = await worldOf(device, [{}]);
   const viewpoint = new Viewpoint(device, world);

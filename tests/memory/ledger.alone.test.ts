@@ -41,7 +41,7 @@ test('room for what a generator writes is declared, and given back', async () =>
   assert.equal(ledger.bytes, 0);
 });
 
-test('a scene beyond the budget is refused before the device hears of it', async () => {
+test('a scene beyond the budget is refused before the device allocates', async () => {
   const device = await serialDevice();
   const ledger = MemoryLedger.of(device);
   const packed = packGaussians(smallCloud(512, 1), { sh: 'int8' });
@@ -101,7 +101,7 @@ test('what was allocated before a refusal of the device is freed, and its bytes 
 
 after(endNodeDevice);
 
-test('what is soon not needed any more is given back before anybody is refused, and no more of it than there must be', () => {
+test('memory that is soon unused is released before an allocation is refused, and no more of it than necessary', () => {
   const ledger = new MemoryLedger();
   ledger.budgetBytes = 100;
   const kept = ledger.reserve('kept', 20);

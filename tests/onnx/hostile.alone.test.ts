@@ -98,7 +98,7 @@ test('graphs within graphs come to an end', async () => {
   assert.match(result.message, /graphs within graphs/);
 });
 
-test('lengths that lie are corrupt, whatever they claim', async () => {
+test('wrong lengths are corrupt, for any value', async () => {
   for (const claim of [
     [0x7f],
     [0xff, 0xff, 0xff, 0xff, 0x0f],

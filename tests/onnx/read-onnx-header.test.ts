@@ -53,7 +53,7 @@ for (const name of fixtureNames()) {
   });
 }
 
-test('inputs with a default are told apart', async () => {
+test('inputs with a default are distinguished', async () => {
   const { inputs, optionalInputs } = await fixtureHeader('subgraphs.onnx');
   assert.deepEqual([inputs.map(({ name }) => name), optionalInputs], [['flag', 'x', 'list'], ['weight']]);
 });

@@ -65,7 +65,7 @@ test('an opacity just under 1/255 draws nothing, just over it one pixel', () => 
   assert.equal(contributors(1.00001 / 255), 1);
 });
 
-test('nearer splats cover farther ones, whatever their order in the cloud', () => {
+test('nearer splats cover farther ones, in any order of the cloud', () => {
   const layers = [
     ball({ position: [0, 0, 31], opacity: 0.5, color: [1, 0, 0] }),
     ball({ position: [0, 0, 32], opacity: 0.25, color: [0, 1, 0] }),
@@ -117,7 +117,7 @@ test('a pixel is finished before its transmittance falls under 1e-4, and stays s
   }
 });
 
-test('at exactly the least transmittance gsplat stops and INRIA goes on', () => {
+test('at exactly the minimum transmittance gsplat stops and INRIA continues', () => {
   const cloud = cloudOf([ball({}), ball({})]);
   for (const [name, contributors] of [
     ['gsplat', 1],

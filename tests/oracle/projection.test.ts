@@ -110,7 +110,7 @@ test('the clamp moves the shape, never the center', () => {
   near(ellipse.y, -20 * camera.fy + 190, 1e-14, 'y');
 });
 
-test('the quaternion (w, x, y, z) turns local axes as q·v·q⁻¹ does, whatever its length', () => {
+test('the quaternion (w, x, y, z) turns local axes as q·v·q⁻¹ does, for any length', () => {
   fc.assert(
     fc.property(fc.integer(), (seed) => {
       const random = seededRandom(seed);

@@ -182,7 +182,7 @@ test('gaussian-splat page says in a sentence what it was asked wrongly', () => {
   }
 });
 
-test('gaussian-splat page brings ONNX Runtime for a generator, whatever the case of its name', () => {
+test('gaussian-splat page adds ONNX Runtime for a generator, for any case of its name', () => {
   copyFileSync(fixturePath('packed.onnx'), inFolder('LOUD.ONNX'));
   const { status, text } = command('page', 'LOUD.ONNX', 'loud', '--no-serve');
   assert.equal(status, 0, text);
@@ -237,7 +237,7 @@ test('gaussian-splat render draws a scene of several files', () => {
   assert.match(text, /^gltf\/scene\.gltf: 6 splats/m);
 });
 
-test('gaussian-splat render does not write one picture over the other', () => {
+test('gaussian-splat render does not overwrite one image with the other', () => {
   const { status, text } = command(
     'render',
     'gltf/scene.gltf',

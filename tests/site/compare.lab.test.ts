@@ -53,7 +53,7 @@ describe('the comparison', { skip: isBuilt ? false : 'no site: npm run build' },
   });
   after(() => open.close());
 
-  it('whoever turns one picture turns both, and the keyboard moves the line', { timeout: 120_000 }, async () => {
+  it('turning one frame turns both, and the keyboard moves the line', { timeout: 120_000 }, async () => {
     const { tab, faults } = visit;
     await bothLoaded(tab);
     for (const [leader, key] of [

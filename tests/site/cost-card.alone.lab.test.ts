@@ -21,7 +21,7 @@ describe('cards and fallbacks', { skip: isBuilt ? false : 'no site: npm run buil
 
   // SwiftShader needs a third of a minute for it.
   const skip = process.env.SITE === 'full' ? false : 'only with SITE=full: npm run test:site';
-  it('bytes of the file, the first picture, memory and milliseconds', { skip, timeout: 200_000 }, async () => {
+  it('bytes of the file, the first frame, memory and milliseconds', { skip, timeout: 200_000 }, async () => {
     const { tab, faults } = await open.visit('/examples/?frames=3', { width: 240, height: 300 });
     const card = tab.locator('[data-example=file]');
     await card.locator('gaussian-splat').scrollIntoViewIfNeeded();
@@ -62,7 +62,7 @@ describe('cards and fallbacks', { skip: isBuilt ? false : 'no site: npm run buil
 
   // Their networks take too long on SwiftShader for a test: the scene is visible while the first frame is drawn.
   for (const name of ['oil', 'denoise']) {
-    it(`${name}: a click puts the scene where the picture was`, { skip, timeout: 200_000 }, async () => {
+    it(`${name}: a click replaces the image by the scene`, { skip, timeout: 200_000 }, async () => {
       const { tab, faults } = await open.visit('/examples/', { width: 240, height: 300 });
       const card = tab.locator(`[data-example=${name}]`);
       await card.locator('.cost dd').first().waitFor();

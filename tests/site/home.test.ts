@@ -55,7 +55,7 @@ describe('the first page', { skip: isBuilt ? false : 'no site: npm run build' },
     await tab.setViewportSize({ width: 390, height: 800 });
   });
 
-  it('copies the view that somebody has turned to', async () => {
+  it('copies the view that a visitor has turned to', async () => {
     const { tab, faults } = only;
     await tab.waitForFunction(() => document.querySelector<Splat>('#hero')!.loaded, undefined, TIMEOUT);
     await tab.evaluate(() => document.querySelector<Splat>('#hero')!.focus());

@@ -67,6 +67,6 @@ export async function violations(tab: Page, colors = true): Promise<string[]> {
   const context = { include: [['html']], exclude: isFull ? [] : ALIKE.map((selector) => [selector]) };
   const options = { rules: { 'color-contrast': { enabled: colors } } };
   const found = (await tab.evaluate(`axe.run(${JSON.stringify(context)}, ${JSON.stringify(options)})`)) as AxeResults;
-  assert.ok(found.passes.length > 5, 'axe has looked at something');
+  assert.ok(found.passes.length > 5, 'axe has checked something');
   return found.violations.map(({ id, help, nodes }) => `${id}: ${help}: ${nodes.map(({ html }) => html).join(' | ')}`);
 }

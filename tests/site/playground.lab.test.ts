@@ -83,7 +83,7 @@ describe('the playground', { skip: isBuilt ? false : 'no site: npm run build' },
     await tab.locator('#attribute-chain').blur();
     const { origin, href } = new URL(tab.url());
     const addresses = `${origin}/a.onnx ${new URL('b.onnx', href).href}`;
-    assert.ok((await tab.locator('#html').textContent())!.includes(`chain="${addresses}"`), 'each address by itself');
+    assert.ok((await tab.locator('#html').textContent())!.includes(`chain="${addresses}"`), 'each address separately');
     assert.match(
       html,
       /^<script type="module" src="http:[^"]+\/cdn\/gaussian-splat\.min\.js"><\/script>\n<gaussian-splat/,

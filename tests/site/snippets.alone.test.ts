@@ -76,7 +76,7 @@ function makePage(folder: string): SpawnSyncReturns<string> {
   });
 }
 
-describe('what documents tell people to write', { skip }, () => {
+describe('code that documents recommend', { skip }, () => {
   const made = { folder: '', index: '' };
   before(() => {
     made.folder = join(mkdtempSync(join(tmpdir(), 'page-')), 'my page');

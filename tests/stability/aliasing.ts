@@ -59,7 +59,7 @@ test('from full size down to a 64th', async () => {
       const expected = boxFiltered(await draw(device, cloud, large, { mode }), large, OVERSAMPLING);
       decibels[mode] = psnr(await draw(device, cloud, camera, { mode }), expected, { channels: 4 });
       curves[mode].push([zoom, decibels[mode]]);
-      note('S21', `1/${zoom} of the size, ${mode}, to its own oversampled picture`, decibels[mode], { unit: 'dB' });
+      note('S21', `1/${zoom} of the size, ${mode}, to its own oversampled image`, decibels[mode], { unit: 'dB' });
     }
     holds('S21', `1/${zoom} of the size: gain of antialiased scenes`, decibels.antialiased - decibels.classic, {
       atLeast: 0,

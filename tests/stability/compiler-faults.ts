@@ -66,7 +66,7 @@ fullTest('a choice that was kept from an earlier visit is tried again, and dropp
   device.destroy();
 });
 
-test('matrices transposed in every variant: an error, not a wrong picture', async () => {
+test('matrices transposed in every variant: an error, not a wrong image', async () => {
   const { device, befallen } = await faultyDevice([
     { shader: /gs\./, from: 'return to_camera * (', to: 'return transpose(to_camera) * (' },
   ]);
@@ -76,7 +76,7 @@ test('matrices transposed in every variant: an error, not a wrong picture', asyn
   device.destroy();
 });
 
-test('the known answer takes little time', async () => {
+test('the self-test takes little time', async () => {
   const device = await fullDevice();
   const variants = { rasterizer: 'quads', accumulation: 'rgba16float', threads: 'serial' } as const;
   assert.ok(await passesSelfTest(device, variants));
@@ -86,5 +86,5 @@ test('the known answer takes little time', async () => {
     await passesSelfTest(device, variants);
     best = Math.min(best, performance.now() - start);
   }
-  note('S16', 'known answer of 64 splats, pipelines made', best, { unit: 'ms' });
+  note('S16', 'self-test of 64 splats, pipelines compiled', best, { unit: 'ms' });
 });

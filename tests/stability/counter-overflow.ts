@@ -105,7 +105,7 @@ async function countPairs(count: number, side: number): Promise<void> {
     wrong += row.filter((value, i) => Math.abs(value - [64, 128, 191, 255][i % 4]) > 1).length;
     staging.unmap();
   }
-  holds('S13', 'wrong color values in three rows of the picture', wrong, { atMost: 0, unit: 'values' });
+  holds('S13', 'wrong color values in three rows of the image', wrong, { atMost: 0, unit: 'values' });
   assert.equal(isLost, false, 'the device is there');
   device.destroy();
 }

@@ -23,7 +23,7 @@ const camera = resized(cameras[0], 64);
 const kept = new URL('corpus/off-centre-64.f32', import.meta.url);
 
 for (const rasterizer of RASTERIZERS) {
-  test(`the same picture on any device, ${rasterizer}`, async () => {
+  test(`the same image on any device, ${rasterizer}`, async () => {
     const images: Float32Array[] = [];
     // Tiles take seconds to compile for each device.
     for (let i = 0; i < (rasterizer === 'quads' || isFull ? 2 : 1); i++) {
@@ -38,10 +38,10 @@ for (const rasterizer of RASTERIZERS) {
       });
     }
     if (process.env.STABILITY_KEEP && rasterizer === 'quads') writeFileSync(kept, Buffer.from(images[0].buffer));
-    assert.ok(existsSync(kept), 'the kept picture is there');
+    assert.ok(existsSync(kept), 'the stored image exists');
     const bytes = readFileSync(kept);
     const expected = new Float32Array(bytes.buffer.slice(bytes.byteOffset, bytes.byteOffset + bytes.byteLength));
     const p999 = 255 * percentile(images[0], expected, 0.999, { channels: 4 });
-    holds('S26', `99.9 % of the channels to SwiftShader's picture, ${rasterizer}`, p999, { atMost: 1, unit: '/255' });
+    holds('S26', `99.9 % of the channels to SwiftShader's image, ${rasterizer}`, p999, { atMost: 1, unit: '/255' });
   });
 }

@@ -76,7 +76,7 @@ for (const rasterizer of RASTERIZERS) {
       { numRuns: rasterizer === 'quads' ? sized(25, 500) : sized(6, 500), seed: 19 },
     );
     holds('S19', `cameras at random, ${rasterizer}, worst`, worst, { atLeast: 59, unit: 'dB' });
-    holds('S19', 'distance of the eye that colors are seen from to the true one', offCenter, {
+    holds('S19', 'distance of the eye from which colors are evaluated to the reference', offCenter, {
       atMost: 1e-9,
       unit: 'units',
     });

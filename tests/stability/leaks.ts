@@ -95,7 +95,7 @@ test('the renderer says how much it holds, to the byte', async () => {
   assert.equal(shared, 1, 'indices are shared by all renderers of a device');
   const uncounted = ledger.bytes - before - renderer.byteLength;
   // Indices of the quads belong to the device, a staging buffer of 16 bytes to the watch over capacity.
-  holds('S23', 'bytes on the GPU that byteLength does not tell', uncounted, {
+  holds('S23', 'bytes on the GPU that byteLength does not include', uncounted, {
     atLeast: 0,
     atMost: 2048,
     unit: 'bytes',

@@ -161,7 +161,7 @@ test('tiles, divided into any number of submissions, are the same to the byte', 
   gaussians.destroy();
 });
 
-test('tiles are divided by themselves, the more the more there is to do', async () => {
+test('tiles are divided automatically, more for more work', async () => {
   // A device that knows nothing yet of what painting costs.
   const device = await deviceWith([]);
   const camera = cameraAt([0, 0, -1], [0, 0, 0], { width: 160, height: 96 });

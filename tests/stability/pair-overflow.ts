@@ -53,7 +53,7 @@ test('ten times the room, at once', async () => {
   const small = { ...camera, width: 64, height: 32, fx: camera.fx / block, fy: camera.fy / block, cx: 32, cy: 16 };
   const whole = truth(cloud, small);
   const close = compareImage(sampled(first, width, height, block), whole);
-  holds('S10', 'the frame that lacked room, against the whole picture', close.psnr, { atLeast: 40, unit: 'dB' });
+  holds('S10', 'the frame with too little capacity, against the full frame', close.psnr, { atLeast: 40, unit: 'dB' });
   const next = await capture(device, renderer, { gaussians, camera });
   assert.equal((await renderer.stats()).pairOverflow, 0, 'the next frame has room');
   const fresh = new Renderer(device, { threads: THREADS, rasterizer: 'tiles' });

@@ -41,7 +41,7 @@ const mean = (rows: readonly FlightSecond[], of: (row: FlightSecond) => number):
 console.log(`${pages.list.count} pages, ${slots} slots of ${bytes} bytes, ${latencyMs} ms until a page comes`);
 for (const isStill of [true, false]) {
   const rows = await fly(pages, { ...options, isStill });
-  console.log(isStill ? 'wishes of the view' : 'and of where it will be');
+  console.log(isStill ? 'page requests of the view' : 'and of where it will be');
   console.log(`  degrees turned in each second: ${rows.map(({ turned }) => turned.toFixed(0)).join(' ')}`);
   console.log(`  pixels at the ends of seconds: ${rows.map(({ error }) => error.toFixed(1)).join(' ')}`);
   console.log(

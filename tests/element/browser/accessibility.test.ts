@@ -13,7 +13,7 @@ const hotspot = (name: string): HTMLButtonElement => {
 };
 
 describe('axe finds nothing in the element', () => {
-  it('as a picture, as an application with prompt and hotspots, as decoration', async () => {
+  it('as an image, as an application with prompt and hotspots, as decoration', async () => {
     await showLoaded({ alt: 'A compass' });
     const application = await showLoaded({
       'camera-controls': '',
@@ -51,7 +51,7 @@ describe('axe finds nothing in the element', () => {
 });
 
 describe('screen readers', () => {
-  it('hear of an error in a region that was there before, in the words of the page if it has some', async () => {
+  it('are notified of an error in an existing live region, in the words of the page if it has some', async () => {
     const element = show({ src: '/net/slow/compass.ply?ms=400' });
     const own = show({ src: '/net/status/404' });
     own.innerHTML = '<p slot="error">Leider nein.</p>';

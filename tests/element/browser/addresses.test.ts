@@ -48,7 +48,7 @@ describe('scenes of strangers', () => {
     assertEqual(await shown(), [[], true], 'one that the page allows');
   });
 
-  it('a missing frame is asked for ever more rarely, and told once', async () => {
+  it('a missing frame is requested at growing intervals, and reported once', async () => {
     const ball = await (await fetch(COMPASS)).arrayBuffer();
     await keep({ 'b.splat': ball, 'missing.json': sequence(['b.splat', 'none.splat', 'b.splat?2'], 20) });
     const element = show({ src: `${FOLDER}missing.json`, loop: '' });

@@ -58,7 +58,7 @@ describe('the poster', () => {
     await nextEvent(element, 'load');
     await until(() => dismissed > 0, 'poster-dismissed');
     assertEqual([element.loaded, element.revealed, dismissed], [true, true, 1], 'after it');
-    assertEqual(element.shadowRoot?.activeElement?.id, 'view', 'the keyboard goes on in the scene');
+    assertEqual(element.shadowRoot?.activeElement?.id, 'view', 'the keyboard continues in the scene');
   });
 
   it('of the page itself is a button, too, with a sign that there is something to start', async () => {
@@ -89,7 +89,7 @@ describe('the poster', () => {
     assertEqual((await screenOf(element)).middleOf(isRed), null, 'covered again');
   });
 
-  it('gives way by itself otherwise', async () => {
+  it('is dismissed automatically otherwise', async () => {
     const element = show({ src: COMPASS, poster: POSTER });
     await nextEvent(element, 'poster-dismissed');
     assert(element.loaded && element.revealed, 'revealed');
@@ -162,7 +162,7 @@ describe('the interaction prompt', () => {
 describe('auto-rotate', () => {
   const rotating = { 'auto-rotate': '', 'auto-rotate-delay': '100', 'rotation-per-second': '60deg' };
 
-  it('turns after a rest, stops for a person, and goes on', async () => {
+  it('turns after a rest, stops for a visitor, and continues', async () => {
     const element = await showLoaded({ ...rotating, 'camera-controls': '' });
     const sources: string[] = [];
     element.addEventListener('camera-change', ({ detail }) => sources.push(detail.source));
@@ -208,7 +208,7 @@ describe('auto-rotate', () => {
   });
 });
 
-describe('the wish for less motion', () => {
+describe('the preference for less motion', () => {
   it('counts when it comes and when it goes', async () => {
     const element = await showLoaded({ 'auto-rotate': '', 'auto-rotate-delay': '100', 'rotation-per-second': '60deg' });
     const button = (): HTMLElement | null => partOf(element, '[part=pause-button]');
@@ -223,7 +223,7 @@ describe('the wish for less motion', () => {
   });
 });
 
-describe('what moves by itself', () => {
+describe('automatic motion', () => {
   const rotating = { 'auto-rotate': '', 'auto-rotate-delay': '60', 'rotation-per-second': '60deg' };
   const MOVIE = '/net/sequence/movie.json?count=600&fps=2';
   const buttonOf = (element: GaussianSplatElement): HTMLElement | null => partOf(element, '[part=pause-button]');
@@ -261,12 +261,12 @@ describe('what moves by itself', () => {
     assertEqual(getComputedStyle(button).display, 'none', 'where the page brings its own');
     element.autoRotate = false;
     await element.updateComplete;
-    assertEqual(does(element), null, 'nothing moves by itself');
+    assertEqual(does(element), null, 'nothing moves automatically');
   });
 
   it('stops by the space bar, and stays so with another scene', async () => {
     const element = await showLoaded({ src: MOVIE, autoplay: '', 'camera-controls': '', ...rotating });
-    await until(() => element.currentTime > 0 && theta(element) < 0, 'time and camera to go on');
+    await until(() => element.currentTime > 0 && theta(element) < 0, 'time and camera to continue');
     element.focus();
     await sendKeys({ press: 'Space' });
     await element.updateComplete;
@@ -277,7 +277,7 @@ describe('what moves by itself', () => {
     await nextEvent(element, 'load');
     assert(element.paused && !(await isMoving(element)), 'and stays so');
     buttonOf(element)?.click();
-    await until(() => element.currentTime > 0, 'the time to go on');
+    await until(() => element.currentTime > 0, 'the time to continue');
   });
 
   it("what a script plays, a still scene, and a player's scene have no button; less motion has one to start", async () => {
@@ -352,7 +352,7 @@ describe('fly', () => {
 describe('screen readers', () => {
   const spoken = (element: GaussianSplatElement): string => partOf(element, '[role=status]')?.textContent ?? '?';
 
-  it('hear where the camera has gone while the scene has the focus, and not too often', async () => {
+  it('are notified of the camera position while the scene has the focus, and not too often', async () => {
     const element = await showLoaded({ 'camera-controls': '', 'camera-orbit': '0deg 90deg auto' });
     const heard: string[] = [];
     const status = partOf(element, '[role=status]');
@@ -375,7 +375,7 @@ describe('screen readers', () => {
     await until(() => spoken(element) === '', 'silence');
   });
 
-  it('are told that words are English, but for those of the page', async () => {
+  it('are informed that words are English, except for those of the page', async () => {
     const languages = (element: Element, ...parts: string[]): (string | null | undefined)[] =>
       parts.map((part) => element.shadowRoot?.querySelector(part)?.getAttribute('lang'));
     const controls = { 'camera-controls': '' };
@@ -400,7 +400,7 @@ describe('screen readers', () => {
     assertEqual(partOf(shown, '#keys')?.textContent, words['keys-orbit']);
   });
 
-  it('hear the words of the page', async () => {
+  it('read the words of the page', async () => {
     const element = await showLoaded({
       ...{ 'camera-controls': '', 'interpolation-decay': '0', 'camera-orbit': '0deg 90deg auto' },
       a11y: '{"right": "Blick von rechts", "interaction-prompt": "Ziehen"}',

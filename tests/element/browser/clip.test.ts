@@ -59,7 +59,7 @@ describe('a clip', () => {
     await until(() => JSON.stringify(spansOf(element)) === '[[0,1.2]]', 'all of it is there');
   });
 
-  it('does not play by itself after pause(), also while it is loading', async () => {
+  it('does not start after pause(), also while it is loading', async () => {
     const element = show({ src: CLIP, autoplay: '' });
     await element.updateComplete;
     element.pause();
@@ -134,7 +134,7 @@ describe('a clip', () => {
     assertEqual(waits, 0, 'waits');
   });
 
-  it('waits for what has not come, also after a frame that is late, and goes on from there', async () => {
+  it('waits for frames in transit, also after a late frame, and continues from there', async () => {
     const gate = `clip-${Math.round(performance.timeOrigin)}`;
     const element = await showLoaded({ src: `${CLIP}?gate=${gate}` });
     const said: string[] = [];
@@ -148,7 +148,7 @@ describe('a clip', () => {
     assertEqual(said, ['playing 0.0', 'waiting 0.4'], 'events of a clip whose second group is missing');
     assertEqual([element.readyState, element.currentTime], [2, 0.4], 'readyState, currentTime');
     await fetch(`/net/open/${gate}`);
-    await until(() => said.some((each) => each.startsWith('ended')), 'it goes on to the end');
+    await until(() => said.some((each) => each.startsWith('ended')), 'it continues to the end');
     const order = said.map((each) => each.split(' ')[0]);
     assertEqual(order.slice(0, 4), ['playing', 'waiting', 'canplay', 'playing'], 'events');
   });
@@ -245,7 +245,7 @@ describe('a clip', () => {
     assert(took[took.length >> 1] < 5, `${took.join(', ')} ms`);
   });
 
-  it('a group that cannot be had is told of once, and passed over', async () => {
+  it('a missing group is reported once, and skipped', async () => {
     const element = show({ src: `${CLIP}?lost=1` });
     let errors = 0;
     element.addEventListener('generator-error', () => errors++);
@@ -293,20 +293,20 @@ describe('a clip', () => {
     assertEqual(first.currentTime, 0.95, 'the first one stands');
   });
 
-  it('in a <splat-scene> stops at the frame on show if a script pauses it, and the others go on', async () => {
+  it('in a <splat-scene> stops at the visible frame if a script pauses it, and the others continue', async () => {
     const element = await showLoaded({ src: COMPASS, loop: '' });
     element.insertAdjacentHTML('beforeend', `<splat-scene src="${CLIP}"></splat-scene>`.repeat(2));
     const children = [...element.children] as (HTMLElement & { paused: boolean; currentTime: number; pause(): void })[];
     await until(() => element.duration === 1.2, 'the clock of the element');
     await element.play();
-    await until(() => element.currentTime > 0.3, 'its time to go on');
+    await until(() => element.currentTime > 0.3, 'its time to continue');
     const events: string[] = [];
     children[0].addEventListener('pause', ({ type }) => events.push(type));
     children[0].pause();
     const [paused, other] = children.map(({ currentTime }) => currentTime);
     assert(paused > 0.3 && Math.abs(paused - other) < 1e-9, `${paused} s of ${other} s`);
     assertEqual([children[0].paused, children[1].paused, events], [true, false, ['pause']], 'paused, events');
-    await until(() => children[1].currentTime !== other, 'the other one goes on');
+    await until(() => children[1].currentTime !== other, 'the other one continues');
     assertEqual(children[0].currentTime, paused, 'it stands');
   });
 

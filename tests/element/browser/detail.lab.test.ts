@@ -48,19 +48,19 @@ describe('levels of detail of a plain file', () => {
     element.detail = 'auto';
     await frames(2);
     assert((await imageOf(element)) === whole, 'the whole picture');
-    assert(/merged splats.*while they move/.test(element.stats!.reasons.join()), 'moving pictures may have some');
+    assert(/merged splats.*while they move/.test(element.stats!.reasons.join()), 'frames in motion may have some');
     element.quality = 'default';
     await frames(2);
-    assertEqual(element.stats!.reasons, [], 'with a chosen quality no picture has any');
+    assertEqual(element.stats!.reasons, [], 'with a chosen quality no frame has any');
     element.quality = null;
     element.detail = 'off';
     await until(() => !hasLevels(element), 'no levels');
     assertEqual(element.stats!.bytes.scene, bytes.scene, 'bytes');
-    assert((await imageOf(element)) === whole, 'the whole picture again');
+    assert((await imageOf(element)) === whole, 'the full frame again');
   });
 
   // Time by the controller's clock, which a busy machine stretches.
-  itInLab('are built unasked where a large scene moves too slowly, and rest pictures stay whole', async () => {
+  itInLab('are built automatically if a large scene moves too slowly, and frames at rest stay full', async () => {
     const element = await showLoaded({ src: ball(50_000), 'camera-orbit': AT_REST }, 'width: 60px; height: 40px');
     // The camera may still be moving from its position for the first splats.
     await atRest(element);
@@ -80,7 +80,7 @@ describe('levels of detail of a plain file', () => {
     const rested = await pixelsOf(element);
     const error = rested.reduce((sum, value, i) => sum + (value - whole[i]) ** 2, 0) / rested.length;
     const decibels = 10 * Math.log10(255 ** 2 / error);
-    console.log(`the picture at rest: ${decibels.toFixed(1)} dB to that before the turn`);
+    console.log(`the frame at rest: ${decibels.toFixed(1)} dB to that before the turn`);
     assert(decibels > 50, `${decibels} dB`);
   }).timeout(120_000);
 

@@ -90,7 +90,7 @@ describe('a function that gives devices', () => {
     }
   };
 
-  it('may have one at hand, and what it throws is no fault of the file', async () => {
+  it('may have one ready, and its exceptions are no fault of the file', async () => {
     const own = await (await navigator.gpu.requestAdapter())!.requestDevice();
     const element = await shown(() => own);
     assertEqual([element.loaded, element.error], [true, null], 'loaded');
@@ -104,7 +104,7 @@ describe('a function that gives devices', () => {
 });
 
 describe('memory that is not to be had', () => {
-  it('for a larger picture than the first is told of, and the page lives on', async () => {
+  it('for a larger frame than the first is reported, and the page keeps working', async () => {
     const element = await showLoaded({ src: COMPASS }, 'width: 60px; height: 50px');
     const { createTexture } = GPUDevice.prototype;
     let refused = 0;
@@ -129,7 +129,7 @@ describe('memory that is not to be had', () => {
 });
 
 describe('the loss of the device', () => {
-  it('is recovered from in silence: the same picture, one pair of events', async () => {
+  it('is recovered from in silence: the same frame, one pair of events', async () => {
     const element = await showLoaded({ 'camera-orbit': '20deg 60deg 80%' });
     const before = await screenOf(element);
     const seen: string[] = [];
@@ -166,7 +166,7 @@ describe('the loss of the device', () => {
     assertEqual(String(element.getCameraOrbit()), before);
   });
 
-  itInLab('six times, every other time again in the middle of the recovery, ends with the same picture', async () => {
+  itInLab('six times, every other time again in the middle of the recovery, ends with the same frame', async () => {
     const element = await showLoaded();
     const before = await screenOf(element);
     const seen: string[] = [];
@@ -220,7 +220,7 @@ describe('the loss of the device', () => {
       await nextEvent(element, 'error');
       assertEqual([element.error?.code, element.error?.reason], ['device-lost', 'device-lost/unrecoverable'], 'codes');
       assert(before.middleOf(isRed), 'a picture before');
-      assertEqual((await screenOf(element)).differences(before), 0, 'color values of the last picture that differ');
+      assertEqual((await screenOf(element)).differences(before), 0, 'color values of the last frame that differ');
       const { message } = element.error!;
       const said =
         /lost \(reason "destroyed": Device was destroyed\), and no other in its place \(.*: the GPU process does not answer\)\. /;
@@ -232,7 +232,7 @@ describe('the loss of the device', () => {
     }
   });
 
-  it('is followed by a picture once the browser has a device again, without a reload', async () => {
+  it('is followed by a frame once the browser has a device again, without a reload', async () => {
     hurry(4);
     const original = GaussianSplatElement.sharedDevice;
     let refusals = 0;
@@ -272,7 +272,7 @@ describe('the loss of the device', () => {
     }
   });
 
-  itInLab('leaves no empty picture: toBlob() has the picture, or says why not', async () => {
+  itInLab('leaves no empty image: toBlob() returns the frame, or rejects with a reason', async () => {
     const element = await showLoaded();
     const size = async (blob: Blob): Promise<number> => {
       const { width, height } = await createImageBitmap(blob);
@@ -411,7 +411,7 @@ describe('without WebGPU, where the page asks for it', () => {
     });
   }
 
-  it('a poster stands alone for the scene, with its name, whoever brings it', async () => {
+  it('a poster replaces the scene, with its name, from any source', async () => {
     await withGpu(undefined, async () => {
       const gif = 'data:image/gif;base64,R0lGODlhAQABAAAAACw=';
       const element = show({ ...ASKED, poster: gif, alt: 'A compass', 'camera-controls': '' });
@@ -469,7 +469,7 @@ describe('without WebGPU, where the page asks for it', () => {
     });
   });
 
-  it('an insecure page is told to use https', async () => {
+  it('an insecure page is advised to use https', async () => {
     Object.defineProperty(window, 'isSecureContext', { configurable: true, get: () => false });
     try {
       await withGpu(undefined, async () => {

@@ -16,7 +16,7 @@ const canvasSize = (element: GaussianSplatElement): [number, number] => [
 beforeEach(() => hurry(3));
 
 describe('another document', () => {
-  it('an element that is moved into a frame keeps its looks and its picture', async () => {
+  it('an element that is moved into an iframe keeps its styles and its frame', async () => {
     const element = await showLoaded();
     const frame = document.createElement('iframe');
     document.body.append(frame);
@@ -29,7 +29,7 @@ describe('another document', () => {
     assertEqual(canvasSize(element), [120, 100]);
   });
 
-  it('an element that is made here and first shown in a frame has its looks and its picture', async () => {
+  it('an element that is made here and first shown in an iframe has its styles and its frame', async () => {
     const frame = document.createElement('iframe');
     document.body.append(frame);
     const element = document.createElement('gaussian-splat');
@@ -44,7 +44,7 @@ describe('another document', () => {
     frame.remove();
   });
 
-  it('an element whose frame was taken away draws nothing, and shows its picture where it is put next', async () => {
+  it('an element whose iframe was removed draws nothing, and shows its frame in its next place', async () => {
     const element = await showLoaded({ 'auto-rotate': '', 'auto-rotate-delay': '0' });
     const frame = document.createElement('iframe');
     document.body.append(frame);
@@ -62,7 +62,7 @@ describe('another document', () => {
     assert(submits > before, 'it draws again');
   });
 
-  it('frames come from the window that an element is in, which may be on show while the page is not', async () => {
+  it('frames come from the window that contains an element, which may be visible while the page is not', async () => {
     const element = await showLoaded({ 'auto-rotate': '', 'auto-rotate-delay': '0' });
     const frame = document.createElement('iframe');
     document.body.append(frame);

@@ -165,7 +165,7 @@ it('a scene appears by the progress of the page, and by time', async () => {
   assertEqual(await countOf(timed, isColored), 0, 'at the beginning of the next one');
 });
 
-it('a function of the page changes splats; a wrong one is told of by its line, and the scene stays', async () => {
+it('a function of the page changes splats; a wrong one is reported by its line, and the scene stays', async () => {
   const element = await showLoaded(VIEW);
   const whole = await countOf(element, isColored);
   const reported = nextEvent<CustomEvent<{ code: string; message: string }>>(element, 'shader-error');
@@ -265,7 +265,7 @@ it('what a shader moves has a pause button, stands still with reduced motion, an
     const still = await showLoaded({ ...VIEW, alt: 'A compass', 'reveal-effect': 'grow 60s' });
     await atRest(still);
     const whole = await countOf(still, isColored);
-    assert(whole > 0, 'it is there at once');
+    assert(whole > 0, 'it is visible at once');
     still.splatShader = { code, animated: true };
     await until(() => buttonOf(still)?.getAttribute('aria-label') === 'Start the motion', 'what would move waits');
     await atRest(still);

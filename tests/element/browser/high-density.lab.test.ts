@@ -21,7 +21,7 @@ describe('on a dense screen', () => {
     await until(() => canvasOf(element)?.width === 240, 'no more than there are');
   });
 
-  it('also in a browser that does not tell device pixels, and when the ratio changes there', async () => {
+  it('also in a browser that does not report device pixels, and when the ratio changes there', async () => {
     const observe = ResizeObserver.prototype.observe;
     const matchMediaBefore = window.matchMedia;
     const queries: MediaQueryList[] = [];

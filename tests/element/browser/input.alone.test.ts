@@ -60,7 +60,7 @@ afterEach(async () => {
 });
 
 describe('mouse', () => {
-  it('a drag orbits, outside of the element too, and tells who did it', async () => {
+  it('a drag orbits, outside of the element too, and reports its source', async () => {
     const element = await controlled();
     const sources = new Set<string>();
     element.addEventListener('camera-change', (event: CustomEvent<CameraChangeDetail>) =>
@@ -316,7 +316,7 @@ describe('camera attributes', () => {
     assert(element.loaded, 'still there');
   });
 
-  it('up of a capture that is tilted: a direction, straight in the picture and in viewer space', async () => {
+  it('up of a capture that is tilted: a direction, upright in the frame and in viewer space', async () => {
     // The compass has red at +x of its frame, 1 from the middle: at -2 of 5 up, that is 22 degrees below the horizon.
     const element = await showLoaded({ up: '-2 -5 0', 'camera-orbit': '0deg 90deg auto', 'interpolation-decay': '0' });
     const level = await showLoaded({ 'camera-orbit': '0deg 90deg auto' });

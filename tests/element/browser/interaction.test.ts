@@ -60,7 +60,7 @@ const click = async (x: number, y: number): Promise<void> => {
 afterEach(() => sendMouse({ type: 'move', position: [700, 500] }));
 
 describe('positionFromPoint', () => {
-  it('tells whose surface it is: the own scene and its splat, a child, a mesh and its material', async () => {
+  it('reports the owner of a surface: the own scene and its splat, a child, a mesh and its material', async () => {
     const { element, ball, box } = await shown();
     const own = await element.positionFromPoint(...at(1, 0));
     assert(own?.element === element, `the own scene, not ${own?.element.localName}`);
@@ -94,7 +94,7 @@ describe('positionFromPoint', () => {
   });
 
   for (const renderer of ['webgpu', 'webgl'])
-    it(`${renderer}: numbers of splats are those of the renderer's order`, async () => {
+    it(`${renderer}: indices of splats are those of the renderer's order`, async () => {
       // Far apart along x: their order is that of the Morton curve, so that each has the number of its place.
       const bytes = new DataView(new ArrayBuffer(32 * 5));
       for (let i = 0; i < 5; i++) {

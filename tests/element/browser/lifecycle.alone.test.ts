@@ -92,7 +92,7 @@ describe('power', () => {
     assertEqual(progress, 0, 'progress of the lazy one');
     lazy.style.marginTop = '0';
     await lazy.ready;
-    assert(lazy.loaded, 'the lazy one loads in sight');
+    assert(lazy.loaded, 'the lazy one loads in the viewport');
   });
 
   it('play() loads a lazy element off screen, and not the scene that replaces it', async () => {
@@ -109,7 +109,7 @@ describe('power', () => {
 });
 
 describe('size', () => {
-  it('follows the element, and the picture with it', async () => {
+  it('follows the element with its frame', async () => {
     const element = await showLoaded();
     assertEqual(canvasSize(element), [120, 100], 'at first');
     element.style.width = '200px';
@@ -117,7 +117,7 @@ describe('size', () => {
     const screen = await screenOf(element);
     const red = screen.middleOf(isRed);
     assert(red && red.x > 110, `red at ${red?.x}`);
-    assertEqual(screen.differences(await screenOf(element)), 0, 'differences of two pictures');
+    assertEqual(screen.differences(await screenOf(element)), 0, 'differences of two frames');
   });
 
   it('without size draws nothing, yet is loaded, and draws when it gets one', async () => {
@@ -186,14 +186,14 @@ describe('moves and removals', () => {
     const seen: boolean[] = [];
     element.addEventListener('model-visibility', ({ detail }) => seen.push(detail.visible));
     element.remove();
-    assertEqual(seen, [false], 'out of sight with its removal');
+    assertEqual(seen, [false], 'off-screen with its removal');
     box.append(element);
     await until(() => seen.length > 1, 'its being seen again');
     assertEqual(seen, [false, true], 'one event for each change');
     assert((await screenOf(element)).middleOf(isRed), 'still seen');
   });
 
-  it('a removed element frees its GPU memory, and loads anew when it is put back', async () => {
+  it('a removed element frees its GPU memory, and loads again when it is inserted again', async () => {
     const delayBefore = GaussianSplatElement.releaseDelay;
     GaussianSplatElement.releaseDelay = 50;
     try {
@@ -227,7 +227,7 @@ describe('moves and removals', () => {
     }
   });
 
-  it('an eager element off screen loads anew as well', async () => {
+  it('an eager element off screen loads again as well', async () => {
     const delayBefore = GaussianSplatElement.releaseDelay;
     GaussianSplatElement.releaseDelay = 0;
     try {
@@ -308,7 +308,7 @@ describe('properties', () => {
     assert(thrown.includes('expects a finite number'), thrown);
   });
 
-  it('of addresses take lists, too, and whatever else they are given names no script error', async () => {
+  it('of addresses take lists, too, and any other value causes no script error', async () => {
     const element = await showLoaded();
     const missing = nextEvent<CustomEvent<{ message: string }>>(element, 'generator-error');
     Object.assign(element, { chain: [], postprocess: ['/a/missing.onnx'] });
@@ -323,7 +323,7 @@ describe('properties', () => {
 });
 
 describe('paper', () => {
-  it('has the picture, which browsers leave out of WebGPU canvases, and only while it is printed', async () => {
+  it('has the image, which browsers omit from WebGPU canvases, and only while it is printed', async () => {
     const element = await showLoaded();
     const canvases = (): HTMLCanvasElement[] => [...element.shadowRoot!.querySelectorAll('canvas')];
     dispatchEvent(new Event('beforeprint'));

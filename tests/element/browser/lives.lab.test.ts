@@ -121,7 +121,7 @@ describe('a long life', () => {
     });
   });
 
-  it('losses of the device at random moments: a pair of events each, and the first picture each time', async () => {
+  it('losses of the device at random moments: a pair of events each, and the first frame each time', async () => {
     const element = await showLoaded({ 'camera-orbit': '25deg 65deg auto', 'interaction-prompt': 'none' });
     const image = await screenOf(element);
     const goal = element.getAttribute('camera-orbit') ?? '';

@@ -67,7 +67,7 @@ describe('the scene worker', () => {
     assertEqual(workers.length, 3, 'workers');
   });
 
-  it('answers also where something fails that nobody foresaw', async () => {
+  it('answers also after an unexpected failure', async () => {
     const nothing = { type: 'boxes', request: null } as unknown as Parameters<typeof loader.ask>[0];
     const loader = GaussianSplatElement.sceneLoader;
     const never = () => Promise.reject(new Error('on the page'));
@@ -76,7 +76,7 @@ describe('the scene worker', () => {
     assert(error instanceof Error && /decode\/corrupt/.test(error.message), `an error with a name: ${String(error)}`);
   });
 
-  it("that is refused gives way to the page's own thread, with one warning for all elements", async () => {
+  it("'that is refused is replaced by the main thread, with one warning for all elements'", async () => {
     type SceneLoader = (typeof GaussianSplatElement)['sceneLoader'];
     const original = GaussianSplatElement.sceneLoader;
     const Loader = original.constructor as new (spawn: () => Worker) => SceneLoader;

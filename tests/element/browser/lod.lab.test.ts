@@ -134,7 +134,7 @@ describe('a streamed SOG scene', () => {
     await close(element);
   });
 
-  it('stays on show where a file is missing, fetches it once it is there, and fails with a name where the coarsest is', async () => {
+  it('stays visible if a file is missing, fetches it once it exists, and fails with a name for the coarsest', async () => {
     const warned: string[] = [];
     const original = console.warn;
     console.warn = (message: unknown) => void warned.push(String(message));
@@ -157,7 +157,7 @@ describe('a streamed SOG scene', () => {
     broken.remove();
   });
 
-  it("comes by way of the page's own thread where workers are refused", async () => {
+  it("'is loaded on the main thread if workers are refused'", async () => {
     const original = GaussianSplatElement.sceneLoader;
     const Loader = original.constructor as new (spawn: () => Worker) => typeof original;
     GaussianSplatElement.sceneLoader = new Loader(() => new Worker('/net/status/404', { type: 'module' }));

@@ -33,7 +33,7 @@ describe('code that cannot be loaded when it is needed', () => {
   });
 
   // A page keeps loaded code for good: missing code is tested before available code.
-  it('is told as such: all that reads scenes, worker or not, and load() tries again', async () => {
+  it('is reported as such: all that reads scenes, worker or not, and load() tries again', async () => {
     const script = '/packages/element/dist/loading/scene-worker.js';
     let workers = 0;
     GaussianSplatElement.sceneLoader = new Loader(() => {
@@ -58,14 +58,14 @@ describe('code that cannot be loaded when it is needed', () => {
     await assertLost('/net/html', 'diagnose.js', /code for other files/);
   });
 
-  it("on the page's thread: the reader of a format, and another format is read", async () => {
+  it("'on the main thread: the reader of a format, and another format is read'", async () => {
     GaussianSplatElement.sceneLoader = withoutWorker();
     await assertLost(COMPASS, 'readers/splat.js', /reads \.splat/);
     await claimComing(/no worker could be started/);
     await showLoaded({ src: `${FIXTURES}compass.ply` });
   });
 
-  it("on the page's thread: what runs generators", async () => {
+  it("'on the main thread: the code for generators'", async () => {
     await assertLost('/tests/fixtures/generators/packed.onnx', 'dynamic/open-dynamic-model.js', /runs generators/);
   });
 });

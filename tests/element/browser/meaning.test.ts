@@ -58,7 +58,7 @@ describe('up, as the file says it', () => {
       );
     });
 
-  it('gives way to the attribute', async () => {
+  it('is overridden by the attribute', async () => {
     const splats: Splat[] = [
       { at: [0, 0, 1], color: GREEN },
       { at: [0, 0, -1], color: RED },
@@ -131,7 +131,7 @@ describe('the filter', () => {
 });
 
 describe('what of a file is not drawn', () => {
-  it('is told by the console once, and by stats', async () => {
+  it('is reported by the console once, and by stats', async () => {
     const bad: Splat[] = Array.from({ length: 2 }, () => ({ at: [NaN, 0, 0] as const, color: RED }));
     const good: Splat[] = Array.from({ length: 8 }, (_, i) => ({ at: [i / 8, 0, 0] as const, color: GREEN }));
     const said: string[] = [];

@@ -48,7 +48,7 @@ describe('the address of the page', () => {
     assertEqual(element.error?.code, 'network');
   });
 
-  it('each load is signed once, whatever urlModifier says the next time', async () => {
+  it('each load is signed once, for any later result of urlModifier', async () => {
     let calls = 0;
     GaussianSplatElement.urlModifier = (url) => (url.includes('signed') ? `${url}&sig=${calls++}` : url);
     try {
@@ -94,7 +94,7 @@ describe('a urlModifier', () => {
     }
   });
 
-  it('that gives no address, a promise for one, is told of by the element, and the next scene comes', async () => {
+  it('that returns no address, or a promise for one, is reported by the element, and the next scene loads', async () => {
     const element = await shown((async (url: string) => url) as unknown as (url: string) => string);
     assert(element.error?.message.includes('[object%20Promise]'), element.error?.message ?? 'no error');
     element.src = `${COMPASS}?next`;
@@ -213,7 +213,7 @@ describe('attributes and events', () => {
     assertEqual(element.cameraControls, true);
   });
 
-  it('a mouse whose button nobody holds drags nothing; a held space bar scrolls nothing', async () => {
+  it('a mouse whose button is not held drags nothing; a held space bar scrolls nothing', async () => {
     const element = await showLoaded({ 'camera-controls': '', 'auto-rotate': '', 'auto-rotate-delay': '100000' });
     const view = element.shadowRoot!.querySelector<HTMLElement>('#view')!;
     const pointer = (type: string, clientX: number, buttons: number): boolean =>

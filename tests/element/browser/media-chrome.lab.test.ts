@@ -54,7 +54,7 @@ describe('media-chrome', () => {
     await until(() => !element.paused, 'the time to run');
     await until(() => controller.getAttribute('mediapaused') === null, 'the playing state');
     const time = element.currentTime;
-    await until(() => element.currentTime !== time, 'the time to go on');
+    await until(() => element.currentTime !== time, 'the time to continue');
     assert(element.matches(':state(playing)'), 'the custom state');
     await click(part('media-play-button'));
     await until(() => element.paused, 'the pause');
@@ -86,7 +86,7 @@ describe('media-chrome', () => {
     element.pause();
   });
 
-  it('loads a scene behind its poster with its button, and starts anew with another one', async () => {
+  it('loads a scene behind its poster with its button, and starts again with another one', async () => {
     const { element, part, click } = await makePlayer('src="/net/sequence/movie.json" reveal="manual"');
     const controller = part('media-controller');
     await until(() => customElements.get('media-play-button') !== undefined, 'the button');

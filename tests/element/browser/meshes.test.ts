@@ -76,7 +76,7 @@ describe('meshes', () => {
     assert(!isBlue((await screenOf(element)).at(60 + 2.15 * METER, 50)), 'turned to its edge');
   });
 
-  it('are layers of the picture: edges show the splats behind them, and so does glass', async () => {
+  it('are layers of the frame: edges show the splats behind them, and so does glass', async () => {
     const element = place();
     const ball = document.createElement('splat-scene') as SplatSceneElement;
     ball.setAttribute('src', GREEN);
@@ -337,7 +337,7 @@ describe('meshes', () => {
         devices.at(-1)!.destroy();
         await restored;
         await frames();
-        assertEqual((await screenOf(element)).differences(image, 2), 0, 'the picture is back');
+        assertEqual((await screenOf(element)).differences(image, 2), 0, 'the frame is back');
       }
       document.body.replaceChildren();
       await delay(300);

@@ -47,8 +47,8 @@ async function comeToRest(element: GaussianSplatElement): Promise<number> {
   return performance.now();
 }
 
-describe('the pace of pictures', () => {
-  it('moves faster than at full quality, comes to rest as the true image, byte for byte, and says what it does', async () => {
+describe('dynamic quality', () => {
+  it('moves faster than at full quality, settles on the accurate frame, byte for byte, and reports its settings', async () => {
     const auto = await showLoaded(SCENE, SIZE);
     const fixed = await showLoaded({ ...SCENE, quality: 'default' }, SIZE);
     const unhurried = await showLoaded({ ...SCENE, 'frame-budget': '60000' }, SIZE);
@@ -92,15 +92,15 @@ describe('the pace of pictures', () => {
       await gpuIdle();
       waited = Math.min(waited, performance.now() - rested);
     }
-    console.log(`the true image ${waited.toFixed(0)} ms after rest`);
+    console.log(`the accurate frame ${waited.toFixed(0)} ms after rest`);
     await frames(2);
     const [shown, expected] = [await screenOf(auto), await screenOf(fixed)];
-    assertEqual(shown.differences(expected), 0, 'color values that differ from the plain default picture');
+    assertEqual(shown.differences(expected), 0, 'color values that differ from the plain default frame');
     // Finished, not only begun; a frame that is on its way when the camera stops is waited for.
     assert(waited <= 300 + 2 * whole, `${waited} ms after rest, a frame takes ${whole}`);
   });
 
-  it('a frame of fewer pixels fades into the true image, and nothing of it stays', async () => {
+  it('a frame of fewer pixels fades into the accurate frame, and nothing of it stays', async () => {
     const element = await showLoaded({ ...SCENE, 'interpolation-decay': '0' }, SIZE);
     await findQuality(element);
     const overlay = (): HTMLCanvasElement | null => element.shadowRoot!.querySelector('canvas[aria-hidden]');
@@ -171,7 +171,7 @@ describe('the pace of pictures', () => {
     assertEqual(made, [], 'pipelines made in motion');
   });
 
-  it('a picture that is asked for is whole, even in motion', async () => {
+  it('a requested image is complete, even in motion', async () => {
     const element = await showLoaded({ ...SCENE, 'interpolation-decay': '0' }, SIZE);
     await findQuality(element);
     // The first frame of a motion is whole, however long it takes.
@@ -184,7 +184,7 @@ describe('the pace of pictures', () => {
     await delay(600);
     assertEqual(element.stats?.dynamicQuality.drawn, 'whole', 'at rest');
     const resting = await element.toBlob();
-    assertEqual(moving.size, resting.size, 'bytes of the pictures');
+    assertEqual(moving.size, resting.size, 'bytes of the frames');
     const [a, b] = await Promise.all([moving, resting].map(async (blob) => new Uint8Array(await blob.arrayBuffer())));
     assert(
       a.every((value, i) => value === b[i]),

@@ -48,7 +48,7 @@ describe('a scene that is loaded without a size and shown later', () => {
     ['webgl', it],
     ['webgpu', itInLab],
   ] as const)
-    test(`is there, as are its labels: ${renderer}`, async () => {
+    test(`is visible, as are its labels: ${renderer}`, async () => {
       for (const [name, hide] of Object.entries(PLACES)) {
         const element = show({ ...STILL, renderer, loading: 'eager' });
         element.innerHTML = '<button slot="hotspot-front" data-position="0 0 1"></button>';
@@ -58,7 +58,7 @@ describe('a scene that is loaded without a size and shown later', () => {
         assert(element.loaded, `${name}: ${element.error?.message ?? 'not loaded'}`);
         reveal();
         const isThere = await comesToShow(element, (screen) => screen.middleOf(isRed) !== null);
-        assert(isThere, `${name}: the picture stays blank`);
+        assert(isThere, `${name}: the frame stays blank`);
         await until(() => element.queryHotspot('hotspot-front')?.visible === true, `${name}: the label`);
         document.body.replaceChildren();
       }

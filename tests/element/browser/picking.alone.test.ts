@@ -221,7 +221,7 @@ describe('hotspots', () => {
     await until(() => Math.abs(opacity(front) - 0.6) < 0.01, 'the custom property');
   });
 
-  it('that come, or go elsewhere, while nothing moves are looked at, too', async () => {
+  it('that are added, or move, while nothing else moves are checked, too', async () => {
     const element = await compass();
     const sees = (name: string, expected: boolean, what: string): Promise<void> =>
       until(() => element.queryHotspot(`hotspot-${name}`)?.visible === expected, what, 3_000);
@@ -284,13 +284,13 @@ describe('hotspots', () => {
     assertEqual(element.queryHotspot('hotspot-placed')?.canvasPosition, null, 'where it is');
   });
 
-  it('that replace one another are told whether they are visible', async () => {
+  it('that replace one another are notified of their visibility', async () => {
     const element = await compass();
     const first = label(element, 'same', '0m 0m 1m', { visibilityAttribute: 'seen' });
     await until(() => first.hasAttribute('data-seen'), 'the first label to be seen');
     first.remove();
     const second = label(element, 'same', '0m 0m 1m', { visibilityAttribute: 'seen' });
-    await until(() => second.hasAttribute('data-seen'), 'the second one to be told as well', 3_000);
+    await until(() => second.hasAttribute('data-seen'), 'the second one to be notified as well', 3_000);
   });
 
   it('cost nothing while nothing moves, and can be clicked', async () => {
@@ -387,7 +387,7 @@ describe('the scene as a whole', () => {
     assertEqual(show({}).getBoundingBox(), null, 'without a scene');
   });
 
-  it('updateFraming() frames it anew', async () => {
+  it('updateFraming() frames it again', async () => {
     const element = await compass({ 'camera-orbit': 'auto' });
     const framed = String(element.getCameraOrbit());
     element.cameraOrbit = '10deg 20deg 3m';
@@ -397,7 +397,7 @@ describe('the scene as a whole', () => {
     assertEqual(String(element.getCameraOrbit()), framed);
   });
 
-  it('moveBefore() keeps the picture and the scene', async () => {
+  it('moveBefore() keeps the frame and the scene', async () => {
     const element = await compass();
     const parent = document.createElement('section');
     document.body.append(parent);

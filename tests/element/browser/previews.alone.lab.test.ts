@@ -66,7 +66,7 @@ describe('a scene of 500,000 splats', () => {
       );
     }
     assert(best.share <= 1 / 3, `a preview after ${best.share} of the time`);
-    assert(best.longestTask < 50, `a task of ${best.longestTask} ms on the page's thread`);
+    assert(best.longestTask < 50, `a task of ${best.longestTask} ms on the main thread`);
   });
 });
 
@@ -74,7 +74,7 @@ describe('previews on show', () => {
   // Worker, device and pipelines are loaded before the measurement starts.
   beforeEach(async () => void (await showLoaded({ src: '/tests/element/browser/fixtures/compass.ply' })));
 
-  it('of 500,000 splats a picture is there within a third of the time; the page is never blocked, and the camera never jumps', async function () {
+  it('of 500,000 splats is shown within a third of the time; the page is never blocked, and the camera never jumps', async function () {
     if (!(await fetch(SCENE)).ok) return this.skip();
     // The best of three: other work on the machine comes and goes.
     let best = { share: Infinity, longestTask: Infinity };
@@ -104,9 +104,9 @@ describe('previews on show', () => {
       await until(() => element.stats?.isPreview === true, 'statistics of the preview');
       const { isPreview, reasons = [] } = element.stats ?? {};
       assert(isPreview && reasons.some((sentence) => /part/.test(sentence)), `stats say ${reasons.join(' ')}`);
-      assert(!element.loaded && element.revealed && element.matches(':state(preview)'), 'on show, and not loaded');
+      assert(!element.loaded && element.revealed && element.matches(':state(preview)'), 'visible, and not loaded');
       await element.toBlob().then(
-        () => assert(false, 'no picture of a part'),
+        () => assert(false, 'no frame of a preview'),
         (error: DOMException) => assertEqual(error.name, 'InvalidStateError', 'why there is none'),
       );
       await element.ready;
@@ -115,15 +115,15 @@ describe('previews on show', () => {
       assert(!element.matches(':state(preview)'), 'no preview any more');
       best = { share: first / total, longestTask: await longestTask() };
       console.log(
-        `first picture after ${first.toFixed(0)} of ${total.toFixed(0)} ms; longest task ${best.longestTask.toFixed(0)} ms`,
+        `first frame after ${first.toFixed(0)} of ${total.toFixed(0)} ms; longest task ${best.longestTask.toFixed(0)} ms`,
       );
       const steps = radii.slice(1).map((radius, i) => Math.abs(Math.log(radius / radii[i])));
       assert(Math.max(0, ...steps) < 0.05, `the distance changed by ${Math.max(...steps)} at once`);
       element.remove();
       await gpuIdle();
     }
-    assert(best.share <= 1 / 3, `a picture after ${best.share} of the time`);
-    assert(best.longestTask < 50, `a task of ${best.longestTask} ms on the page's thread`);
+    assert(best.share <= 1 / 3, `a frame after ${best.share} of the time`);
+    assert(best.longestTask < 50, `a task of ${best.longestTask} ms on the main thread`);
   }).timeout(120_000);
 
   it('a slow file is seen part by part, and the whole stands where it would have stood', async () => {

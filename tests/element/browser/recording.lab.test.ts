@@ -136,7 +136,7 @@ describe('record()', () => {
   };
   const load = (): Promise<GaussianSplatElement> => showLoaded({ ...STILL, 'camera-orbit': '0deg 80deg 60%' }, STYLE);
 
-  it('is a video of what is on show, which browsers play', async () => {
+  it('is a video of the visible frames, which browsers play', async () => {
     const element = await load();
     const before = element.getCameraOrbit().toString();
     const video = await element.record({ path: 'turntable', duration: 600 });

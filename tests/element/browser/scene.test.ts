@@ -121,7 +121,7 @@ describe('a scene', () => {
     assertEqual([element.progress, element.loaded], [0, false], 'out of sight');
   });
 
-  it('ends its progress also where the server does not tell the length', async () => {
+  it('ends its progress also if the server does not report the length', async () => {
     const element = show({ src: '/net/unsized/compass.ply' });
     const progress: ProgressEvent[] = [];
     element.addEventListener('progress', (event) => progress.push(event));
@@ -176,7 +176,7 @@ describe('a scene', () => {
 });
 
 describe('src', () => {
-  it('the latest wins, whatever answers first', async () => {
+  it('the latest wins, in any order of responses', async () => {
     const element = show({ src: '/net/slow/compass.splat?ms=600' });
     const urls: string[] = [];
     element.addEventListener('load', (event) => urls.push(new URL(event.detail.url).pathname));
@@ -243,7 +243,7 @@ describe('src', () => {
     }
   });
 
-  it('a flip there and back loads nothing anew', async () => {
+  it('a flip there and back loads nothing again', async () => {
     const element = await showLoaded();
     let loads = 0;
     element.addEventListener('progress', () => loads++);
@@ -255,7 +255,7 @@ describe('src', () => {
     assert(element.loaded, 'still loaded');
   });
 
-  it('keeps the old picture until the new one is there', async () => {
+  it('keeps the old frame until the new scene is loaded', async () => {
     const element = await showLoaded(
       { src: `${FIXTURES}green.splat` },
       'width: 120px; height: 100px; --poster-transition: 0s',

@@ -207,7 +207,7 @@ describe('several scenes in one element', () => {
     assertEqual(submits - before, 0, 'nothing is drawn at rest');
   });
 
-  it('frame, pick and take pictures of the whole', async () => {
+  it('frame, pick and save images of the whole', async () => {
     const element = await placeLoaded(`<gaussian-splat src="${GREEN}"></gaussian-splat>`);
     const radius = element.getCameraOrbit().radius;
     const child = document.createElement('splat-scene') as SplatSceneElement;
@@ -232,8 +232,8 @@ describe('several scenes in one element', () => {
     const { data } = context.getImageData(0, 0, image.width, image.height);
     const count = (isPicked: (i: number) => boolean): number =>
       data.filter((_, i) => i % 4 === 0 && isPicked(i)).length;
-    assert(count((i) => data[i] > 150 && data[i + 1] < 100 && data[i + 3] > 100) > 0, 'red in the picture');
-    assert(count((i) => data[i + 1] > 150 && data[i] < 100 && data[i + 3] > 100) > 0, 'green in the picture');
+    assert(count((i) => data[i] > 150 && data[i + 1] < 100 && data[i + 3] > 100) > 0, 'red in the frame');
+    assert(count((i) => data[i + 1] > 150 && data[i] < 100 && data[i + 3] > 100) > 0, 'green in the frame');
   });
 
   itInLab('come back after a lost device, each once, and go without a trace', async () => {
@@ -253,7 +253,7 @@ describe('several scenes in one element', () => {
       devices.at(-1)!.destroy();
       await restored;
       await frames();
-      assertEqual((await screenOf(element)).differences(image, 2), 0, 'the picture is back');
+      assertEqual((await screenOf(element)).differences(image, 2), 0, 'the frame is back');
       assertEqual(events, ['contextlost', 'contextrestored'], 'events');
       childrenOf(element)[1].remove();
       await frames();
@@ -273,7 +273,7 @@ describe('several scenes in one element', () => {
     const [follower, own] = childrenOf(element);
     assertEqual([element.duration, follower.duration, own.duration], [1.2, 1.2, 1.2], 'durations');
     assertEqual([element.paused, own.paused], [true, false], 'who plays');
-    await until(() => own.currentTime > 0.3, 'its time to go on');
+    await until(() => own.currentTime > 0.3, 'its time to continue');
     assertEqual(element.currentTime, 0, 'the time of the element');
     own.pause();
     // The second frame is green, the fourth red.
@@ -286,10 +286,10 @@ describe('several scenes in one element', () => {
     assertNear(await placeOf(element, isGreen), [-2, 0], 'the frame of that time', 0.6);
     const third = await placeLoaded(`<gaussian-splat autoplay loop ${VIEW}><splat-scene src="${GREEN}"></splat-scene>
       <splat-scene src="${movie}"></splat-scene></gaussian-splat>`);
-    await until(() => !third.paused && third.currentTime > 0.1, 'the clock of an element that plays by itself');
+    await until(() => !third.paused && third.currentTime > 0.1, 'the clock of an element that plays automatically');
     third.remove();
     const button = element.shadowRoot?.querySelector<HTMLButtonElement>('[part=pause-button]');
-    assert(button, 'visitors can start and stop what plays by itself');
+    assert(button, 'visitors can start and stop automatic motion');
     button.click();
     assert(!own.paused && element.paused, 'it plays again');
     button.click();

@@ -84,7 +84,7 @@ describe('a sequence of files', () => {
     element.pause();
   });
 
-  it('a file of motion that is not there is told of once, and the frames of the others are shown', async () => {
+  it('a missing motion file is reported once, and the frames of the others are shown', async () => {
     const element = await showLoaded({ src: '/net/moving/movie.json?lost=0&count=12' });
     let errors = 0;
     element.addEventListener('error', () => errors++);
@@ -127,7 +127,7 @@ describe('a sequence of files', () => {
     await frames(5);
   });
 
-  itInLab('where every frame is late, in a second round too, pictures follow the clock at a distance', async () => {
+  itInLab('if every frame is late, in a second round too, frames follow the clock at a distance', async () => {
     // Three seconds, two of them prefetched, and each frame takes longer than eight of them.
     const element = await showLoaded({ src: `${MOVIE}?count=72&fps=24&ms=350`, loop: '' });
     const seen = [new Set<number>(), new Set<number>()];
@@ -143,11 +143,11 @@ describe('a sequence of files', () => {
     element.pause();
     assert(
       seen.every(({ size }) => size >= 3),
-      `pictures in each round: ${seen.map((one) => [...one].join(' ')).join('; ')}`,
+      `frames in each round: ${seen.map((one) => [...one].join(' ')).join('; ')}`,
     );
   });
 
-  itInLab('a late frame leaves the last one on show, and is shown when it is there', async () => {
+  itInLab('a late frame leaves the last one visible, and is shown when it arrives', async () => {
     const element = await showLoaded({ src: `${MOVIE}?ms=1200` });
     element.currentTime = 0.15;
     await delay(300);
@@ -156,7 +156,7 @@ describe('a sequence of files', () => {
     assert(await shows(element, isGreen), 'the second frame');
   });
 
-  itInLab('fetches two seconds of frames ahead, whatever its length', async () => {
+  itInLab('fetches two seconds of frames ahead, for any length', async () => {
     await fetchedFrames();
     const element = await showLoaded({ src: `${MOVIE}?count=300&fps=10` });
     let max = 0;
@@ -175,7 +175,7 @@ describe('a sequence of files', () => {
     assert(max > 5, 'and fetches ahead');
   });
 
-  it('a frame that is not there is told once and passed over', async () => {
+  it('a missing frame is reported once and skipped', async () => {
     const element = show({ src: `${MOVIE}?lost=1` });
     const messages: string[] = [];
     element.addEventListener('generator-error', ({ detail }) => messages.push(detail.reason));
@@ -212,7 +212,7 @@ const refusal = (promise: Promise<void>): Promise<string> =>
   );
 
 describe('the clock', () => {
-  it('starts anew with another scene, of the same length or of none', async () => {
+  it('starts again with another scene, of the same length or of none', async () => {
     const element = await showLoaded({ src: MOVIE });
     const ended = nextEvent(element, 'ended');
     element.playbackRate = 8;
@@ -267,7 +267,7 @@ describe('the clock', () => {
       // The event fires before the clock continues.
       await nextEvent(element, 'playing');
       assertEqual(element.currentTime, seconds, what);
-      await until(() => element.currentTime > seconds, 'the time to go on');
+      await until(() => element.currentTime > seconds, 'the time to continue');
     };
     await until(() => element.currentTime > 0, 'the time to run');
     let before = 0;
@@ -332,7 +332,7 @@ const SCRIPTS: Readonly<Record<string, (media: Timed, a: string, b: string) => v
     media.currentTime = 0.5;
     media.src = a;
   },
-  'a source that nobody waits for': (media, a, b) => {
+  'a source without waiting callers': (media, a, b) => {
     media.src = b;
     media.currentTime = 0.5;
     media.src = `${b}#`;
@@ -387,7 +387,7 @@ describe('a source and a time in one task', () => {
 });
 
 describe('play()', () => {
-  itInLab('loads a scene that waits for a click, or for somebody to see it', async () => {
+  itInLab('loads a scene that waits for a click, or for the viewport', async () => {
     const covered = show({ src: MOVIE, reveal: 'manual' });
     const below = show({ src: MOVIE }, 'width: 100px; height: 100px; margin-top: 5000px');
     await Promise.all([covered.play(), below.play()]);

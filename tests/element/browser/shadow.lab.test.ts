@@ -102,7 +102,7 @@ describe('shadow-intensity', () => {
     assert(light >= 197, `${light} under nothing, ${dark} before`);
   });
 
-  it('is cast by meshes, and nobody picks it', async () => {
+  it('is cast by meshes, and cannot be picked', async () => {
     const element = await shown({ 'shadow-intensity': '1' });
     const box = document.createElement('splat-mesh');
     Object.assign(box, { src: boxGlb({ half: [0.3, 0.3, 0.3] }), position: [1.2, -0.2, 0] });

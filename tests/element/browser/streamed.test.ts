@@ -158,7 +158,7 @@ describe('a streamed scene', () => {
     }
   });
 
-  it('stays on show where a page is missing, and fails with a name where the first is', async () => {
+  it('stays visible if a page is missing, and fails with a name if the first is', async () => {
     const warned: string[] = [];
     const original = console.warn;
     console.warn = (message: unknown) => void warned.push(String(message));
@@ -201,7 +201,7 @@ describe('a streamed scene', () => {
     stop();
   });
 
-  itInLab("comes by way of the page's own thread where workers are refused", async () => {
+  itInLab("'is loaded on the main thread if workers are refused'", async () => {
     const original = GaussianSplatElement.sceneLoader;
     const Loader = original.constructor as new (spawn: () => Worker) => typeof original;
     GaussianSplatElement.sceneLoader = new Loader(() => new Worker('/net/status/404', { type: 'module' }));

@@ -81,7 +81,7 @@ describe('flyTo', () => {
     assertEqual(await flight, false, 'arrived');
   });
 
-  it('gives way to hands, to attributes and to another flight: false', async () => {
+  it('is interrupted by gestures, attributes and another flight: false', async () => {
     const element = await scene();
     const takers = [
       () =>
@@ -100,7 +100,7 @@ describe('flyTo', () => {
     }
   });
 
-  it('is there at once for people who want less motion, and arrives out of sight', async () => {
+  it('jumps for visitors who want less motion, and arrives off-screen', async () => {
     const element = await scene();
     await emulateMedia({ reducedMotion: 'reduce' });
     try {
@@ -116,7 +116,7 @@ describe('flyTo', () => {
     element.style.marginTop = '5000px';
     await delay(300);
     assertEqual(await element.flyTo({ orbit: '45deg 90deg 8m' }, { duration: 20_000 }), true);
-    near(theta(element), 45, 'theta out of sight');
+    near(theta(element), 45, 'theta off-screen');
   });
 
   it('takes a camera of a training, and refuses what is no view', async () => {
@@ -217,7 +217,7 @@ describe('a list of views', () => {
     await claimComing(/console\.warn: <gaussian-splat> views: .*view\.orbit/);
   });
 
-  itInLab('is a path: by a share of it, and in time', async () => {
+  itInLab('is a path: by a fraction of it, and in time', async () => {
     const element = await scene({ views: VIEWS });
     await element.seekPath(0.5);
     near(theta(element), 90, 'in the middle is the second of three');

@@ -61,7 +61,7 @@ afterEach(async () => {
   scrollTo(0, 0);
 });
 
-describe('nobody loses the scene', () => {
+describe('visitors never lose the scene', () => {
   const random = randomSource(11);
   const point = (): number[] => [Math.round(random() * WIDTH), Math.round(random() * HEIGHT)];
   /** The same events as from a hand, without the browser's time between them. */
@@ -78,7 +78,7 @@ describe('nobody loses the scene', () => {
     ways.forEach(([, to], id) => report('pointerup', to, id));
   };
 
-  it('by 100 gestures of fingers: it is in sight, or one tap on the button away', async () => {
+  it('by 100 gestures of fingers: it is visible, or one tap on the button away', async () => {
     const element = await scene({ 'touch-action': 'none' });
     const { radius } = element.getCameraOrbit();
     let away = 0;
@@ -97,7 +97,7 @@ describe('nobody loses the scene', () => {
     assert(away < 10, `${away} times of 10`);
   });
 
-  it('by 100 gestures of a mouse: it is in sight, or a double click away', async () => {
+  it('by 100 gestures of a mouse: it is visible, or a double click away', async () => {
     const element = await scene({ zoom: 'always' });
     const { radius } = element.getCameraOrbit();
     for (let i = 0; i < 100; i++) {
@@ -114,7 +114,7 @@ describe('nobody loses the scene', () => {
     }
   });
 
-  it('two swipes of two fingers and ten right drags leave it in sight', async () => {
+  it('two swipes of two fingers and ten right drags leave it visible', async () => {
     const element = await scene();
     for (let i = 0; i < 2; i++) await swipe([[[60, 30], [60, 150]], [[140, 30], [140, 150]]]); // prettier-ignore
     assert((await seenPixels(element)) > 100, 'after swipes');
@@ -122,7 +122,7 @@ describe('nobody loses the scene', () => {
     assert((await seenPixels(element)) > 100, 'after drags');
   });
 
-  it('a double tap beside the scene brings it back, but for disable-tap', async () => {
+  it('a double tap beside the scene brings it back, except with disable-tap', async () => {
     const element = await scene({ 'touch-action': 'none', 'camera-orbit': '0deg 90deg 8m' });
     await swipe([[[100, 80], [60, 80]]]); // prettier-ignore
     const turned = theta(element);
@@ -201,7 +201,7 @@ describe('a camera attribute counts whenever it is set', () => {
 describe('the wheel', () => {
   const radius = (element: GaussianSplatElement): number => element.getCameraOrbit().radius;
 
-  it('scrolls a page past a scene that nobody has chosen, and zooms with Ctrl and after a click', async () => {
+  it('scrolls a page past a scene without the focus, and zooms with Ctrl and after a click', async () => {
     const element = await scene();
     document.body.style.height = '5000px';
     const before = radius(element);

@@ -113,7 +113,7 @@ describe('VR by WebGPU', () => {
       const cloud = await readCompass();
       buttonOf(element)!.click();
       assert(binding.asked[0]?.includes('webgpu') === true, 'asked in the click');
-      await until(() => binding!.frames > 4, 'a picture in the headset', LIMIT_MS);
+      await until(() => binding!.frames > 4, 'a frame in the headset', LIMIT_MS);
       for (const eye of ['left', 'right'] as const) {
         const decibels = closeness(element, cloud, eye, await binding.pixels(eye), binding.size);
         console.log(`${layout}, ${eye} eye: ${decibels.toFixed(1)} dB`);
@@ -222,7 +222,7 @@ describe('VR by WebGPU', () => {
     await page.play();
     await until(() => page.currentTime > 0, 'the clip to play', LIMIT_MS);
     buttonOf(page)!.click();
-    await until(() => binding!.frames > 1, 'a picture in the headset', LIMIT_MS);
+    await until(() => binding!.frames > 1, 'a frame in the headset', LIMIT_MS);
     const [begin, before] = [performance.now(), page.currentTime];
     await until(() => page.currentTime > before + 0.05, 'the clip to play in the headset', LIMIT_MS);
     await leave(page);

@@ -66,7 +66,7 @@ async function enter(element: GaussianSplatElement): Promise<void> {
     xr().requestSession = requestSession;
   }
   await until(() => element.getAttribute('vr-status') === 'session-started', 'the session', LIMIT_MS);
-  await until(() => isDrawn(), 'a picture in the headset', LIMIT_MS);
+  await until(() => isDrawn(), 'a frame in the headset', LIMIT_MS);
 }
 
 function isDrawn(): boolean {

@@ -171,7 +171,7 @@ describe('navigation="walk"', () => {
     await until(() => away() > 0.3, 'a walk');
   });
 
-  it('Home returns to the start, and a view that has moved the camera is where the walk goes on', async () => {
+  it('Home returns to the start, and a walk continues from a view that has moved the camera', async () => {
     const element = await walkIn(room(5));
     const start = eyeOf(element);
     press(element, 'keydown', 'KeyW');

@@ -107,11 +107,11 @@ async function assertSame(attributes: Readonly<Record<string, string>>): Promise
     element.remove();
   }
   const found = decibels(images[0], images[1]);
-  assert(found >= MIN_DB, `${JSON.stringify(attributes)}: ${found.toFixed(1)} dB from WebGPU's picture`);
+  assert(found >= MIN_DB, `${JSON.stringify(attributes)}: PSNR ${found.toFixed(1)} dB against WebGPU`);
 }
 
 describe('renderer="webgl"', () => {
-  it("draws WebGPU's picture, from all sides", async () => {
+  it("draws WebGPU's frame, from all sides", async () => {
     for (const orbit of ['0deg 90deg 8m', '130deg 60deg 5m', '-75deg 120deg 2m'])
       await assertSame({ 'camera-orbit': orbit });
     await assertSame({ quality: 'reference', 'max-sh-degree': '1', src: '/demo/dist/scenes/skull.spz' });
@@ -122,7 +122,7 @@ describe('renderer="webgl"', () => {
       await assertSame({ filter, 'camera-orbit': '30deg 75deg 20m' });
   });
 
-  itInLab('pictures of any size, over a color, are those of WebGPU', async () => {
+  itInLab('images of any size, over a color, are those of WebGPU', async () => {
     const options = { width: 333, height: 111, background: 'rgb(40 80 120)' };
     const taken = [];
     for (const renderer of ['webgl', 'webgpu']) {
@@ -134,7 +134,7 @@ describe('renderer="webgl"', () => {
         image.every((value, i) => i % 4 !== 3 || value === 255),
         'nothing is transparent',
       );
-      assertEqual(decibels(await pixelsOf(element), before), Infinity, 'the picture on show stays');
+      assertEqual(decibels(await pixelsOf(element), before), Infinity, 'the visible frame stays');
       taken.push(image);
       element.remove();
     }
@@ -150,7 +150,7 @@ describe('renderer="webgl"', () => {
     assertEqual(element.shadowRoot!.querySelector('canvas')!.toDataURL(), element.toDataURL(), 'the picture');
   });
 
-  itInLab('a picture that is read at once is of the camera of now', async () => {
+  itInLab('an image that is read at once has the current camera', async () => {
     const element = await showLoaded(WEBGL);
     element.setAttribute('camera-orbit', '180deg 70deg 6m');
     element.jumpCameraToGoal();
@@ -166,7 +166,7 @@ describe('renderer="webgl"', () => {
     await delay(500);
     // A canvas of copies can be read at any time.
     const shown = canvas().toDataURL();
-    assertEqual(shown, element.toDataURL(), 'the picture on the screen');
+    assertEqual(shown, element.toDataURL(), 'the frame on the screen');
     await frames(3);
     const before = draws;
     await delay(500);
@@ -243,7 +243,7 @@ describe('renderer="webgl"', () => {
     element.remove();
   });
 
-  it('a lost context comes back with the same picture', async () => {
+  it('a lost context comes back with the same frame', async () => {
     const element = await showLoaded(WEBGL);
     const before = await pixelsOf(element);
     const restored = nextEvent(element, 'contextrestored');
@@ -266,7 +266,7 @@ describe('renderer="webgl"', () => {
     await until(() => gl.isContextLost(), 'the end of the context');
   });
 
-  it('a scene whose order does not come gives way to the next one', async () => {
+  it('a scene whose order does not arrive is replaced by the next one', async () => {
     const original = ElementClass.sceneLoader;
     const Loader = original.constructor as new (spawn: () => Worker) => typeof original;
     const script = new URL('/packages/element/dist/loading/scene-worker.js', location.href).href;
@@ -437,7 +437,7 @@ describe('scenes and meshes beside the scene', () => {
 });
 
 describe('without WebGPU', () => {
-  it('WebGL draws by itself', async () => {
+  it('WebGL draws automatically', async () => {
     await withoutGpu(async () => {
       const element = await showLoaded({ ...WEBGL, renderer: 'auto', src: `${FIXTURES}compass.ply` });
       assertEqual(element.stats?.renderer, 'webgl', 'renderer');

@@ -27,7 +27,7 @@ const codeOf = (file: Uint8Array): Promise<unknown> =>
   );
 
 describe('a gzip file', () => {
-  it('is read whatever stands behind its end', async () => {
+  it('is read with any data after its end', async () => {
     const file = await gzipped(inflatedSpz(700));
     assertEqual(await codeOf(file), 700, 'without');
     for (const behind of [[0, 0, 0], [10], [...'junk'].map((letter) => letter.charCodeAt(0))]) {

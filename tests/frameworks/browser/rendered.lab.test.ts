@@ -22,7 +22,7 @@ describe('an element that something else renders', () => {
     );
   });
 
-  it('loads anew for another contract, and not for another object that says the same', async () => {
+  it('loads again for another contract, and not for an equal object', async () => {
     const element = await showLoaded();
     let starts = 0;
     element.addEventListener('loadstart', () => starts++);

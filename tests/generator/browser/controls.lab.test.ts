@@ -86,7 +86,7 @@ it('axe finds nothing in them in light, dark and forced colors; the keyboard rea
   assertEqual(element.shadowRoot!.activeElement?.id, 'view', 'where the keyboard is');
 });
 
-it('visitors who ask for less motion: a child does not play by itself, views and the way back jump', async () => {
+it('visitors who ask for less motion: a child does not play automatically, views and the way back jump', async () => {
   await emulateMedia({ reducedMotion: 'reduce' });
   const { element, child } = await showAll();
   assertEqual(child.paused, true, 'the child stands still');

@@ -54,7 +54,7 @@ for (const form of someOf(FORMS, 3)) {
 }
 
 itInLab(
-  'the place of a camera, -(R^T t), is what the file says it is, whatever the optimizer of the runtime makes of it',
+  "the position of a camera, -(R^T t), is the file's, for any optimization of the runtime",
   async () => {
     const url = `${FIXTURES}spelled-eye.onnx`;
     const c = Math.cos(1);
@@ -78,7 +78,7 @@ itInLab(
   },
 );
 
-it('what no list knows is found by the comparison: the model goes on on the CPU, with the reason, and what is on show is made anew', async () => {
+it('an unlisted fault is found by the comparison: the model continues on the CPU, with the reason, and the visible frame is computed again', async () => {
   const url = `${FIXTURES}spelled-hidden.onnx`;
   const { generator, reasons, sink } = await opened(url);
   assertEqual([generator.kind, sink.runs.length], ['captured', 1], 'the first run');
@@ -126,7 +126,7 @@ itInLab('a model with a state is compared with its first state, which the first 
   generator.close();
 });
 
-itInLab('a page that lets no worker be started goes on as before', async () => {
+itInLab('a page that forbids workers continues as before', async () => {
   const workers = countWorkers(() => {
     throw new Error('no workers here');
   });

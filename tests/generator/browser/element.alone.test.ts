@@ -111,7 +111,7 @@ describe('a generator in the element', () => {
     assert(count > 500, `${count} pixels are covered`);
   });
 
-  it('follows the attribute time, and says when the frame is on show', async () => {
+  it('follows the attribute time, and reports when the frame is visible', async () => {
     const element = await showLoaded({ src: BALL });
     const still = await imageOf(element);
     const [seeking, seeked] = [nextEvent(element, 'seeking'), nextEvent(element, 'seeked')];
@@ -230,7 +230,7 @@ describe('a generator in the element', () => {
     assertEqual(free.getCameraTarget().toString(), before, 'framed anew');
   });
 
-  it('a pose that does not fit is told once, and the last good frame stays', async () => {
+  it('an invalid pose is reported once, and the last good frame stays', async () => {
     const element = await showLoaded({ src: `${FIXTURES}split.onnx` });
     const before = await imageOf(element);
     let faults = 0;
@@ -241,7 +241,7 @@ describe('a generator in the element', () => {
     element.setAttribute('camera-orbit', '40deg 75deg auto');
     await delay(500);
     assertEqual([faults, element.loaded, element.error], [1, true, null]);
-    assert((await imageOf(element)).count > 0.5 * before.count, 'the picture is gone');
+    assert((await imageOf(element)).count > 0.5 * before.count, 'the frame is gone');
   });
 
   it('makes no buffer and reads nothing back while it plays', async () => {
@@ -276,7 +276,7 @@ describe('a generator in the element', () => {
     assertEqual([a.stats?.splats, b.stats?.splats], [64, 64]);
   });
 
-  it('is slow: orbiting goes on at its own rate, and the latest time is shown in the end', async () => {
+  it('is slow: orbiting continues at its own rate, and the latest time is shown in the end', async () => {
     const element = await showLoaded({ src: `${FIXTURES}heavy.onnx` });
     let frames = 0;
     const shown: number[] = [];
@@ -327,7 +327,7 @@ describe('a generator in the element', () => {
     await restored;
     assert(element.loaded && !element.paused, 'shown and playing');
     await delay(400);
-    assert((await imageOf(element)).count > 500, 'the picture is back');
+    assert((await imageOf(element)).count > 500, 'the frame is back');
     element.pause();
   });
 });

@@ -93,7 +93,7 @@ describe('every family on the GPU', () => {
   });
 
   for (const name of [...GENERATORS, ...HALVES]) {
-    it(`${name}: the CPU's numbers, the CPU's picture, and nothing made on the frame path`, async function () {
+    it(`${name}: the CPU's numbers, the CPU's image, and no allocation on the frame path`, async function () {
       const isHalf = HALVES.includes(name);
       if (isHalf && !device.features.has('shader-f16')) {
         console.log(`${name}: not run, this adapter has no shader-f16`);
@@ -131,7 +131,7 @@ describe('every family on the GPU', () => {
   }
 
   for (const name of ['style', 'noise']) {
-    it(`${name}: the CPU's picture, and nothing made on the frame path`, async () => {
+    it(`${name}: the CPU's image, and no allocation on the frame path`, async () => {
       const url = `${FAMILIES}${name}.onnx`;
       let found: Promise<Uint8Array> | undefined;
       let isReading = true;

@@ -223,7 +223,7 @@ describe('a fault that the scene survives', () => {
     assert(element.loaded && neighbor.loaded, 'both are back');
   });
 
-  it('an element that leaves while it runs: the others go on', async () => {
+  it('an element that is removed while it runs: the others continue', async () => {
     const element = await showLoaded({ src: `${FIXTURES}heavy.onnx` });
     const neighbor = await showLoaded({ src: BALL });
     element.currentTime = 4;
@@ -251,8 +251,8 @@ describe('a fault that the scene survives', () => {
   });
 });
 
-describe('faults of pages that use the generator by itself', () => {
-  itInLab('generators that follow one another in a circle, or nobody', async () => {
+describe('faults of pages that use the generator without the element', () => {
+  itInLab('generators that follow one another in a circle, or no other', async () => {
     const models = new GaussianModels();
     models.registerGaussianGenerator('body', { url: `${FIXTURES}link-fixed.onnx` }, { after: 'clothes' });
     models.registerGaussianGenerator('clothes', { url: `${FIXTURES}link-fixed.onnx` }, { after: 'body' });

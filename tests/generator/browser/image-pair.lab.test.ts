@@ -31,7 +31,7 @@ async function image(seed: number): Promise<Blob> {
 
 const poseAt = (x: number): number[] => [1, 0, 0, x, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1];
 
-it('a pair of pictures and their pose are taken in one run, and a picture that fails does not hold up the rest', async () => {
+it('a pair of images and their pose are taken in one run, and an image that fails does not delay the rest', async () => {
   const errors: string[] = [];
   const [first, second] = [await image(0), await image(90)];
   const urls = [first, second].map((blob) => URL.createObjectURL(blob));
@@ -54,7 +54,7 @@ it('a pair of pictures and their pose are taken in one run, and a picture that f
   await delay(1000);
   assertEqual(runs.count - before, 1, 'runs for a pair and its pose');
   element.inputValues = { image: third, image_2: '/net/status/404', relative_pose: poseAt(-0.2) };
-  await until(() => errors.length > 0, 'word of the picture that is missing');
+  await until(() => errors.length > 0, 'error of the missing image');
   await until(() => runs.count === before + 2, 'a run with the pose');
   assert(/404/.test(errors[0]), errors[0]);
 });

@@ -119,7 +119,7 @@ describe('a post-processor', () => {
     // Float16 without the device feature runs on the CPU: the image is read back and uploaded again.
     ['post-half.onnx', 9, 7, 'float16', 'wasm'],
   ] as const) {
-    it(`${name}: what it is told to make of a picture, twice, and nothing for the same again`, async () => {
+    it(`${name}: its result for an image, twice, and no run for the same one again`, async () => {
       const images: number[][] = [];
       const reading: Promise<void>[] = [];
       const errors: unknown[] = [];
@@ -151,7 +151,7 @@ describe('a post-processor', () => {
     });
   }
 
-  it('is not recorded where a recording would show the first picture for ever', async () => {
+  it('is not recorded if a recording would show the first image for ever', async () => {
     const reading: Promise<Uint8Array>[] = [];
     const post = await PostProcessor.open({ url: `${FIXTURES}filter-copied.onnx` }, device, {
       onError: reportError,
@@ -164,7 +164,7 @@ describe('a post-processor', () => {
       await post.idle;
     }
     const found = (await Promise.all(reading)).map((bytes) => Math.round(510 * numbersOf(bytes, 'float32')[100]));
-    assertEqual(found, [255, 51, 0], 'half of each picture');
+    assertEqual(found, [255, 51, 0], 'half of each image');
     post.close();
     tensor.destroy();
   });
@@ -213,7 +213,7 @@ describe('a post-processor', () => {
     frame.destroy();
   });
 
-  it('one after the other: each takes the picture of the one before', async () => {
+  it('one after the other: each takes the image of the previous one', async () => {
     let image: Promise<Uint8Array> | undefined;
     const urls = ['post.onnx', 'post-fixed.onnx', 'post.onnx'].map((name) => ({ url: FIXTURES + name }));
     const open = PostProcessor.open(urls, device, {
@@ -235,7 +235,7 @@ describe('a post-processor', () => {
     tensor.destroy();
   });
 
-  it('is none that writes Gaussians, takes Gaussians, or takes no picture', async () => {
+  it('is none that writes Gaussians, takes Gaussians, or takes no image', async () => {
     const found: Record<string, string> = {};
     for (const name of ['packed.onnx', 'link-fixed.onnx', 'picture.onnx']) {
       found[name] = await codeOf(PostProcessor.open({ url: FIXTURES + name }, device, { onImage: () => undefined }));
@@ -244,8 +244,8 @@ describe('a post-processor', () => {
   });
 });
 
-describe('Gaussians made of a picture', () => {
-  it('are those of the CPU, anew for another picture, and a missing picture is named', async () => {
+describe('Gaussians made from an image', () => {
+  it('are those of the CPU, computed again for another image, and a missing image is named', async () => {
     const generator = await Generator.open({ url: `${FIXTURES}picture.onnx` }, device, { onError: reportError });
     const sink = (generator.sink = new ReadingSink(device));
     let code = 'none';
@@ -262,7 +262,7 @@ describe('Gaussians made of a picture', () => {
     };
     await ask();
     await ask();
-    assertEqual(sink.runs.length, 1, 'runs for one picture');
+    assertEqual(sink.runs.length, 1, 'runs for one image');
     const rows = numbersOf(await sink.runs[0].tensors.gaussians, 'float32');
     const planes = resampled(pixels, [24, 16], [8, 8], 'cover');
     const colors = Array.from({ length: 64 }, (_, i) => [0, 1, 2].map((c) => rows[13 * i + 9 + c])).flat();
@@ -299,7 +299,7 @@ describe('Gaussians made of a picture', () => {
     tensor.destroy();
   });
 
-  it('are made anew where their rows get their shape last of all', async () => {
+  it('are computed again if their rows get their shape last of all', async () => {
     const generator = await Generator.open({ url: `${FIXTURES}picture-copied.onnx` }, device, { onError: reportError });
     const sink = (generator.sink = new ReadingSink(device));
     const tensor = new ImageTensor(device, { width: 8, height: 8, dtype: 'float32' });
@@ -310,7 +310,7 @@ describe('Gaussians made of a picture', () => {
     }
     const rows = await Promise.all(sink.runs.map(({ tensors }) => tensors.gaussians));
     const found = rows.map((bytes) => Math.round(255 * numbersOf(bytes, 'float32')[10]));
-    assertEqual(found, [255, 51, 0], 'colors of each picture');
+    assertEqual(found, [255, 51, 0], 'colors of each image');
     generator.close();
     tensor.destroy();
   });
@@ -390,7 +390,7 @@ describe('a chain', () => {
       'rows that may change into rows that may not': ['link.onnx', 'link-fixed.onnx'],
       'the wrong way round': ['link-fixed.onnx', 'packed.onnx'],
       'two that make Gaussians': ['packed.onnx', 'packed.onnx'],
-      'a picture in the end': ['packed.onnx', 'post.onnx'],
+      'an image in the end': ['packed.onnx', 'post.onnx'],
       'a live count that gets lost': ['faulty-values.onnx', 'link-fixed.onnx'],
     };
     for (const [name, files] of Object.entries(cases)) {

@@ -212,7 +212,7 @@ describe('instances of one generator', () => {
     assertEqual(errors, []);
   });
 
-  it('are ready each by itself, though another never rests', async () => {
+  it('are ready independently, though another never rests', async () => {
     const [player, other] = [await open('avatar-instances'), await open('avatar-instances')];
     let plays = true;
     let number = 0;

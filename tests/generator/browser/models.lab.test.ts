@@ -5,7 +5,7 @@ import { assert, assertEqual, delay, nextEvent, until } from '../../element/brow
 import { FIXTURES, makeDevice } from './support.js';
 
 describe('models of a page', () => {
-  it('register, load, add, run, and hear of frames', async () => {
+  it('register, load, add, run, and are notified of frames', async () => {
     const device = await makeDevice();
     const models = new GaussianModels();
     models.registerGaussianGenerator('ball', { url: `${FIXTURES}packed.onnx` });

@@ -74,7 +74,7 @@ it('turning the camera while a generator takes 300 ms a run draws as many frames
   console.log(
     `${without.toFixed(1)} frames a second without runs, ${beside.toFixed(1)} beside ${slow.runs} runs of ${RUN_MS} ms in ${slow.ms.toFixed(0)} ms`,
   );
-  assert(still.runs <= 2, `${still.runs} runs while nothing plays, but for the last one of each time`);
+  assert(still.runs <= 2, `${still.runs} runs while nothing plays, except for the last one of each time`);
   assert(slow.runs >= 2 && slow.runs <= slow.ms / RUN_MS + 3, `${slow.runs} runs: one at a time, and none without end`);
   assert(beside >= 0.6 * without, `${beside} frames a second beside the generator, ${without} without`);
   // The last request is visible: the same image as from a new element.

@@ -68,11 +68,11 @@ describe('a post-processor in the element', () => {
       await untilLight(element, (mean) => mean < plain.mean - 2, 'a darker picture');
       const dark = await lightOf(element);
       // Three images of its size, eight bytes a pixel, and the tensor for the model.
-      assert(element.stats!.bytes.frames > plainBytes + 24 * 120 * 100, 'stats count its pictures');
+      assert(element.stats!.bytes.frames > plainBytes + 24 * 120 * 100, 'stats count its images');
       assert(dark.covered > 0.5 * plain.covered, `${plain.covered} pixels were covered, now ${dark.covered}`);
       assertEqual((await screenOf(element)).at(1, 1), [255, 255, 255], 'the ground of the page');
       element.setAttribute('control-gain', '1');
-      await untilLight(element, (mean) => Math.abs(mean - plain.mean) < 1.5, 'the picture as it was');
+      await untilLight(element, (mean) => Math.abs(mean - plain.mean) < 1.5, 'the unprocessed frame');
       element.setAttribute('control-gain', '0');
       await untilLight(element, (mean) => mean < plain.mean - 2, 'a darker picture');
       element.removeAttribute('postprocess');
@@ -96,7 +96,7 @@ describe('a post-processor in the element', () => {
     );
   });
 
-  itInLab('that is slow does not hold up the camera, and shows its picture when it rests', async () => {
+  itInLab('that is slow does not delay the camera, and shows its image at rest', async () => {
     const element = await showLoaded(
       { src: COMPASS, postprocess: `${FIXTURES}post-slow.onnx`, 'control-gain': '0' },
       STYLE,
@@ -112,10 +112,10 @@ describe('a post-processor in the element', () => {
     await frames(2);
     assert(moves >= 10, `${moves} frames were drawn while it ran`);
     const settled = await lightOf(element);
-    await untilLight(element, (mean) => mean < 250, `the processed picture again (${settled.mean})`);
+    await untilLight(element, (mean) => mean < 250, `the processed frame again (${settled.mean})`);
   });
 
-  it('tells of a control that neither it nor the scene has, and of no other', async () => {
+  it('reports a control that neither it nor the scene has, and no other', async () => {
     const reported: ElementError[] = [];
     const attributes = { postprocess: `${FIXTURES}post.onnx`, 'control-gain': '0', 'control-gaim': '1' };
     const element = show({ src: BALL, ...attributes }, STYLE);
@@ -134,10 +134,10 @@ describe('a post-processor in the element', () => {
     const before = await lightOf(element);
     element.style.cssText = 'width: 200px; height: 160px; background: white';
     await delay(300);
-    await untilLight(element, (mean) => Math.abs(mean - before.mean) < 12, 'the processed picture, larger');
+    await untilLight(element, (mean) => Math.abs(mean - before.mean) < 12, 'the processed frame, larger');
   });
 
-  itInLab('that is slow keeps no picture of the sizes that pass meanwhile', async () => {
+  itInLab('that is slow keeps no image of intermediate sizes', async () => {
     const element = await showLoaded(
       { src: COMPASS, postprocess: `${FIXTURES}post-slow.onnx`, 'control-gain': '0' },
       STYLE,
@@ -281,7 +281,7 @@ describe('a picture as a control', () => {
     const event = nextEvent<CustomEvent<ElementError>>(element, 'generator-error');
     element.inputValues = { image: '/net/status/404' };
     assertEqual((await event).detail.reason, 'network/status');
-    assert(element.loaded && (await count(1)) > 100, 'the last picture stays');
+    assert(element.loaded && (await count(1)) > 100, 'the last image stays');
     const bytes = await (await fetch(await photo('blue', 'blue'))).blob();
     element.inputValues = { image: await createImageBitmap(bytes) };
     await untilCounts(([, green, blue]) => blue > 200 && green < 20, 'blue');

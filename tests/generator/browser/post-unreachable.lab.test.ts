@@ -21,7 +21,7 @@ globalThis.fetch = (input, init) => {
 };
 
 describe('a post-processor whose runtime cannot be had', () => {
-  it('is told of once, costs nothing afterwards, and is tried again when something changes', async () => {
+  it('is reported once, costs nothing afterwards, and is tried again when something changes', async () => {
     const element = await showLoaded({ quality: 'default' });
     const reported: ElementError[] = [];
     element.addEventListener('generator-error', ({ detail }) => reported.push(detail));

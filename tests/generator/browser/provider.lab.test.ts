@@ -58,7 +58,7 @@ describe('recorded commands', () => {
     '/tests/fixtures/families/classic.onnx',
     `${FIXTURES}split.onnx`,
   ]) {
-    it(`${path.split('/').at(-1)}: every replay writes, byte for byte, what commands made anew write`, async () => {
+    it(`${path.split('/').at(-1)}: every replay writes, byte for byte, the result of new commands`, async () => {
       const model = await openModel({ url: path });
       const runtime = await loadRuntime();
       const poseInput = model.header.inputs.find(({ name }) => model.contract.inputs[name].role === 'pose');

@@ -86,7 +86,7 @@ describe('generators among other scenes', () => {
         if (i % 20 === 19) element.append(movie);
         await frames(1);
       }
-      assert(element.currentTime > 0, 'the time goes on');
+      assert(element.currentTime > 0, 'the time continues');
       element.pause();
       element.append(movie);
       box.rotation = null;
@@ -100,7 +100,7 @@ describe('generators among other scenes', () => {
       }
       await element.ready;
       const isBack = async (): Promise<boolean> => (await screenOf(element)).differences(still, 3) === 0;
-      await until(isBack, 'the picture of the beginning');
+      await until(isBack, 'the frame of the beginning');
       element.append(scene(`${SCENES}green.splat`, '0 -2 0'));
       await element.ready;
       assertEqual(element.stats?.scenes.length, 6, 'the own scene and five children');

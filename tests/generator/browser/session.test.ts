@@ -362,7 +362,7 @@ describe('generators', () => {
     assertEqual(next.runs.length, 1, 'runs on the other device');
   });
 
-  it('that are closed while they run reach nobody', async () => {
+  it('that are closed while they run notify no listener', async () => {
     const generator = await open('packed.onnx');
     const sink = (generator.sink = new ReadingSink(device));
     generator.request({ timeSeconds: 9 });

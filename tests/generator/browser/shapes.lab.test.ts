@@ -44,7 +44,7 @@ it('batches, matrices, a camera to world and a count of 64 bits: the numbers of 
   generator.close();
 });
 
-it('a model goes on from what it wrote in the run before, and begins anew when the time goes back', async () => {
+it('a model continues from the outputs of its last run, and starts again when the time goes back', async () => {
   const device = await makeDevice();
   const sink = new ReadingSink(device);
   const url = `${FIXTURES}state.onnx`;
@@ -66,7 +66,7 @@ it('a model goes on from what it wrote in the run before, and begins anew when t
   generator.close();
 });
 
-describe('what models take, told to the page', () => {
+describe('inputs of models, reported to the page', () => {
   it('inputs, an event when they are others, and none of a scene file', async () => {
     const element = show({ src: `${FIXTURES}state.onnx` });
     let reported = 0;

@@ -28,7 +28,7 @@ import { random, sized } from './support.js';
 const LIMIT_MS = 2_000;
 
 describe('S22: the loss of the device', () => {
-  it('again and again, at any moment of a frame: the same picture, soon, and one pair of events each time', async () => {
+  it('again and again, at any moment of a frame: the same frame, soon, and one pair of events each time', async () => {
     // A page without a device: the cost of a start on this machine, under its current load.
     const began = performance.now();
     const element = await showLoaded({ 'interpolation-decay': '0' });
@@ -75,7 +75,7 @@ describe('S22: the loss of the device', () => {
     assert(times[sized(0, losses >> 1)] <= limit, `back after ${times.map(Math.round).join(', ')} ms`);
   });
 
-  it('while a scene loads: the scene is there in the end, and nobody was told of an error', async () => {
+  it('while a scene loads: the scene is shown in the end, and no error is reported', async () => {
     await showLoaded();
     for (let i = 0; i < sized(3, 20); i++) {
       const element = show({ src: `${COMPASS}?${i}`, loading: 'eager' });

@@ -25,7 +25,7 @@ async function alphaOf(blob: Blob): Promise<number> {
 }
 
 describe('S22: a crash of the GPU process', () => {
-  it('once: the picture is back, and none is empty', async () => {
+  it('once: the frame is back, and none is empty', async () => {
     const element = await showLoaded();
     const expected = await alphaOf(await element.toBlob());
     const events: string[] = [];
@@ -47,7 +47,7 @@ describe('S22: a crash of the GPU process', () => {
     await kill();
     await until(() => element.error !== null, 'what the element says', 60_000);
     assertEqual(element.error?.reason, 'device-lost/unrecoverable');
-    await until(() => element.loaded, 'the picture, without a reload', BLOCKED_MS);
+    await until(() => element.loaded, 'the frame, without a reload', BLOCKED_MS);
     assert((await screenOf(element)).middleOf(isRed) !== null, 'the picture');
   });
 });

@@ -116,7 +116,7 @@ describe('S12: all scenes of a page together', () => {
     }
   });
 
-  it('trusts a phone that says nothing of its memory with 512 MB, a computer with whatever it takes', async () => {
+  it('budgets 512 MB for a phone that does not report its memory, no limit for a computer', async () => {
     const real = globalThis.matchMedia;
     for (const [isCoarse, bytes] of [
       [true, 2 ** 29],
@@ -137,14 +137,14 @@ describe('S12: all scenes of a page together', () => {
   });
 });
 
-describe('S12: scenes out of sight', () => {
+describe('S12: off-screen scenes', () => {
   beforeEach(() => until(() => ledger().bytes === 0, 'an empty ledger'));
   afterEach(() => {
     document.querySelectorAll('.far').forEach((element) => element.remove());
     scrollTo(0, 0);
   });
 
-  it('are dropped for others, and come back in sight without an event', async () => {
+  it('are dropped for others, and come back in the viewport without an event', async () => {
     const first = await showLoaded();
     const one = ledger().bytes;
     // A quarter of the page's limit is less than one scene.
@@ -158,7 +158,7 @@ describe('S12: scenes out of sight', () => {
       second.scrollIntoView();
       await second.ready;
       assert(second.loaded, String(second.error?.message));
-      assertEqual(ledger().bytes, one, 'bytes while the second is in sight');
+      assertEqual(ledger().bytes, one, 'bytes while the second is visible');
       assert(first.loaded, 'for the page the first is there');
       const events: string[] = [];
       for (const type of ['loadstart', 'load-start', 'progress', 'load', 'error', 'contextlost'])
@@ -168,13 +168,13 @@ describe('S12: scenes out of sight', () => {
       const blob = await first.toBlob();
       assert(blob.size > 1000, `an image of ${blob.size} bytes`);
       assertEqual(events, [], 'events');
-      assertEqual(ledger().bytes, one, 'bytes while the first is in sight');
+      assertEqual(ledger().bytes, one, 'bytes while the first is visible');
       second.scrollIntoView();
       await until(() => second.stats !== null && first.stats === null, 'the second in place of the first');
       const box = first.getBoundingBox();
-      assert(box && box.max.x > box.min.x, 'the box of a scene out of sight');
+      assert(box && box.max.x > box.min.x, 'the box of an off-screen scene');
       const image = await first.toBlob();
-      assertEqual(image.size, blob.size, 'bytes of an image that is taken out of sight');
+      assertEqual(image.size, blob.size, 'bytes of an image that is saved off-screen');
     });
   });
 });

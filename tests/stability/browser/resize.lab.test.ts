@@ -5,7 +5,7 @@ import { screenOf } from '../../element/browser/support/screen.js';
 import { random, sized } from './support.js';
 
 describe('S18: resize', () => {
-  it('hundreds of sizes, 0 x 0 among them, end with the picture of a fresh start', async () => {
+  it('hundreds of sizes, 0 x 0 among them, end with the frame of a fresh start', async () => {
     const element = await showLoaded({ 'interpolation-decay': '0' });
     const fresh = await screenOf(element);
     const messages: string[] = [];

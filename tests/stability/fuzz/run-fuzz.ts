@@ -11,11 +11,11 @@ import { judge, type Cause, type Subject, type Verdict } from './judge.js';
 const USAGE = `usage: npm run lab:fuzz -- [options]
 
   --cases N        scenes (default 10000)
-  --minutes M      stop after so many minutes (default 240)
+  --minutes M      stop after M minutes (default 240)
   --seed S         default: the time; the report names it
   --rasterizer R   quads (default) or tiles
-  --below DB       shrink the first picture, too, that is under so many dB where no rounding decides, whatever its cause
-  --out FILE       where to write the report as JSON
+  --below DB       also shrink the first frame below DB dB that no rounding explains, for any cause
+  --out FILE       file for the report, as JSON
 `;
 
 interface Tally {

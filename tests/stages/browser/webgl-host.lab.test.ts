@@ -196,7 +196,7 @@ describe("splats in a host's frame", () => {
         max = Math.max(max, Math.abs(value - (isInside(i) ? inside : outside)[i]));
         hidden += isInside(i) ? Math.abs(value - outside[i]) : 0;
       });
-      assert(max <= 2, `${max} of 255 from our own picture with that depth`);
+      assert(max <= 2, `${max} of 255 from our own image with that depth`);
       assert(hidden > 1000, 'the box hides nothing');
       const untouched = read(gl, 0, 0, { ...camera, width: X, height: Y });
       assert(

@@ -131,7 +131,7 @@ const ROUNDING = 0.01;
 function checkWhole({ listed, shares }: Cut, view: DetailView, what: string): void {
   for (const chunk of listed) {
     if (isNear(packed.details!, chunk, view, view.fade + ROUNDING)) continue;
-    check(shares[chunk] === 1, `${what}: chunk ${chunk}, which does not fade, has a share of ${shares[chunk]}`);
+    check(shares[chunk] === 1, `${what}: chunk ${chunk}, which does not fade, has a fraction of ${shares[chunk]}`);
   }
 }
 
@@ -194,7 +194,7 @@ export const detailCases: readonly StageCase[] = [
         const view = randomView(random, k);
         looked += checkCovered(await cutOnGpu(bench, packed, view), view, `view ${k}`);
       }
-      check(looked > 1000, `only ${looked} chunks were looked into`);
+      check(looked > 1000, `only ${looked} chunks were read`);
     },
   },
   {

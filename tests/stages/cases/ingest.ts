@@ -198,7 +198,7 @@ const hostile: StageCase = {
 };
 
 const counted: StageCase = {
-  name: 'ingest: the live count on the GPU decides, whatever it says, and rows behind it are not drawn',
+  name: 'ingest: the count on the GPU decides, for any value, and rows behind it are not drawn',
   async run(bench) {
     const { cloud } = smallRoom();
     const { layout, tensors } = writeTensors(cloud, PLAIN);

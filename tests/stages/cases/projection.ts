@@ -327,7 +327,7 @@ export const projectionCases: readonly StageCase[] = [
       const { cloud, camera } = twoPlaces();
       const { chunksSeen } = await cullOnGpu(bench, packGaussians(cloud), camera);
       const all = cullGroups(cloud.count);
-      check(chunksSeen > 0 && chunksSeen < 0.6 * all, `${chunksSeen} of ${all} chunks were looked into`);
+      check(chunksSeen > 0 && chunksSeen < 0.6 * all, `${chunksSeen} of ${all} chunks were read`);
       await checkCull(bench, cloud, camera);
     },
   },

@@ -140,7 +140,7 @@ describe('splats in a three.js scene', () => {
       // The end at -x moves towards the viewer or away with rotation.y; in either case one is in front.
       const [left, right] = [WIDTH / 2 - 30, WIDTH / 2 + 30];
       const [front, back] = isNear(at(crossed, left, y), at(barAlone, left, y), 1) ? [left, right] : [right, left];
-      assert(isNear(at(barAlone, front, y), [255, 32, 0], 2), `the bar is there: ${at(barAlone, front, y)}`);
+      assert(isNear(at(barAlone, front, y), [255, 32, 0], 2), `the bar is visible: ${at(barAlone, front, y)}`);
       assert(isNear(at(crossed, front, y), at(barAlone, front, y), 1), `in front: ${at(crossed, front, y)}`);
       assert(!isNear(at(crossed, back, y), at(barAlone, back, y), 30), `behind: ${at(crossed, back, y)}`);
       if (back < WIDTH / 2) assert(isNear(at(crossed, back, y), at(wallAlone, back, y), 4), 'the opaque half hides it');
@@ -170,7 +170,7 @@ describe('splats in a three.js scene', () => {
       assert(worst(shown(canvas), crossed) <= 1, 'after another camera as before');
       scene.remove(placed);
       splats.render(scene, perspective);
-      assert(worst(shown(canvas), barAlone) <= 1, 'removed from the graph, gone from the picture');
+      assert(worst(shown(canvas), barAlone) <= 1, 'removed from the graph, absent from the frame');
       const error = await device.popErrorScope();
       assert(error === null, error?.message ?? '');
       splats.dispose();
@@ -208,7 +208,7 @@ describe('splats in a three.js scene', () => {
     const twin = new SplatScene(ball.gaussians);
     scene.remove(ball);
     scene.add(twin);
-    assert(worst(draw(), first) === 0, 'as its Gaussians are drawn by themselves');
+    assert(worst(draw(), first) === 0, 'as its Gaussians are drawn alone');
     scene.remove(twin);
     scene.add(ball);
     ball.position.set(1, 0, 0);
@@ -230,7 +230,7 @@ describe('splats in a three.js scene', () => {
       `the eye in its own frame: ${eye(own).join(' ')}`,
     );
     model.remove();
-    assert(worst(draw(), nothing) === 0, 'gone from the graph, gone from the picture');
+    assert(worst(draw(), nothing) === 0, 'absent from the graph and from the frame');
     models.clear();
     splats.dispose();
     renderer.dispose();

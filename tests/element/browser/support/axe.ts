@@ -28,7 +28,7 @@ async function axeIn(page: Document): Promise<Axe> {
 
 export async function violations(page: Document, options?: object): Promise<string[]> {
   const { violations, passes } = await (await axeIn(page)).run(page, options);
-  assert(passes.length > 0, 'axe has looked at something');
+  assert(passes.length > 0, 'axe has checked something');
   return violations.map(
     ({ id, help, nodes }) => `${id}: ${help}: ${nodes.map(({ html }) => html.slice(0, 160)).join(' | ')}`,
   );

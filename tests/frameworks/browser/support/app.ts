@@ -87,7 +87,7 @@ export function describeApp(name: string, { page, mounts, effects }: AppUnderTes
       await until(() => Number(app.text('moves')) > 3, 'camera-change');
     });
 
-    it('swaps its source on the same element, and hears the time of a scene that moves', async () => {
+    it('swaps its source on the same element, and is notified of the time of an animated scene', async () => {
       const app = await open(page);
       const before = await app.shown('compass', 1);
       app.click('swap');
@@ -98,7 +98,7 @@ export function describeApp(name: string, { page, mounts, effects }: AppUnderTes
       await until(() => Number(app.text('times')) > times, 'timeupdate');
     });
 
-    it('tells an error with its code', async () => {
+    it('reports an error with its code', async () => {
       const app = await open(page);
       const splat = await app.shown('compass', 1);
       splat.setAttribute('src', '/net/status/404');

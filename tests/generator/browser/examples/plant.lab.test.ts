@@ -2,7 +2,7 @@ import { assert, assertEqual, until } from '../../../element/browser/support/har
 import { assertShown, changes, open, slide } from './support.js';
 
 describe('the page of trained examples', () => {
-  it('the plant runs on the GPU, is drawn, tells what it costs, and follows its time', async () => {
+  it('the plant runs on the GPU, is drawn, reports its cost, and follows its time', async () => {
     const plant = await open('plant');
     await assertShown(plant, 30_000);
     await changes(plant.element, () => slide(plant.card, '[data-time]', 2.5), 'time');

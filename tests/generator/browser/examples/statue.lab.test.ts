@@ -7,7 +7,7 @@ import { assert, assertEqual, until } from '../../../element/browser/support/har
 import { openCard } from './support.js';
 
 describe('the page of trained examples', () => {
-  it('the statue waits for a click, with two pictures and what their cameras have to do with one another', async () => {
+  it('the statue waits for a click, with two images and the relation of their cameras', async () => {
     const { page, card, element } = await openCard('statue');
     const images = [...card.querySelectorAll<HTMLImageElement>('.given img')];
     await until(() => images.every(({ complete, naturalWidth }) => complete && naturalWidth === 256), 'pictures');

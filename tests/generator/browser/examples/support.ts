@@ -54,7 +54,7 @@ export async function changes(element: GaussianSplatElement, act: () => void, wh
   act();
   const deadline = performance.now() + TIMEOUT_MS;
   while ((await screenOf(element)).differences(before, 10) < 100) {
-    assert(performance.now() < deadline, `${what}: the picture is still the same`);
+    assert(performance.now() < deadline, `${what}: the frame is still the same`);
     await new Promise((resolve) => setTimeout(resolve, 200));
   }
 }
