@@ -78,7 +78,7 @@ for (const name of readdirSync(families)) {
   });
 }
 
-test('values that were run are the ones in the table: a live count follows its control', async () => {
+test('values that were run are the ones in the table: the count of rows follows its control', async () => {
   const { sections } = await checkModel(fixturePath('packed-sh-half.onnx'), { run: true });
   const live = sections.find(({ title }) => title === 'Runs')!.rows.map(([, rows]) => rows);
   assert.deepEqual(live, ['32 of 64 rows', '32 of 64 rows', '32 of 64 rows', '0 of 64 rows', '64 rows']);

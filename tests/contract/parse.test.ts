@@ -83,7 +83,7 @@ const REFUSALS: readonly [what: string, json: unknown, code: string, where: RegE
     /inputs\.b/,
     /a and b/,
   ],
-  ['one tensor twice', withOutputs({ count: 'gaussians' }), 'contract/conflict', /count/, /an output of its own/],
+  ['one tensor twice', withOutputs({ count: 'gaussians' }), 'contract/conflict', /count/, /a separate output/],
   [
     'bounds upside down',
     { ...PACKED, bounds: { min: [0, 2, 0], max: [1, 1, 1] } },

@@ -97,7 +97,7 @@ test('invalid arguments are reported in a line, without a stack trace, and at on
   const cases: [RegExp, ...string[]][] = [
     [/expected one SCENE/],
     [/--out is missing/, scene],
-    [/is a folder, no scene/, folder, '--out', out],
+    [/is a folder, not a scene/, folder, '--out', out],
     [/is no folder/, scene, '--out', scene],
     [/is not empty/, scene, '--out', folder],
     [/--spacing: expected a length/, scene, '--out', out, '--tile', '2x2', '--spacing', 'Infinity'],

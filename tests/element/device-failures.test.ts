@@ -24,7 +24,7 @@ test('a lost device is reported with the words of the browser and a remedy', () 
   const generators = new GaussianSplatError('device-lost/unrecoverable', {
     ...{
       where: 'GPU device of the generator',
-      expected: 'a device that stays',
+      expected: 'an available device',
       found: 'one that was lost',
       remedy: '',
     },

@@ -26,7 +26,7 @@ test('splats beyond the capacity of the device are reported, after they were cou
   const whyOf = (left: number): string =>
     statsOf([scene], { ...context, counts: { drawn: 60, left, contributing: 9 } }).reasons.join();
   assert.equal(whyOf(0), '');
-  assert.match(whyOf(1200), /^1200 splats are not drawn: the GPU allows no buffer/);
+  assert.match(whyOf(1200), /^1200 splats are not drawn, because the GPU does not allow larger buffers/);
 });
 
 test('failures of the self-test are reported', () => {

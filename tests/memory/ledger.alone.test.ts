@@ -63,7 +63,7 @@ test('a scene beyond the budget is refused before the device allocates', async (
   device.createBuffer = createBuffer;
   await assert.rejects(
     DynamicGaussians.create(device, writeTensors(smallCloud(512, 1), SPEC).layout),
-    /generated scene of up to 512 splats: expected at most \d+ bytes \(0\.0 MB\), what is left/,
+    /generated scene of up to 512 splats: expected at most \d+ bytes \(0\.0 MB\) left of/,
   );
   first.destroy();
   (await GaussianBuffers.upload(device, packed)).destroy();

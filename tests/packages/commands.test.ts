@@ -138,7 +138,7 @@ test('gaussian-splat page copies files, not links to them, none from outside of 
   const { text } = command('page', 'links/scene/a.gltf', 'page', '--no-serve');
   assert.match(
     text,
-    /names files that were not copied: \.\.\/real\.ply \(outside of its folder\), a\.ply \(a link out of its folder\), missing\.bin \(not there\)/,
+    /names files that were not copied: \.\.\/real\.ply \(outside of its folder\), a\.ply \(a link out of its folder\), missing\.bin \(missing\)/,
   );
   rmSync(inFolder('page'), { recursive: true });
 });

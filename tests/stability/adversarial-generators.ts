@@ -114,8 +114,8 @@ test('any sequence of runs', async () => {
   holds('S24', 'runs that were refused, by name', refused, { atLeast: 1, unit: 'runs' });
 });
 
-/** A live count in a tensor, which the CPU does not check. */
-test('a live count of any 32 bits shows no row that was not written', async () => {
+/** A count of rows in a tensor, which the CPU does not check. */
+test('a count of any 32 bits shows no unwritten row', async () => {
   const device = await nodeDevice();
   const layout = { ...written.layout, count: 'live' };
   const tensor = device.createBuffer({ size: rows.byteLength, usage: 0x80 | 0x8 });
@@ -138,5 +138,5 @@ test('a live count of any 32 bits shows no row that was not written', async () =
     differing += Math.min(...differences);
     for (const thing of [renderer, gaussians, count]) thing.destroy();
   }
-  holds('S24', 'live counts at random: differing bytes', differing, { atMost: 0, unit: 'bytes' });
+  holds('S24', 'random counts of rows: differing bytes', differing, { atMost: 0, unit: 'bytes' });
 });

@@ -40,7 +40,7 @@ export function draftContract(header: OnnxHeader): Draft {
   }
   const outputs = draftOutputs(header, questions);
   const isOpen = header.outputs.some(({ dims }) => dims?.some((dim) => typeof dim !== 'number'));
-  if (isOpen && outputs.layout !== 'image') questions.push('nMax: the most Gaussians that one run writes');
+  if (isOpen && outputs.layout !== 'image') questions.push('nMax: the maximum number of Gaussians of one run');
   const name = header.name
     .split(/[/\\]/)
     .at(-1)!

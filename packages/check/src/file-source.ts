@@ -25,7 +25,7 @@ export class FileSource implements ByteSource {
     const status = await handle.stat();
     if (status.isFile()) return new FileSource(path, status.size, handle);
     await handle.close();
-    throw Object.assign(new Error(`EISDIR: ${path} is no file`), { code: 'EISDIR', syscall: 'open' });
+    throw Object.assign(new Error(`EISDIR: ${path} is not a file`), { code: 'EISDIR', syscall: 'open' });
   }
 
   async read(offset: number, length: number): Promise<Uint8Array> {

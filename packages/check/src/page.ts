@@ -101,7 +101,7 @@ const differs = (tensor: string, expected: string, found: string): ContractFault
   expected,
   found,
   remedy:
-    'pages notice, and run this model on the CPU; `gaussian-export check` names the operators that the GPU has wrong',
+    'pages detect this, and run this model on the CPU; `gaussian-export check` names the operators that the GPU computes wrongly',
 });
 
 export type { Runtime };

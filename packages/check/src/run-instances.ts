@@ -69,7 +69,7 @@ const otherTogether = (name: string, label: string, count: number): ContractFaul
   code: 'contract/instances',
   tensor: name,
   where: `output ${name} (run with ${label})`,
-  expected: 'the numbers that this instance writes in a run of its own',
-  found: `others in a run of ${count} instances`,
+  expected: 'the values that this instance writes in a separate run',
+  found: `other values in a run of ${count} instances`,
   remedy: 'keep the axis of the instances apart in every operation: no sum, mean or softmax may run along it',
 });

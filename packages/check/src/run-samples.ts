@@ -22,7 +22,7 @@ export interface ModelFiles {
 export interface RunReport {
   readonly faults: readonly ContractFault[];
   /**
-   * One row of text for each run: the label of its inputs, the number of live rows, the box of the centers,
+   * One row of text for each run: the label of its inputs, the number of valid rows, the box of the centers,
    * milliseconds, and the result of {@link Compare} if there is one.
    */
   readonly rows: readonly (readonly string[])[];
@@ -112,7 +112,7 @@ async function runSamples(
     keep(label, compared?.faults ?? []);
     const cells = [`${milliseconds.toFixed(1)} ms`, ...(compared ? [compared.cell] : [])];
     if (contract.outputs.layout === 'image') {
-      rows.push([label, `[${outputs[contract.outputs.image]?.dims.join(', ')}]`, 'a picture', ...cells]);
+      rows.push([label, `[${outputs[contract.outputs.image]?.dims.join(', ')}]`, 'an image', ...cells]);
       continue;
     }
     const box = bounds ? `${bounds.min.map(short).join(' ')} to ${bounds.max.map(short).join(' ')}` : 'no centers';

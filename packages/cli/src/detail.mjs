@@ -49,7 +49,8 @@ function parseOptions(args) {
   if (values.out === undefined) throw new UsageError('--out is missing');
   const out = resolve(values.out);
   const scene = resolve(parsed.scene);
-  if (existsSync(scene) && statSync(scene).isDirectory()) throw new UsageError(`${parsed.scene} is a folder, no scene`);
+  if (existsSync(scene) && statSync(scene).isDirectory())
+    throw new UsageError(`${parsed.scene} is a folder, not a scene`);
   const obstacle = obstacleToFolder(out);
   if (obstacle) throw new UsageError(`--out: ${obstacle}`);
   if (existsSync(out) && !isEmpty(out) && !isUnfinished(out)) throw new UsageError(`--out: ${values.out} is not empty`);

@@ -37,8 +37,7 @@ async function makePage({ scene, folder, port, isServed, isSingle }) {
 async function writeFolder(scene, folder, page) {
   await copyElement(scene, join(folder, 'cdn'));
   const tag = tagOf(await copyScene(scene, folder), titleOf(scene));
-  if (existsSync(page))
-    console.log(`\n${page} exists and was not changed. Paste into it:\n\n${SCRIPT}\n${tag}`);
+  if (existsSync(page)) console.log(`\n${page} exists and was not changed. Paste into it:\n\n${SCRIPT}\n${tag}`);
   else writeFileSync(page, htmlOf(SCRIPT, tag, titleOf(scene)));
 }
 
@@ -54,7 +53,7 @@ async function writeSingle(scene, page) {
   const { found, missing } = await filesBeside(scene);
   if (isJson(scene) || found.length + missing.length > 0 || isModel(scene))
     throw new CommandError(
-      `${scene} is of several files, or needs ONNX Runtime. --single takes a scene of one file: PLY, SPZ, SOG, .splat, .ksplat or GLB.`,
+      `${scene} consists of several files, or needs ONNX Runtime. --single takes a scene of one file: PLY, SPZ, SOG, .splat, .ksplat or GLB.`,
     );
   const { size } = statSync(scene);
   if (size > MAX_SINGLE)

@@ -116,7 +116,7 @@ export type ContractErrorCode =
   | 'contract/covariance'
   /** An opacity is outside 0..1. */
   | 'contract/opacity'
-  /** The live count is negative or above the number of rows. */
+  /** The count of valid rows is negative or above the number of rows. */
   | 'contract/count'
   /** The same inputs gave different outputs although no input is a seed. */
   | 'contract/not-deterministic'

@@ -100,7 +100,7 @@ export function cameraFromClip(
   const down = up.row.map((value) => -value);
   const [r, d] = [right.row, down].map(([a, b, c]): Vector3 => [a, b, c]);
   if (Math.abs(dot(r, d)) > SKEW * squared) fail('matrix', 'no skew', describe(Array.from(matrix)));
-  if (!(dot(cross(r, d), w) > 0)) fail('matrix', 'one that mirrors nothing', describe(Array.from(matrix)));
+  if (!(dot(cross(r, d), w) > 0)) fail('matrix', 'one without mirroring', describe(Array.from(matrix)));
   const depth = dot(z, w) / squared;
   const offset = matrix[14] - depth * matrix[15];
   const planes = (clipDepth === '0..1' ? [0, 1] : [-1, 1])

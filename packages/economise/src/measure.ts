@@ -36,6 +36,6 @@ export function errorTogether(errors: readonly number[], views: EvaluationViews)
     expected: 'views that show some of the scene',
     found: 'none that does',
     remedy:
-      'check the axes (OpenCV: x right, y down, z forward), the units and the near planes of the cameras, or whether the scene paints anything',
+      'check the axes (OpenCV: x right, y down, z forward), the units and the near planes of the cameras, and whether the scene is visible',
   });
 }

@@ -52,10 +52,7 @@ async function wasLost(backend: Pick<Backend, 'finished' | 'place'>): Promise<bo
 }
 
 export const nothingToDraw = (): DOMException =>
-  new DOMException(
-    'There is nothing to take an image of: expected a loaded scene in an element that has a size',
-    'InvalidStateError',
-  );
+  new DOMException('There is no frame to save: expected a loaded scene in an element with a size', 'InvalidStateError');
 
 /**
  * Size of the image, pixels. One side alone keeps the aspect ratio of the element.
@@ -96,7 +93,9 @@ function withFilters(host: ImageHost, drawn: HTMLCanvasElement): HTMLCanvasEleme
   if (filter === '') return drawn;
   const context = paper(drawn.width, drawn.height);
   if (!('filter' in context)) {
-    host.warn('<gaussian-splat> toBlob(): this browser cannot apply CSS filters to an image, so the image is without them.');
+    host.warn(
+      '<gaussian-splat> toBlob(): this browser cannot apply CSS filters to an image, so the image is without them.',
+    );
     return drawn;
   }
   context.filter = filter;

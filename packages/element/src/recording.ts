@@ -228,6 +228,6 @@ async function pathOf(host: RecordingHost, name: PathName | undefined, aspect?: 
   await host.settled;
   if (name === undefined) return null;
   const path = await (await host.tour.get()).path(name, aspect);
-  if (path === null) throw new TypeError('Expected views to record a path along, found none: see the attribute views');
+  if (path === null) throw new TypeError('Expected views as a path to record, found none: see the attribute views');
   return path;
 }

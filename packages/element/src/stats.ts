@@ -152,7 +152,7 @@ export function statsOf(
 
 function whyFewPixels(share: number): string[] {
   if (share === 1) return [];
-  return [`Its splats cover the view too often: each side has ${(100 * share).toPrecision(2)} % of its pixels.`];
+  return [`Splats cover the frame too many times, so each side has ${(100 * share).toPrecision(2)} % of its pixels.`];
 }
 
 function whyPreview(isPreview: boolean): string[] {
@@ -166,17 +166,17 @@ function whyDropped(dropped: number): string[] {
 function whyDetail(quality: QualityChoice, { splats, pixels }: SceneStats['detail']): string[] {
   // Fixed qualities use levels of detail only if the page sets an allowed error.
   if (splats === 0 || (pixels === 0 && quality !== 'auto')) return [];
-  const rest = pixels > 0 ? `, by ${pixels} px at most` : ' while they move';
-  return [`${splats} merged splats stand for what is too small to see: frames may be off for it${rest}.`];
+  const rest = pixels > 0 ? `the error is at most ${pixels} px` : 'they are drawn only in motion';
+  return [`${splats} merged splats replace details that are too small to see: ${rest}.`];
 }
 
 function whyLeft(left: number): string[] {
-  return left > 0 ? [`${left} splats are not drawn: the GPU allows no buffer that holds more of them.`] : [];
+  return left > 0 ? [`${left} splats are not drawn, because the GPU does not allow larger buffers.`] : [];
 }
 
 function explainQuality(quality: QualityChoice, { moving, frameMs, targetMs }: DynamicQualityReport): string[] {
   if (quality !== 'auto') return quality === 'default' ? [] : [`The page asks for quality="${quality}".`];
   if (moving === 'whole') return [];
   const found = frameMs === null ? '' : `; the last took ${frameMs.toFixed(1)} ms`;
-  return [`In motion frames are drawn with ${moving}, to keep to ${targetMs.toFixed(1)} ms${found}.`];
+  return [`Frames in motion are drawn with ${moving}, to stay within ${targetMs.toFixed(1)} ms${found}.`];
 }

@@ -102,7 +102,7 @@ export function refuse(where: string, expected: string, found: string, cause?: u
     where,
     expected,
     found,
-    remedy: 'use a smaller scene, or allow for more',
+    remedy: 'use a smaller scene, or raise the limit',
     cause,
   });
 }

@@ -18,7 +18,7 @@ const NOT_A_SCENE = 'give the address of a scene file: .ply, .compressed.ply, .s
 
 const unread = ({ found, remedy }: UnreadKind): ForeignKind => ({
   code: 'decode/unsupported',
-  found: `${found}, which is known but not read`,
+  found: `${found}, which is recognized but not supported`,
   remedy,
 });
 const foreign = (found: string, isText = false): ForeignKind => ({

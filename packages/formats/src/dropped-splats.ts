@@ -17,11 +17,11 @@ export function withLeftOut(cloud: GaussianCloud, name: string): GaussianCloud {
   if (100 * count >= MIN_PERCENT * all) return { ...cloud, warnings: [...warnings, `${found}. They are left out.`] };
   throw new GaussianSplatError('decode/corrupt', {
     where: name,
-    expected: 'splats most of which can be drawn',
+    expected: 'a scene most of whose splats can be drawn',
     found,
     remedy:
       faults[0] > 0
         ? 'export the scene again with scales that are 0 or more, not their logarithms'
-        : 'export the scene again, and look for what went wrong in training',
+        : 'export the scene again, and check the training for errors',
   });
 }

@@ -72,7 +72,7 @@ async function attempt(
   const bytes = new GrowingBytes(end - start);
   const broken = (cause: unknown): unknown =>
     signal?.aborted ? signal.reason : interrupted(address, bytes.length, end - start, cause);
-  if (isPartial && range && Number(range[1]) !== start) throw broken(new Error('other bytes than were asked for'));
+  if (isPartial && range && Number(range[1]) !== start) throw broken(new Error('other bytes than requested'));
   let at = isPartial ? start : 0;
   for await (const chunk of chunksOf(response, broken)) {
     const from = Math.max(0, start - at);

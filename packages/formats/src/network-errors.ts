@@ -6,8 +6,8 @@ import { grouped } from './bytes.js';
 export function unreachable(address: URL, cause: unknown): GaussianSplatError {
   return new GaussianSplatError('network/unreachable', {
     where: label(address),
-    expected: 'an answer from the server',
-    found: `none that may be read (${(cause as Error)?.message ?? 'unknown cause'})`,
+    expected: 'a response from the server',
+    found: `no readable response (${(cause as Error)?.message ?? 'unknown cause'})`,
     remedy:
       'check the address and the connection; if the scene is on another server, that server must send ' +
       '"Access-Control-Allow-Origin", and a page on https cannot load from http',
@@ -18,8 +18,8 @@ export function unreachable(address: URL, cause: unknown): GaussianSplatError {
 export function forbidden(address: URL, cause: unknown): GaussianSplatError {
   return new GaussianSplatError('network/unreachable', {
     where: label(address),
-    expected: `permission for pages of ${globalThis.location.origin} to read the answer (CORS)`,
-    found: 'a server that answers without it',
+    expected: `permission for pages of ${globalThis.location.origin} to read the response (CORS)`,
+    found: 'a response without it',
     remedy: `have that server send "Access-Control-Allow-Origin: ${globalThis.location.origin}" (or "*"), or serve the scene from the page's own`,
     cause,
   });

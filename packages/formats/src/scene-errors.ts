@@ -38,7 +38,7 @@ export function outOfMemory(error: unknown, where: string): GaussianSplatError |
   if (!(error instanceof RangeError)) return undefined;
   return new GaussianSplatError('out-of-memory/allocation', {
     where,
-    expected: 'memory enough to unpack the scene',
+    expected: 'enough memory to unpack the scene',
     found: error.message,
     remedy: 'use a smaller scene, or close other pages',
     cause: error,

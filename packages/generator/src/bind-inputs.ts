@@ -124,7 +124,7 @@ function requireCamera(camera: Camera | undefined, name: string, role: string): 
     found: camera === undefined ? 'none' : isThree ? 'a camera of three.js' : 'an object without worldToCamera',
     remedy: isThree
       ? 'give the state that SplatRenderer.stateOf(camera, model) of @gaussian-splat/three returns'
-      : 'set camera before the generator runs; cameraFromProjection makes one of two matrices',
+      : 'set camera before the generator runs; cameraFromProjection makes one from two matrices',
   });
 }
 
@@ -133,6 +133,6 @@ function wrong(name: string, expected: string, found: string): GaussianSplatErro
     where: `input ${name}`,
     expected,
     found,
-    remedy: 'set a value that fits the input; its contract says which',
+    remedy: 'set a value that fits the input, as its contract declares',
   });
 }

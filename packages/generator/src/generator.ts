@@ -18,7 +18,7 @@ export interface GaussianSink {
    * Receives the output of a run.
    * @param rows Number of rows of one instance.
    * @param instance Index of this instance in a run of several. Its rows begin in each tensor at `instance * rows`, and
-   * its live count is element `instance` of the count tensor.
+   * its count of valid rows is element `instance` of the count tensor.
    */
   ingest(tensors: RunOutputs['tensors'], rows: number, instance: number): void;
 }

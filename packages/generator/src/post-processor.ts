@@ -169,7 +169,7 @@ function imageInput(models: readonly GeneratorModel[]): ImageInput {
     .filter(({ layout }) => layout !== undefined)
     .map((model) => unsuitable(model, 'a model that writes an image', 'a model that writes Gaussians'));
   const images = inputs.reduce((sum, input) => sum + imageShapeOf(input).views, 0);
-  if (images !== 1) faults.push(unsuitable(models[0], 'one input with the role image', `${images} pictures`));
+  if (images !== 1) faults.push(unsuitable(models[0], 'one input with the role image', `${images} images`));
   if (faults.length > 0) throw new ContractError(faults);
   const [input] = inputs;
   return { name: input.name, ...imageShapeOf(input) };
@@ -189,7 +189,7 @@ function depthInput(models: readonly GeneratorModel[]): ImageInput | undefined {
   const faults = inputs
     .filter(({ input }) => sizeOf(input) !== sizeOf(inputs[0].input))
     .map(({ model, input }) =>
-      unsuitable(model, `depth as ${sizeOf(inputs[0].input)}, as another takes it`, sizeOf(input)),
+      unsuitable(model, `depth as ${sizeOf(inputs[0].input)}, as in another model`, sizeOf(input)),
     );
   if (faults.length > 0) throw new ContractError(faults);
   return inputs.at(0)?.input;
@@ -200,5 +200,5 @@ const unsuitable = ({ header }: GeneratorModel, expected: string, found: string)
   where: header.name,
   expected,
   found,
-  remedy: 'use a model that makes an image of an image; one that writes Gaussians is a src',
+  remedy: 'use a model that makes an image from an image; one that writes Gaussians belongs in src',
 });

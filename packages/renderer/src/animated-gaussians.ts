@@ -234,5 +234,5 @@ const tooLarge = (name: string, expected: number, found: number): GaussianSplatE
     where: `AnimatedGaussians.write, ${name}`,
     expected: `at most ${expected} bytes`,
     found: `${found}`,
-    remedy: 'create it with the room of the largest group',
+    remedy: 'create it with the capacity of the largest group',
   });

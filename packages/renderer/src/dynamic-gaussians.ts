@@ -111,13 +111,13 @@ export class DynamicGaussians extends SceneBuffers {
    * Ingests the output of a run: encodes and submits one compute pass. Nothing is read back. No resource is created for
    * a set of buffers that was used before. Later submissions may overwrite the tensors.
    *
-   * Rows from the live count on, and rows with unusable values, are not drawn.
+   * Rows beyond the count, and rows with unusable values, are not drawn.
    * @param tensors Storage buffers, keyed by the tensor names of the layout. The buffer of the count needs COPY_SRC.
    * Sizes of float16 tensors are rounded up to 4 bytes.
    * @param rows Number of rows that this run wrote: 0 to the capacity of the layout, or its padded rows. For 0 no
    * tensor is required.
    * @param instance Index of this scene in a run that wrote several scenes of `rows` rows in sequence to each tensor;
-   * default 0. A live count is then element `instance` of its tensor.
+   * default 0. The count of valid rows is then element `instance` of its tensor.
    * @throws GaussianSplatError `contract/rows` if the rows exceed the capacity; `argument/value` for a missing or too
    * small tensor. The previous content remains.
    */
@@ -249,6 +249,6 @@ function requireRows(rows: number, capacity: number): void {
     where: 'a run of the generator',
     expected: `0 to ${capacity} rows, as the file or nMax of its contract says`,
     found: `${rows}`,
-    remedy: 'raise nMax in the contract to the most rows that a run writes',
+    remedy: 'raise nMax in the contract to the maximum number of rows of a run',
   });
 }

@@ -70,7 +70,7 @@ export class MemoryLedger {
         where: label,
         expected: 'a number of bytes, 0 or more',
         found: String(bytes),
-        remedy: 'hand over the bytes that will be allocated',
+        remedy: 'pass the number of bytes of the allocation',
       });
     if (bytes > max) throw overBudget(label, bytes, `${inBytes(max)}, the memoryBudget that was given`);
     for (const [giveBack, unseen] of this.releasable) {
@@ -79,11 +79,7 @@ export class MemoryLedger {
     }
     const left = this.budgetBytes - this.bytes;
     if (bytes > left)
-      throw overBudget(
-        label,
-        bytes,
-        `${inBytes(Math.max(0, left))}, what is left of a budget of ${inBytes(this.budgetBytes)}`,
-      );
+      throw overBudget(label, bytes, `${inBytes(Math.max(0, left))} left of a budget of ${inBytes(this.budgetBytes)}`);
     const reservation: Reservation = { label, bytes, release: () => void this.#held.delete(reservation) };
     this.#held.add(reservation);
     return reservation;

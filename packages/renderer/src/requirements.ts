@@ -51,7 +51,7 @@ export function requireTarget(target: GPUTexture | undefined, format: string, { 
   if (target.width !== width || target.height !== height)
     throw missing(
       'target',
-      `a texture of ${width} x ${height} pixels, as the camera says`,
+      `a texture of ${width} x ${height} pixels, the size of the camera`,
       `${target.width} x ${target.height}`,
     );
 }
@@ -74,7 +74,7 @@ export function requireBlendable(device: GPUDevice, format: AccumulationFormat):
     where: 'FrameSettings.accumulation',
     expected: 'a device with the feature float32-blendable',
     found: 'a device without it',
-    remedy: 'ask for the feature with deviceDescriptor(adapter), or use rgba16float',
+    remedy: 'request the feature with deviceDescriptor(adapter), or use rgba16float',
   });
 }
 
@@ -91,7 +91,7 @@ export function requireFrameTarget(
     throw missing('target', 'a texture, or a view of one with its format: { view, format }', JSON.stringify(target));
   if (!isObject(settings)) throw missing('settings', 'settings(…), or undefined', settings);
   if (background === 'load' && !colors && formatOf(target).endsWith('-srgb'))
-    throw missing('colors', 'new LinearColors(device), to blend with what a target of linear light holds', colors);
+    throw missing('colors', 'new LinearColors(device), to blend with the content of a target in linear light', colors);
   if (background === undefined || background === 'load') return;
   if (background?.length !== 4 || !Array.prototype.every.call(background, Number.isFinite))
     throw missing('background', "'load', or four finite numbers: premultiplied red, green, blue and alpha", background);

@@ -68,7 +68,7 @@ async function nextView(): Promise<ArrayLike<number>> {
     render.call(this, request, quads);
   };
   try {
-    await until(() => camera !== undefined, 'a picture', LIMIT_MS);
+    await until(() => camera !== undefined, 'an image', LIMIT_MS);
     return camera!.worldToCamera;
   } finally {
     Object.assign(GlRenderer.prototype, { render });

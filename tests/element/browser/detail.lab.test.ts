@@ -48,7 +48,7 @@ describe('levels of detail of a plain file', () => {
     element.detail = 'auto';
     await frames(2);
     assert((await imageOf(element)) === whole, 'the whole picture');
-    assert(/merged splats.*while they move/.test(element.stats!.reasons.join()), 'frames in motion may have some');
+    assert(/merged splats.*only in motion/.test(element.stats!.reasons.join()), 'frames in motion may have some');
     element.quality = 'default';
     await frames(2);
     assertEqual(element.stats!.reasons, [], 'with a chosen quality no frame has any');

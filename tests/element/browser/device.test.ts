@@ -287,7 +287,7 @@ describe('the loss of the device', () => {
     };
     const whole = await element.toBlob();
     const expected = await opaque(whole);
-    assert(expected > 0 && (await size(whole)) > 0, 'a picture');
+    assert(expected > 0 && (await size(whole)) > 0, 'an image');
     for (let i = 0; i < 3; i++) {
       const restored = nextEvent(element, 'contextrestored');
       devices[devices.length - 1].destroy();

@@ -130,7 +130,7 @@ describe('previews on show', () => {
     const element = show({ src: '/net/ball/red.splat?ms=4000' });
     const { detail } = await nextEvent<CustomEvent<{ splats: number }>>(element, 'preview');
     assert(detail.splats < SLOW_SPLATS, `${detail.splats} splats at first`);
-    assert((await screenOf(element)).middleOf(isRed) !== null, 'a picture');
+    assert((await screenOf(element)).middleOf(isRed) !== null, 'an image');
     await element.ready;
     assertEqual(element.stats?.splats, SLOW_SPLATS, 'the whole');
     const direct = await showLoaded({ src: '/net/ball/red.splat?ms=0' });

@@ -155,7 +155,7 @@ describe('VR by WebGPU', () => {
           headset()
             .pixels('left')
             .some((v, i) => i % 4 === 0 && v > 100),
-        'a picture',
+        'an image',
         LIMIT_MS,
       );
       assertEqual(binding.enabled.length, 1, 'sessions');
@@ -177,7 +177,7 @@ describe('VR by WebGPU', () => {
         headset()
           .pixels('left')
           .some((v, i) => i % 4 === 0 && v > 100),
-      'a picture',
+      'an image',
       LIMIT_MS,
     );
     for (const eye of ['left', 'right'] as const) {

@@ -154,7 +154,7 @@ describe('every family on the GPU', () => {
       for (let step = 0; step < 3; step++) {
         const state = await ask(step);
         const [{ values }] = Object.values(await onCpu(url, state));
-        assert(found, 'a picture');
+        assert(found, 'an image');
         const numbers = numbersOf(await found, 'float32').slice(0, values.length);
         error = Math.max(error, relativeError(numbers, values));
         decibels = Math.min(decibels, decibelsOf(numbers, values));

@@ -130,14 +130,14 @@ describe('a fault that is in the way of the scene', () => {
       GaussianSplatElement.runtimeLocation = RUNTIME;
     }
     const element = await showLoaded({ src: `${BALL}?elsewhere` });
-    assert((await coverOf(element)) > 300, 'a picture');
+    assert((await coverOf(element)) > 300, 'an image');
   });
 });
 
 describe('a fault that the scene survives', () => {
   it('NaN, infinity and a count above N: the rest is drawn', async () => {
     const element = await showLoaded({ src: `${FIXTURES}faulty-values.onnx` });
-    assert((await coverOf(element)) > 300, 'a picture');
+    assert((await coverOf(element)) > 300, 'an image');
   });
 
   it('a run that fails after good ones: contract/run, the last good frame, and back again', async () => {
@@ -183,7 +183,7 @@ describe('a fault that the scene survives', () => {
       reported.some(({ message }) => message.includes('share')),
       'the inputs are listed',
     );
-    assert(element.loaded && (await coverOf(element)) > 300, 'a picture');
+    assert(element.loaded && (await coverOf(element)) > 300, 'an image');
   });
 
   it('centers that meet in one point are drawn, and no fault', async () => {
@@ -201,7 +201,7 @@ describe('a fault that the scene survives', () => {
     await element.ready;
     if (devices.at(-1)?.features.has('shader-f16')) return console.log('not tested: this device has shader-f16');
     assert((await fallback).detail.reason.includes('shader-f16'), 'the reason');
-    assert(element.loaded && (await coverOf(element)) > 200, 'a picture');
+    assert(element.loaded && (await coverOf(element)) > 200, 'an image');
   });
 
   it('two contracts: the one that the page gives counts', async () => {
@@ -247,7 +247,7 @@ describe('a fault that the scene survives', () => {
     await element.updateComplete;
     await element.ready;
     assert(element.loaded, String(element.error?.message));
-    assert((await coverOf(element)) > 300, 'a picture');
+    assert((await coverOf(element)) > 300, 'an image');
   });
 });
 
@@ -286,7 +286,7 @@ describe('faults of pages that use the generator without the element', () => {
       ['contract/run'],
       errors.map(({ message }) => message).join(),
     );
-    assert(errors[0].message.includes('no end within 1500 ms'), errors[0].message);
+    assert(errors[0].message.includes('no result within 1500 ms'), errors[0].message);
     for (let i = 1; i < 4; i++) {
       warm.request({ timeSeconds: i });
       await warm.idle;

@@ -227,7 +227,7 @@ describe('a post-processor', () => {
     const { tensor, pixels } = await tensorOf(48, 32, { width: 48, height: 32, dtype: 'float32' });
     post.request(tensor, { controls: { gain: 0.5 } });
     await post.idle;
-    assert(image, 'a picture');
+    assert(image, 'an image');
     const found = numbersOf(await image, 'float32').slice(0, 3 * 48 * 32);
     const expected = resampled(pixels, [48, 32], [48, 32], 'stretch').map((x) => 0.25 * x);
     assert(relativeError(found, expected) < 1e-5, 'a quarter');
@@ -391,7 +391,7 @@ describe('a chain', () => {
       'the wrong way round': ['link-fixed.onnx', 'packed.onnx'],
       'two that make Gaussians': ['packed.onnx', 'packed.onnx'],
       'an image in the end': ['packed.onnx', 'post.onnx'],
-      'a live count that gets lost': ['faulty-values.onnx', 'link-fixed.onnx'],
+      'a count of rows that gets lost': ['faulty-values.onnx', 'link-fixed.onnx'],
     };
     for (const [name, files] of Object.entries(cases)) {
       const urls = files.map((file) => ({ url: FIXTURES + file }));

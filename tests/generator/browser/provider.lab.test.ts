@@ -152,7 +152,7 @@ describe('convolutions', () => {
       tensor.upload(await createImageBitmap(new ImageData(pixels, 16, 16)));
       post.request(tensor);
       await post.idle;
-      assert(image, 'a picture');
+      assert(image, 'an image');
       const data = new Float32Array((await readBuffer(device, tensor.buffer)).buffer as ArrayBuffer, 0, 3 * 256);
       const [{ values }] = Object.values(await runOnCpu(url, {}, { image: { dims: [1, 3, 16, 16], data } }));
       const error = relativeError(numbersOf(await image, 'float32').slice(0, values.length), values);

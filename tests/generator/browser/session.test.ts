@@ -148,7 +148,7 @@ describe('generators', () => {
       }
       if (layout.count) {
         const found = numbersOf(await last.tensors[layout.count], 'int32')[0];
-        assertEqual(found, expected[layout.count].values[0], 'live count');
+        assertEqual(found, expected[layout.count].values[0], 'count of rows');
       }
     });
   }

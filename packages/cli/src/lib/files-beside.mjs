@@ -18,7 +18,7 @@ export async function filesBeside(scene) {
     for (const name of await namedBy(join(dirname(scene), path)).catch(() => [])) {
       const file = posix.join(folder, name);
       if (!isInside(file)) missing.set(file, 'outside of its folder');
-      else if (!existsSync(join(dirname(scene), file))) missing.set(file, 'not there');
+      else if (!existsSync(join(dirname(scene), file))) missing.set(file, 'missing');
       else if (leadsOut(scene, file)) missing.set(file, 'a link out of its folder');
       else if (!found.has(file)) {
         found.add(file);

@@ -39,6 +39,6 @@ export function readJson(path) {
   try {
     return JSON.parse(text);
   } catch (error) {
-    throw new UsageError(`${path} is no JSON: ${error.message}`);
+    throw new UsageError(`${path} is not JSON: ${error.message}`);
   }
 }

@@ -22,7 +22,7 @@ export function obstacleTo(path) {
 /** Returns a description of why files cannot be written to a folder, which need not exist; undefined if they can. */
 export function obstacleToFolder(path) {
   if (!existsSync(path)) return obstacleToFolder(dirname(path));
-  if (!statSync(path).isDirectory()) return `${path} is no folder`;
+  if (!statSync(path).isDirectory()) return `${path} is not a folder`;
   if (!mayWrite(path)) return `${path} may not be written`;
 }
 

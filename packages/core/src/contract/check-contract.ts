@@ -133,7 +133,7 @@ function checkTensor(tensor: OnnxTensor, rule: TensorRule, where: string): Contr
   } else if (!shapeFits(tensor.dims, rule)) {
     const isRow = /\(gaussians\)$/.test(where) && tensor.dims.length > 1;
     const remedy = isRow
-      ? 'export rows of this width, or say in outputs.columns what yours hold, in their order'
+      ? 'export rows of this width, or declare your columns in outputs.columns, in their order'
       : 'export the tensor in this shape; fixed sizes must be numbers, not symbols';
     const found = `[${tensor.dims.map((dim) => dim ?? '?').join(', ')}]`;
     faults.push({ ...common, code: 'contract/shape', expected: describeShapes(rule), found, remedy });
@@ -235,7 +235,7 @@ const oddPose = (tensor: string, format: PoseInput['format'], size: number, wher
   where,
   expected: `${POSE_NUMBERS[format]} numbers for each joint (${format})`,
   found: `${size} numbers`,
-  remedy: 'correct format in the contract; "parameters" are the model\'s own',
+  remedy: 'correct format in the contract; "parameters" is for model-specific poses',
 });
 
 const lengthOf = (value: ControlInput['default']): number | undefined =>
@@ -278,7 +278,7 @@ function checkRows(tensors: readonly GaussianOutput[], { nMax, outputs }: Contra
     const common = { code: 'contract/rows', tensor: name, where: `output ${name}`, found: `N = ${dims[0]}` } as const;
     if (dims[0] !== first.dims[0]) {
       const expected = `N = ${first.dims[0]}, as ${first.name} has`;
-      faults.push({ ...common, expected, remedy: 'write as many rows of every attribute' });
+      faults.push({ ...common, expected, remedy: 'write the same number of rows for every attribute' });
     }
     if (nMax !== undefined && Number(dims[0]) > nMax && !isCounted) {
       const remedy = 'raise nMax in the contract, or name a count: the rows behind it are then padding';
@@ -293,7 +293,7 @@ function checkRows(tensors: readonly GaussianOutput[], { nMax, outputs }: Contra
       where: `output ${symbolic.name}`,
       expected: 'a number of rows, or nMax in the contract',
       found: `N = ${symbolic.dims[0] ?? 'unknown'} and no nMax`,
-      remedy: 'declare nMax, the most Gaussians that one run writes',
+      remedy: 'declare nMax, the maximum number of Gaussians of one run',
     });
   }
   return faults;

@@ -84,7 +84,7 @@ function checkAttributes({ nodes, opsets }: OnnxHeader): ContractFault[] {
       where: `operator ${later.operator} (${later.outputs[0]})`,
       expected: `attributes of opset ${opset}, as the file declares`,
       found: 'noop_with_empty_axes, of a later opset',
-      remedy: 'export with opset_version=18: PyTorch writes 17 wrongly',
+      remedy: 'export with opset_version=18: PyTorch exports 17 incorrectly',
     },
   ];
 }
@@ -102,11 +102,7 @@ function checkExternalFile({ location, byteLength }: ExternalFile, files: CheckF
     { code: 'contract/external-data', where: `external data ${JSON.stringify(location)}`, expected, found, remedy },
   ];
   if (!isInside(location)) {
-    return fault(
-      'a path inside the folder of the model',
-      'one that leads elsewhere',
-      'save the model with plain file names',
-    );
+    return fault('a path inside the folder of the model', 'a path outside it', 'save the model with plain file names');
   }
   const size = files?.get(location);
   if (files === undefined || (size !== undefined && size >= byteLength)) return [];

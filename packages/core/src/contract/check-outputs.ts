@@ -16,14 +16,14 @@ export interface OutputReport {
   readonly faults: readonly ContractFault[];
   /** Number of rows of the tensors; 0 if their shapes are invalid, and for an image. */
   readonly rows: number;
-  /** Number of live rows, which are checked: the value of `count` if the contract names one, else {@link rows} up to `nMax`. */
+  /** Number of valid rows, which are checked: the value of `count` if the contract names one, else {@link rows} up to `nMax`. */
   readonly live: number;
-  /** Box of the finite centers of live rows with an opacity of 1/255 or more, in world units; undefined if there are none. */
+  /** Box of the finite centers of valid rows with an opacity of 1/255 or more, in world units; undefined if there are none. */
   readonly bounds: { readonly min: Vector3; readonly max: Vector3 } | undefined;
 }
 
 /**
- * Checks the outputs of one run: shapes, the live count, that numbers are finite, that covariances are positive
+ * Checks the outputs of one run: shapes, the count of valid rows, that numbers are finite, that covariances are positive
  * semi-definite, and that scales and opacities are in range. Values are checked only if all shapes are valid.
  *
  * @param outputs Outputs of the run, by their names in the file.
@@ -97,12 +97,12 @@ export function compareRuns(
         code: 'contract/not-deterministic',
         tensor: name,
         where: `output ${name}`,
-        expected: 'the same numbers for the same inputs, as no input has the role seed',
+        expected: 'the same numbers for the same inputs, because no input has the role seed',
         found:
           a.data.length === b.data.length
             ? `other numbers, first at element ${at}`
             : `dims [${a.dims}], then [${b.dims}]`,
-        remedy: 'give the model an input with the role seed, or take the random numbers out of it',
+        remedy: 'give the model an input with the role seed, or remove its random numbers',
       },
     ];
   });
@@ -158,7 +158,7 @@ function checkShapes(
     const common = { code: 'contract/rows', tensor: name, where, found: `${count} rows` } as const;
     if (count !== rows.count) {
       const expected = `${rows.count} rows, as ${rows.name} has`;
-      return [{ ...common, expected, remedy: 'write as many rows of every attribute' }];
+      return [{ ...common, expected, remedy: 'write the same number of rows for every attribute' }];
     }
     return nMax !== undefined && count > nMax && !isCounted
       ? [{ ...common, expected: `at most nMax = ${nMax} rows`, remedy: 'raise nMax in the contract' }]
@@ -179,7 +179,7 @@ function liveRows(
     code: 'contract/count',
     tensor: name,
     where: `output ${name}`,
-    expected: `a live count of 0 to ${rows}, the number of rows (or nMax)`,
+    expected: `a count of 0 to ${rows}, the number of rows (or nMax)`,
     found: String(count),
     remedy: 'clamp the count in the model',
   };
@@ -196,7 +196,7 @@ function readerOf(slice: AttributeSlice, { dtype, data }: OutputTensor): RowRead
   return { ...slice, isHalf: dtype === 'float16', read };
 }
 
-/** Checks all live rows. Returns one fault for each attribute and kind of fault, with the number of its rows. */
+/** Checks all valid rows. Returns one fault for each attribute and kind of fault, with the number of its rows. */
 function collectRowFaults(readers: readonly RowReader[], live: number): ContractFault[] {
   const kinds = new Map<string, { fault: RowFault; reader: RowReader; row: number; count: number }>();
   for (const reader of readers) {

@@ -243,7 +243,7 @@ export type InputBinding =
 /** Attributes of a Gaussian. */
 export type GaussianAttribute = 'positions' | 'covariances' | 'scales' | 'rotations' | 'colors' | 'sh' | 'opacities';
 
-/** Content of a tensor of Gaussians: all attributes (`packed`), one attribute, or the number of live rows (`count`). */
+/** Content of a tensor of Gaussians: all attributes (`packed`), one attribute, or the number of valid rows (`count`). */
 export type GaussianTensor = 'packed' | GaussianAttribute | 'count';
 
 /** Encoding of the attributes. Each field is required if its attribute is present. */
@@ -283,7 +283,7 @@ export interface PackedOutputs {
   readonly scaleActivation?: 'linear' | 'log';
   /** Order of the quaternions' components; required if {@link columns} contains rotations. */
   readonly rotationOrder?: QuaternionOrder;
-  /** Name of an output [1] int32 or int64: number of live rows of the N. */
+  /** Name of an output [1] int32 or int64: number of valid rows of the N. */
   readonly count?: string;
 }
 
@@ -310,7 +310,7 @@ export interface SplitOutputs {
   /** [N] or [N,1] opacities. */
   readonly opacities: string;
   readonly opacityActivation: 'linear' | 'logit';
-  /** Name of an output [1] int32 or int64: number of live rows of the N. */
+  /** Name of an output [1] int32 or int64: number of valid rows of the N. */
   readonly count?: string;
 }
 

@@ -98,13 +98,13 @@ export function checkInstances(header: OnnxHeader, contract: Contract): Contract
         (output) => hasInstances(output, contract) && output.dims!.slice(1).some((dim) => typeof dim !== 'number'),
       )
       .map(({ name, dims }) => {
-        const remedy = 'fix N; rows that do not live may lie behind a count, or have the opacity 0';
+        const remedy = 'fix N; unused rows may lie behind a count, or have opacity 0';
         return fault(`output ${name}`, `numbers behind ${axis}`, `[${dims!.join(', ')}]`, remedy, name);
       }),
     ...[...header.inputs, ...written]
       .filter(({ dims }) => dims?.slice(1).includes(axis))
       .map(({ name, dims }) => {
-        const remedy = "name the instances' axis as no other axis is named, and put it first";
+        const remedy = 'give the axis of instances a unique name, and put it first';
         return fault(`tensor ${name}`, `${axis} as the first dimension only`, `[${dims!.join(', ')}]`, remedy, name);
       }),
     ...header.inputs
@@ -120,7 +120,7 @@ export function checkInstances(header: OnnxHeader, contract: Contract): Contract
             'instances',
             `an input whose first dimension is ${axis}`,
             'none',
-            'leave out instances: all would be alike',
+            'leave out instances: all would be equal',
           ),
         ]),
   ];

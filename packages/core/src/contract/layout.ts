@@ -32,7 +32,7 @@ export interface AttributeSlice {
 
 /** Layout of the Gaussians of a file, with all defaults resolved. */
 export interface GaussianLayout {
-  /** Maximum number of live rows in a run of one instance: N, or `nMax` if that is less or N is symbolic. */
+  /** Maximum number of valid rows in a run of one instance: N, or `nMax` if that is less or N is symbolic. */
   readonly capacity: number;
   /** Number of rows of the tensors if it is more than {@link capacity}, because of padding. */
   readonly paddedRows?: number;
@@ -42,7 +42,7 @@ export interface GaussianLayout {
   /** Degree of the spherical harmonics; undefined for plain colors. */
   readonly shDegree: ShDegree | undefined;
   readonly attributes: readonly AttributeSlice[];
-  /** Name of the output with the number of live rows, undefined if there is none: [1] int32, or int64 whose low word is read. */
+  /** Name of the output with the number of valid rows, undefined if there is none: [1] int32, or int64 whose low word is read. */
   readonly count: string | undefined;
   /** Element type of {@link count}. Default: int32. */
   readonly countDtype?: 'int32' | 'int64';

@@ -75,15 +75,10 @@ function conflictsOf(contract: Contract, where: string): ContractFault[] {
       conflict(`outputs.${field}`, expected, found, remedy),
     ),
     ...repeatedRoles(contract).map(([place, expected, found]) =>
-      conflict(place, expected, found, 'feed one of them, and make the other a part of the model'),
+      conflict(place, expected, found, 'keep one of them, and compute the other in the model'),
     ),
     ...repeatedTensors(contract.outputs).map(([field, other]) =>
-      conflict(
-        `outputs.${field}`,
-        'an output of its own',
-        `the output that ${other} names, too`,
-        'name another output',
-      ),
+      conflict(`outputs.${field}`, 'a separate output', `the output that ${other} names, too`, 'name another output'),
     ),
     ...boundsConflicts(contract).map((axis) =>
       conflict(`bounds`, `min at or below max on axis ${axis}`, 'min above max', 'exchange the two'),
@@ -97,7 +92,7 @@ function inputConflicts(binding: InputBinding, { duration }: Contract): Conflict
   switch (binding.role) {
     case 'time':
       return binding.unit === 'normalized' && duration === undefined
-        ? [['unit', 'the duration that normalized time is a fraction of', 'no duration', 'declare duration in seconds']]
+        ? [['unit', 'a duration, because time is normalized', 'no duration', 'declare duration in seconds']]
         : [];
     case 'control':
       return controlConflicts(binding);
@@ -151,7 +146,7 @@ function columnConflicts(outputs: OutputBinding): Conflict[] {
     ...(shape.length === 2 && scaleActivation === undefined ? ['scaleActivation'] : []),
     ...(shape.length === 2 && rotationOrder === undefined ? ['rotationOrder'] : []),
   ];
-  return missing.map((field) => [field, 'a value, since columns has scales and rotations', 'nothing', 'declare it']);
+  return missing.map((field) => [field, 'a value, because columns has scales and rotations', 'nothing', 'declare it']);
 }
 
 /**

@@ -57,11 +57,11 @@ const output = (what: string): Schema => text(`Name of the output ${what}`);
 
 const order = choice('Layout of the matrix in the tensor; default row-major', 'row-major', 'column-major');
 const axes = choice(
-  'Where the x, y and z axes of the camera point (left/right, up/down, forward/back); default RDF, as OpenCV has them',
+  'Directions of the x, y and z axes of the camera (left/right, up/down, forward/back); default RDF, as in OpenCV',
   ...['RDF', 'RDB', 'RUF', 'RUB', 'LDF', 'LDB', 'LUF', 'LUB'],
 );
-const opacityActivation = choice('How opacities are written: 0..1, or before the sigmoid', 'linear', 'logit');
-const scaleActivation = choice('How scales are written: standard deviations, or their logarithms', 'linear', 'log');
+const opacityActivation = choice('Form of the opacities: 0..1, or before the sigmoid', 'linear', 'logit');
+const scaleActivation = choice('Form of the scales: standard deviations, or their logarithms', 'linear', 'log');
 const quaternionOrder = choice('Order of the numbers of a quaternion', 'wxyz', 'xyzw');
 const shOrder = choice(
   'Red, green and blue innermost ([(d+1)^2, 3]), or coefficients innermost ([3, (d+1)^2])',
@@ -69,7 +69,7 @@ const shOrder = choice(
   'channel-major',
 );
 const color = choice('Content of the color columns', 'rgb', 'sh');
-const count = output('[1] int32 or int64 that says how many rows live');
+const count = output('[1] int32 or int64 with the number of valid rows');
 
 function variant(
   key: 'role' | 'layout',
@@ -89,7 +89,7 @@ function variant(
 }
 
 const input: Schema = {
-  description: 'What one input of the ONNX file means',
+  description: 'Meaning of one input of the ONNX file',
   oneOf: [
     variant('role', 'view', '[4,4] float32: world to camera', { order, axes }),
     variant('role', 'camera_to_world', '[4,4] float32: camera to world, the inverse of view', { order, axes }),
@@ -132,7 +132,7 @@ const input: Schema = {
     ),
     variant('role', 'shape', '[B] float32: coefficients of a body or an expression', {
       names: texts('Names of the coefficients'),
-      default: numbers('Coefficients to begin with; default zeros'),
+      default: numbers('Initial coefficients; default zeros'),
     }),
     variant(
       'role',
@@ -142,7 +142,7 @@ const input: Schema = {
         range: numbers('Smallest and largest value', 2),
         default: {
           anyOf: [{ type: 'number' }, numbers('All elements, flattened')],
-          description: 'Value to begin with: one number for all elements, or a list of all of them',
+          description: 'Initial value: one number for all elements, or a list of all of them',
         },
         step: positive('Step between values'),
         label: text('Name for readers'),
@@ -155,7 +155,7 @@ const input: Schema = {
       'Gaussians of the generator before this one in a chain',
       {
         attribute: choice(
-          'Which tensor of the layout this input takes',
+          'Tensor of the layout that this input takes',
           ...['packed', 'positions', 'covariances', 'scales', 'rotations', 'colors', 'sh', 'opacities', 'count'],
         ),
         color,
@@ -191,20 +191,20 @@ const input: Schema = {
     variant(
       'role',
       'depth',
-      '[1,1,H,W] float32 or float16, of a post-processor: depth along the axis of the camera in world units at which half of the light is gone; 0 where more passes',
+      '[1,1,H,W] float32 or float16, of a post-processor: depth along the axis of the camera in world units at which the transmittance falls to 0.5; 0 if it never does',
     ),
   ],
 };
 
 const outputs: Schema = {
-  description: 'Where and how the Gaussians are written',
+  description: 'Tensors and layout of the Gaussians',
   oneOf: [
     variant(
       'layout',
       'packed',
-      'One tensor [N, D]: position 3, covariance 6, color 3 or harmonics 3(d+1)^2, opacity 1; or as columns says',
+      'One tensor [N, D]: position 3, covariance 6, color 3 or harmonics 3(d+1)^2, opacity 1; or in the order of columns',
       {
-        gaussians: output('with everything'),
+        gaussians: output('with all columns'),
         color,
         opacityActivation,
         shOrder,
@@ -253,7 +253,7 @@ const outputs: Schema = {
     variant(
       'layout',
       'visionary',
-      'Two tensors as Visionary has them: [N,10] position, opacity, covariance; and colors or harmonics',
+      'Two tensors, as in Visionary: [N,10] position, opacity, covariance; and colors or harmonics',
       {
         gaussians: output('[N,10]'),
         colors: output('[N,4] or [N,3] of colors'),
@@ -293,12 +293,12 @@ export const CONTRACT_SCHEMA: Schema = {
     instances: {
       type: 'object',
       properties: {
-        axis: text('Name of the symbolic dimension that stands first in outputs, and in inputs that may differ'),
+        axis: text('Name of the symbolic first dimension of outputs, and of inputs that may differ'),
         most: { type: 'integer', minimum: 1, description: 'Maximum number of instances in one run' },
       },
       required: ['axis', 'most'],
       additionalProperties: false,
-      description: 'Declared by a model that computes several instances of itself in one run',
+      description: 'Declared by a model that computes several instances in one run',
     },
     dtype: choice('Element type of the Gaussian outputs', 'float32', 'float16'),
     shDegree: { type: 'integer', minimum: 0, maximum: 3, description: 'Degree of the spherical harmonics' },
@@ -312,25 +312,28 @@ export const CONTRACT_SCHEMA: Schema = {
       additionalProperties: false,
       description: 'Box around all centers at all times, with controls, poses and shapes at their defaults',
     },
-    duration: positive('Seconds that the input time or frame plays'),
-    fps: positive('Frames to a second of the input frame'),
+    duration: positive('Duration of the input time or frame in seconds'),
+    fps: positive('Frames per second of the input frame'),
     coordinates: {
       type: 'object',
       properties: {
         up: choice('The axis that points up; default -y', '+x', '-x', '+y', '-y', '+z', '-z'),
         handedness: choice('Handedness of the world; default right', 'right', 'left'),
-        metresPerUnit: positive('Metres to one world unit'),
+        metresPerUnit: positive('Meters per world unit'),
       },
       additionalProperties: false,
-      description: 'The frame that Gaussians are written in',
+      description: 'Coordinate system of the Gaussians',
     },
-    antialiased: { type: 'boolean', description: 'Trained with opacity compensation for the dilation; default false' },
+    antialiased: {
+      type: 'boolean',
+      description: 'Trained with opacity compensation for the low-pass filter; default false',
+    },
     filter: choice(
-      'Filter it was trained with, in place of antialiased: 0.3 px², 0.3 with compensation, 0.1 with compensation',
+      'Low-pass filter of the training, instead of antialiased: 0.3 px², 0.3 with compensation, 0.1 with compensation',
       ...(Object.keys(SPLAT_FILTERS) as SplatFilter[]),
     ),
     license: text('SPDX identifier, or a few words'),
-    attribution: text('Who is to be named'),
+    attribution: text('Names for the attribution'),
   },
   required: ['version', 'inputs', 'outputs'],
   additionalProperties: false,

@@ -162,8 +162,8 @@ class RemoteFile implements UrlSource {
       signal?.throwIfAborted();
       throw new GaussianSplatError('network/unreachable', {
         where: this.name,
-        expected: 'an answer from the server',
-        found: `none that may be read (${(cause as Error)?.message ?? 'unknown cause'})`,
+        expected: 'a response from the server',
+        found: `no readable response (${(cause as Error)?.message ?? 'unknown cause'})`,
         remedy:
           'check the address and the connection; a server of another origin must send "Access-Control-Allow-Origin"',
         cause,
@@ -189,7 +189,7 @@ class RemoteFile implements UrlSource {
         where: this.name,
         expected: `at most ${String(maxBytes)} bytes`,
         found: 'more',
-        remedy: 'use a smaller model, or allow for more',
+        remedy: 'use a smaller model, or raise the limit',
         cause,
       });
     });

@@ -209,9 +209,9 @@ const kernelRule: Rule = function* (node, opset, _, { functions }) {
     yield of('fallback', node, 'control flow ends the recording', 'unroll it');
   } else if (!RULES.kernels.includes(operator)) {
     const remedy = RULES.instead[operator] ?? 'write it in other operators';
-    yield of('fallback', node, 'WebGPU has no kernel for it: every run waits for the GPU in its midst', remedy);
+    yield of('fallback', node, 'WebGPU has no kernel for it: every run is interrupted by a wait for the GPU', remedy);
   } else if (operator === 'GridSample' && opset > RULES.gridSampleOpset) {
-    const reason = `WebGPU has kernels for it up to opset ${RULES.gridSampleOpset}: every run waits for the GPU in its midst`;
+    const reason = `WebGPU has kernels for it up to opset ${RULES.gridSampleOpset}: every run is interrupted by a wait for the GPU`;
     yield of('fallback', node, reason, `export opset ${RULES.exportOpset}`);
   }
 };

@@ -16,8 +16,8 @@ export const WEBGPU_RULES = {
     ),
   /** Replacements of operators without a kernel that are common in generators. */
   instead: {
-    Compress: 'keep every row and write opacity 0 into the dead ones',
-    NonZero: 'keep every row and write opacity 0 into the dead ones',
+    Compress: 'keep every row and write opacity 0 into the unused ones',
+    NonZero: 'keep every row and write opacity 0 into the unused ones',
     Round: 'Floor(x + 0.5), or compare with a shifted number',
     Sign: 'Where(x > 0, 1, -1)',
     Min: 'Where(a < b, a, b), or Clip',

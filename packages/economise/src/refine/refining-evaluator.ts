@@ -97,13 +97,13 @@ function requireMeans({ device, views }: Partial<RefiningOptions>): void {
       where: 'RefiningOptions.device',
       expected: 'a GPUDevice: splats are fitted by compute shaders',
       found: 'none',
-      remedy: 'ask an adapter for one (SwiftShader’s will do, slowly), or do without refining',
+      remedy: 'request one from an adapter (SwiftShader works, slowly), or do not refine',
     });
   if (!views || views.length === 0)
     throw new GaussianSplatError('argument/value', {
       where: 'RefiningOptions.views',
       expected: 'one view or more',
       found: 'none',
-      remedy: 'give the views that splats are scored in',
+      remedy: 'pass the scoring views',
     });
 }

@@ -94,7 +94,7 @@ export function encodingsFor(
       expected: `a name that ends in ${[...ENCODINGS.keys(), '.sog'].join(', ')}`,
       found: extension || 'no extension',
       remedy:
-        'choose .glb for accuracy, .sog for size, lod-meta.json in a folder for streaming, .ply for tools that know nothing else',
+        'choose .glb for accuracy, .sog for size, lod-meta.json in a folder for streaming, .ply for tools that read nothing else',
     });
   }
   requireFilter(name, extension, cloud);
@@ -131,7 +131,7 @@ function requireFilter(
   throw new GaussianSplatError('argument/value', {
     where: name,
     expected: `a format that can name the filter of the scene: ${others.join(', ')}`,
-    found: `${extension}, which has no place for ${filterVariance} px²${antialiased ? ' with compensation (antialiasing)' : ''}`,
+    found: `${extension}, which cannot store ${filterVariance} px²${antialiased ? ' with compensation (antialiasing)' : ''}`,
     remedy: `choose ${others.join(' or ')}`,
   });
 }

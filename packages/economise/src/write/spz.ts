@@ -74,7 +74,7 @@ export function fractionalBitsOf({ positions, origin }: Pick<GaussianCloud, 'pos
   if (largest <= MAX_STEPS) return Math.min(MAX_FRACTIONAL_BITS, Math.floor(Math.log2(MAX_STEPS / largest)));
   throw new GaussianSplatError('argument/value', {
     where: 'positions of a scene that is written as SPZ',
-    expected: 'coordinates of at most 8,388,607, which is what 24 bits hold',
+    expected: 'coordinates of at most 8,388,607, the range of 24 bits',
     found: String(Math.round(largest)),
     remedy: 'choose .ply or .glb, which keep scenes far from (0, 0, 0), or move the scene',
   });

@@ -248,7 +248,7 @@ export abstract class SplatChild extends ReactiveElement implements SourceOwner 
       const matrix = readMatrix(this.matrix);
       if (matrix) return matrix;
       this.warn(
-        `<${this.localName}> matrix: expected 16 numbers, the last row 0 0 0 1, or a DOMMatrix; the place is used.`,
+        `<${this.localName}> matrix: expected 16 numbers, the last row 0 0 0 1, or a DOMMatrix; position, rotation and scale are used.`,
       );
     }
     return matrixOf({

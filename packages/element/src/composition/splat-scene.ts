@@ -112,7 +112,7 @@ export class SplatSceneElement extends SplatChild {
 
   #readDynamicValues(): Omit<DynamicState, 'timeSeconds'> {
     const pose = readNumbers(this.pose);
-    if (pose === undefined && this.pose) this.warn('<splat-scene>: pose expects numbers; the rest pose counts.');
+    if (pose === undefined && this.pose) this.warn('<splat-scene>: pose expects numbers; the rest pose is used.');
     return { pose, ...readControls(this.attributes, this.inputValues, (sentence) => this.warn(sentence)) };
   }
 }

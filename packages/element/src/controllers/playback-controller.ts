@@ -304,4 +304,4 @@ function requireFinite(value: number, name = 'currentTime'): void {
 
 /** Returns the `AbortError` with which a canceled `play()` rejects. */
 export const notPlayed = (): DOMException =>
-  new DOMException('play() was taken back by pause() or another src', 'AbortError');
+  new DOMException('play() was interrupted by pause() or another src', 'AbortError');

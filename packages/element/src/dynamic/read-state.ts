@@ -46,7 +46,7 @@ export class StateReader {
       if (binding.role === 'shape') shape = value;
       if (binding.role !== 'control' && binding.role !== 'seed') continue;
       const image = valueOf(state.images, name);
-      if (image !== undefined) this.#notify(name, 'numbers', String(image).slice(0, 60), 'its default counts');
+      if (image !== undefined) this.#notify(name, 'numbers', String(image).slice(0, 60), 'its default is used');
       if (value === undefined) continue;
       if (binding.role === 'seed') seed = this.#wholeNumber(name, value[0]);
       else controls[name] = this.#inRange(name, binding, value);
@@ -58,7 +58,7 @@ export class StateReader {
   #inRange(name: string, { range: [min, max] }: ControlInput, values: readonly number[]): number | readonly number[] {
     const inside = values.map((value) => Math.min(max, Math.max(min, value)));
     if (inside.some((value, i) => value !== values[i])) {
-      this.#notify(name, `${min} to ${max}`, values.slice(0, 4).join(' '), 'the nearest value within counts');
+      this.#notify(name, `${min} to ${max}`, values.slice(0, 4).join(' '), 'the nearest value in this range is used');
     }
     return inside.length === 1 ? inside[0] : inside;
   }
@@ -67,7 +67,7 @@ export class StateReader {
     const [min, max] = INT32;
     const nearest = Math.min(max, Math.max(min, Math.round(value)));
     if (nearest !== value)
-      this.#notify(name, `a whole number from ${min} to ${max}`, String(value), 'the nearest one counts');
+      this.#notify(name, `a whole number from ${min} to ${max}`, String(value), 'the nearest one is used');
     return nearest;
   }
 

@@ -79,7 +79,7 @@ const notDrawable = (where: string, unusable: number): ContractError =>
       code: 'contract/not-finite',
       where,
       expected: 'Gaussians that can be drawn',
-      found: `a run in which none can: ${unusable} rows have numbers that are not finite, no extent, or a rotation of zeros`,
-      remedy: 'look for a division by zero: "gaussian-splat check MODEL --run" says at which inputs',
+      found: `a run without any: ${unusable} rows have numbers that are not finite, no extent, or a rotation of zeros`,
+      remedy: 'look for a division by zero: "gaussian-splat check MODEL --run" reports the inputs',
     },
   ]);

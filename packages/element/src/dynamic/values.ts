@@ -74,7 +74,8 @@ export function readControls(
     delete images[name];
     if (numbers) controls[name] = numbers;
     else if (isPixels(value) || (typeof value === 'string' && value !== '')) images[name] = value as ImageSources;
-    else warn(`<gaussian-splat>: control ${name} expects numbers, found ${JSON.stringify(value)}; its default counts.`);
+    else
+      warn(`<gaussian-splat>: control ${name} expects numbers, found ${JSON.stringify(value)}; its default is used.`);
   }
   return { controls, images };
 }

@@ -305,7 +305,7 @@ const tooManyCuts = (found: number): string =>
     where: '<splat-cut>',
     expected: `at most ${MAX_CUTS} cuts of one scene, a reveal by sweep included`,
     found: `${found}, of which the last are left out`,
-    remedy: 'put cuts of one scene into its <splat-scene>, and hide what is not needed',
+    remedy: 'put cuts of one scene into its <splat-scene>, and hide those that are not needed',
   }).message;
 
 const NO_WEBGL =

@@ -22,7 +22,7 @@ export function unrecoverable(cause: unknown, loss?: GPUDeviceLostInfo): Gaussia
     found: isLoss ? lost : `${lost}, and no other in its place (${why})`,
     remedy:
       loss?.reason === 'destroyed'
-        ? "a script of this page called the device's destroy(): leave that, or let SharedDevice's function request a new device each time"
+        ? "a script of this page called the device's destroy(): remove that call, or let SharedDevice's function request a new device each time"
         : `${reload}; if it happens again, use a smaller scene or update the graphics driver`,
     cause,
   });

@@ -17,7 +17,7 @@ export function noWebGpu(): GaussianSplatError {
   if (globalThis.isSecureContext === false) {
     return new GaussianSplatError('unsupported/insecure-context', {
       where: 'this page',
-      expected: 'a secure context, since browsers offer WebGPU in no other',
+      expected: 'a secure context (https or localhost), which WebGPU requires',
       found: `the insecure address ${globalThis.location?.origin ?? '(none)'}`,
       remedy: 'serve the page over https, or from localhost',
     });
@@ -42,9 +42,9 @@ export const noAdapter = (): GaussianSplatError =>
 export const changedPage = (): GaussianSplatError =>
   new GaussianSplatError('unsupported/page', {
     where: 'this page',
-    expected: 'the Array.from of the browser',
-    found: 'another, which a script of the page has put in its place',
-    remedy: 'load a version of that script that leaves Array.from alone, or show the scene in an iframe',
+    expected: "the browser's Array.from",
+    found: 'a replacement by a script of the page',
+    remedy: 'load a version of that script that keeps Array.from, or show the scene in an iframe',
   });
 
 export const noLimits = (error: unknown): GaussianSplatError =>

@@ -40,7 +40,7 @@ async function build(packed: PackedGaussians, signal: AbortSignal): Promise<Pack
 function outOfMemory(cause: unknown): GaussianSplatError {
   return new GaussianSplatError('out-of-memory/allocation', {
     where: 'levels of detail',
-    expected: 'memory enough to build them',
+    expected: 'enough memory to build them',
     found: cause instanceof Error ? cause.message : String(cause),
     remedy: 'use a smaller scene, or write it with gaussian-splat detail',
     cause,

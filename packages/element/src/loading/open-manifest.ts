@@ -50,7 +50,7 @@ const tooMany = (where: string, splats: number, max: number): GaussianSplatError
     where,
     expected: `at most ${max} splats`,
     found: String(splats),
-    remedy: 'use a smaller scene, or allow for more',
+    remedy: 'use a smaller scene, or raise the limit',
   });
 
 function parsed(bytes: Uint8Array, where: string): unknown {

@@ -52,5 +52,5 @@ const namesOf = ({ nodes }: OnnxHeader): number =>
 const tooMuch = (where: string, expected: string, found: string): GaussianSplatError =>
   new GaussianSplatError('out-of-memory/budget', {
     ...{ where, expected, found },
-    remedy: 'use a smaller model, or allow for more',
+    remedy: 'use a smaller model, or raise the limit',
   });

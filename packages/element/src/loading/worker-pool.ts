@@ -257,7 +257,7 @@ export class WorkerPool {
       await this.#prepare();
       await new Promise((resolve) => setTimeout(resolve, GRACE_MS));
       if (slot.isReady) return this.#place(job);
-      this.#warn('its script does not come');
+      this.#warn('its script does not arrive');
       job.resolve(job.here());
     } catch (error) {
       job.reject(error);
@@ -300,7 +300,7 @@ export class WorkerPool {
    * Restarts a load in another worker. A load that has been restarted does not share its worker, because it may have
    * blocked the previous one. Rejects the load if it cannot restart.
    */
-  #move(slot: WorkerSlot, job: Job, moves: number, found = 'a worker that gave no sign of life'): void {
+  #move(slot: WorkerSlot, job: Job, moves: number, found = 'a worker that did not respond'): void {
     slot.drop(job);
     job.moves += moves;
     // Transferred buffers cannot be sent again.

@@ -76,7 +76,7 @@ export function poseOfView(view: CameraView, context: ViewContext): CameraPose {
 }
 
 const FORMS =
-  '{ orbit, target, fieldOfView } as of the attributes, { position, lookAt }, { position, rotation } of a cameras.json, or { worldToCamera }';
+  '{ orbit, target, fieldOfView } as in the attributes, { position, lookAt }, { position, rotation } of a cameras.json, or { worldToCamera }';
 
 function ofOrbit(
   { orbit, target, fieldOfView }: OrbitView,

@@ -36,7 +36,7 @@ export async function openFloor(source: FloorSource, signal: AbortSignal): Promi
   if (mapUrl === null && isStreamed(request))
     throw new GaussianSplatError('argument/value', {
       where: 'walk-map',
-      expected: 'a file of the floor, since the scene is streamed',
+      expected: 'a file of the floor, because the scene is streamed',
       found: 'none',
       remedy: 'make one with gaussian-splat floor from the file that the folder was made from',
     });

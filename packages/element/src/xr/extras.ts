@@ -94,7 +94,7 @@ export class Extras {
     };
     const offerOf = (name: 'vr' | 'ar'): XrOffer => {
       const { value } = this[name];
-      if (!value) throw new TypeError(`the attribute ${name} is not set, or its code is not there yet`);
+      if (!value) throw new TypeError(`the attribute ${name} is not set, or its code is not loaded yet`);
       return value;
     };
     Object.defineProperties(element, {

@@ -72,7 +72,7 @@ def image(name: str = "image") -> Input:
 
 @dataclass(frozen=True)
 class Coordinates:
-    """The frame that Gaussians are written in: which axis points up, the handedness, meters in a unit if known."""
+    """Coordinate system of the Gaussians: which axis points up, the handedness, meters in a unit if known."""
 
     up: Up = "-y"
     handedness: Literal["right", "left"] = "right"

@@ -213,10 +213,10 @@ def _kernel(node: onnx.NodeProto, opset: int, values: _Values) -> Iterator[Findi
         yield _of("fallback", node, "control flow ends the recording", "unroll it")
     elif node.op_type not in KERNELS:
         remedy = INSTEAD.get(node.op_type, "write it in other operators")
-        yield _of("fallback", node, "WebGPU has no kernel for it: every run waits for the GPU in its midst", remedy)
+        yield _of("fallback", node, "WebGPU has no kernel for it: every run is interrupted by a wait for the GPU", remedy)
     elif node.op_type == "GridSample" and opset > RULES["gridSampleOpset"]:
         reason = f"WebGPU has kernels for it up to opset {RULES['gridSampleOpset']}"
-        yield _of("fallback", node, f"{reason}: every run waits for the GPU in its midst", _EXPORT)
+        yield _of("fallback", node, f"{reason}: every run is interrupted by a wait for the GPU", _EXPORT)
 
 
 def _inexact(node: onnx.NodeProto, opset: int, values: _Values) -> Iterator[Finding]:

@@ -60,7 +60,7 @@ class Fault:
 
 @dataclass(frozen=True)
 class Attribute:
-    """The live rows of one attribute, and the activation of its numbers."""
+    """The valid rows of one attribute, and the activation of its numbers."""
 
     tensor: str
     rows: AnyArray
@@ -118,7 +118,7 @@ def _fits(dim: object, rule: int | str) -> bool:
 def read(
     outputs: Mapping[str, Any], written: Mapping[str, AnyArray], n_max: int | None = None
 ) -> tuple[list[Fault], Attributes]:
-    """Returns the faults of shapes and numbers of rows, and without faults the attributes of the live rows. A
+    """Returns the faults of shapes and numbers of rows, and without faults the attributes of the valid rows. A
     post-processor has one attribute, its image."""
     faults: list[Fault] = []
     read: dict[str, AnyArray] = {}
@@ -151,7 +151,7 @@ def read(
             rows, wanted = shape[0], len(read[first])
             if rows != wanted:
                 expected = f"{wanted} rows, as {outputs[first]} has"
-                remedy = "write as many rows of every attribute"
+                remedy = "write the same number of rows for every attribute"
                 faults.append(Fault("rows", name, where, expected, f"{rows} rows", remedy))
             elif n_max is not None and rows > n_max and "count" not in outputs:
                 remedy = "raise nMax in the contract"
@@ -162,7 +162,7 @@ def read(
     if "count" in read:
         name, live = str(outputs["count"]), int(read["count"][0, 0])
         if not 0 <= live <= most:
-            expected = f"a live count of 0 to {most}, the number of rows (or nMax)"
+            expected = f"a count of 0 to {most}, the number of rows (or nMax)"
             faults.append(Fault("count", name, f"output {name}", expected, str(live), "clamp the count in the model"))
             live = min(max(0, live), most)
     return faults, {each: part for each, part in _attributes(outputs, {k: v[:live] for k, v in read.items()})}

@@ -126,7 +126,7 @@ function checkEntry(
   cursor.u64();
   const [splats, bands] = [cursor.u32(), cursor.u32()];
   const chunk = chunks[places.get(offset) ?? -1] as Chunk | undefined;
-  if (!chunk) throw damaged(cursor.name, 'places of chunks', `byte ${offset}`, 'decode/header');
+  if (!chunk) throw damaged(cursor.name, 'offsets of chunks', `byte ${offset}`, 'decode/header');
   cursor.take(17 * bands);
   const isLong = cursor.left >= 28;
   if (isLong) cursor.take(20);
@@ -256,8 +256,8 @@ const idsOf = (bins: Bins, count: number): number[] => Array.from(bins.get(ATTRI
 /** Returns the row of each splat by its id. Throws `decode/header` without ids, `decode/corrupt` if one occurs twice. */
 export function rowsById(bins: Bins, name: string): Map<number, number> {
   const ids = bins.get(ATTRIBUTE.id);
-  if (!ids) throw damaged(name, 'numbers of splats', 'none', 'decode/header');
+  if (!ids) throw damaged(name, 'indices of splats', 'none', 'decode/header');
   const rows = new Map(Array.from(ids, (id, row) => [id, row]));
   if (rows.size === ids.length) return rows;
-  throw damaged(name, 'splats of different numbers', 'a number twice');
+  throw damaged(name, 'splats with different indices', 'an index twice');
 }

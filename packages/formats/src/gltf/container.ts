@@ -48,7 +48,7 @@ export function openContainer(source: JsonSource, known = HARMLESS): GltfFile {
   if (unknown !== undefined) {
     throw new GaussianSplatError('decode/unsupported', {
       where: `${name}, extensionsRequired`,
-      expected: 'extensions that are known here, or that splats can do without',
+      expected: 'supported extensions, or extensions that splats do not need',
       found: show(unknown),
       remedy: WITHOUT.find(([extension]) => extension.test(String(unknown)))?.[1] ?? CONVERT,
     });

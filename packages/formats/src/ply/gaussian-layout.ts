@@ -136,7 +136,7 @@ export async function loadMetadata(
 }
 
 export const importMeaning = (): Promise<typeof meaning> =>
-  loadModule('the code that reads what a PLY says of itself', () => import('./metadata.js'));
+  loadModule('the code that reads the metadata of a PLY', () => import('./metadata.js'));
 
 /** Matches elements after the splats, and their only property: the color space of SHARP, and a safe orbit. */
 export const TRAILING = /^(color_space|safe_orbit_camera_.*)$/;

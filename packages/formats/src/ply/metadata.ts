@@ -105,7 +105,7 @@ export async function readTrailing(
   if (has(ELEVATIONS, 2) && has(RADIUS, 1)) {
     const orbit = safeOrbit([...valuesOf(ELEVATIONS), ...valuesOf(RADIUS)]);
     if (orbit) cloud.hints = { ...cloud.hints, orbit };
-    else warn(cloud, 'The limits of the camera are left out, because they are no angles and radius of an orbit.');
+    else warn(cloud, 'The limits of the camera are left out, because they are not the angles and radius of an orbit.');
   }
   if (!has('color_space', 1) || valuesOf('color_space')[0] !== 1) return;
   const { encodeLinearColors } = await loadModule(
@@ -141,7 +141,7 @@ export function warnDropped(cloud: DraftCloud, { elements }: PlyHeader, fileName
     const listed = unread.slice(0, 6).join(', ') + (unread.length > 6 ? `, ... (${unread.length})` : '');
     warn(
       cloud,
-      `Properties of splats that are not known are left out: ${listed}. If they move or recolor the splats, what is drawn is not what was trained.`,
+      `Properties of splats that are not known are left out: ${listed}. If they move or recolor the splats, the frame differs from the training.`,
     );
   }
   const others = elements.filter(({ name, count }) => count > 0 && !KNOWN.test(name)).map(({ name }) => name);

@@ -98,7 +98,7 @@ function warnDropped(cloud: DraftCloud, json: Json, hasMeshes: boolean): void {
   if (!hasMeshes) for (const warning of leftOutExtensions(json)) warn(cloud, warning);
   const { animations } = json;
   if (Array.isArray(animations) && animations.length > 0)
-    warn(cloud, `${grouped(animations.length)} animations are left out for splats: they are drawn as they stand.`);
+    warn(cloud, `${grouped(animations.length)} animations are left out: the splats are drawn without motion.`);
 }
 
 /**

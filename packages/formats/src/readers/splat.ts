@@ -20,7 +20,7 @@ export function readSplat(source: SceneSource): GaussianCloud {
       where: `${name}, byte ${grouped(source.bytes.length)} (end of the file)`,
       expected: 'a multiple of 32 bytes, as .splat files have',
       found: `${grouped(count)} whole splats and ${rest} bytes of another`,
-      remedy: 'download or export the file again; it is incomplete, or no .splat file',
+      remedy: 'download or export the file again; it is incomplete, or not a .splat file',
     });
   }
   if (!looksLikeSplats(bytes, 'at least half')) {

@@ -38,7 +38,7 @@ export async function readZip(source: SceneSource): Promise<GaussianCloud> {
   const folder = path.slice(0, path.lastIndexOf('/') + 1);
   const inner = archive.open(path);
   const format = findFormat(inner, path, '');
-  if (!format) throw noScene(name, path, 'a file that is none');
+  if (!format) throw noScene(name, path, 'a file that is not a scene');
   if (format.name === 'zip' && source.openFile === WITHIN)
     throw noScene(name, path, 'an archive within an archive within an archive');
   const read = await loadReader(format);

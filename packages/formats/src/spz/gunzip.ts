@@ -63,7 +63,7 @@ export class Gunzip {
       found: isCut
         ? `one that is cut after ${grouped(this.#output.length)} inflated bytes`
         : `a damaged one after ${grouped(this.#output.length)} inflated bytes`,
-      remedy: 'download or export the file again; it did not arrive whole',
+      remedy: 'download or export the file again; it is incomplete',
       cause,
     });
   }

@@ -66,7 +66,7 @@ function inflate(stream: Uint8Array, length: number, attribute: string, at: numb
       where: `${name}, byte ${grouped(at + cause.byte)}, zstd stream of ${attribute}`,
       expected: `an intact stream of ${grouped(length)} bytes`,
       found: cause.message,
-      remedy: 'download or export the file again; it did not arrive whole',
+      remedy: 'download or export the file again; it is incomplete',
       cause,
     });
   }

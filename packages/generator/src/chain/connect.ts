@@ -109,12 +109,12 @@ const cannotConnect = (
 const takesNothing = (before: GeneratorModel, after: GeneratorModel, role: string): ContractFault => ({
   code: 'contract/chain',
   where: after.header.name,
-  expected: `an input with the role ${role}, for what ${before.header.name} writes`,
+  expected: `an input with the role ${role}, for the outputs of ${before.header.name}`,
   found: 'none',
-  remedy: 'put models into a chain in the order in which they feed one another',
+  remedy: 'put models into a chain in the order of their data',
 });
 
-/** Returns a fault if the next model does not receive the live count: rows after it are undefined. */
+/** Returns a fault if the next model does not receive the count of valid rows: later rows are undefined. */
 function lostCount(
   before: GeneratorModel,
   after: GeneratorModel,
@@ -125,7 +125,7 @@ function lostCount(
     {
       code: 'contract/chain',
       where: after.header.name,
-      expected: `an input with the role gaussians and the attribute count, since ${before.header.name} writes a live count`,
+      expected: `an input with the role gaussians and the attribute count, since ${before.header.name} writes a count`,
       found: 'none',
       remedy: 'give the model such an input and a count of its own, or export the one before it without a count',
     },

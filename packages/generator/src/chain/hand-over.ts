@@ -104,8 +104,8 @@ const tooManyRows = (name: string, capacity: number, rows: number): ContractErro
     {
       code: 'contract/rows',
       where: `a run of ${name}`,
-      expected: `at most ${capacity} rows, as nMax of its contract says`,
+      expected: `at most ${capacity} rows, the nMax of its contract`,
       found: `${rows}`,
-      remedy: 'raise nMax in the contract to the most rows that a run writes',
+      remedy: 'raise nMax in the contract to the maximum number of rows of a run',
     },
   ]);

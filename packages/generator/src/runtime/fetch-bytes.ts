@@ -106,8 +106,8 @@ const shorten = (url: string): string => url.slice(0, 200);
 const unreachable = (url: string, cause: unknown): GaussianSplatError =>
   new GaussianSplatError('network/unreachable', {
     where: shorten(url),
-    expected: 'an answer from the server',
-    found: `none that may be read (${(cause as Error)?.message ?? 'unknown cause'})`,
+    expected: 'a response from the server',
+    found: `no readable response (${(cause as Error)?.message ?? 'unknown cause'})`,
     remedy: 'check the address and the connection; a server of another origin must send "Access-Control-Allow-Origin"',
     cause,
   });

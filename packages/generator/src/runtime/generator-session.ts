@@ -318,8 +318,8 @@ function requireRoom({ header, outputs }: GeneratorModel, { limits }: GPUDevice)
 function deviceLost(cause: unknown): GaussianSplatError {
   return new GaussianSplatError('device-lost/unrecoverable', {
     where: 'GPU device of the generator',
-    expected: 'a device that stays',
-    found: 'a device that was lost',
+    expected: 'an available device',
+    found: 'a lost device',
     remedy: 'open the generator again on a new device',
     cause,
   });

@@ -71,7 +71,7 @@ export class Runtime {
     let timer: ReturnType<typeof setTimeout> | undefined;
     const limit = new Promise<never>((_, reject) => {
       const limit = callLimit;
-      timer = setTimeout(() => reject((this.#breakage = new Error(`no end within ${limit} ms`))), limit);
+      timer = setTimeout(() => reject((this.#breakage = new Error(`no result within ${limit} ms`))), limit);
     });
     try {
       return await Promise.race([task(), limit]);
@@ -179,7 +179,7 @@ async function importScript(script: string): Promise<Ort> {
   const address = copies++ === 0 ? script : `${script}?copy=${copies}`;
   let timer: ReturnType<typeof setTimeout> | undefined;
   const silence = new Promise<never>((_, reject) => {
-    timer = setTimeout(() => reject(new Error(`no end within ${SCRIPT_LIMIT_MS / 1000} s`)), SCRIPT_LIMIT_MS);
+    timer = setTimeout(() => reject(new Error(`no result within ${SCRIPT_LIMIT_MS / 1000} s`)), SCRIPT_LIMIT_MS);
   });
   try {
     return (await Promise.race([import(/* @vite-ignore */ /* webpackIgnore: true */ address), silence])) as Ort;

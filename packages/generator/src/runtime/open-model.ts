@@ -101,7 +101,7 @@ const longContract = (where: string): GaussianSplatError =>
     where: `${where}, the contract beside it`,
     expected: `at most ${MAX_CONTRACT_BYTES} bytes`,
     found: 'more',
-    remedy: 'write the contract without what no reader needs',
+    remedy: 'remove unneeded texts from the contract',
   });
 
 async function contractOf(source: ModelSource, header: OnnxHeader, request: FetchOptions): Promise<ResolvedContract> {

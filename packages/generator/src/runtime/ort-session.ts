@@ -259,7 +259,7 @@ function rowsOf(
         where: `output ${tensor}`,
         expected: `${rows} rows, as ${first} has`,
         found: `${count} rows`,
-        remedy: 'write as many rows of every attribute',
+        remedy: 'write the same number of rows for every attribute',
       },
     ]);
   }

@@ -85,7 +85,7 @@ function requireBufferSize(device: GPUDevice, label: string, size: number): void
     where: `GPU buffer ${label}`,
     expected: `at most ${limit} bytes (maxBufferSize ${maxBufferSize}, maxStorageBufferBindingSize ${maxStorageBufferBindingSize})`,
     found: `${size} bytes`,
-    remedy: "ask for the adapter's limits with deviceDescriptor(adapter), or show a smaller scene",
+    remedy: "request the adapter's limits with deviceDescriptor(adapter), or show a smaller scene",
   });
 }
 

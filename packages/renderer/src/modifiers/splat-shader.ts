@@ -51,7 +51,7 @@ export function hookText({ code, uniforms = {} }: SplatShader, name: string, oth
   const own = withoutComments(code);
   const forbidden = FORBIDDEN.exec(own);
   if (forbidden)
-    throw refused('functions, structs and constants alone', `"${forbidden[0].trim()}"${lineAt(own, forbidden.index)}`);
+    throw refused('only functions, structs and constants', `"${forbidden[0].trim()}"${lineAt(own, forbidden.index)}`);
   if (!/\bfn\s+modify\s*\(/.test(own)) throw refused('a function `modify`', 'none');
   const entries = Object.entries(uniforms);
   if (entries.length > constants.MAX_VALUES)

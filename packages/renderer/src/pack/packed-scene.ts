@@ -12,7 +12,7 @@ const notWhole = (): GaussianSplatError =>
     where: 'readPacked',
     expected: 'a scene that is on the GPU as a whole',
     found: 'a streamed one, of which pages come and go',
-    remedy: 'read the file that it was made of',
+    remedy: 'read the file that it was made from',
   });
 
 /**

@@ -87,7 +87,7 @@ export function levelSource(
       where: `level ${pages[page - 1].level} of box ${pages[page - 1].box}`,
       expected: `1 to ${list.chunks[page]} chunks of ${4 * chunk} bytes`,
       found: `${words.byteLength} bytes`,
-      remedy: 'bring what packLevelPage makes of the run',
+      remedy: 'pass the result of packLevelPage for the run',
     });
   };
   return { scene, list, fetch };

@@ -161,7 +161,7 @@ export function checkManifest(value: unknown, where: string, maxPages = MAX_PAGE
       isVector(instance.translate) &&
       (i === 0) === (instance.parent === undefined) &&
       (i === 0 || isPlace(instance.parent, trees![instances![0].tree].pages));
-    if (!isFine) fail(`instances[${i}]`, 'a tree, where it stands, and the chunk above it', instance);
+    if (!isFine) fail(`instances[${i}]`, 'a tree, its translation, and its parent chunk', instance);
   });
   checkPages(manifest as DetailManifest, fail, Math.min(MAX_PAGES, maxPages));
   return manifest as DetailManifest;
@@ -196,14 +196,14 @@ function checkPages({ trees, instances }: DetailManifest, fail: Fail, maxPages: 
     tree.pages.forEach(({ file, chunks, parent }, p) => {
       const path = `trees[${t}].pages[${p}]`;
       if ((lengths.get(file) ?? chunks) !== chunks) fail(path, `as many chunks of ${file} as elsewhere`, chunks);
-      if (parent && !places.take(parent)) fail(path, 'a chunk that nothing else is below', parent);
+      if (parent && !places.take(parent)) fail(path, 'a chunk without another child', parent);
       lengths.set(file, chunks);
     });
     return places;
   });
   const first = taken[instances[0].tree];
   instances.forEach(({ parent }, i) => {
-    if (parent && !first.take(parent)) fail(`instances[${i}]`, 'a chunk that nothing else is below', parent);
+    if (parent && !first.take(parent)) fail(`instances[${i}]`, 'a chunk without another child', parent);
   });
   const counts = trees.map(({ pages }) => pages.reduce((sum, file) => sum + pagesIn(file), 0));
   const count = instances.reduce((sum, { tree }) => sum + counts[tree], 0);

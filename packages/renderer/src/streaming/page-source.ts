@@ -101,7 +101,7 @@ function requireBounds(where: string, bounds: Float32Array): void {
     where,
     expected: 'bounds of splats',
     found: 'numbers that are not finite',
-    remedy: 'write the folder again with npm run detail, and upload all files of it',
+    remedy: 'write the folder again with gaussian-splat detail, and upload all files of it',
   });
 }
 

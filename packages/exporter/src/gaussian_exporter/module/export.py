@@ -246,7 +246,7 @@ def _rows(model: onnx.ModelProto, layout: Layout, n_max: int | None, expected: S
             where="n_max",
             expected="the most Gaussians that a run writes, since the file may write another number in each",
             found=f"none; {most} were seen",
-            remedy=f"keep every row, and write opacity 0 into the dead ones; or give n_max={2 * most}",
+            remedy=f"keep every row, and write opacity 0 into the unused ones; or give n_max={2 * most}",
         )
     return {"nMax": n_max}
 

@@ -113,9 +113,9 @@ def tried(
         raise ExportError(
             "argument/value",
             where=f"output {layout.outputs[0]} of the module",
-            expected="as many rows for every input",
+            expected="the same number of rows for every input",
             found=f"{rows[0]} {said(tries[0], tries)}, {rows[at]} {said(tries[at], tries)}",
-            remedy="keep every row, and write opacity 0 into the dead ones, which is faster; or give the most that"
+            remedy="keep every row, and write opacity 0 into the unused ones, which is faster; or give the most that"
             f" there can be, such as n_max={2 * max(rows)}",
         )
     return tries, expected
