@@ -1,6 +1,8 @@
 /**
- * `npm run lint:words [-- --longest 20] [--inside]`, a part of `npm run lint`: texts for readers use the project's terms (scripts/words/terms.mjs), and README and guides sentences of a readable length. It reads documents, pages of the
- * site, comments of the public API, the tables of attributes, and sentences of errors and of scripts. `--longest` prints the longest sentences of README and guides, `--inside` counts words in all comments and strings.
+ * `npm run lint:words [-- --longest 20] [--inside]`, a part of `npm run lint`: texts use the project's terms
+ * (scripts/words/terms.mjs), and README and guides sentences of a readable length. It reads documents, pages of the site,
+ * all comments, and all sentences in strings: errors, messages of commands, titles of tests. `--longest` prints the longest
+ * sentences of README and guides, `--inside` prints the rates of comments and strings by kind.
  */
 import { readdirSync, readFileSync } from 'node:fs';
 import { join } from 'node:path';
@@ -8,7 +10,7 @@ import { parseArgs } from 'node:util';
 import { root } from './lib/run.mjs';
 import { RETIRED_PARTS, retiredPartOf } from './words/names.mjs';
 import { blocksOfMarkdown, blocksOfPage, sentencesOf, wordsOf } from './words/prose.mjs';
-import { attributeComments, publicComments, sentencesInCode } from './words/sources.mjs';
+import { attributeComments, publicComments, sentencesInCode, sentencesInPython } from './words/sources.mjs';
 import { RATES, retiredIn } from './words/terms.mjs';
 
 /** Words of a sentence outside tables: bounds of the average, the longest, and the fractions above `many` and of at most `FEW` words. */
@@ -26,15 +28,13 @@ const LIMITS = {
 const FEW = 7;
 /** Upper limits per 1,000 words of documents and pages. */
 const RATE_LIMITS = { where: 1.5, 'what-clauses': 1.5, 'of which': 0.5 };
-/** Folders whose comments keep upper limits of rates per 1,000 words, and have no retired words or fragments. */
-const HELD_COMMENTS =
-  /^(shaders|tests|scripts|demo|packages\/(core|renderer|formats|generator|element|react|three|check|economise|cli|exporter)\/src)\//;
-const COMMENTED_FOLDERS = ['packages', 'tests', 'scripts', 'demo', 'shaders'];
+/** Folders with code. Its comments keep upper limits of rates per 1,000 words, and have no retired words or fragments. */
+const FOLDERS = ['packages', 'tests', 'scripts', 'demo', 'benchmarks', 'shaders'];
+/** The retired words themselves, and their test. */
+const EXEMPT = /^(scripts\/words\/|tests\/site\/words\.test\.ts$)/;
 const COMMENTED_ENDINGS = ['.ts', '.tsx', '.mjs', '.js', '.wgsl', '.py'];
 const COMMENT_LIMITS = { where: 3, 'what-clauses': 3, 'of which': 0.7 };
 const FRAGMENT = /^(What|Of|Where|With|By|That|Those)\b/;
-/** Reasons and records, for those who work on the project. */
-const RECORDS = /^docs\/decisions\//;
 const NOT_OURS = /(^|\/)(node_modules|dist|cdn|generated|\.[^/]+)$/;
 
 const { values } = parseArgs({
@@ -47,7 +47,7 @@ const documents = [
   'CHANGELOG.md',
   ...filesIn('docs', '.md'),
   ...filesIn('packages', '.md'),
-].filter((path) => !RECORDS.test(path));
+];
 const read = (path) => readFileSync(join(root, path), 'utf8');
 const placed = (path, blocks) => blocks.map((block) => ({ file: path, ...block }));
 const prose = new Map(documents.map((path) => [path, blocksOfMarkdown(read(path))]));
@@ -58,23 +58,19 @@ const documentsAndPages = [
   ...[...filesIn('demo', '.njk'), ...filesIn('demo', '.html'), ...filesIn('benchmarks', '.html')].flatMap((path) =>
     placed(path, blocksOfPage(read(path))),
   ),
-].map((block) => ({ ...block, isDocument: true }));
-const texts = [
-  ...documentsAndPages,
-  ...[
-    ...filesIn('demo', '.js'),
-    ...filesIn('benchmarks', '.js'),
-    ...filesIn('demo', '.tsx'),
-    ...filesIn('packages', '.ts').filter((path) => path.includes('/src/')),
-  ].flatMap((path) => sentencesInCode(join(root, path))),
-  ...attributeComments(),
-  ...publicComments(),
 ];
+const code = FOLDERS.flatMap((folder) => COMMENTED_ENDINGS.flatMap((ending) => filesIn(folder, ending)))
+  .concat(readdirSync(root).filter((name) => /\.(mjs|js)$/.test(name)))
+  .filter((path) => !/generated/.test(path) && !EXEMPT.test(path));
+const strings = code
+  .filter((path) => !path.endsWith('.wgsl'))
+  .flatMap((path) => (path.endsWith('.py') ? sentencesInPython : sentencesInCode)(join(root, path)));
+const texts = [...documentsAndPages, ...strings, ...attributeComments(), ...publicComments()];
 
 let faults = 0;
 const seen = new Set();
-for (const { file, line, text, isDocument, isHeading } of texts) {
-  for (const { found, instead, at } of retiredIn(text, { isDocument, isHeading })) {
+for (const { file, line, text, isHeading } of texts) {
+  for (const { found, instead, at } of retiredIn(text, { isHeading })) {
     const fault = `${file}:${line + text.slice(0, at).split('\n').length - 1}: "${found}". Write: ${instead}.`;
     if (seen.has(fault)) continue;
     seen.add(fault);
@@ -141,13 +137,11 @@ function measureRates(name, blocks, limits = {}) {
   return broken.length;
 }
 
-/** Checks the comments of the held folders. @returns {number} of faults */
+/** Checks all comments. @returns {number} of faults */
 function holdComments() {
-  const comments = COMMENTED_FOLDERS.flatMap((folder) => COMMENTED_ENDINGS.flatMap((ending) => filesIn(folder, ending)))
-    .filter((path) => HELD_COMMENTS.test(path) && !/generated/.test(path))
-    .flatMap((path) => commentsIn(read(path), path).map((text) => ({ path, text })));
+  const comments = code.flatMap((path) => commentsIn(read(path), path).map((text) => ({ path, text })));
   const wrong = comments.flatMap(({ path, text }) => [
-    ...retiredIn(text, { isDocument: true }).map(
+    ...retiredIn(text).map(
       ({ found, instead, at }) =>
         `${path}: comment: "${found}". Write: ${instead}.\n    … ${around(text, at, found.length)} …`,
     ),
@@ -156,8 +150,8 @@ function holdComments() {
       : []),
   ]);
   for (const sentence of wrong) console.error(sentence);
-  console.log(`held comments: ${wrong.length} retired words and fragments`);
-  return wrong.length + measureRates('held comments', comments, COMMENT_LIMITS);
+  console.log(`comments: ${comments.length}, ${wrong.length} retired words and fragments`);
+  return wrong.length + measureRates('comments', comments, COMMENT_LIMITS);
 }
 
 /** Checks declared names of shaders, as the ESLint rule does those of scripts. @returns {number} of faults */
@@ -174,28 +168,18 @@ function holdShaderNames() {
   return wrong.length;
 }
 
-/** Comments and strings of code: retired words and rates, without limits. */
+/** Rates of comments and strings by kind, without limits. */
 function countInside() {
-  const sources = COMMENTED_FOLDERS.flatMap((folder) => COMMENTED_ENDINGS.flatMap((ending) => filesIn(folder, ending)));
+  const ofProduct = (path) => /^(packages\/[^/]+\/src|shaders)\//.test(path);
   for (const [name, chosen] of Object.entries({
-    'comments of packages and shaders': (path) => /^(packages\/[^/]+\/src|shaders)\//.test(path),
-    'comments of tests, scripts and pages': (path) => /^(tests|scripts|demo)\//.test(path),
+    'packages and shaders': ofProduct,
+    'tests, scripts and pages': (path) => !ofProduct(path),
   })) {
-    const comments = sources
-      .filter((path) => chosen(path) && !/generated|\.d\.ts$/.test(path))
-      .flatMap((path) => commentsIn(read(path), path).map((text) => ({ text })));
-    measureRates(name, comments);
-    const hits = comments.flatMap(({ text }) => retiredIn(text, { isDocument: true }));
-    const fragments = comments.filter(({ text }) => FRAGMENT.test(text)).length;
-    console.log(
-      `  ${comments.length} comments, ${hits.length} retired words, ${fragments} fragments that begin with a function word`,
-    );
+    const comments = code.filter(chosen).flatMap((path) => commentsIn(read(path), path).map((text) => ({ text })));
+    measureRates(`${comments.length} comments of ${name}`, comments);
+    const sentences = strings.filter(({ file }) => chosen(file));
+    measureRates(`${sentences.length} strings of ${name}`, sentences);
   }
-  const strings = filesIn('packages', '.ts')
-    .filter((path) => path.includes('/src/') && !path.includes('generated'))
-    .flatMap((path) => sentencesInCode(join(root, path)));
-  measureRates('strings of packages', strings);
-  console.log(`  ${strings.flatMap(({ text }) => retiredIn(text, { isDocument: true })).length} retired words`);
 }
 
 /** Comments of three words or more, one text each; lines that follow each other are one comment. */

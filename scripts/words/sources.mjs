@@ -135,6 +135,18 @@ export function sentencesInCode(path) {
   return found;
 }
 
+/** The same of Python, without docstrings. */
+export function sentencesInPython(path) {
+  const source = readFileSync(path, 'utf8').replace(/"""[\s\S]*?"""/g, (found) => found.replace(/[^\n]/g, ''));
+  return [...source.matchAll(/"((?:[^"\\\n]|\\.)*)"/g)]
+    .map(({ 1: text, index }) => ({
+      file: relative(root, path),
+      line: source.slice(0, index).split('\n').length,
+      text: text.replace(/\{[^{}]*\}/g, '`'),
+    }))
+    .filter(({ text }) => isProse(text));
+}
+
 /** A sentence, or a label such as "First frame": no identifier, selector or code. */
 const isProse = (text) =>
   /^[^{}]*$/.test(text) &&

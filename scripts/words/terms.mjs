@@ -12,7 +12,7 @@ export const RETIRED = [
   [/\bleavers?\b/i, 'eviction candidate'],
   [/\b(pace|paces|paced|rungs?|ladders?)\b/i, 'dynamic quality, quality level, rate'],
   [/\b(economy|economies|economi[sz](ed|es|ing)|spared)\b/i, 'prune, pruning, splat budget'],
-  [/\bvisible sets?\b/i, 'potentially visible set (PVS)'],
+  [/(?<!potentially )\bvisible sets?\b/i, 'potentially visible set (PVS)'],
   [/\blevers?\b/i, 'setting'],
   [/\bnoted\b|\bnot(es|ing) (contribution|depth|what)/i, 'auxiliary output'],
   [/\bthin(s|ned|ning)\b/i, 'filter'],
@@ -20,14 +20,10 @@ export const RETIRED = [
   [/\b(one|the|each|measured) choice of variants\b/i, 'autotune'],
   [/\bknown answers?\b/i, 'self-test'],
   [/\blive (generators?|models?|scenes?)\b/i, 'generator, dynamic'],
-  [/\b(some|any|no|every)body('s|’s)?\b|\bwho(so)?ever\b|\bwhom\b/i, 'visitors, authors, callers; or the passive'],
+  [/(?<!\.)\b(some|any|no|every)body('s|’s)?\b|\bwho(so)?ever\b|\bwhom\b/i, 'visitors, authors, callers; or the passive'],
   [/\bwhatever\b/i, 'name what: any, all, each'],
   [/\bso (many|much)\b/i, 'a number: n, as many as'],
   [/\bso (far|long)\b/i, 'until now, as long as, up to there'],
-];
-
-/** Retired in documents and pages. Comments and strings follow with the renames: `npm run lint:words -- --inside` counts them. */
-export const RETIRED_IN_DOCUMENTS = [
   [/\b(gives?|gave|given|giving) way\b/i, 'is replaced by, is dismissed'],
   [/\b(in|into|out of) sight\b/i, 'visible, in the viewport, off-screen'],
   [/\bsets? out\b/i, 'starts moving to'],
@@ -71,7 +67,7 @@ export const RETIRED_IN_DOCUMENTS = [
   ],
 ];
 /** A heading or the label of a link may begin with What. */
-const NOT_IN_HEADINGS = RETIRED_IN_DOCUMENTS.at(-1)[0];
+const NOT_IN_HEADINGS = RETIRED.at(-1)[0];
 
 /** Words that are right at times: upper limits of their number per 1,000 words. */
 export const RATES = {
@@ -82,16 +78,14 @@ export const RATES = {
 };
 
 /** Retired words of a text in their order: `{ found, instead, at }`. */
-export function retiredIn(text, { isDocument = false, isHeading = false } = {}) {
-  const patterns = isDocument ? [...RETIRED, ...RETIRED_IN_DOCUMENTS] : RETIRED;
-  const hits = patterns
-    .filter(([pattern]) => !(isHeading && pattern === NOT_IN_HEADINGS))
-    .flatMap(([pattern, instead]) =>
+export function retiredIn(text, { isHeading = false } = {}) {
+  const hits = RETIRED.filter(([pattern]) => !(isHeading && pattern === NOT_IN_HEADINGS)).flatMap(
+    ([pattern, instead]) =>
       [...text.matchAll(new RegExp(pattern.source, `g${pattern.flags}`))].map(({ 0: found, index: at }) => ({
         found,
         instead,
         at,
       })),
-    );
+  );
   return hits.sort((a, b) => a.at - b.at);
 }

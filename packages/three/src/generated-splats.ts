@@ -5,7 +5,7 @@ import { DynamicGaussians } from '@gaussian-splat/renderer';
 import { SplatScene, type SplatSceneOptions } from './splat-scene.js';
 
 /**
- * What a generator writes, as an object of a three.js scene:
+ * The output of a generator, as an object of a three.js scene:
  *
  * ```ts
  * const models = new GaussianModels();
