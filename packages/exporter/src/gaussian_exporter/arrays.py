@@ -1,4 +1,4 @@
-"""Types of numpy arrays, and the few functions of arrays that several rooms need while exporting."""
+"""Types of numpy arrays, and functions of arrays that several modules need while exporting."""
 
 from typing import Any
 

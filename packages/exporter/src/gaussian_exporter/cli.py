@@ -47,7 +47,7 @@ Export = Callable[[argparse.Namespace, Facts, Options], onnx.ModelProto]
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Runs the command; 0 if all went well, 1 with a message for people if not, 2 for wrong options."""
+    """Runs the command. Returns 0 on success, 1 after an error message, 2 for wrong options."""
     given = parser().parse_args(arguments)
     try:
         {"check": check, "cost": cost, "frames": frames}.get(given.family, export)(given)
@@ -83,7 +83,7 @@ def parser() -> Command:
 
 
 def add_common(family: Command) -> None:
-    """Options of every family: facts for the contract, and how the output is written."""
+    """Options of every family: facts for the contract, and the form of the output."""
     facts = family.add_argument_group("facts for the contract")
     facts.add_argument("--name", help="name for people; default: the output's file name")
     facts.add_argument("--license", required=True, help="SPDX identifier, or a few words")
@@ -113,7 +113,7 @@ def add_common(family: Command) -> None:
 
 
 def facts_of(given: argparse.Namespace) -> Facts:
-    """The contract's facts among the options."""
+    """Options that are facts for the contract."""
     handedness: Json = {"handedness": "left"} if given.left_handed else {}
     coordinates = Coordinates(up=given.up, meters_per_unit=given.meters_per_unit, **handedness)  # type: ignore[arg-type]
     return Facts(
@@ -149,7 +149,7 @@ def cost(given: argparse.Namespace) -> None:
 
 
 def frames(given: argparse.Namespace) -> None:
-    """Writes moments of a generator, and says how to make a clip of them."""
+    """Writes moments of a generator as PLY files, and prints the command that makes a clip from them."""
     if not given.fps > 0:
         raise ExportError("argument/value", where="--fps", expected="more than 0", found=str(given.fps), remedy="30")
     model = with_contract(loaded(given.file), given.file)
@@ -204,7 +204,7 @@ def loaded(path: Path) -> onnx.ModelProto:
 
 
 def raise_faults(faults: Sequence[Fault]) -> None:
-    """Prints all but the first, and raises that."""
+    """Prints all findings except the first, and raises the first."""
     for fault in faults[1:]:
         print(f"gaussian-export: {fault.error()}", file=sys.stderr)
     if faults:
@@ -212,7 +212,7 @@ def raise_faults(faults: Sequence[Fault]) -> None:
 
 
 def report_findings(model: onnx.ModelProto) -> None:
-    """Prints the nodes that would leave the GPU, or that there are none."""
+    """Prints the nodes that would leave the GPU, or a message that there are none."""
     findings = gpu_findings(model)
     for line in told(findings):
         print(line)

@@ -21,10 +21,11 @@ SHARES = (0.13, 0.25, 0.37, 0.5, 0.62, 0.75, 0.89, 1.0)
 
 
 def default_feeds(model: onnx.ModelProto, contract: Json) -> dict[str, AnyArray]:
-    """Something for every input: declared defaults, zeros, and a camera five units in front of the bounds' center; of a
-    file of several instances for one."""
+    """Values for every input: declared defaults, zeros, and a camera five units in front of the bounds' center; for a
+    file with instances, those of one.
+    """
     bindings = _bindings(contract)
-    # An input that is an initializer, too, keeps the value of the file, as in pages.
+    # An input that is an initializer, too, keeps its stored value, as in pages.
     stored = {tensor.name for tensor in model.graph.initializer}
     given = (value for value in model.graph.input if value.name not in stored)
     return {value.name: _default(value, bindings.get(value.name), contract) for value in given}
@@ -56,7 +57,7 @@ def _default(value: onnx.ValueInfoProto, binding: Json | None, contract: Json) -
     if binding["role"] == "gaussians":
         return _gaussians(binding, shape).astype(dtype).reshape(shape)
     if binding["role"] == "depth":
-        # Nothing in the first columns, then a surface that recedes.
+        # Depth images: 0 in the first columns, then a surface that recedes.
         across = np.linspace(0, 1, shape[-1], endpoint=False)
         return np.broadcast_to(np.where(across < 0.25, 0, 0.5 + 10 * across), shape).astype(dtype)
     if binding["role"] == "image":
@@ -67,12 +68,12 @@ def _default(value: onnx.ValueInfoProto, binding: Json | None, contract: Json) -
 
 
 def _no_turn(order: object) -> AnyArray:
-    """The quaternion of no rotation."""
+    """The identity quaternion."""
     return np.array([0, 0, 0, 1] if order == "xyzw" else [1, 0, 0, 0])
 
 
 def _gaussians(binding: Json, shape: list[int]) -> AnyArray:
-    """An attribute of small round Gaussians of another model."""
+    """An attribute of the Gaussians of another model: small and round."""
     size, attribute = _flat(shape), binding["attribute"]
     color = 0.5 if binding.get("color") == "rgb" or attribute == "colors" else 0.1
     opacity = 0.0 if binding.get("opacityActivation") == "logit" else 0.5
@@ -141,7 +142,7 @@ def check_outputs(
 
 
 def _raise_first(contract: Json, results: dict[str, AnyArray], label: str, is_default: bool) -> None:
-    # Bounds speak of all times, and of defaults of everything else.
+    # Bounds hold at all times, with defaults of all other inputs.
     bounded = contract if is_default else {key: value for key, value in contract.items() if key != "bounds"}
     named = {name: each for name, each in results.items() if name in cast(Json, contract["outputs"]).values()}
     alone = [named]
@@ -166,7 +167,7 @@ def _bindings(contract: Json) -> dict[str, Json]:
 
 
 def _states(contract: Json, given: dict[str, AnyArray]) -> Iterator[tuple[str, bool, dict[str, AnyArray]]]:
-    """Other times; all controls at the least, and all at the most that their ranges allow: people will go there."""
+    """Other times; all controls at their minimum, and all at their maximum, because visitors can set these."""
     end = cast(float, contract.get("duration", 1.0))
     for share in SHARES:
         if clocks := clocks_at(share * end, contract, given):
@@ -178,7 +179,7 @@ def _states(contract: Json, given: dict[str, AnyArray]) -> Iterator[tuple[str, b
 
 
 def clocks_at(seconds: float, contract: Json, given: dict[str, AnyArray]) -> dict[str, AnyArray]:
-    """Inputs with the roles time and frame at a time, of those that are given."""
+    """Values at a time for the inputs with the roles time and frame."""
     duration = cast(float, contract.get("duration", np.inf))
     rate = cast(float, contract.get("fps", 0.0))
     # The end of the duration belongs to the last frame; in float64, 29/25 s times 25 is less than 29.

@@ -1,6 +1,5 @@
-"""The Gaussian Generator contract, version 1, as the JSON that lies in a file's metadata under `gaussian_contract`.
-
-Everything this package knows about the words of the contract is in this module.
+"""The Gaussian Generator contract, version 1, as JSON in a file's metadata under `gaussian_contract`. This module
+contains all knowledge of this package about the contract.
 """
 
 from __future__ import annotations
@@ -46,7 +45,7 @@ def normalized_time(name: str = "time") -> Input:
 
 
 def pose(name: str, joints: Sequence[str], parents: Sequence[int], quaternions: bool) -> Input:
-    """[J,3] axis-angle in radians, or [J,4] quaternions w x y z; at rest by default."""
+    """[J,3] axis-angle in radians, or [J,4] quaternions w x y z; default: no rotation."""
     rest = [1.0, 0.0, 0.0, 0.0] if quaternions else [0.0, 0.0, 0.0]
     kind: Json = {"format": "quaternion", "quaternionOrder": "wxyz"} if quaternions else {"format": "axis-angle"}
     skeleton: Json = {"joints": list(joints), "parents": [int(parent) for parent in parents]}
@@ -54,12 +53,12 @@ def pose(name: str, joints: Sequence[str], parents: Sequence[int], quaternions: 
 
 
 def shape(name: str, count: int) -> Input:
-    """[count]: coefficients of a body; zeros by default. A contract has one input of this role at most."""
+    """[count]: coefficients of a body; default zeros. A contract has at most one input of this role."""
     return Input(name, {"role": "shape", "default": [0.0] * count})
 
 
 def control(name: str, default: float | Sequence[float], low: float, high: float, label: str | None = None) -> Input:
-    """Float32 of any shape: a control for people. One default for all elements, or one for each."""
+    """Float32 of any shape: a control for visitors. One default for all elements, or one for each."""
     value = default if isinstance(default, (int, float)) else list(default)
     named = {} if label is None else {"label": label}
     return Input(name, {"role": "control", "range": [low, high], "default": value, **named})
@@ -100,14 +99,14 @@ class Coordinates:
         return Coordinates(**fields)
 
     def json(self) -> Json:
-        """As the contract writes it."""
+        """Returns the form of the contract."""
         scale = {} if self.meters_per_unit is None else {"metresPerUnit": self.meters_per_unit}
         return {"up": self.up, "handedness": self.handedness, **scale}
 
 
 @dataclass(frozen=True)
 class Facts:
-    """Facts from the caller, as no checkpoint contains them. `duration` in seconds, `fps` in frames per second."""
+    """Facts from the caller, which no checkpoint contains. `duration` in seconds, `fps` in frames per second."""
 
     name: str
     license: str
@@ -122,7 +121,7 @@ class Facts:
 
 @dataclass(frozen=True)
 class GaussianOutputs:
-    """How Gaussians are written. sh_degree is None for plain colors; names are those of the layout's tensors."""
+    """Form of the Gaussians. sh_degree is None for plain colors; names are those of the layout's tensors."""
 
     layout: Layout
     shape: Shape
@@ -154,7 +153,7 @@ class GaussianOutputs:
 
 
 def gaussian_contract(facts: Facts, inputs: Sequence[Input], outputs: GaussianOutputs) -> Json:
-    """The contract of a generator, keys in the order a reader wants them."""
+    """The contract of a generator, keys in reading order."""
     if facts.duration is None and any(given.binding.get("unit") == "normalized" for given in inputs):
         raise ExportError(
             "argument/value",

@@ -19,19 +19,20 @@ from .graph import ALIASES, INSTANCES_AXIS
 from .placement import axis_of_instances
 
 # Fitted, by relative squares, to ten recorded graphs of 30,000 to 2.5 million Gaussians measured on one NVIDIA H200:
-# nine come out within 30 %, one (80,000 Gaussians) at half its time. The bus could carry 4.8 TB/s; the kernels of the
-# provider reach a quarter of it. Multiplications explained nothing more: they are shown and not counted.
+# nine estimates are within 30 %, one (80,000 Gaussians) is half of the measured time. The bus could carry 4.8 TB/s; the
+# kernels of the provider reach a quarter of it. Multiplications do not improve the fit, so they are shown and not
+# counted.
 MICROSECONDS_PER_DISPATCH = 7.4
 BYTES_PER_SECOND = 1.26e12
-# A Gemm or MatMul computes tiles of this many rows and columns, whole ones.
+# Rows and columns of the tiles that a Gemm or MatMul computes; tiles at the edges count fully.
 TILE = 32
-# Below both of these a product of matrices has a kernel without tiles.
+# Below both of these sizes a matrix product has a kernel without tiles.
 SMALL = 8
 
 ELEMENTWISE = frozenset(
     {"Add", "Sub", "Mul", "Div", "Pow", "Greater", "GreaterOrEqual", "Less", "LessOrEqual", "Equal"}
 )
-# These read as many elements of their first input as they write.
+# Operators that read as many elements of their first input as they write.
 PICKERS = frozenset({"Slice", "Gather", "GatherElements", "GatherND"})
 
 Dims = tuple[int, ...]
@@ -88,7 +89,7 @@ class Cost:
 def cost_of(model: onnx.ModelProto, instances: int = 1) -> Cost:
     """The cost of a run; of `instances` at once if the file has an axis for them.
 
-    Raises graph/invalid if a size is unknown, since the cost then is unknown too.
+    Raises graph/invalid if a size is unknown, because the cost is then unknown, too.
     """
     values = _Values(model, instances)
     outputs = {output.name for output in model.graph.output}
@@ -102,7 +103,7 @@ def cost_of(model: onnx.ModelProto, instances: int = 1) -> Cost:
 
 
 def report(cost: Cost, rows: int = 12) -> Iterator[str]:
-    """Lines for people: the dearest nodes, then every operator, then the whole."""
+    """Lines of text: the most expensive nodes, then every operator, then the total."""
     yield f"{'node':28} {'operator':12} {'writes':22} {'read MB':>8} {'writ. MB':>8} {'GFLOP':>7} {'us':>7}  remark"
     dearest = sorted((node for node in cost.nodes if node.dispatches), key=lambda node: -node.microseconds)
     for node in dearest[:rows]:
@@ -128,7 +129,7 @@ def _counted(nodes: Sequence[NodeCost]) -> list[tuple[str, int]]:
 
 
 class _Values:
-    """Sizes and element types of every value, with a number for the axis of instances."""
+    """Sizes and element types of every value, with the given size of the axis of instances."""
 
     def __init__(self, model: onnx.ModelProto, instances: int):
         fixed = onnx.ModelProto()
@@ -204,7 +205,7 @@ def _product(node: onnx.NodeProto, values: _Values) -> tuple[int, str]:
     if node.op_type == "MatMul" and columns < SMALL and inner < SMALL:
         return 2 * prod(batch) * rows * columns * inner, ""
     if len(right) == 2:
-        # Batches of one row are rows of one product; others are padded to tiles each for itself.
+        # Batches of one row are rows of one product; other batches are each padded to tiles.
         rows, batch = (prod(batch), []) if rows == 1 else (rows, batch)
     whole = -(-rows // TILE) * TILE * (-(-columns // TILE) * TILE)
     is_wide = left[-1] % 4 == 0 and right[-1] % 4 == 0

@@ -18,11 +18,12 @@ ErrorCode = Literal[
 
 
 class ExportError(Exception):
-    """Anything the exporter cannot do. `code` is stable and meant for programs; the text is meant for people."""
+    """Base of all errors of the exporter. `code` is stable and meant for programs; the text is meant for readers."""
 
     def __init__(self, code: ErrorCode | str, *, where: str, expected: str, found: str, remedy: str):
-        """Every part is a full phrase without a trailing full stop. `code`: an ErrorCode, or what breaks a contract:
-        `contract/...`, as the checker of pages has it."""
+        """Every part is a full phrase without a trailing full stop. `code`: an ErrorCode, or the code of a contract
+        fault: `contract/...`, as in the checker of pages.
+        """
         super().__init__(f"{where}: expected {expected}, found {found}. {remedy[:1].upper()}{remedy[1:]}. [{code}]")
         self.code = code
         self.where = where
@@ -32,7 +33,7 @@ class ExportError(Exception):
 
 
 def require_package(name: str, extra: str) -> None:
-    """Raises argument/package if a package is not installed that only some calls need. `extra`: that installs it."""
+    """Raises argument/package if a package is missing that only some calls need. `extra`: the extra that installs it."""
     if find_spec(name) is None:
         raise ExportError(
             "argument/package",

@@ -1,4 +1,4 @@
-"""Moments of a generator as PLY files and a manifest of a sequence: what `gaussian-splat sequence` makes a clip of."""
+"""Moments of a generator as PLY files and the manifest of a sequence, the input of `gaussian-splat sequence`."""
 
 from __future__ import annotations
 
@@ -23,7 +23,8 @@ LEAST_SCALE = 1e-9
 
 def write_frames(model: onnx.ModelProto, path: Path, folder: Path, fps: float, duration: float | None) -> int:
     """Runs a generator at the times of all frames and writes one PLY file each, as INRIA's trainer does, and
-    frames.json. Returns how many. Raises contract/... and argument/... errors; needs onnxruntime."""
+    frames.json. Returns the number of frames. Raises contract/... and argument/... errors; needs onnxruntime.
+    """
     require_package("onnxruntime", "check")
     import onnxruntime as ort
 
@@ -54,7 +55,7 @@ def write_frames(model: onnx.ModelProto, path: Path, folder: Path, fps: float, d
 
 
 def columns_of(attributes: Attributes, outputs: Json) -> dict[str, AnyArray]:
-    """Properties of INRIA's PLY files. `outputs`: the contract's, for the orders of quaternions and harmonics."""
+    """Properties of INRIA's PLY files. `outputs`: those of the contract, for the orders of quaternions and harmonics."""
     wide = {name: np.asarray(each.rows, np.float64) for name, each in attributes.items()}
     if "rotations" in wide and outputs.get("rotationOrder") == "xyzw":
         wide["rotations"] = wide["rotations"][:, [3, 0, 1, 2]]
@@ -75,7 +76,7 @@ def columns_of(attributes: Attributes, outputs: Json) -> dict[str, AnyArray]:
         scales, rotations = wide["scales"], wide["rotations"]
         log_scales = scales if kinds["scales"] == "log" else np.log(np.maximum(scales, LEAST_SCALE))
     sh = wide["sh"] if "sh" in wide else (wide["colors"] - 0.5) / SH_C0
-    # Rows of coefficients with three channels each; files have all of red first.
+    # Rows of coefficients with three channels each; files have all red ones first.
     channels = sh.reshape(len(sh), -1, 3)
     rest = channels[:, 1:].transpose(0, 2, 1).reshape(len(sh), -1)
     groups = {"f_dc": channels[:, 0], "f_rest": rest, "opacity": opacities, "scale": log_scales, "rot": rotations}

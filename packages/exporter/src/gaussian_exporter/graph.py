@@ -1,6 +1,6 @@
 """A builder of ONNX graphs with fixed shapes, for operators that the WebGPU provider of ONNX Runtime runs.
 
-Shapes are known while building, so a wrong one fails here, with the line that asked for it, and not in a browser.
+Shapes are known while building, so a wrong one fails here, with the line that requested it, and not in a browser.
 Numbers are float32; integers occur only as constants (shapes, axes, indices), never as results.
 """
 
@@ -19,23 +19,23 @@ from onnx import TensorProto, helper, numpy_helper
 from .arrays import AnyArray
 from .errors import ExportError
 
-# GridSample of opset 20 has no WebGPU kernel, that of 16 has; reductions take their axes as in opset 13.
+# GridSample has a WebGPU kernel in opset 16 but not in 20; reductions take their axes as in opset 13.
 OPSET = 17
 IR_VERSION = 8
 # A WebGPU device of default limits binds 8 storage buffers to a shader: 7 inputs and one output.
 MOST_CONCAT_INPUTS = 7
 
-# Tables of fewer numbers stay float32 also in compact files: there is little to save.
+# Tables with fewer numbers stay float32 also in compact files, because they save little.
 LEAST_COMPACT = 4096
 
-# These give their input another shape, or none: no kernel runs.
+# Operators that only give their input another shape: no kernel runs.
 ALIASES = frozenset({"Reshape", "Unsqueeze", "Squeeze", "Flatten", "Identity"})
 
 Shape = tuple[int, ...]
-# The size that stands for the axis of instances while a graph is built: a prime that no other size is a multiple of, so
-# that it is known again in products. In the file the axis is symbolic, under this name.
+# Placeholder for the axis of instances while a graph is built: a prime of which no other size is a multiple, so that it
+# is recognizable in products. In the file the axis is symbolic, under this name.
 INSTANCES, INSTANCES_AXIS = 2**31 - 1, "B"
-# How large tables lie in a file: as float32, or in 16 bits.
+# Form of large tables in a file: float32, or 16 bits.
 Weights = Literal["float32", "compact"]
 Errors = Literal["relative", "even", "none"]
 Number = float | int
@@ -58,7 +58,7 @@ class Tensor:
         return self.graph.binary("Sub", self, other)
 
     def __rsub__(self, other: Number) -> Tensor:
-        """A number less this tensor."""
+        """A number minus this tensor."""
         return self.graph.binary("Sub", self.graph.scalar(other), self)
 
     def __mul__(self, other: Tensor | Number) -> Tensor:
@@ -81,7 +81,7 @@ class Tensor:
         return self.graph.node(operator, [self], self.shape)
 
     def clip(self, low: Number, high: Number) -> Tensor:
-        """Values held between two numbers."""
+        """Values clamped between two numbers."""
         return self.graph.node("Clip", [self, self.graph.scalar(low), self.graph.scalar(high)], self.shape)
 
     def sum(self, axis: int, keep: bool = False) -> Tensor:
@@ -96,7 +96,7 @@ class Tensor:
         return self.graph.node("ReduceL2", [self], reduced(self.shape, [axis], keep), axes=[axis], keepdims=int(keep))
 
     def product(self, axis: int) -> Tensor:
-        """Product along one axis, which is gone."""
+        """Product along one axis, which is removed."""
         return self.graph.node("ReduceProd", [self], reduced(self.shape, [axis], False), axes=[axis], keepdims=0)
 
     def mean(self, axes: Sequence[int], keep: bool = False) -> Tensor:
@@ -106,17 +106,17 @@ class Tensor:
         )
 
     def reshape(self, *shape: int) -> Tensor:
-        """The same numbers in another shape; no axis may be -1."""
+        """Reshapes to another shape; no axis may be -1."""
         if prod(shape) != prod(self.shape):
             raise wrong_shape("Reshape", f"{prod(self.shape)} elements", str(shape))
         if shape == self.shape:
             return self
-        # At most one size depends on the instances; ONNX infers it from -1.
+        # At most one size depends on the instances, which ONNX infers from -1.
         written = [-1 if size % INSTANCES == 0 else size for size in shape]
         return self.graph.node("Reshape", [self, self.graph.integers(written)], shape)
 
     def transpose(self, *axes: int) -> Tensor:
-        """Axes in another order."""
+        """Permutes the axes."""
         return self.graph.node("Transpose", [self], tuple(self.shape[axis] for axis in axes), perm=list(axes))
 
     def part(self, start: int, stop: int, axis: int = -1) -> Tensor:
@@ -136,7 +136,7 @@ class Tensor:
         return self.graph.node("Gather", [self, self.graph.integers(indices)], shape, axis=axis)
 
     def alongside(self, other: Tensor) -> Tensor:
-        """The same numbers, once for each instance if `other` has instances."""
+        """Repeats the numbers for each instance if `other` has instances."""
         if other.shape[0] != INSTANCES or self.shape[0] == INSTANCES:
             return self
         return self.graph.zero().reshape(INSTANCES, *[1] * len(self.shape)) + self
@@ -149,7 +149,7 @@ class Tensor:
 
 
 def declared(shape: Shape) -> list[int | str]:
-    """A shape as the file says it."""
+    """A shape in the form of the file."""
     return [INSTANCES_AXIS if size == INSTANCES else size for size in shape]
 
 
@@ -176,11 +176,12 @@ def wrong_shape(operator: str, expected: str, found: str) -> ExportError:
 
 
 class Graph:
-    """One ONNX graph being built. Inputs first, then operators on tensors, then outputs, then `model`."""
+    """One ONNX graph that is being built: first inputs, then operators on tensors, then outputs, then `model`."""
 
     def __init__(self, name: str, weights: Weights = "float32", instances: bool = False):
-        """`name` is the graph's name inside the file; `weights`: how large tables of numbers lie in it; `instances`:
-        whether what differs from instance to instance has an axis for them, before all others."""
+        """`name` is the graph's name in the file; `weights`: form of large tables of numbers; `instances`: whether
+        values that differ between instances have an axis for them, before all others.
+        """
         self.name = name
         self.lead: Shape = (INSTANCES,) if instances else ()
         self._weights = weights
@@ -190,14 +191,14 @@ class Graph:
         self._constants: dict[str, onnx.TensorProto] = {}
         self._by_value: dict[tuple[str, Shape, bytes], Tensor] = {}
         self._by_node: dict[tuple[str, tuple[str, ...], str], Tensor] = {}
-        # Names of results that became outputs, by those that they had.
+        # Names of results that became outputs, by their former names.
         self._now: dict[str, str] = {}
         # Results and inputs that may differ from run to run; the smallest input of each instance.
         self._changing: set[str] = set()
         self._least: Tensor | None = None
 
     def input(self, name: str, *shape: int) -> Tensor:
-        """A float32 input of fixed shape; one that differs from instance to instance begins with `lead`."""
+        """A float32 input of fixed shape; one that differs between instances begins with `lead`."""
         self._inputs.append(helper.make_tensor_value_info(name, TensorProto.FLOAT, declared(shape)))
         self._changing.add(name)
         tensor = Tensor(self, name, shape)
@@ -206,8 +207,10 @@ class Graph:
         return tensor
 
     def zero(self) -> Tensor:
-        """A zero (1), or one for each instance (B), that the runtime cannot know to be constant: it comes from an
-        input. Adding it repeats what all instances share, and makes a kernel write what would be a copy."""
+        """A zero (1), or one for each instance (B), that the runtime cannot recognize as constant, because it comes
+        from an input. Adding it repeats shared values for all instances, and makes a kernel write a result that
+        would otherwise be a copy.
+        """
         if self._least is None:
             raise ValueError("there is no input to make a zero of")
         each = prod(self.lead)
@@ -216,9 +219,10 @@ class Graph:
         return total.reshape(each)
 
     def written_anew(self, tensor: Tensor) -> Tensor:
-        """The same numbers, as an output that a recording of the commands (graph capture) repeats. ONNX Runtime copies
-        other shapes of a result into outputs, and a copy is made in the first run and never again: a kernel has to
-        write those. Constants stay as they are, and pages read them once."""
+        """Returns an output that a recording of the commands (graph capture) repeats. ONNX Runtime copies reshaped
+        results into outputs, and a copy is made in the first run and never again, so a kernel has to write those.
+        Constants stay as they are, and pages read them once.
+        """
         maker = next((node.op_type for node in self._nodes if tensor.name in node.output), None)
         if tensor.name not in self._changing or maker not in ALIASES or self._least is None:
             return tensor
@@ -228,12 +232,13 @@ class Graph:
     def constant(
         self, value: AnyArray | Sequence[Number], name: str = "constant", errors: Errors = "relative"
     ) -> Tensor:
-        """Numbers baked into the file as float32. Equal arrays are stored once. Not finite numbers are refused.
+        """Numbers baked into the file as float32. Equal arrays are stored once. Numbers that are not finite are
+        refused.
 
-        With `weights="compact"` large tables are stored in 16 bits and become float32 when the session is made: as
-        float16 where errors may be `relative`; as whole numbers between each column's least and greatest where they
-        must be alike everywhere (`even`: places, and shares that sum to 1); not at all if they would do harm (`none`:
-        covariances of needles are not positive definite any more).
+        With `weights="compact"` large tables are stored in 16 bits and become float32 when the session is created:
+        as float16 if errors may be `relative`; as whole numbers between each column's minimum and maximum if they
+        must be equal everywhere (`even`: positions, and weights that sum to 1); not at all if they would do harm
+        (`none`: covariances of needles would not remain positive definite).
         """
         array = np.ascontiguousarray(np.asarray(value, np.float32))
         if not np.isfinite(array).all():
@@ -258,7 +263,7 @@ class Graph:
         low, high = columns.min(0), columns.max(0)
         step = np.where(high > low, (high - low) / 65535, 1)
         whole = np.round((columns - low) / step).astype(np.uint16).reshape(array.shape)
-        # Upper and lower bytes: builds of the runtime for the web cannot turn uint16 into float32.
+        # Upper and lower bytes, because builds of the runtime for the web cannot convert uint16 to float32.
         upper, lower = (whole >> 8).astype(np.uint8), (whole & 255).astype(np.uint8)
         wide = self._widened(self._initializer(upper, name)) * 256 + self._widened(self._initializer(lower, name))
         return wide * self._initializer(step.astype(np.float32), name) + self._initializer(low.astype(np.float32), name)
@@ -271,7 +276,7 @@ class Graph:
         return self._initializer(np.asarray(value, np.float32), "number")
 
     def integers(self, values: Sequence[int]) -> Tensor:
-        """Constant int64 numbers: shapes, axes and indices, which ONNX wants in that type."""
+        """Constant int64 numbers: shapes, axes and indices, for which ONNX requires that type."""
         return self._initializer(np.asarray(list(values), np.int64), "integers")
 
     def _initializer(self, array: AnyArray, name: str) -> Tensor:
@@ -333,7 +338,9 @@ class Graph:
         self._outputs.append(helper.make_tensor_value_info(name, kind, declared(tensor.shape)))
 
     def _renamed(self, old: str, new: str) -> bool:
-        """Gives a node's result the name of an output, which saves a copy; not if it is one already, or no node's."""
+        """Gives a node's result the name of an output, which saves a copy. Does nothing if the result is already an
+        output, or not of a node.
+        """
         taken = {output.name for output in self._outputs}
         maker = next((node for node in self._nodes if old in node.output), None)
         if maker is None or old in taken:
@@ -346,8 +353,9 @@ class Graph:
         return True
 
     def model(self, metadata: dict[str, str]) -> onnx.ModelProto:
-        """The finished file, without what no output needs. ONNX's own checker and shape inference must agree with every
-        shape that was declared."""
+        """The finished file, without unused nodes. ONNX's own checker and shape inference must agree with every
+        declared shape.
+        """
         self._nodes = self._needed_nodes()
         graph = helper.make_graph(
             self._nodes, self.name, self._inputs, self._outputs, list(self._used_constants().values())

@@ -1,4 +1,4 @@
-"""A file held against its contract before it runs: names, shapes, element types, rows, versions, operators, files.
+"""Checks a file against its contract before it runs: names, shapes, element types, rows, versions, operators, files.
 
 One rule set with the checker of pages and shells (packages/core/src/contract: parse-contract.ts, check-contract.ts,
 check-file.ts, instances.ts); tests/fixtures/verdicts.json and instances.json hold both.
@@ -55,7 +55,7 @@ class Tensor:
     """An input or output as the file declares it; dims are None if the file does not declare the rank."""
 
     def __init__(self, value: onnx.ValueInfoProto, axis: str | None = None):
-        """`axis`: that of instances, which is left out."""
+        """`axis`: that of instances, which is removed."""
         self.name = value.name
         tensor = value.type.tensor_type
         self.dims: Dims | None = None
@@ -148,7 +148,7 @@ def _conflicts(contract: Mapping[str, Any]) -> Iterator[Fault]:
 
 
 def header_faults(model: onnx.ModelProto, contract: Mapping[str, Any] | None, folder: Path) -> list[Fault]:
-    """Everything that is wrong with the file before it runs; of its contract, too, if there is one in order."""
+    """All faults of the file that are found before it runs; those of its contract, too, if it has one in order."""
     faults = [*_versions(model), *_operators(model), *_external(model, folder)]
     return [*faults, *(_tensors(model, contract) if contract is not None else [])]
 
@@ -268,7 +268,7 @@ def _instances(inputs: Sequence[Tensor], outputs: Mapping[str, Tensor], contract
 
 
 def _of_another_model(name: str, role: str, layout: str) -> Iterator[Fault]:
-    """Only post-processors receive the depth of a frame, and only generators the Gaussians of the one before them."""
+    """Only post-processors receive the depth of a frame, and only generators the Gaussians of the previous model."""
     is_post = layout == "image"
     if role != ("gaussians" if is_post else "depth"):
         return

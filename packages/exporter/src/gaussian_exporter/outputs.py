@@ -1,4 +1,4 @@
-"""From tensors of Gaussians to a finished generator: outputs, bounds and contract."""
+"""Converts tensors of Gaussians to a finished generator: outputs, bounds and contract."""
 
 from __future__ import annotations
 
@@ -31,13 +31,13 @@ from .pieces.covariance import covariance_of_scale_and_rotation
 
 @dataclass(frozen=True)
 class Options:
-    """How a generator is written. dtype float16 halves the output and needs the device feature shader-f16. Where a
-    family has scales and rotations the split layout writes them in place of covariances, which cost a graph more than
-    the rest of it and in float16 lose what makes needles thin. The default layout is split, where nothing is copied
-    together and what never changes is written once; packed for files without inputs, which run once. Weights `compact`
-    halve the file, and nothing else: tables are float32 again when the session is made. `instances`: the most that one
-    run may compute, of a file with an axis for them; None for a file without. Families that have no such file refuse
-    it."""
+    """Options of a generator. dtype float16 halves the output and needs the device feature shader-f16. If a family has
+    scales and rotations the split layout writes them instead of covariances, which cost a graph more than the rest
+    of it and in float16 lose the short axes of needles. The default layout is split, which copies nothing together
+    and writes constant parts once; packed for files without inputs, which run once. Weights `compact` halve the
+    file, and nothing else: tables are float32 again when the session is created. `instances`: the maximum of one
+    run, for a file with an axis for them; None for a file without. Families without such a file refuse it.
+    """
 
     layout: Layout | None = None
     dtype: DType = "float32"
@@ -46,7 +46,7 @@ class Options:
 
     @property
     def wants_axes(self) -> bool:
-        """Whether scales and rotations are written by families that could as well bake covariances."""
+        """Whether scales and rotations are written by families that could also bake covariances."""
         return self.layout == "split" or (self.dtype == "float16" and self.layout is None)
 
 
@@ -67,7 +67,7 @@ class Gaussians:
     sh: Tensor | None = None
 
     def covariance(self) -> Tensor:
-        """The covariances (N,6), made from scales and rotations if they were not given."""
+        """The covariances (N,6), computed from scales and rotations if they were not given."""
         if self.covariances is not None:
             return self.covariances
         if self.rotations is None:
@@ -75,7 +75,7 @@ class Gaussians:
         return covariance_of_scale_and_rotation(self.scale(), self.rotations)
 
     def scale(self) -> Tensor:
-        """Standard deviations (N,3), made from their logarithms if those were given."""
+        """Standard deviations (N,3), computed from their logarithms if those were given."""
         if self.scales is not None:
             return self.scales
         if self.log_scales is None:
@@ -83,7 +83,7 @@ class Gaussians:
         return self.log_scales.unary("Exp")
 
     def opacity(self) -> Tensor:
-        """Opacities (N,1), made from their logits if those were given."""
+        """Opacities (N,1), computed from their logits if those were given."""
         if self.opacities is not None:
             return self.opacities
         if self.opacity_logits is None:
@@ -153,7 +153,7 @@ def finish(
 
 
 def refuse_instances(options: Options, family: str) -> None:
-    """Raises argument/value if a file with an axis for instances is asked of a family that has none."""
+    """Raises argument/value if a file with an axis for instances is requested from a family without one."""
     if options.instances is not None:
         raise ExportError(
             "argument/value",
@@ -171,8 +171,9 @@ def write_packed(graph: Graph, gaussians: Gaussians, options: Options) -> None:
 
 
 def write_split(graph: Graph, gaussians: Gaussians, options: Options, shape: Shape) -> None:
-    """A tensor for each attribute. Float32 scales and opacities as they come, before their activation or after it;
-    rotations w x y z."""
+    """A tensor for each attribute. Float32 scales and opacities are unchanged, before their activation or after it;
+    rotations w x y z.
+    """
     raw = options.dtype == "float32"
     tensors = {"positions": gaussians.positions}
     if shape == "covariances":
@@ -192,7 +193,7 @@ def write_split(graph: Graph, gaussians: Gaussians, options: Options, shape: Sha
 
 
 def refuse_place(path: Path, *read: Path) -> None:
-    """Raises argument/value, before the work, if no file can be written at a path, or if it is one that is read."""
+    """Raises argument/value, before the work, if a path is not writable, or is one of the inputs."""
     found = None
     if path.is_dir():
         found = "a folder"
@@ -211,8 +212,9 @@ def refuse_place(path: Path, *read: Path) -> None:
 
 
 def save(model: onnx.ModelProto, path: Path) -> int:
-    """Writes the file, complete or not at all, and returns its bytes. Raises contract/... if pages refuse its contract,
-    and argument/value above 2 GiB, where protobuf ends."""
+    """Writes the file, complete or not at all, and returns its size in bytes. Raises contract/... if pages refuse its
+    contract, and argument/value above 2 GiB, the limit of protobuf.
+    """
     contract = of_metadata({prop.key: prop.value for prop in model.metadata_props}, str(path))
     for fault in contract_faults(contract):
         raise fault.error()

@@ -21,7 +21,7 @@ from .contract import METADATA_KEY
 from .errors import ExportError
 from .graph import ALIASES
 
-# One rule set with the checker of pages and shells: packages/core/src/onnx/webgpu-rules.ts, of which this is the copy.
+# The rules are those of the checker of pages and shells: this is a copy of packages/core/src/onnx/webgpu-rules.ts.
 RULES: dict[str, Any] = json.loads(files(__package__).joinpath("webgpu_rules.json").read_text(encoding="utf-8"))
 KERNELS = frozenset(RULES["kernels"])
 INSTEAD: dict[str, str] = RULES["instead"]
@@ -32,20 +32,21 @@ Kind = Literal["fallback", "failure", "wrong", "inexact", "slow"]
 
 @dataclass(frozen=True)
 class Finding:
-    """One reason why a file will not stay on the GPU (fallback), not run (failure), compute
-    other numbers there than on the CPU (wrong), lose digits for some inputs (inexact), or be slow."""
+    """One reason why a file does not stay on the GPU (fallback), does not run (failure), computes other numbers there
+    than on the CPU (wrong), loses digits for some inputs (inexact), or is slow.
+    """
 
     kind: Kind
     node: str
     operator: str
     reason: str
     remedy: str
-    # Name of the tensor concerned, or of the node's first output.
+    # Name of the affected tensor, or of the node's first output.
     tensor: str = ""
 
     @property
     def is_refused(self) -> bool:
-        """Whether pages refuse the file for it, instead of running it on the CPU."""
+        """Whether pages refuse the file for this reason, instead of running it on the CPU."""
         return self.kind == "failure" and self.operator in ("Cast", "file", "bfloat16")
 
     def error(self) -> ExportError:
@@ -59,7 +60,7 @@ class Finding:
         )
 
     def __str__(self) -> str:
-        """One line for people."""
+        """One line of text."""
         return f"{self.kind}: {self.operator} '{self.node}': {self.reason}; {self.remedy}"
 
 
@@ -74,13 +75,13 @@ def told(findings: Sequence[Finding]) -> list[str]:
 
 
 def axis_of_instances(model: onnx.ModelProto) -> str | None:
-    """The symbol of the axis of instances in the file's own contract, if it has one."""
+    """The symbol of the axis of instances in the file's own contract, if any."""
     for prop in model.metadata_props:
         if prop.key == METADATA_KEY:
             try:
                 return str(json.loads(prop.value.removeprefix("\ufeff"))["instances"]["axis"])
             except (ValueError, KeyError, TypeError, RecursionError):
-                # A contract that is faulty has no axis; its faults are found elsewhere.
+                # A faulty contract has no axis; its faults are reported elsewhere.
                 return None
     return None
 
@@ -116,7 +117,7 @@ class _Values:
 
 
 def gpu_findings(model: onnx.ModelProto) -> list[Finding]:
-    """Everything that would keep a file from running wholly on the GPU with its graph captured; empty if nothing."""
+    """All findings that keep a file from running entirely on the GPU with its graph captured; empty if there are none."""
     values = _Values(model)
     opset = next((entry.version for entry in model.opset_import if entry.domain in ("", "ai.onnx")), 0)
     found = list(_of_file(model, opset, values))
@@ -131,15 +132,18 @@ def gpu_findings(model: onnx.ModelProto) -> list[Finding]:
 
 
 def is_folded(node: onnx.NodeProto, values: _Values) -> bool:
-    """Whether a node is computed when the session is made: of constants, or the shape of a tensor of fixed shape."""
+    """Whether a node is computed when the session is created: it has constant inputs, or returns the shape of a tensor
+    of fixed shape.
+    """
     if node.op_type == "Shape" and None not in values.dims.get(node.input[0], [None]):
         return True
     return bool(node.input) and all(name in values.constants or not name for name in node.input)
 
 
 def _of_copies(model: onnx.ModelProto, values: _Values) -> Iterator[Finding]:
-    """Outputs that are another shape of a result: no kernel writes them. A file without inputs runs once and is none
-    the worse for it; what is constant is read once, and the rest recorded."""
+    """Outputs that are reshaped results, which no kernel writes. This does not matter for a file without inputs, which
+    runs once, nor for constants, which are read once.
+    """
     makers = {name: node for node in model.graph.node for name in node.output}
     for output in model.graph.output if model.graph.input else []:
         maker = makers.get(output.name)
@@ -236,7 +240,7 @@ def _types(node: onnx.NodeProto, opset: int, values: _Values) -> Iterator[Findin
     handled = (TensorProto.INT64, TensorProto.DOUBLE)
     used = [name for name in [*node.input, *node.output] if name and name not in values.constants]
     wide = [name for name in used if values.types.get(name) in handled]
-    # Indices of Gather and its kin may be int64, and a Cast may make them; anything else is arithmetic.
+    # Indices of Gather and similar operators may be int64, and a Cast may create them; other uses are arithmetic.
     if node.op_type in RULES["makers"]:
         wide = [name for name in wide if name in node.input]
     elif node.op_type in RULES["indexed"]:
@@ -269,8 +273,10 @@ def _sizes(node: onnx.NodeProto, opset: int, values: _Values) -> Iterator[Findin
 
 
 def miscomputed_convolution(node: onnx.NodeProto, dims: Sequence[int | None]) -> tuple[int, int] | None:
-    """Channels in and out of a convolution that the WebGPU provider computes wrongly: of one or two dimensions and one
-    group, of a multiple of 3 that is none of 4 to a multiple of 4, and not one pixel at a time. None for others."""
+    """Input and output channels of a convolution that the WebGPU provider computes wrongly: of one or two dimensions
+    and one group, from a multiple of 3 that is not one of 4 to a multiple of 4, with a kernel of more than one
+    pixel. None for others.
+    """
     given = {attribute.name: helper.get_attribute_value(attribute) for attribute in node.attribute}
     if len(dims) not in (3, 4) or given.get("group", 1) != 1 or None in dims:
         return None

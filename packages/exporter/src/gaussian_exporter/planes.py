@@ -1,4 +1,4 @@
-"""Reading feature planes between their points, while exporting."""
+"""Samples feature planes between their points, while exporting."""
 
 import numpy as np
 
@@ -7,7 +7,8 @@ from .arrays import AnyArray, Doubles, Floats
 
 def sample_plane(plane: Floats, x: AnyArray, y: AnyArray) -> Doubles:
     """Bilinear values (N,C) of a plane (C,H,W) at x, y (N), -1 at the first point's center and 1 at the last one's.
-    Positions beyond the plane take its border, as in PyTorch's grid_sample with align_corners and border padding."""
+    Positions outside the plane get its border, as in PyTorch's grid_sample with align_corners and border padding.
+    """
     _, height, width = plane.shape
     column = np.clip((np.float64(x) + 1) / 2 * (width - 1), 0, width - 1)
     row = np.clip((np.float64(y) + 1) / 2 * (height - 1), 0, height - 1)

@@ -1,7 +1,7 @@
 """Checks the outputs of a run against the contract's `outputs`: shapes, rows, numbers.
 
-The rules are those of the checker of pages and shells, packages/core/src/contract (tensor-rules.ts, check-outputs.ts,
-gaussian-values.ts): tests/fixtures/written.json holds both.
+The rules are those of the checker of pages and shells, packages/core/src/contract (tensor-rules.ts,
+check-outputs.ts, gaussian-values.ts): tests/fixtures/written.json tests both.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 from .arrays import AnyArray
 from .errors import ExportError
 
-# As in packages/core/src/errors.ts, without "contract/".
+# Codes of packages/core/src/errors.ts, without "contract/".
 FaultCode = str
 Rule = Sequence[int | str]
 
@@ -41,7 +41,7 @@ _HALF = 2.0**-11
 
 @dataclass(frozen=True)
 class Fault:
-    """One thing that is wrong, with the code that the checker of pages has for it."""
+    """One fault, with the code of the checker of pages."""
 
     code: FaultCode
     tensor: str
@@ -51,7 +51,7 @@ class Fault:
     remedy: str
 
     def error(self, when: str = "") -> ExportError:
-        """To be raised; `when` says of which run."""
+        """Converts to an error; `when` names the run."""
         where = self.where + when
         return ExportError(
             f"contract/{self.code}", where=where, expected=self.expected, found=self.found, remedy=self.remedy
@@ -101,7 +101,7 @@ Shape = TypeVar("Shape", bound=tuple[Any, ...])
 
 
 def bare(shape: Shape, rules: Sequence[Rule]) -> Shape | None:
-    """The shape without ones before it, as few left away as it takes; None if no rule allows it."""
+    """The shape without leading ones, as few removed as necessary; None if no rule allows it."""
     for rule in rules:
         if len(rule) == len(shape) and all(_fits(b, a) for a, b in zip(rule, shape, strict=True)):
             return shape
@@ -109,7 +109,7 @@ def bare(shape: Shape, rules: Sequence[Rule]) -> Shape | None:
 
 
 def _fits(dim: object, rule: int | str) -> bool:
-    """N, H and W may stay open; other letters are sizes that a file must fix."""
+    """N, H and W may be symbolic; other letters are sizes that a file must fix."""
     if isinstance(rule, int):
         return dim == rule
     return rule in ("N", "H", "W") or (isinstance(dim, int) and dim > 0)
@@ -190,7 +190,7 @@ def _attributes(outputs: Mapping[str, Any], rows: Mapping[str, AnyArray]) -> Ite
 
 
 def value_faults(attributes: Attributes) -> Iterator[Fault]:
-    """Numbers out of order: of those of a kind in one attribute the first row, and how many there are."""
+    """Invalid numbers: for each kind and attribute the first row, and the number of rows."""
     for name, part in attributes.items():
         is_finite = np.isfinite(part.rows)
         # Infinite logits and the logarithm of a zero scale are opacities 0 and 1 and a flat disc.
@@ -235,7 +235,7 @@ def _are_opacities(rows: AnyArray) -> AnyArray:
     return cast(AnyArray, (rows.astype(np.float64) >= -slack).all(1) & (rows.astype(np.float64) <= 1 + slack).all(1))
 
 
-# Its square is a covariance in float32.
+# The square of this limit is a covariance in float32.
 _LARGEST = 1e18
 
 
@@ -272,7 +272,7 @@ _LEAST_OPACITY = 1 / 255
 
 
 def box_of(attributes: Attributes) -> tuple[AnyArray, AnyArray] | None:
-    """Corners around the finite centers of the rows that are drawn; None if there are none."""
+    """Corners around the finite centers of the drawn rows; None if there are none."""
     if "positions" not in attributes:
         return None
     centers = attributes["positions"].rows.astype(np.float64)
@@ -287,7 +287,7 @@ def box_of(attributes: Attributes) -> tuple[AnyArray, AnyArray] | None:
 
 
 def bounds_faults(contract: Mapping[str, Any], attributes: Attributes) -> Iterator[Fault]:
-    """Centers outside the bounds that the contract declares: those of all times, with the other inputs at defaults."""
+    """Centers outside the contract's bounds, which hold at all times, with the other inputs at defaults."""
     box = box_of(attributes)
     if box is None or "bounds" not in contract:
         return

@@ -37,7 +37,7 @@ def read_avatar(path: Path, ignored: Sequence[str] = ()) -> Avatar:
     return Avatar(**{k: np.asarray(v, np.float32) for k, v in given.items() if k not in lists}, **lists)  # type: ignore[arg-type]
 
 
-# Files that identify the folder of one avatar repository: pattern, name of the repository, reason of the refusal.
+# Files that identify the folder of an avatar repository: pattern, name of the repository, reason of the refusal.
 _FOLDERS = (
     ("**/flame_param.npz", "GaussianAvatars", "it moves FLAME"),
     ("**/mlp_ckpt", "GauHuman", "its network moves SMPL"),

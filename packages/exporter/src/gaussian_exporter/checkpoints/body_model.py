@@ -50,7 +50,7 @@ _FINGERS = [
     for finger in ("index", "middle", "pinky", "ring", "thumb")
     for joint in (1, 2, 3)
 ]
-# The names of the joints, by their number.
+# Names of the joints, by index.
 _NAMES = {
     5: ["global", "neck", "jaw", "left_eye", "right_eye"],
     24: [*_BODY, "left_hand", "right_hand"],
@@ -63,7 +63,8 @@ def read_skinned(
     gaussians: Path, body: Path, ignored: Sequence[str] = (), shapes: int = 10, expressions: int = 10
 ) -> Avatar:
     """Gaussians (a PLY file or checkpoint) in the rest pose of a body model, each with the skinning weights and the
-    blend shapes of the nearest vertex. `shapes`, `expressions`: how many coefficients are inputs."""
+    blend shapes of the nearest vertex. `shapes`, `expressions`: numbers of coefficients that are inputs.
+    """
     cloud, model = usable(read_cloud(gaussians, ignored)), read_body(body)
     template, regressor = model["v_template"], model["J_regressor"]
     nearest = nearest_rows(cloud.positions, template)
@@ -87,8 +88,9 @@ def read_skinned(
 
 
 def read_body(path: Path) -> dict[str, Doubles]:
-    """The arrays of a body model that place its vertices: v_template (V,3), shapedirs (V,3,B), posedirs (V,3,9(J-1)),
-    J_regressor (J,V), weights (V,J), kintree_table (2,J)."""
+    """Arrays of a body model that determine its vertices: v_template (V,3), shapedirs (V,3,B), posedirs (V,3,9(J-1)),
+    J_regressor (J,V), weights (V,J), kintree_table (2,J).
+    """
     try:
         with np.load(existing(path, "a body model (.npz)"), allow_pickle=False) as archive:
             found = {name: np.asarray(archive[name], np.float64) for name in _NEEDED if name in archive.files}
@@ -132,7 +134,7 @@ def nearest_rows(points: AnyArray, table: AnyArray) -> AnyArray:
 
 
 def _directions(both: Doubles, shapes: int, expressions: int) -> tuple[Doubles, Doubles]:
-    """The first directions (V,3,B) of the body's shape, and of its expressions if the model has such."""
+    """The first directions (V,3,B) of the body's shape, and of its expressions if the model has them."""
     count = int(both.shape[2])
     border = _SHAPES_BEFORE_EXPRESSIONS.get(count, count)
     return both[:, :, : min(shapes, border)], both[:, :, border : border + expressions]

@@ -7,7 +7,7 @@ from ..errors import ExportError
 
 
 def find_cfg_args(folder: Path) -> Path | None:
-    """The file beside a training: in the folder itself or, of one iteration's, up to two levels up."""
+    """Path of the file: in the folder itself or, for the folder of an iteration, up to two levels up."""
     around = [folder, *folder.resolve().parents[:2]]
     return next((path for each in around if (path := each / "cfg_args").is_file()), None)
 

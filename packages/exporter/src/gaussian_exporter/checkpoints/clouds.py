@@ -24,7 +24,7 @@ from .unread import refuse_settings, refuse_unread
 _C0 = 0.28209479177387814
 _GSPLAT = ("means", "scales", "quats", "opacities", "sh0", "shN")
 _NERFSTUDIO = ("means", "scales", "quats", "opacities", "features_dc", "features_rest")
-# Beside the Gaussians: poses of training images, of which the Gaussians know nothing.
+# Poses of training images, which checkpoints contain beside the Gaussians and which do not affect them.
 _GSPLAT_KEYS = r"step|splats|pose_adjust(\..*)?"
 # Metrics, cameras and colors of training images: none of them is part of a rendered view.
 _NERFSTUDIO_KEYS = (
@@ -39,8 +39,9 @@ _CAPTURED, _CAPTURED_4D = 12, 19
 
 def read_cloud(path: Path, ignored: Sequence[str] = ()) -> Cloud:
     """A PLY file in INRIA's layout; a checkpoint of gsplat (.pt), nerfstudio (.ckpt) or INRIA's trainer (chkpnt*.pth);
-    or the folder of a training with one of them in it. `ignored`: tensors, properties of vertices and settings that
-    change nothing; "2d" among them says that a gsplat checkpoint without a rank in its name is of 3D Gaussians."""
+    or the folder of a training that contains one. `ignored`: tensors, properties of vertices and settings that
+    change nothing; "2d" declares that a gsplat checkpoint without a rank in its name has 3D Gaussians.
+    """
     path = newest_in(existing(path, "a PLY file, a checkpoint, or the folder of a training"))
     with path.open("rb") as file:
         is_archive = file.read(2) == b"PK"
@@ -54,7 +55,7 @@ def read_cloud(path: Path, ignored: Sequence[str] = ()) -> Cloud:
     vertices = read_ply(path)
     refuse_other_properties(vertices.names, path, ignored)
     cloud = cloud_of_vertices(vertices)
-    # A fused file of Mip-Splatting has its 3D filter in the scales, and only the settings name the other filter.
+    # A fused file of Mip-Splatting has its 3D filter in the scales; its other filter is only in the settings.
     return cloud if kernel is None else replace(cloud, filter="mip")
 
 
@@ -74,7 +75,7 @@ def refused_settings(path: Path, ignored: Sequence[str]) -> float | None:
 
 
 def newest_in(path: Path) -> Path:
-    """The file of the last iteration in the folder of a training; a file itself."""
+    """The file of the last iteration in the folder of a training; a file is returned unchanged."""
     if not path.is_dir():
         return path
     for inside, pattern in (("ckpts", r"ckpt_(\d+)_rank0\.pt"), ("nerfstudio_models", r"step-(\d+)\.ckpt")):
@@ -112,7 +113,8 @@ def captured_of(content: object) -> Sequence[Any] | None:
     return content[0] if is_pair else None  # type: ignore[index]
 
 
-# Parameters that only one network has. They turn images into Gaussians: the file is weights, and no Gaussians.
+# Parameters that only one network has. Such a file contains the weights of a network from images to Gaussians, and no
+# Gaussians.
 _NETWORKS = {
     "encoder.epipolar_transformer.": "pixelSplat",
     "encoder.depth_predictor.corr_refine_net.": "MVSplat",
@@ -123,7 +125,7 @@ _NETWORKS = {
 
 
 def network_of(content: object) -> str | None:
-    """Which published network a state_dict is of, alone or as an entry of the file."""
+    """Name of the published network of a state_dict, alone or as an entry of the file."""
     entries = content if isinstance(content, Mapping) else {}
     states = [entries, *(value for value in entries.values() if isinstance(value, Mapping))]
     names = [str(name) for state in states for name in state]
@@ -189,11 +191,11 @@ def nerfstudio(path: Path, pipeline: Mapping[str, Any], ignored: Sequence[str] =
 
 
 def inria(path: Path, captured: Sequence[Any]) -> Cloud:
-    """INRIA's GaussianModel.capture: degree, places, harmonics, scales, rotations, opacities, and the optimizer."""
+    """INRIA's GaussianModel.capture: degree, positions, harmonics, scales, rotations, opacities, and the optimizer."""
     degree, positions, dc, rest, scales, rotations, opacities = captured[:7]
     if scales.shape[1] != 3:
         raise other_family(path, "2D Gaussian Splatting", f"{scales.shape[1]} scales a Gaussian", "train a 3D model")
-    # Harmonics above the active degree are not drawn yet.
+    # Harmonics above the active degree are not drawn yet during the training.
     sh = np.concatenate([dc, rest], 1)[:, : (int(degree) + 1) ** 2]
     return Cloud(*(np.asarray(x, np.float32) for x in (positions, scales, rotations, opacities.reshape(-1, 1), sh)))
 

@@ -7,7 +7,7 @@ from ..errors import ExportError, listed
 
 
 def existing(path: Path, what: str) -> Path:
-    """The path, if there is something at it."""
+    """The path, if it exists."""
     if path.exists():
         return path
     there = sorted(item.name for item in path.parent.iterdir()) if path.parent.is_dir() else []
@@ -21,7 +21,7 @@ def existing(path: Path, what: str) -> Path:
 
 
 def latest_iteration(folder: Path, inside: str = "point_cloud") -> Path:
-    """The folder `inside`/iteration_N with the largest N, or `folder` itself without such a folder."""
+    """The folder `inside`/iteration_N with the largest N, or `folder` itself without any."""
     found = [(int(match[1]), path) for path in folder.glob(f"{inside}/iteration_*") if (match := _number(path))]
     return max(found)[1] if found else folder
 

@@ -1,4 +1,4 @@
-"""The folder that 4DGaussians leaves: point_cloud.ply and deformation.pth of an iteration, cfg_args."""
+"""The output folder of 4DGaussians: point_cloud.ply and deformation.pth of an iteration, cfg_args."""
 
 from __future__ import annotations
 

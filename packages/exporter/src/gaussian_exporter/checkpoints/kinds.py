@@ -1,5 +1,6 @@
-"""Which family a checkpoint is of, by what lies in it and beside it: what changes the meaning of the rest is never
-passed over."""
+"""Determines the family of a checkpoint from its content and the files beside it. Properties that change the meaning
+of others are never ignored.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +11,7 @@ from ..errors import ExportError
 from ..families.classic import Cloud
 from .unread import refuse_unread
 
-# Properties of vertices that INRIA's layout has, or that say nothing about Gaussians.
+# Properties of vertices in INRIA's layout, or without a meaning for Gaussians.
 _PLAIN = r"x|y|z|nx|ny|nz|f_dc_[0-2]|f_rest_\d+|opacity|scale_[0-2]|rot_[0-3]|filter_3D|red|green|blue"
 # A property that only one family writes: its name, and the remedy.
 _BY_PROPERTY = {
@@ -27,7 +28,7 @@ _BY_PROPERTY = {
     "f_anchor_feat_0": ("Scaffold-GS or Octree-GS", "run gaussian-export scaffold"),
     "f_offset_0": ("Scaffold-GS or Octree-GS", "run gaussian-export scaffold"),
 }
-# A file or folder beside point_cloud.ply, or beside the folder point_cloud, that only one family leaves.
+# A file or folder beside point_cloud.ply, or beside the folder point_cloud, that only one family writes.
 _BY_NEIGHBOR = {
     "deformation.pth": ("4DGaussians", "run gaussian-export hexplane"),
     "deform": ("Deformable-3D-Gaussians", "run gaussian-export deformable"),

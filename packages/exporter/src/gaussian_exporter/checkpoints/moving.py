@@ -30,7 +30,7 @@ def read_spacetime(path: Path, ignored: Sequence[str] = ()) -> Spacetime:
     existing(path, "the folder of a SpacetimeGaussians training, or its point_cloud.ply")
     vertices = read_ply(latest_iteration(path) / "point_cloud.ply" if path.is_dir() else path)
     if "f_t_0" in vertices.names or "trbf_center" not in vertices.names:
-        # The first is a family of its own, the other no model of this one.
+        # The first has its own family; the second is not a model of this family.
         refuse_other_properties(vertices.names, vertices.path)
 
     def numbered(prefix: str, count: int) -> Floats:
@@ -119,8 +119,9 @@ def read_gaussian4d(
 
 
 def _seconds(path: Path, settings: dict[str, object], given: Sequence[float] | None) -> list[float]:
-    """First and last second that are played. The trainer divides those of its configuration by the frame ratio, and
-    writes neither into cfg_args."""
+    """First and last second of the playback. The trainer divides those of its configuration by the frame ratio, and
+    writes neither into cfg_args.
+    """
     duration = settings.get("time_duration") if given is None else given
     if not isinstance(duration, (list, tuple)) or len(duration) != 2 or not float(duration[0]) < float(duration[1]):
         raise ExportError(

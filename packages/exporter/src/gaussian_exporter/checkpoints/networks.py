@@ -21,7 +21,7 @@ def read_feed_forward(folder: Path, ignored: Sequence[str] = ()) -> FeedForward:
     config, weights = read_network(folder, "feed-forward", ("width", "height", "views", "near", "far", "depths"))
 
     def stack(name: str) -> list[Convolution]:
-        # Without any, the first is asked for: its absence is the error.
+        # Without any layers, the first is requested, so that the error names it.
         return [convolution(weights.under(f"{name}.{index}")) for index in numbers(weights, name) or [0]]
 
     model = FeedForward(

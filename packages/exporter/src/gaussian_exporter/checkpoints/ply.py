@@ -1,4 +1,4 @@
-"""PLY files as trainers write them: one element `vertex` of scalar properties, binary or ascii."""
+"""PLY files of trainers: one element `vertex` of scalar properties, binary or ascii."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -52,7 +52,7 @@ class Vertices:
         return np.stack([self.rows[name].astype(np.float32) for name in names], 1)
 
     def refuse_unread(self, ignored: Sequence[str] = (), harmless: str = "(?!)") -> None:
-        """Raises checkpoint/other-family for properties that the reader did not use; normals change nothing."""
+        """Raises checkpoint/other-family for unread properties; normals change nothing."""
         known = f"n[xyz]|{harmless}"
         refuse_unread(self.path, "properties", self.names, self._read, ignored=ignored, harmless=known)
 

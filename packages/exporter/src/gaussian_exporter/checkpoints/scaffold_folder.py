@@ -1,4 +1,4 @@
-"""The folder that Scaffold-GS or Octree-GS leaves: point_cloud.ply of anchors, three or four networks, cfg_args."""
+"""The output folder of Scaffold-GS or Octree-GS: point_cloud.ply of anchors, three or four networks, cfg_args."""
 
 from __future__ import annotations
 
@@ -24,7 +24,9 @@ _OLD_FEATURE_BANK = "mlp_feature_bank"
 
 
 def read_scaffold(folder: Path, appearance: int = 0, ignored: Sequence[str] = ()) -> Scaffold:
-    """Reads the latest iteration. `appearance`: which training image's code to bake in, if the model has any."""
+    """Reads the latest iteration. `appearance`: index of the training image whose code is baked in, if the model has
+    codes.
+    """
     point_cloud = latest_iteration(existing(folder, "the folder of a Scaffold-GS or Octree-GS training"))
     vertices = read_ply(point_cloud / "point_cloud.ply")
     networks = read_networks(point_cloud, ignored)
@@ -54,14 +56,15 @@ def read_scaffold(folder: Path, appearance: int = 0, ignored: Sequence[str] = ()
 
 
 def _takes_distance(network: Weights, features: Floats, name: str, appearance: Floats | None) -> bool:
-    """Whether a network of Scaffold-GS has an input more than features, direction and the code of an appearance. The
-    first versions always have it, and no setting for it."""
+    """Whether a network of Scaffold-GS has one more input than features, direction and the code of an appearance. The
+    first versions always have it, and no setting for it.
+    """
     extra = len(appearance) if name == "color" and appearance is not None else 0
     return bool(network.linears()[0].inputs == features.shape[1] + 4 + extra)
 
 
 def settings_of(folder: Path, has_levels: bool) -> dict[str, object]:
-    """cfg_args. Octree-GS cannot do without; of Scaffold-GS the shapes of the networks say the same."""
+    """Reads cfg_args, which Octree-GS requires; for Scaffold-GS the shapes of the networks contain the same facts."""
     if has_levels:
         return require_cfg_args(folder, "it says how distances become levels (dist2level, fork, add_level)")
     path = find_cfg_args(folder)
@@ -69,7 +72,7 @@ def settings_of(folder: Path, has_levels: bool) -> dict[str, object]:
 
 
 def read_networks(folder: Path, ignored: Sequence[str] = ()) -> dict[str, Weights]:
-    """Either one file of state_dicts, checkpoints.pth, or a traced network in a file of its own each."""
+    """Either one file of state_dicts, checkpoints.pth, or a file with a traced network for each."""
     united = folder / "checkpoints.pth"
     if united.exists():
         weights = read_weights(united)

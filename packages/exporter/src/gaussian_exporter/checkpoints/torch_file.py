@@ -1,8 +1,8 @@
 """PyTorch's files (torch.save and TorchScript) read without PyTorch.
 
-Both are zip archives of raw tensors and one pickle that says where each tensor lies. A pickle may name any function to
-be called; here only the handful that rebuild tensors are known, everything else becomes an inert record. So a file
-from a stranger can be read, and exporting needs no PyTorch of some gigabytes.
+Both are zip archives of raw tensors and one pickle with the position of each tensor. A pickle may name any function
+to call; here only the few that rebuild tensors are known, and everything else becomes an inert record. So untrusted
+files can be read, and exporting needs no PyTorch, which takes gigabytes.
 """
 
 from __future__ import annotations
@@ -89,7 +89,7 @@ class _Reader(pickle.Unpickler):
             return _KNOWN[module, name]
         if module == "torch" and name in _STORAGES:
             return _STORAGES[name]
-        # A class of its own for each name: NEWOBJ wants a class, REDUCE anything that can be called.
+        # A separate class for each name: NEWOBJ needs a class, REDUCE anything callable.
         return type(name, (Record,), {})
 
     def persistent_load(self, pid: Any) -> AnyArray:
@@ -141,14 +141,14 @@ def _flattened(value: object, name: str) -> list[tuple[str, AnyArray]]:
 
 
 class Weights:
-    """Named tensors of one file, asked for with the shape that the model needs."""
+    """Named tensors of one file, requested with the shape that the model needs."""
 
     def __init__(self, tensors: Mapping[str, AnyArray], where: str, file: Weights | None = None, prefix: str = ""):
-        """`where` is the file's name, for messages; `file` and `prefix` are of a part of another."""
+        """`where` is the file's name, for messages; `file` and `prefix` describe a part of another instance."""
         self.tensors = tensors
         self.where = where
         self._prefix = prefix
-        # Names in the file of all tensors that were read, by any part of it.
+        # Names of all tensors in the file that were read, by any part of it.
         self._read: set[str] = set() if file is None else file._read
 
     def __contains__(self, name: str) -> bool:
@@ -169,7 +169,7 @@ class Weights:
         return np.asarray(self.tensors[name], np.float32)
 
     def refuse_unread(self, ignored: Sequence[str] = (), harmless: str = "(?!)") -> None:
-        """Raises checkpoint/other-family for tensors that the reader did not use."""
+        """Raises checkpoint/other-family for unread tensors."""
         names = [self._prefix + name for name in self.tensors]
         refuse_unread(self.where, "tensors", names, self._read, ignored=ignored, harmless=harmless)
 
@@ -180,7 +180,7 @@ class Weights:
         return Weights(found, f"{self.where}: {prefix}", self, self._prefix + start)
 
     def count(self) -> int:
-        """How many numbered layers there are."""
+        """Number of numbered layers."""
         return len({name.split(".")[0] for name in self.tensors if name.split(".")[0].isdigit()})
 
     def linears(self) -> list[Linear]:
@@ -202,5 +202,5 @@ class Weights:
 
 
 def read_weights(path: Path) -> Weights:
-    """All tensors of a file, to be asked for by name."""
+    """All tensors of a file, requested by name."""
     return Weights(read_tensors(path), str(path))

@@ -1,4 +1,4 @@
-"""The gate of every checkpoint: each name in a file was read, is known to change nothing, or is refused."""
+"""Requires that each name in a checkpoint was read, or is known to change nothing."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pathlib import Path
 
 from ..errors import ExportError, listed
 
-# Settings of INRIA's trainer that say where data lie, or how images are read.
+# Settings of INRIA's trainer for the locations of data, or for reading images.
 _SETTINGS = re.compile(
     r"sh_degree|source_path|model_path|images|depths|resolution|white_background|train_test_exp|data_device|eval"
 )
@@ -24,10 +24,11 @@ def refuse_unread(
     harmless: str = "(?!)",
     family: str = "an unknown family",
 ) -> None:
-    """Raises checkpoint/other-family for names that were not read. `kind` says what they name, `harmless` is a pattern
-    of names that change nothing, `ignored` are names that the person who exports declares as such."""
+    """Raises checkpoint/other-family for unread names. `kind` is what the names denote, `harmless` is a pattern of
+    names that change nothing, `ignored` are names that the user declares as such.
+    """
     known, passed = set(read), re.compile(harmless)
-    # A file may hold thousands of tensors of one part: its prefix names it, too.
+    # A file may hold thousands of tensors of one part, so its prefix names them, too.
     unread = [name for name in names if name not in known and not passed.fullmatch(name)]
     unread = [name for name in unread if not any(name == each or name.startswith(f"{each}.") for each in ignored)]
     if unread:
@@ -42,8 +43,8 @@ def refuse_unread(
 
 
 def refuse_settings(path: Path, settings: Mapping[str, object], ignored: Sequence[str], harmless: str = "(?!)") -> None:
-    """The same for settings of cfg_args that are switched on, beside plain Gaussians."""
-    # A switch that is off, or a number that says "none", changes nothing.
+    """Raises the same error for enabled settings of cfg_args, beside plain Gaussians."""
+    # Settings that are off, or "none" as a number, change nothing.
     active = [name for name, value in settings.items() if value not in (None, False, 0, -1, "", [], ())]
     read = [name for name in active if _SETTINGS.fullmatch(name)]
     refuse_unread(path, "settings", active, read, ignored=ignored, harmless=harmless)

@@ -1,1 +1,1 @@
-"""One module for each family of models: its arrays, and the graph that it writes."""
+"""One module for each family of models: its arrays, and its graph."""

@@ -1,7 +1,7 @@
 """Skinned avatars: Gaussians bound to a skeleton, driven by pose and shape, with linear blend skinning in the graph.
 
-The shape of SMPL and its kin (blend shapes of body shape and of pose, joints that follow the shape, one weight for each
-Gaussian and joint) without any of their data: a rig of any licence can be brought in this form.
+The form is that of SMPL and similar models (blend shapes of body shape and of pose, joints that follow the shape,
+one weight for each Gaussian and joint) without any of their data, so a rig of any license can be converted to it.
 """
 
 from __future__ import annotations
@@ -65,8 +65,8 @@ def export_avatar(
 ) -> onnx.ModelProto:
     """A generator of N Gaussians from a pose (and a shape, an expression, a translation).
 
-    With harmonics above degree 0, the camera's position is also an input: colors depend on the direction to the camera
-    in the limb's own frame. `bounds` are those of the rest pose.
+    With harmonics above degree 0, the camera's position is also an input: colors depend on the direction to the
+    camera in the limb's own axes. `bounds` are those of the rest pose.
     """
     check(avatar)
     options = options or Options()
@@ -85,7 +85,7 @@ def export_avatar(
 
 
 def check(avatar: Avatar) -> None:
-    """Raises checkpoint/mismatch for arrays that do not fit, parents after children, weights that do not sum to 1."""
+    """Raises checkpoint/mismatch for inconsistent arrays, parents after children, and weights that do not sum to 1."""
     count, joints = len(avatar.positions), len(avatar.parents)
     shapes = {
         "positions": (count, 3),
@@ -119,8 +119,9 @@ def _demand(holds: bool, where: str, expected: str, found: str) -> None:
 
 
 def blended(avatar: Avatar, graph: Graph, products: Tensor, inputs: list[Input]) -> tuple[Tensor, Tensor]:
-    """Points x y z 1 (...,N,4) and joints (...,J,3) at rest, of this shape, expression and pose. Adds the inputs it
-    needs."""
+    """Points x y z 1 (...,N,4) and joints (...,J,3) at rest, for the current shape, expression and pose. Adds the
+    inputs that these need.
+    """
     positions = graph.constant(avatar.positions, "positions", errors="even")
     ones = graph.constant(np.ones((1, 1)), "one").expand(len(avatar.positions), 1)
     points = graph.concat([positions, ones], 1)
@@ -133,7 +134,7 @@ def blended(avatar: Avatar, graph: Graph, products: Tensor, inputs: list[Input])
         joints = along(body, avatar.joint_directions, joints, "joint_directions")
     if avatar.expression_directions is not None:
         count = avatar.expression_directions.shape[2]
-        # Only one input has the role `shape`, so that a page knows which coefficients are the body's.
+        # Only one input has the role `shape`, so that pages can identify the coefficients of the body.
         inputs.append(control("expression", 0.0, -3.0, 3.0))
         face = row_of(graph, "expression", count)
         points = along(face, avatar.expression_directions, points, "expression_directions")
@@ -147,13 +148,14 @@ def blended(avatar: Avatar, graph: Graph, products: Tensor, inputs: list[Input])
 
 
 def row_of(graph: Graph, name: str, count: int) -> Tensor:
-    """An input of `count` numbers, of each instance if there are such, as one row (...,1,count)."""
+    """An input of `count` numbers, for each instance if there are any, as one row (...,1,count)."""
     return graph.input(name, *graph.lead, count).reshape(*graph.lead, 1, count)
 
 
 def along(row: Tensor, directions: Floats, start: Tensor, name: str) -> Tensor:
-    """Points (...,N,C) from a start (N,C) or (...,N,C): directions (N,3,B) times coefficients (...,1,B) further. With
-    C = 4 the last column stays."""
+    """Points (...,N,C): a start (N,C) or (...,N,C) plus directions (N,3,B) times coefficients (...,1,B). With C = 4
+    the last column is unchanged.
+    """
     graph, (count, columns) = row.graph, start.shape[-2:]
     table = graph.constant(directions.transpose(2, 0, 1), name)
     if columns > 3:
@@ -168,7 +170,7 @@ def along(row: Tensor, directions: Floats, start: Tensor, name: str) -> Tensor:
 
 
 def blended_matrices(avatar: Avatar, matrices: Tensor) -> Tensor:
-    """Each Gaussian's blend (...,N,3,4) of its joints' matrices (...,R,12), R joints or more."""
+    """Blend (...,N,3,4) for each Gaussian of its joints' matrices (...,R,12), R joints or more."""
     graph, (count, joints) = matrices.graph, avatar.weights.shape
     weights = graph.constant(avatar.weights, "weights", errors="even")
     none = graph.constant(np.zeros((1, 1)), "no_weight").expand(count, matrices.shape[-2] - joints)
@@ -179,18 +181,18 @@ def blended_matrices(avatar: Avatar, matrices: Tensor) -> Tensor:
 def skinned(
     avatar: Avatar, graph: Graph, points: Tensor, carried: Tensor, translation: Tensor, inputs: list[Input]
 ) -> Gaussians:
-    """Gaussians in the world; points (...,N,4) x y z 1 at rest, carried (...,N,3,4) each one's matrix."""
+    """Gaussians in world coordinates; points (...,N,4) x y z 1 at rest, and the matrix of each in carried (...,N,3,4)."""
     count = len(avatar.positions)
     placed = (carried @ points.reshape(*points.shape, 1)).reshape(*graph.lead, count, 3) + translation
     half = graph.constant(rotation_matrices(avatar.rotations) * avatar.scales[:, None, :], "halves")
-    # The blend's own matrix also stretches where joints disagree; covariances follow it exactly.
+    # The blended matrix also stretches if joints disagree; covariances follow it exactly.
     stretched = carried @ in_four_rows(half)
     sh = graph.constant(avatar.sh, "sh")
     if avatar.sh.shape[1] > 1:
         camera = row_of(graph, "camera_position", 3)
         inputs.append(camera_position())
         direction, _ = direction_and_distance(placed, camera)
-        # Transposed, the blend turns the direction back into the frame that the harmonics were trained in.
+        # Transposed, the blend rotates the direction back to the axes in which the harmonics were trained.
         own = (carried * direction.reshape(*direction.shape, 1)).sum(-2).part(0, 3)
         colors = harmonics.color(own / (own.length(-1, keep=True) + 1e-10), sh)
     else:

@@ -1,7 +1,7 @@
 """Classic 3DGS: every Gaussian as trained.
 
-Written with its harmonics the file is constant: a page runs it once. With `colors="view"` the harmonics are evaluated
-in the graph from the camera's position, which makes the output 13 numbers a Gaussian instead of up to 58.
+With its harmonics the file is constant, so a page runs it once. With `colors="view"` the harmonics are evaluated in
+the graph from the camera's position, which makes the output 13 numbers a Gaussian instead of up to 58.
 """
 
 from dataclasses import dataclass, field, replace
@@ -25,8 +25,9 @@ Colors = Literal["sh", "view"]
 
 @dataclass(frozen=True)
 class Cloud:
-    """Gaussians as a PLY file holds them: positions (N,3), log_scales (N,3), rotations (N,4) w x y z, opacity_logits
-    (N,1), sh (N,(degree+1)^2,3). filter: with which one it was trained, if the checkpoint says so."""
+    """Gaussians of a PLY file: positions (N,3), log_scales (N,3), rotations (N,4) w x y z, opacity_logits (N,1), sh
+    (N,(degree+1)^2,3). filter: that of the training, if the checkpoint declares it.
+    """
 
     positions: Floats
     log_scales: Floats
@@ -66,7 +67,9 @@ def usable_degree(rest: float, where: Path) -> None:
 
 
 def filtered(cloud: Cloud, widths: Floats) -> Cloud:
-    """Mip-Splatting's Gaussians as they are drawn: no narrower than their cameras saw them, and as much fainter."""
+    """Mip-Splatting's Gaussians as they are drawn: at least as wide as the filter of their cameras, and with opacities
+    reduced accordingly.
+    """
     squared = np.exp(2 * np.float64(cloud.log_scales))
     wider = squared + np.float64(widths) ** 2
     fainter = np.sqrt(squared.prod(1, keepdims=True) / wider.prod(1, keepdims=True))
@@ -124,6 +127,6 @@ def export_classic(
     )
     bounds = cloud.positions.min(0), cloud.positions.max(0)
     if options.layout is None and not axes:
-        # Most columns never change: one operator copies them beside the colors.
+        # Most columns never change, so one operator copies them beside the colors.
         options = replace(options, layout="packed")
     return finish(graph, gaussians, inputs, bounds, facts, options)

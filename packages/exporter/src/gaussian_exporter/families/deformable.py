@@ -1,4 +1,6 @@
-"""Deformable-3D-Gaussians: a network of places and time says how each Gaussian differs from its canonical self."""
+"""Deformable-3D-Gaussians: a network of position and time computes the difference of each Gaussian from its canonical
+state.
+"""
 
 from __future__ import annotations
 
@@ -20,9 +22,10 @@ from .classic import Cloud, usable
 
 @dataclass(frozen=True)
 class Deform:
-    """The network: layers, of which the first and the one after `skip` take the codes of place and time (the latter
-    beside what came before); time_network turns the time's code into another, where there is one; heads add to
-    positions, quaternions of length 1 and standard deviations. Codes are x, sin and cos of x times powers of two."""
+    """The network: layers, of which the first and the one after `skip` take the codes of position and time (the latter
+    beside the previous layer); time_network turns the time's code into another, if there is one; heads add to
+    positions, quaternions of length 1 and standard deviations. Codes are x, sin and cos of x times powers of two.
+    """
 
     layers: Sequence[Linear]
     position: Linear
@@ -35,8 +38,9 @@ class Deform:
 
 
 def export_deformable(cloud: Cloud, deform: Deform, facts: Facts, options: Options | None = None) -> onnx.ModelProto:
-    """A generator of the cloud's Gaussians at a time from 0 to 1. Covariances are written: the trainer's rasterizer
-    does not bring quaternions to length 1 again, and so draws other shapes than they would."""
+    """A generator of the cloud's Gaussians at a time from 0 to 1. Covariances are written, because the trainer's
+    rasterizer does not normalize the changed quaternions, which affects the shapes.
+    """
     options = options or Options()
     cloud = usable(cloud)
     graph = Graph("deformable", options.weights)
@@ -51,7 +55,7 @@ def export_deformable(cloud: Cloud, deform: Deform, facts: Facts, options: Optio
     rotations = linear(hidden, deform.rotation, "rotations", graph.constant(turns + deform.rotation.bias, "turns"))
     count = len(cloud.positions)
     products = (rotations.reshape(count, 4, 1) * rotations.reshape(count, 1, 4)).reshape(count, 16)
-    # 1 - 2(yy + zz) and its kin, which is the rotation of the quaternion for length 1 alone.
+    # 1 - 2(yy + zz) and similar terms, which are the quaternion's rotation only for length 1.
     matrices = products @ graph.constant(UNNORMED, "quaternion_products") + graph.constant(
         np.eye(3).reshape(1, 9), "one"
     )
@@ -141,7 +145,7 @@ def deformed(cloud: Cloud, deform: Deform, time: float) -> Doubles:
 
 
 def reach(cloud: Cloud, deform: Deform) -> tuple[Doubles, Doubles]:
-    """Corners around all centers at nine times, and a twentieth more for what moves between."""
+    """Corners around all centers at nine times, enlarged by a twentieth for motion between them."""
     all_of_it = [deformed(cloud, deform, time) for time in np.linspace(0, 1, 9)]
     low, high = np.min([at.min(0) for at in all_of_it], 0), np.max([at.max(0) for at in all_of_it], 0)
     slack = 0.05 * (high - low)

@@ -28,7 +28,7 @@ STRIDES = (1, 2, 2)
 REDUCTION = 4
 # The head's channels: inverse depth, opacity, scales, quaternion, color.
 HEAD = (1, 1, 3, 4, 3)
-# How far the head may move an inverse depth (as a power of e), and the range of a Gaussian's size in pixels.
+# Limits of the head: change of an inverse depth (as a power of e), and range of a Gaussian's size in pixels.
 REFINEMENT = 0.2
 SMALLEST, LARGEST = 0.2, 4.2
 # The heat equation, backwards: half of the variance times the colors' second derivative.
@@ -37,7 +37,7 @@ SHARPENING = 0.5
 DILATION = 0.3
 # Added to the variance of a pixel's features before it is divided out.
 EPSILON = 1e-5
-# A second camera this near to a point, in world units, does not see it.
+# A second camera within this distance of a point, in world units, does not see it.
 NEAREST = 1e-3
 
 
@@ -87,16 +87,16 @@ class Pose:
     shift: Tensor
 
     def inverse(self) -> Pose:
-        """The way back."""
+        """The inverse."""
         return Pose(self.turn.transpose(1, 0), (self.shift @ self.turn) * -1.0)
 
 
 def export_feed_forward(model: FeedForward, facts: Facts, options: Options | None = None) -> onnx.ModelProto:
     """A generator of views * height * width Gaussians, row by row of the first image, then of the second.
 
-    Inputs: `image` (and `image_2`), `focal_length` and `principal_point` ([2] each, as fractions of width and height;
-    the same for every image), and with two images `relative_pose`, the 4x4 matrix from the first camera's frame (OpenCV
-    axes) to the second's.
+    Inputs: `image` (and `image_2`), `focal_length` and `principal_point` ([2] each, as fractions of width and
+    height; the same for every image), and with two images `relative_pose`, the 4x4 matrix from the first camera to
+    the second (OpenCV axes).
     """
     check(model)
     options = options or Options()
@@ -158,7 +158,7 @@ def gaussians(
 
 
 def joined(graph: Graph, first: Gaussians, second: Gaussians) -> Gaussians:
-    """Two lists as one."""
+    """Concatenates two lists."""
     if first.colors is None or second.colors is None:
         raise ValueError("pixel-aligned Gaussians have plain colors")
     return Gaussians(
@@ -268,7 +268,7 @@ def placed(
 
 
 def sharpened(colors: Tensor, widened: float) -> Tensor:
-    """Colors (1,3,H,W) that a blur of this variance, in squared pixels, turns into those given, nearly."""
+    """Sharpened colors (1,3,H,W): a blur of this variance, in squared pixels, approximately restores the given ones."""
     if widened == 0:
         return colors
     graph, (_, channels, height, width) = colors.graph, colors.shape

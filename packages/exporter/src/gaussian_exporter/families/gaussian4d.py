@@ -1,8 +1,8 @@
-"""4D Gaussian Splatting: Gaussians of space and time, cut at the time that is shown.
+"""4D Gaussian Splatting: Gaussians of space and time, cut at the shown time.
 
-A cut through a Gaussian of four dimensions is one of three: its covariance never changes, its center moves evenly, and
-its opacity falls with the distance in time. So all of it is baked but one product and one exponential a Gaussian; and,
-where harmonics change with time, their sum.
+A cut through a Gaussian of four dimensions has three dimensions: its covariance never changes, its center moves
+evenly, and its opacity falls with the distance in time. So everything is baked except one product and one
+exponential a Gaussian; and, if harmonics change with time, their sum.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ class Gaussian4D:
 
 
 def export_gaussian4d(model: Gaussian4D, facts: Facts, options: Options | None = None) -> onnx.ModelProto:
-    """A generator of the cuts at a time from 0 to 1, which is `start` to `end`."""
+    """A generator of the cuts at a time from 0 to 1, which maps to `start` to `end`."""
     options = options or Options()
     graph = Graph("gaussian4d", options.weights)
     time = graph.input("time", 1)
@@ -72,7 +72,7 @@ def export_gaussian4d(model: Gaussian4D, facts: Facts, options: Options | None =
 
 
 def harmonics(model: Gaussian4D, graph: Graph, since: Tensor) -> Tensor:
-    """Harmonics (N,(d+1)^2,3): those that stay, and those that come and go with the time."""
+    """Harmonics (N,(d+1)^2,3): constant ones, and those that depend on the time."""
     count, terms = model.sh.shape[:2]
     if terms not in (1, 4, 9, 16, 32, 48):
         raise ExportError(
@@ -99,10 +99,10 @@ class Cuts:
 
 
 def cuts(model: Gaussian4D) -> Cuts:
-    """The parts of a cut that no time changes."""
+    """The parts of a cut that do not depend on time."""
     scales, scale_t = np.exp(np.float64(model.log_scales)), np.exp(np.float64(model.log_scales_t))
     if model.rotations_r is None:
-        # The trainer takes the scale of time itself for the variance.
+        # The trainer uses the scale of time itself as the variance.
         return Cuts(covariances(scales, model.rotations), np.zeros((len(scales), 3)), scale_t + model.filter)
     turns = rotations_4d(model.rotations, model.rotations_r)
     turns = turns[:, ::-1, ::-1] if model.rotation == "reversed" else turns
@@ -125,7 +125,7 @@ def rotations_4d(left: Floats, right: Floats) -> Doubles:
 
 
 def reach(model: Gaussian4D, cut: Cuts) -> tuple[Doubles, Doubles]:
-    """Corners around all centers while they are seen: they move evenly, so its ends are enough."""
+    """Corners around all centers while they are visible: they move evenly, so both ends are enough."""
     lives = np.sqrt(-2 * np.log(_LEAST) * cut.variances)
     ends = [np.clip(model.times + sign * lives, model.start, model.end) - model.times for sign in (-1, 1)]
     places = np.concatenate([model.positions + end * cut.velocities for end in ends])

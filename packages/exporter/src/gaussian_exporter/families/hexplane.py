@@ -31,10 +31,11 @@ TIME = 3
 
 @dataclass(frozen=True)
 class Deformation:
-    """How Gaussians move. box (2,3): the corners that plane coordinates -1 and 1 stand for; resolutions: for each six
-    planes (C,H,W) over the axes of PLANES, the first axis along W; trunk: the network after the planes. A head that is
-    None leaves its part at rest. Heads add to position, log scale, quaternion, opacity logit and harmonics; `mask`
-    multiplies what they are added to."""
+    """Animated Gaussians. box (2,3): the corners at plane coordinates -1 and 1; resolutions: for each six planes
+    (C,H,W) over the axes of PLANES, the first axis along W; trunk: the network after the planes. A head that is
+    None leaves its attribute at rest. Heads add to position, log scale, quaternion, opacity logit and harmonics;
+    `mask` multiplies the values before the addition.
+    """
 
     box: Floats
     resolutions: Sequence[Sequence[Floats]]
@@ -93,8 +94,9 @@ def plane_coordinates(cloud: Cloud, deformation: Deformation) -> Doubles:
 
 
 def reach(cloud: Cloud, deformation: Deformation) -> tuple[Doubles, Doubles]:
-    """Corners around all centers at all times: at the planes' own times, between which features run straight, and a
-    hundredth of the scene wider for what the network bends on the way."""
+    """Corners around all centers at all times: at the planes' own times, between which features are linear, enlarged
+    by a hundredth of the scene for the nonlinearity of the network.
+    """
     low, high = cloud.positions.min(0).astype(np.float64), cloud.positions.max(0).astype(np.float64)
     if deformation.position is None:
         return low, high
@@ -120,14 +122,14 @@ def reach(cloud: Cloud, deformation: Deformation) -> tuple[Doubles, Doubles]:
 
 
 def applied(layers: Sequence[Linear], x: Doubles) -> Doubles:
-    """Computes the graph's `mlp` in NumPy, to find the bounds."""
+    """Evaluates the graph's `mlp` in NumPy, to compute the bounds."""
     for index, layer in enumerate(layers):
         x = (np.maximum(x, 0) if index else x) @ layer.weight.T.astype(np.float64) + layer.bias
     return x
 
 
 def features(cloud: Cloud, deformation: Deformation, graph: Graph, time: Tensor) -> Tensor:
-    """The planes' features (sum of C, rows), a column for each Gaussian of each instance, as sampling leaves them."""
+    """The planes' features (sum of C, rows), a column for each Gaussian of each instance, in the order of sampling."""
     at = plane_coordinates(cloud, deformation)
     products, still = [], []
     for level, planes in enumerate(deformation.resolutions):
@@ -173,7 +175,7 @@ def sampled_in_time(graph: Graph, planes: Sequence[Floats], at: Doubles, time: T
 
 
 def share(size: int, of: int) -> float:
-    """The part of a padded plane's length that a plane's own points take."""
+    """The fraction of a padded plane's length that the plane's own points take."""
     return (size - 1) / (of - 1) if of > 1 else 0.0
 
 

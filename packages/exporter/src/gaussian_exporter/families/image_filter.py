@@ -23,7 +23,8 @@ Output = Literal["picture", "noise"]
 @dataclass(frozen=True)
 class ImageFilter:
     """Layers in order. Each of `down` halves the size, each of `up` doubles it; a block is two layers whose result is
-    added to what went in. output: `picture` through a sigmoid, or `noise` that is taken off the input."""
+    added to its input. output: `picture` through a sigmoid, or `noise` that is subtracted from the input.
+    """
 
     stem: Convolution
     down: Sequence[Convolution]

@@ -43,8 +43,10 @@ class Levels:
 @dataclass(frozen=True)
 class Scaffold:
     """A trained model of M anchors with k Gaussians each. anchors (M,3); offsets (M,k,3) in units of the first three
-    scales; features (M,F); scales (M,6), positive. Networks end without their activation. `uses_distance` says which of
-    them take the distance after the direction; `appearance` (A) is the code of one training image, if there are any."""
+    scales; features (M,F); scales (M,6), positive. Networks end without their activation. `uses_distance` names the
+    networks that take the distance after the direction; `appearance` (A) is the code of one training image, if
+    there are any.
+    """
 
     anchors: Floats
     offsets: Floats
@@ -112,7 +114,7 @@ def check(model: Scaffold) -> None:
 
 
 def check_bank(model: Scaffold) -> None:
-    """Raises checkpoint/mismatch if a feature bank takes other inputs than the trainers feed it."""
+    """Raises checkpoint/mismatch if a feature bank takes other inputs than in the trainers."""
     if model.feature_bank is None:
         return
     expected = 4 if model.levels is None else 3 + model.levels.fed_to_networks
@@ -128,8 +130,9 @@ def check_bank(model: Scaffold) -> None:
 
 
 def decode(model: Scaffold, graph: Graph, seen: Tensor) -> dict[str, Tensor]:
-    """The networks' outputs (M, ...), without their activations: opacity, color, and of the covariance its scales and
-    rotations apart. seen (M,4): direction and distance."""
+    """The networks' outputs (M, ...), without their activations: opacity, color, and for the covariance scales and
+    rotations separately. seen (M,4): direction and distance.
+    """
     known = [graph.constant(model.features, "features")]
     levels = model.levels
     if levels is not None and levels.fed_to_networks:
@@ -174,7 +177,8 @@ def hidden(
 
 def in_order(weight: Floats, features: int, uses_distance: bool) -> Floats:
     """A first layer's columns (features, direction, perhaps distance, perhaps level) in the order of the graph:
-    features, perhaps level, direction, distance, the last zero where it is not used."""
+    features, perhaps level, direction, distance, the last zero if it is unused.
+    """
     direction = features + 3
     distance = weight[:, direction : direction + 1] if uses_distance else np.zeros((len(weight), 1), np.float32)
     level = weight[:, direction + uses_distance :]
@@ -182,7 +186,7 @@ def in_order(weight: Floats, features: int, uses_distance: bool) -> Floats:
 
 
 def parts_of_covariance(end: Linear) -> tuple[Linear, Linear]:
-    """The covariance's last layer, 7 outputs for each Gaussian, as two: 3 for its scales, 4 for its rotation."""
+    """The covariance's last layer, 7 outputs for each Gaussian, as two layers: 3 for its scales, 4 for its rotation."""
     weight, bias = end.weight.reshape(-1, 7, end.inputs), end.bias.reshape(-1, 7)
     return (
         Linear(weight[:, :3].reshape(-1, end.inputs), bias[:, :3].reshape(-1)),
@@ -209,7 +213,7 @@ def view_dependent(features: Tensor, weights: Tensor) -> Tensor:
 
 
 def presence(levels: Levels, anchors: Tensor, camera: Tensor, resolution: Tensor) -> Tensor:
-    """How present each anchor is from here (M,1): 1, 0, or, with the rule `progressive`, between."""
+    """Weight of each anchor for this camera (M,1): 1, 0, or, with the rule `progressive`, between."""
     graph = anchors.graph
     center = levels.voxel_size / 2 / np.float64(levels.fork) ** levels.levels
     distance = distance_to(anchors + graph.constant(center, "half_voxels"), camera)
@@ -218,9 +222,9 @@ def presence(levels: Levels, anchors: Tensor, camera: Tensor, resolution: Tensor
     own = graph.constant(levels.levels, "levels")
     if levels.rule == "progressive":
         top = float(levels.levels.max() - levels.levels.min())
-        # Whole levels below count fully, the level it falls into by its fraction: both are this one ramp.
+        # Whole levels below count fully, and the current level by its fraction: both are this one ramp.
         return ((wanted + 1.0).clip(0.9999, top + 0.9999) - own).clip(0, 1)
-    # level <= rounded(wanted), without rounding: levels are whole numbers. The coarsest is always there.
+    # level <= rounded(wanted), without rounding, because levels are whole numbers. The coarsest level is always shown.
     slack = {"floor": 0.0, "round": 0.5, "ceil": 1.0}[levels.rule]
     compare = "Greater" if levels.rule == "ceil" else "GreaterOrEqual"
     shown = graph.node(compare, [wanted + slack, own], own.shape)
@@ -229,8 +233,9 @@ def presence(levels: Levels, anchors: Tensor, camera: Tensor, resolution: Tensor
 
 
 def place(model: Scaffold, graph: Graph, anchors: Tensor, opacity: Tensor, decoded: dict[str, Tensor]) -> Gaussians:
-    """Gaussians (M*k) from what the networks said. Each is in its final shape before the last operator: to change the
-    shape of what a file writes is a copy."""
+    """Gaussians (M*k) from the networks' outputs. Each has its final shape before the last operator, because a reshape
+    of an output is a copy.
+    """
     count, k = model.offsets.shape[:2]
     total = count * k
     reach = graph.constant(model.offsets * model.scales[:, None, :3], "offsets")
@@ -245,6 +250,6 @@ def place(model: Scaffold, graph: Graph, anchors: Tensor, opacity: Tensor, decod
 
 
 def reach(model: Scaffold) -> tuple[Floats, Floats]:
-    """Corners around all centers, which no camera moves."""
+    """Corners around all centers, which do not depend on the camera."""
     centers = (model.anchors[:, None] + model.offsets * model.scales[:, None, :3]).reshape(-1, 3)
     return centers.min(0), centers.max(0)

@@ -1,4 +1,6 @@
-"""SpacetimeGaussians, lite: each Gaussian lives around its own time, moves along a cubic curve and turns evenly."""
+"""SpacetimeGaussians, lite: each Gaussian is visible around its own time, moves along a cubic curve and rotates
+evenly.
+"""
 
 from __future__ import annotations
 
@@ -15,9 +17,10 @@ from ..outputs import Gaussians, Options, finish
 
 @dataclass(frozen=True)
 class Spacetime:
-    """positions (N,3) at the time of each, centers (N,1) of it, 0 to 1; widths (N,1): how long it lives, a logarithm;
-    motion (N,9): velocity, and the factors of the square and the cube; rotations (N,4) w x y z with turns (N,4) added
-    in a unit of time; log_scales (N,3); opacity_logits (N,1); colors (N,3), plain."""
+    """positions (N,3) at the time of each, centers (N,1) of it, 0 to 1; widths (N,1): logarithm of its lifetime;
+    motion (N,9): velocity, and the factors of the square and the cube; rotations (N,4) w x y z with turns (N,4)
+    added in a unit of time; log_scales (N,3); opacity_logits (N,1); colors (N,3), plain.
+    """
 
     positions: Floats
     centers: Floats
@@ -54,7 +57,7 @@ def export_spacetime(model: Spacetime, facts: Facts, options: Options | None = N
 
 
 def reach(model: Spacetime) -> tuple[Doubles, Doubles]:
-    """Corners around all centers at 65 times, as far as they are seen then, and a hundredth more."""
+    """Corners around the visible centers at 65 times, enlarged by a hundredth."""
     low, high = np.full(3, np.inf), np.full(3, -np.inf)
     for time in np.linspace(0, 1, 65):
         t = time - np.float64(model.centers)

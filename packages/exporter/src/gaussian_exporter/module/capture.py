@@ -1,4 +1,4 @@
-"""PyTorch's two exporters, with the parts of them switched off that change numbers, and operators that ONNX lacks."""
+"""PyTorch's two exporters, with disabled steps that change numbers, and operators that ONNX lacks."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from .roles import Role
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
-# Opset of each exporter: 17 suits TorchScript best; that of PyTorch's own keeps all WebGPU kernels.
+# Opset of each exporter: 17 suits TorchScript best; the opset of PyTorch's own exporter keeps all WebGPU kernels.
 OPSETS = {"dynamo": RULES["exportOpset"], "TorchScript": 17}
 # Pattern in the error of an exporter that lacks an operator, and a replacement for the module's author.
 _INSTEAD = {
@@ -36,7 +36,7 @@ _INSTEAD = {
 def captured(
     wrapped: Any, inputs: Mapping[str, Role], outputs: Sequence[str], exporter: str, torch: Any
 ) -> onnx.ModelProto:
-    """The module as one exporter writes it."""
+    """The module, written by one exporter."""
     args = tuple(torch.from_numpy(role.default.copy()) for role in inputs.values())
     names = {"input_names": list(inputs), "output_names": list(outputs), "opset_version": OPSETS[exporter]}
     with contextlib.ExitStack() as stack:
@@ -48,7 +48,7 @@ def captured(
         stack.enter_context(closed_inverses(torch))
         warnings.simplefilter("ignore")
         if exporter == "dynamo":
-            # Its rewriter takes constants of 1e-8 for zero: the addend that keeps many a rest pose finite.
+            # Its rewriter replaces constants of 1e-8 by zero, although this addend keeps rest poses finite.
             options = {"dynamo": True, "external_data": False, "verbose": False, "optimize": False}
             return folded(torch.onnx.export(wrapped, args, **options, **names).model)
         file = io.BytesIO()
@@ -57,7 +57,7 @@ def captured(
 
 
 def folded(model: Any) -> onnx.ModelProto:
-    """A model of onnx_ir with constants folded and nothing twice, and no number changed."""
+    """A model of onnx_ir with constants folded and duplicates merged, without a change of numbers."""
     import onnx_ir as ir
     import onnx_ir.passes.common as passes
     from onnxscript import optimizer
@@ -80,7 +80,7 @@ def folded(model: Any) -> onnx.ModelProto:
 
 @contextlib.contextmanager
 def silenced(name: str) -> Iterator[None]:
-    """Without the log of a package."""
+    """Disables the log of a package."""
     log = logging.getLogger(name)
     level = log.level
     log.setLevel(logging.CRITICAL)
@@ -91,7 +91,7 @@ def silenced(name: str) -> Iterator[None]:
 
 
 def keeping_modes(export: Function) -> Function:
-    """Returns a function of a module that leaves each part of it in its mode, training or evaluation."""
+    """Returns a function of a module that keeps each part in its mode, training or evaluation."""
 
     @functools.wraps(export)
     def keeping(module: Any, *given: Any, **named: Any) -> Any:
@@ -107,7 +107,7 @@ def keeping_modes(export: Function) -> Function:
 
 @contextlib.contextmanager
 def closed_inverses(torch: Any) -> Iterator[None]:
-    """Inverses of matrices of up to 4 rows in products and sums, since ONNX has no operator for them."""
+    """Inverses of matrices of up to 4 rows in products and sums, because ONNX has no operator for them."""
     owners = ((torch, "inverse"), (torch.linalg, "inv"), (torch.Tensor, "inverse"))
     before = [getattr(owner, name) for owner, name in owners]
     try:
@@ -142,7 +142,8 @@ def _minor(entries: list[list[Any]], row: int, column: int) -> Any:
 
 def widened(module: Any, torch: Any) -> tuple[Any, list[str]]:
     """The module in float32 on the CPU, a copy if it has weights in 16 bits or elsewhere, and the names of those in 16
-    bits: pages have no kernels for bfloat16, and float16 only on some devices."""
+    bits: pages have no kernels for bfloat16, and float16 only on some devices.
+    """
     weights = [*module.named_parameters(), *module.named_buffers()]
     narrow = [name for name, tensor in weights if tensor.dtype in (torch.bfloat16, torch.float16)]
     if not narrow and all(tensor.device.type == "cpu" for _, tensor in weights):

@@ -1,4 +1,6 @@
-"""`export_module`: exporter, opset and options that stay on the GPU, names, contract, and a comparison with PyTorch."""
+"""`export_module`: chooses exporter, opset and options that stay on the GPU, sets names and contract, and compares
+with PyTorch.
+"""
 
 from __future__ import annotations
 
@@ -55,7 +57,9 @@ class ExportReport:
         return "\n".join([*lines, f"  {self.html()}"])
 
     def html(self) -> str:
-        """The element that shows it: playing where it knows the time, with controls for what visitors may set."""
+        """The HTML element that shows it: with playback if it has a time, and with controls for the inputs of
+        visitors.
+        """
         inputs = cast(dict[str, Json], self.contract["inputs"])
         roles = {str(binding["role"]) for binding in inputs.values()}
         file, shown = escape(self.path.name), {"control", "pose", "shape", "image"}
@@ -88,12 +92,13 @@ def export_module(
 ) -> ExportReport:
     """Writes a torch.nn.Module as a generator with its contract, compares it with PyTorch, and prints the result.
 
-    `inputs`: a role for each argument of `forward`, in its order: {"t": time(), "twist": control(-1, 1)}. `outputs`:
-    the tensors that it returns, split() by default: positions, scales, rotations, colors, opacities. Both of PyTorch's
-    exporters are tried, and the first whose file computes the same as the module is kept. `batched`: the module takes
-    a batch before every input, [1,72] if the role has [72], and [1,1] for a time or a control; images have one anyway.
-    `coordinates`: which axis is up, {"up": "+y"}; -y without it. Raises graph/invalid if neither exporter succeeds, and
-    contract/violation if its outputs have another shape than split() declares, or numbers out of range.
+    `inputs`: a role for each argument of `forward`, in its order: {"t": time(), "twist": control(-1, 1)}.
+    `outputs`: the tensors that it returns, split() by default: positions, scales, rotations, colors, opacities.
+    Both of PyTorch's exporters are tried, and the first whose file computes the same as the module is kept.
+    `batched`: the module takes a batch before every input, [1,72] if the role has [72], and [1,1] for a time or a
+    control; images always have one. `coordinates`: which axis is up, {"up": "+y"}; -y without it. Raises
+    graph/invalid if neither exporter succeeds, and contract/violation if its outputs have another shape than
+    split() declares, or numbers out of range.
     """
     require_package("onnxruntime", "module")
     import torch
@@ -155,8 +160,7 @@ def export_module(
 
 
 def generator(inputs: Mapping[str, Role], outputs: Layout | None = None, **facts: Any) -> Callable[[Any], Any]:
-    """A decorator of a module class, or of a function of tensors: it gets `export(out)`, which is `export_module`.
-
+    """A decorator of a module class, or of a function of tensors, which then has `export(out)`: see `export_module`.
     @generator({"t": time(), "twist": control(-1, 1)}, split("positions", "covariances", "colors", "opacities"))
     """
 
@@ -214,7 +218,7 @@ def _facts(
 
 
 def _bounds(wrapped: Any, inputs: Mapping[str, Role], layout: Layout, torch: Any) -> Json:
-    """A box around the centers at defaults, at 24 times if the module knows the time, enlarged by a tenth."""
+    """A box around the centers at defaults, at 24 times if the module has a time, enlarged by a tenth."""
     if layout.kind == "image":
         return {}
     rest = {name: role.default for name, role in inputs.items()}
@@ -225,7 +229,7 @@ def _bounds(wrapped: Any, inputs: Mapping[str, Role], layout: Layout, torch: Any
         tensors = in_torch(wrapped, rest | moment, torch)
         box = box_of(read(layout.json(), dict(zip(layout.outputs, tensors, strict=True)))[1])
         boxes += [] if box is None else [box]
-    # Images, frames and what was written before may move the centers anywhere.
+    # Images, frames and previous outputs may move the centers anywhere.
     if not boxes or any(role.binding["role"] in ("image", "frame", "state") for role in inputs.values()):
         return {}
     low, high = np.min([box[0] for box in boxes], 0), np.max([box[1] for box in boxes], 0)

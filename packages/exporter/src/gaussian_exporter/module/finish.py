@@ -39,7 +39,7 @@ def finish_graph(
 
 
 def _narrow(graph: onnx.GraphProto) -> None:
-    """Float64 becomes float32, the widest that pages compute in: constants, casts, and what is declared."""
+    """Converts float64 to float32, the widest type in pages: constants, casts, and declarations."""
     for tensor in graph.initializer:
         _narrow_tensor(tensor)
     for value in [*graph.input, *graph.value_info, *graph.output]:
@@ -61,13 +61,13 @@ def _narrow_tensor(tensor: onnx.TensorProto) -> None:
 
 
 def _name_output(graph: onnx.GraphProto, value: onnx.ValueInfoProto, wanted: str) -> None:
-    """A constant loses its name in TorchScript's exporter; a copy of it has the right one."""
+    """TorchScript's exporter drops the name of a constant; a copy of it has the right one."""
     graph.node.append(helper.make_node("Identity", [value.name], [wanted], name=f"named_{wanted}"))
     value.name = wanted
 
 
 def _declare(value: onnx.ValueInfoProto, seen: Sequence[AnyArray], layout: Layout) -> None:
-    """The shape that the output had in PyTorch; where the number of rows differs, or the file says that it may, N."""
+    """The shape of the output in PyTorch; N for the number of rows if it differs, or is symbolic in the file."""
     shape = value.type.tensor_type.shape
     dims: list[int | str] = [*seen[0].shape]
     # A state and a count have no rows; a state may be a single number.
@@ -82,8 +82,9 @@ def _declare(value: onnx.ValueInfoProto, seen: Sequence[AnyArray], layout: Layou
 
 
 def _turn_vectors(model: onnx.ModelProto) -> None:
-    """A turned matrix times a vector becomes one times a matrix of one column: ONNX Runtime's optimiser loses the
-    transposition of the first, and with it the place of many a camera."""
+    """Replaces a transposed matrix times a vector by a product with a matrix of one column: ONNX Runtime's optimizer
+    loses the transposition of the first form, and with it camera positions.
+    """
     found = {f.tensor for f in gpu_findings(model) if f.operator == "MatMul" and f.kind == "slow"}
     nodes = []
     for node in model.graph.node:
@@ -101,8 +102,9 @@ def _turn_vectors(model: onnx.ModelProto) -> None:
 
 
 def _write_by_kernels(model: onnx.ModelProto, inputs: Mapping[str, Role]) -> None:
-    """Adds a zero that comes from an input to outputs that are another shape of a result: recorded commands would write
-    them once and never again."""
+    """Adds a zero that comes from an input to outputs that are reshaped results: recorded commands would write them
+    once and never again.
+    """
     graph = model.graph
     copied = [f.tensor for f in gpu_findings(model) if f.kind == "slow" and f.operator in ALIASES]
     floats = [v for v in graph.input if v.type.tensor_type.elem_type == TensorProto.FLOAT]

@@ -1,4 +1,4 @@
-"""Operators that have no kernel on the GPU, written with others that have one."""
+"""Replaces operators without a kernel on the GPU by others that have one."""
 
 from __future__ import annotations
 

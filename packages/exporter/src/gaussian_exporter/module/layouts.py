@@ -1,4 +1,4 @@
-"""How a module's outputs are read: the meaning of each tensor and of its numbers."""
+"""Declares the meaning of a module's outputs: each tensor, and its numbers."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ from ..contract import Json
 from ..errors import ExportError
 from .roles import Role
 
-# In the order in which a module that returns a tuple gives them.
+# In the order of a module that returns a tuple.
 ATTRIBUTES = ("positions", "covariances", "scales", "rotations", "colors", "sh", "opacities")
 
 
 @dataclass(frozen=True)
 class Layout:
-    """`names` are those of the outputs in the file, in the module's order; `words` what the contract says besides."""
+    """`names` are those of the outputs in the file, in the module's order; `words` are further fields of the contract."""
 
     kind: Literal["split", "packed", "image"]
     names: tuple[str, ...]
     words: Json
-    # The input that takes an output behind all others in the next run.
+    # The input that receives an additional last output in the next run.
     state: str | None = None
     # Keys of the dict that the module returns, if they differ from the names.
     keys: Mapping[str, str] | None = None
@@ -50,11 +50,13 @@ def split(
     count: bool = False,
     state: str | None = None,
 ) -> Layout:
-    """A tensor for each attribute: split("positions", "scales", "rotations", "colors", "opacities") in the order that
-    the module returns them. Of a module that returns a dict any order, or its own keys: split({"positions": "xyz",
-    "opacities": "alpha", ...}). `scales="log"` and `opacities="logit"` for numbers before their activation;
-    `colors="linear"` for linear light, which the file converts to sRGB. Without names: those five. `state`: the input
-    with the role state() that takes, in the next run, what the module returns last; without it, the only such input."""
+    """A tensor for each attribute: split("positions", "scales", "rotations", "colors", "opacities") in the order of
+    the module's results. For a module that returns a dict, in any order, or with its own keys: split({"positions":
+    "xyz", "opacities": "alpha", ...}). `scales="log"` and `opacities="logit"` for numbers before their activation;
+    `colors="linear"` for linear light, which the file converts to sRGB. Without names: those five. `state`: the
+    input with the role state() that receives, in the next run, the module's last result; without it, the only such
+    input.
+    """
     keys = names[0] if names and isinstance(names[0], Mapping) else None
     plain = tuple(keys) if keys is not None else tuple(name for name in names if isinstance(name, str))
     given = plain or ("positions", "scales", "rotations", "colors", "opacities")
@@ -116,8 +118,9 @@ def tensors_of(result: Any, layout: Layout) -> list[Any]:
 
 
 def fitted(name: str, tensor: Any, layout: Layout, torch: Any) -> Any:
-    """The tensor in the contract's shape, where that is the same Gaussians: a leading 1 dropped, covariances as their
-    upper triangle, rotation matrices as quaternions, one scale a splat three times, colors without their alpha."""
+    """The tensor in the contract's shape, if it contains the same Gaussians: a leading 1 dropped, covariances as their
+    upper triangle, rotation matrices as quaternions, one scale a splat three times, colors without their alpha.
+    """
     if layout.state is not None and name == layout.outputs[-1]:
         return tensor
     if name == "count":
@@ -125,13 +128,13 @@ def fitted(name: str, tensor: Any, layout: Layout, torch: Any) -> Any:
     x = tensor.float() if tensor.dtype != torch.float32 else tensor
     if layout.kind == "image":
         return x[:, :3] if x.dim() == 4 else x[None, :3]
-    # Covariances and rotations may be matrices, harmonics have two axes behind the rows.
+    # Covariances and rotations may be matrices, and harmonics have two axes after the rows.
     are_matrices = name in ("covariances", "rotations") and x.dim() > 2 and x.shape[-2:] == (3, 3)
     wide = 3 if name == "sh" or are_matrices else 2
     while x.dim() > wide and x.shape[0] == 1:
         x = x[0]
     if name == "rotations" and are_matrices and x.dim() == 3:
-        # Exporters have no numbers to look at.
+        # While a module is exported, its tensors have no values.
         if not (torch.jit.is_tracing() or torch.compiler.is_compiling()):
             turned_back = x @ x.transpose(1, 2) - torch.eye(3, device=x.device)
             if not ((turned_back.abs() < 1e-2).all() and (x.det() > 0).all()):
@@ -157,8 +160,9 @@ def _srgb(linear: Any, torch: Any) -> Any:
 
 
 def _quaternions(rows: Any, torch: Any) -> Any:
-    """w x y z, of any length, of rotation matrices: a column of 4 q q^T whose diagonal, 4 at most, is 1 or more, since
-    the four sum to 4."""
+    """w x y z, of any length, of rotation matrices: a column of 4 q q^T whose diagonal, 4 at most, is 1 or more,
+    because the four sum to 4.
+    """
     a, b, c, d, e, f, g, h, i = rows.unbind(-1)
     w = torch.stack([1 + a + e + i, h - f, c - g, d - b], -1)
     x = torch.stack([h - f, 1 + a - e - i, b + d, c + g], -1)

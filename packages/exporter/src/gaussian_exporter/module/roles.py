@@ -14,17 +14,17 @@ from ..contract import Json
 
 @dataclass(frozen=True)
 class Role:
-    """How a page feeds an input. `samples[0]` is its default; the others reach the ends of its range."""
+    """An input of a page. `samples[0]` is its default; the others reach the ends of its range."""
 
     binding: Json
     shape: tuple[int, ...]
     samples: Sequence[AnyArray]
-    # A value at which lengths and differences are 0, if a page can give one. It reveals a dropped small addend.
+    # A value at which lengths and differences are 0, if a page can set one. It reveals a dropped small addend.
     zero: AnyArray | None = None
 
     @property
     def default(self) -> AnyArray:
-        """The value that the page gives before it sets another."""
+        """The initial value in a page."""
         return self.samples[0]
 
 
@@ -37,8 +37,9 @@ _SHARES = (0.0, 0.131, 0.367, 0.5, 0.618, 0.887, 1.0)
 
 
 def time(duration: float | None = None, normalized: bool = False, shape: Sequence[int] = (1,)) -> Role:
-    """Seconds or, with `normalized`, a fraction 0..1 of the duration, which is then required. `duration` is the model's
-    own length in seconds, if it has one, and becomes the page's."""
+    """Seconds or, with `normalized`, a fraction 0..1 of the duration, which is then required. `duration` is the length
+    of the model in seconds, if it has one, and becomes the page's.
+    """
     if normalized and duration is None:
         raise ValueError("time(normalized=True) needs duration=SECONDS")
     unit = "normalized" if normalized else "seconds"
@@ -57,7 +58,7 @@ def control(
     step: float | None = None,
     shape: Sequence[int] = (1,),
 ) -> Role:
-    """A slider for people, `label` beside it. Default: 0 if that is within the range, else its middle."""
+    """A slider for visitors, with the text `label`. Default: 0 if that is within the range, else its middle."""
     middle = 0.0 if low <= 0 <= high else (low + high) / 2
     value = middle if default is None else default
     named: Json = {"label": label} if label is not None else {}
@@ -80,7 +81,8 @@ def pose(
     flat: bool = False,
 ) -> Role:
     """[J,3] axis-angle in radians, [J,4] quaternions w x y z, [J,3,3] rotation matrices, or [P] parameters; joints by
-    name, or how many. `flat`: all in one row, [72] of 24 joints."""
+    name or number. `flat`: all in one row, [72] for 24 joints.
+    """
     count = joints if isinstance(joints, int) else len(joints)
     joint: tuple[int, ...] = {"axis-angle": (3,), "quaternion": (4,), "matrix": (3, 3), "parameters": ()}[format]
     sizes = (count * int(np.prod(joint)),) if flat or not joint else (count, *joint)
@@ -133,7 +135,7 @@ def _matrices() -> list[AnyArray]:
 
 
 def view(axes: str = "RDF", column_major: bool = False) -> Role:
-    """[4,4] world to camera; RDF is OpenCV's camera, RUB OpenGL's."""
+    """[4,4] world to camera; axes RDF as in OpenCV, or RUB as in OpenGL."""
     order = "column-major" if column_major else "row-major"
     matrices = [matrix.T.copy() if column_major else matrix for matrix in _matrices()]
     return Role({"role": "view", "order": order, "axes": axes}, (4, 4), matrices)
@@ -188,8 +190,9 @@ def image(width: int, height: int, views: int = 1) -> Role:
 
 
 def depth(width: int, height: int) -> Role:
-    """[1,1,H,W], of a post-processor: depth of the frame along the axis of the camera, in world units, at which half of
-    the light is gone; 0 where more than half passes."""
+    """[1,1,H,W], for a post-processor: depth of the frame along the axis of the camera, in world units, of the splat
+    that halves the transmittance; 0 if none does.
+    """
     rng, sizes = np.random.default_rng(1), (1, 1, height, width)
     surface = rng.uniform(0.5, 20, sizes).astype(np.float32)
     holes = np.where(rng.random(sizes) < 0.2, 0, surface).astype(np.float32)

@@ -1,4 +1,4 @@
-"""The module itself, before any exporter: run with values of its inputs, and refused for what its outputs lack."""
+"""Runs the module itself, before any exporter, with values of its inputs, and refuses unsuitable outputs."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Values = Mapping[str, AnyArray]
 
 
 def wrapped_module(module: Any, inputs: Mapping[str, Role], layout: Layout, batched: bool, torch: Any) -> Any:
-    """The module with outputs as the contract has them, and a batch before its inputs if it takes one."""
+    """The module with outputs in the contract's form, and with a batch axis before its inputs if it takes one."""
     stays = [role.binding["role"] in ("image", "depth", "state") or not batched for role in inputs.values()]
 
     class Named(torch.nn.Module):  # type: ignore[misc]
@@ -41,14 +41,15 @@ def in_torch(wrapped: Any, values: Values, torch: Any) -> list[AnyArray]:
 
 
 def weights_of(module: Any) -> Iterator[tuple[str, str, Any]]:
-    """Whether a parameter or a buffer, its name, and it."""
+    """Whether a parameter or a buffer, its name, and the tensor."""
     for kind, weights in (("parameter", module.named_parameters()), ("buffer", module.named_buffers())):
         yield from ((kind, name, tensor) for name, tensor in weights)
 
 
 def tries_of(inputs: Mapping[str, Role]) -> list[dict[str, AnyArray]]:
-    """All defaults; every input at its other values, together, as many times as the richest has some; and every input
-    at its zero, alone and all of them: an exporter that drops a small addend shows it nowhere else."""
+    """Sets of inputs: all defaults; all other values together, as many sets as the input with the most values; and
+    every input at its zero, alone and all together, which reveals a small addend that an exporter drops.
+    """
     most = max((len(role.samples) for role in inputs.values()), default=1)
     tries = [{name: role.samples[i % len(role.samples)] for name, role in inputs.items()} for i in range(most)]
     zeros = {name: role.zero for name, role in inputs.items() if role.zero is not None}
@@ -56,7 +57,7 @@ def tries_of(inputs: Mapping[str, Role]) -> list[dict[str, AnyArray]]:
 
 
 def said(values: Values, tries: Sequence[Values]) -> str:
-    """Which of the tries it was."""
+    """Index of the set."""
     if values is tries[0]:
         return "at its inputs' defaults"
     shown = (
@@ -69,8 +70,9 @@ def said(values: Values, tries: Sequence[Values]) -> str:
 def tried(
     module: Any, inputs: Mapping[str, Role], layout: Layout, batched: bool, n_max: int | None, torch: Any
 ) -> tuple[list[dict[str, AnyArray]], list[list[AnyArray]]]:
-    """Values of the inputs, and what the module writes with each. Raises argument/value where it does not take them or
-    does not repeat itself, contract/violation where no file of it could keep the contract."""
+    """Values of the inputs, and the module's outputs for each. Raises argument/value if it rejects them or is not
+    deterministic, contract/violation if no file of it could conform to the contract.
+    """
     wrapped, tries = wrapped_module(module, inputs, layout, batched, torch), tries_of(inputs)
     written: list[list[AnyArray]] = []
     for values in [*tries, tries[0]]:
@@ -95,7 +97,7 @@ def tried(
     for values, tensors in zip(tries, expected, strict=True):
         faults, attributes = read(layout.json(), dict(zip(layout.outputs, tensors, strict=True)), n_max)
         for fault in [*faults, *value_faults(attributes)]:
-            # Numbers out of order elsewhere than at defaults are checked in the file, where people can go.
+            # Invalid numbers at other values than defaults are checked in the file, because visitors can set these.
             if values is tries[0] or fault.code == "not-finite":
                 raise fault.error(f" of the module, {said(values, tries)}")
     for name, tensor, other in zip(layout.outputs, expected[0], again, strict=True):
@@ -129,7 +131,7 @@ def difference(mine: AnyArray, theirs: AnyArray) -> float:
     both = ~(np.isfinite(mine) | np.isfinite(theirs))
     apart = np.where(both, 0, np.abs(mine - theirs))
     scale = max(float(np.abs(theirs[np.isfinite(theirs)]).max(initial=0)), 1e-12)
-    # A number that one has and the other has not.
+    # A value that only one of them has.
     return float(np.nan_to_num(apart, nan=np.inf, posinf=np.inf).max(initial=0)) / scale
 
 

@@ -10,8 +10,9 @@ from ..graph import Tensor, wrong_shape
 
 @dataclass(frozen=True)
 class Convolution:
-    """weight (out, in, k, k) with odd k, bias (out), as PyTorch stores them. norm: scale and shift (out) of an instance
-    normalisation after it, if there is one."""
+    """weight (out, in, k, k) with odd k, bias (out), as PyTorch stores them. norm: scale and shift (out) of an
+    instance normalization after it, if there is one.
+    """
 
     weight: Floats
     bias: Floats
@@ -24,9 +25,8 @@ _NORM_EPSILON = 1e-5
 
 def is_wrong_on_webgpu(inputs: int, outputs: int, size: int) -> bool:
     """Whether the WebGPU provider computes other numbers than the CPU for a convolution of these channels and kernel.
-
-    Measured with onnxruntime-webgpu 1.27.0: wrong for 6, 9 and 18 channels going in and 4, 8 or 12 coming out, right
-    for every other pair tried, for 3 going in, and for kernels of one pixel.
+    Measured with onnxruntime-webgpu 1.27.0: wrong for 6, 9 and 18 input channels with 4, 8 or 12 output channels,
+    right for every other pair tried, for 3 input channels, and for kernels of one pixel.
     """
     return inputs % 4 != 0 and inputs % 3 == 0 and inputs > 3 and outputs % 4 == 0 and size > 1
 
@@ -58,7 +58,7 @@ def enlarge(x: Tensor, factor: int, smooth: bool) -> Tensor:
     graph = x.graph
     shape = (*x.shape[:2], x.shape[2] * factor, x.shape[3] * factor)
     scales = graph.constant(np.array([1, 1, factor, factor]), "scales")
-    # Resize's second input, a region of interest, is left out; ONNX writes that as an empty name.
+    # Resize's second input, a region of interest, is omitted; ONNX writes that as an empty name.
     nothing = Tensor(graph, "", ())
     if smooth:
         how = {"mode": "linear", "coordinate_transformation_mode": "half_pixel"}

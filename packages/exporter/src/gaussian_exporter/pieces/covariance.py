@@ -8,8 +8,8 @@ from .mlp import Linear, linear
 
 # Entries of an upper triangle, row by row.
 UPPER = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)]
-# A rotation matrix is linear in the products of its quaternion's parts: entry (row by row) -> (i, j, factor) of parts
-# i and j of (w x y z). Divided by |q|^2 it holds for quaternions of any length.
+# A rotation matrix is linear in the products of its quaternion's components: entry (row by row) -> (i, j, factor) of
+# components i and j of (w x y z). Divided by |q|^2 it holds for quaternions of any length.
 _TERMS = {
     0: [(0, 0, 1), (1, 1, 1), (2, 2, -1), (3, 3, -1)],
     1: [(1, 2, 2), (0, 3, -2)],
@@ -21,7 +21,7 @@ _TERMS = {
     7: [(2, 3, 2), (0, 1, 2)],
     8: [(0, 0, 1), (1, 1, -1), (2, 2, -1), (3, 3, 1)],
 }
-# The same as a matrix (16,9): from all products of two parts to the entries.
+# The same table as a matrix (16,9): from all products of two components to the entries.
 PRODUCTS: Floats = np.zeros((16, 9), np.float32)
 for _entry, _terms in _TERMS.items():
     for _i, _j, _factor in _terms:
@@ -42,8 +42,8 @@ def rotation_matrix(quaternions: Tensor) -> Tensor:
 
 def covariance_of_half(half: Tensor) -> Tensor:
     """Upper triangles xx xy xz yy yz zz (...,6) of H H^T, for halves H (...,3,C); columns of zeros do no harm."""
-    # All products of two rows, then one product with a table that adds up those of an entry: WebGPU runs a product of
-    # small matrices for each Gaussian slowly.
+    # Computes all products of two rows, then one product with a table that adds up those of an entry, because WebGPU
+    # runs a product of small matrices for each Gaussian slowly.
     each, columns = half.shape[:-2], half.shape[-1]
     products = half.reshape(*each, 3, 1, columns) * half.reshape(*each, 1, 3, columns)
     table = np.zeros((6, 3, 3, columns), np.float32)

@@ -1,4 +1,4 @@
-"""Spherical harmonics evaluated inside a graph, as 3DGS defines them."""
+"""Spherical harmonics evaluated inside a graph, with the definition of 3DGS."""
 
 from math import pi, sqrt
 

@@ -19,17 +19,17 @@ class Linear:
 
     @property
     def inputs(self) -> int:
-        """Numbers going in."""
+        """Number of inputs."""
         return int(self.weight.shape[1])
 
     @property
     def outputs(self) -> int:
-        """Numbers coming out."""
+        """Number of outputs."""
         return int(self.weight.shape[0])
 
 
 def linear(x: Tensor, layer: Linear, name: str, plus: Tensor | None = None) -> Tensor:
-    """One layer on rows (..., in). `plus` (rows, out), constant or not, takes the place of the bias."""
+    """One layer on rows (..., in). `plus` (rows, out), constant or not, replaces the bias."""
     graph = x.graph
     if x.shape[-1] != layer.inputs:
         raise wrong_shape("Gemm", f"{layer.inputs} columns", str(x.shape))
@@ -42,9 +42,10 @@ def linear(x: Tensor, layer: Linear, name: str, plus: Tensor | None = None) -> T
 
 
 def convolved(x: Tensor, layer: Linear, name: str) -> Tensor:
-    """One layer on columns (1, in, rows, 1) as a convolution of 1x1; gives (1, out, rows, 1). ONNX Runtime computes a
-    ReLU behind a convolution in the same dispatch, which it does not behind a Gemm: 0.43 ms in place of 0.65 for a 4DGS
-    of 60,000 Gaussians on an H100."""
+    """One layer on columns (1, in, rows, 1) as a convolution of 1x1; returns (1, out, rows, 1). ONNX Runtime computes
+    a ReLU after a convolution in the same dispatch, but not after a Gemm: 0.43 ms instead of 0.65 for a 4DGS of
+    60,000 Gaussians on an H100.
+    """
     graph = x.graph
     if x.shape[1] != layer.inputs:
         raise wrong_shape("Conv", f"{layer.inputs} channels", str(x.shape))
@@ -68,12 +69,12 @@ def mlp(x: Tensor, layers: Sequence[Linear], name: str, last: str | None = None)
 
 
 def stacked(layers: Sequence[Linear]) -> Linear:
-    """Layers of the same input as one, outputs one after the other."""
+    """Layers of the same input as one layer, with concatenated outputs."""
     return Linear(np.concatenate([layer.weight for layer in layers]), np.concatenate([layer.bias for layer in layers]))
 
 
 def beside(layers: Sequence[Linear]) -> Linear:
-    """Layers as one, each on a part of the input of its own: a matrix with blocks along its diagonal."""
+    """Layers as one layer, each on its own part of the input: a matrix with blocks along its diagonal."""
     weight = np.zeros((sum(layer.outputs for layer in layers), sum(layer.inputs for layer in layers)), np.float32)
     row = column = 0
     for layer in layers:

@@ -9,8 +9,8 @@ from ..graph import Tensor
 from .covariance import PRODUCTS
 from .mlp import Linear, linear
 
-# Rows are filled up to a multiple of this, which the provider multiplies four at a time; one of those that are no
-# joint's is the parent of roots.
+# Rows are padded to a multiple of this number, because the provider multiplies four at a time; one of the padding rows
+# is the parent of roots.
 _AT_ONCE = 4
 _TINY = 1e-10
 
@@ -19,12 +19,13 @@ def quaternions_of_axis_angle(pose: Tensor) -> Tensor:
     """Unit quaternions w x y z (...,J,4) of axes times angles in radians (...,J,3); smooth at 0."""
     angle = pose.length(-1, keep=True) + _TINY
     half = angle * 0.5
-    # Made unit again: sines of some GPUs are good to 1e-4, and what is no rotation adds up along the way to the root.
+    # Normalized again, because sines of some GPUs are accurate only to 1e-4, and such errors accumulate along the path
+    # to the root.
     return unit_quaternions(pose.graph.concat([half.unary("Cos"), pose * (half.unary("Sin") / angle)], -1))
 
 
 def unit_quaternions(quaternions: Tensor) -> Tensor:
-    """Quaternions (...,J,4) of any length, made as long as 1."""
+    """Quaternions (...,J,4) of any length, normalized."""
     return quaternions / (quaternions.length(-1, keep=True) + _TINY)
 
 
@@ -66,7 +67,7 @@ def skinning_matrices(products: Tensor, joints: Tensor, parents: Sequence[int]) 
 
 
 def _doublings(parents: Sequence[int]) -> int:
-    """Products until the deepest joint has come to the root, 1 or more. Parents must come before children."""
+    """Number of products until the deepest joint has reached the root, 1 or more. Parents must come before children."""
     depth: list[int] = []
     for parent in parents:
         depth.append(0 if parent < 0 else depth[parent] + 1)
@@ -74,8 +75,9 @@ def _doublings(parents: Sequence[int]) -> int:
 
 
 def _around_a_point() -> Linear:
-    """From a point (3) to the matrix (16x16, row by row) that leads from products of a quaternion's parts to the 4x4
-    matrix that turns space around that point."""
+    """For a point (3), the matrix (16x16, row by row) from products of a quaternion's components to the 4x4 matrix
+    that rotates space around that point.
+    """
     weight: Floats = np.zeros((3, 16, 16), np.float32)
     bias: Floats = np.zeros((16, 16), np.float32)
     squares = np.eye(4, dtype=np.float32).ravel()
@@ -83,7 +85,7 @@ def _around_a_point() -> Linear:
     for row in range(3):
         for column in range(3):
             bias[:, 4 * row + column] = turn[:, row, column]
-            # The point itself, less where it would be turned to.
+            # The point itself minus its rotated position.
             weight[column, :, 4 * row + 3] -= turn[:, row, column]
         weight[row, :, 4 * row + 3] += squares
     bias[:, 15] = squares
