@@ -30,7 +30,7 @@ class View:
     translation: np.ndarray
 
     @property
-    def centre(self) -> np.ndarray:
+    def center(self) -> np.ndarray:
         return -self.rotation.T @ self.translation
 
 
@@ -56,7 +56,7 @@ class Capture:
     intrinsics: Intrinsics
     views: list[View]
     points: np.ndarray
-    colours: np.ndarray
+    colors: np.ndarray
     cut_height: float
 
 
@@ -93,14 +93,14 @@ def read_colmap(sparse: Path) -> Capture:
 def looked_at_point(views: list[View]) -> np.ndarray:
     """The point nearest to all optical axes (least squares)."""
     normals = [np.eye(3) - np.outer(view.rotation[2], view.rotation[2]) for view in views]
-    return np.linalg.solve(sum(normals), sum(normal @ view.centre for normal, view in zip(normals, views)))
+    return np.linalg.solve(sum(normals), sum(normal @ view.center for normal, view in zip(normals, views)))
 
 
-def first_guess(views: list[View], centre: np.ndarray) -> np.ndarray:
+def first_guess(views: list[View], center: np.ndarray) -> np.ndarray:
     """World to upright, rows x, y, z: up is the mean of what photographers held up, forward is FRONT_VIEW's."""
     down = np.mean([view.rotation[1] for view in views], axis=0)
     down /= np.linalg.norm(down)
-    forward = centre - next(view for view in views if view.name == FRONT_VIEW).centre
+    forward = center - next(view for view in views if view.name == FRONT_VIEW).center
     forward -= down * (forward @ down)
     forward /= np.linalg.norm(forward)
     return np.stack([np.cross(down, forward), down, forward])
@@ -124,9 +124,9 @@ def asymmetry(parameters: np.ndarray, points: np.ndarray) -> float:
 def to_upright(capture: Capture) -> Capture:
     """Moves cameras and points so that the mirror plane is x = 0, the box is centred and its half diagonal is
     OBJECT_RADIUS. Yaw and roll come from the object's own left-right symmetry."""
-    centre = looked_at_point(capture.views)
-    base = first_guess(capture.views, centre)
-    points = (capture.points - centre) @ base.T
+    center = looked_at_point(capture.views)
+    base = first_guess(capture.views, center)
+    points = (capture.points - center) @ base.T
     # The post is no part of the symmetry, and points far out are not on the object.
     symmetric = points[(points[:, 1] < 0.28) & (np.linalg.norm(points, axis=1) < 0.6)]
     found = minimize(
@@ -138,14 +138,14 @@ def to_upright(capture: Capture) -> Capture:
     )
     yaw, roll, offset = found.x
     rotation = rotation_yaw_roll(yaw, roll) @ base
-    turned = (capture.points - centre) @ rotation.T
+    turned = (capture.points - center) @ rotation.T
     kept = turned[(turned[:, 1] < CUT_HEIGHT) & (np.linalg.norm(turned, axis=1) < 0.6)]
     low, high = np.percentile(kept, 0.3, axis=0), np.percentile(kept, 99.7, axis=0)
     high[1] = CUT_HEIGHT
     middle = (low + high) / 2
     middle[0] = offset
     scale = OBJECT_RADIUS / (np.linalg.norm(high - low) / 2)
-    origin = centre + rotation.T @ middle
+    origin = center + rotation.T @ middle
     views = [
         View(view.name, view.rotation @ rotation.T, scale * (view.translation + view.rotation @ origin))
         for view in capture.views
@@ -153,4 +153,4 @@ def to_upright(capture: Capture) -> Capture:
     moved = scale * (turned - middle)
     turned_by = f"yaw {np.degrees(yaw):.2f}, roll {np.degrees(roll):.2f} degrees"
     print(f"upright: {turned_by}, asymmetry {found.fun:.4f}, scale {scale:.4f}")
-    return Capture(capture.intrinsics, views, moved, capture.colours, float(scale * (CUT_HEIGHT - middle[1])))
+    return Capture(capture.intrinsics, views, moved, capture.colors, float(scale * (CUT_HEIGHT - middle[1])))

@@ -10,11 +10,11 @@ from gaussians import SH_C0, Gaussians
 from model import Parameters, weights
 
 # A Gaussian that makes up less than this many pixels of every single photograph is never missed.
-LEAST_PIXELS = 0.1
+MIN_PIXELS = 0.1
 # Fraction of a Gaussian's visible weight, over all photographs, that must fall on the object.
-LEAST_ON_OBJECT = 0.6
+MIN_ON_OBJECT = 0.6
 # Neighbours and distance, in units of the typical distance, beyond which a Gaussian counts as floating alone.
-NEIGHBOURS = 8
+NEIGHBORS = 8
 LONELY = 6.0
 # How bright the scene is: as the photographs at this percentile of all exposures.
 EXPOSURE_PERCENTILE = 85
@@ -23,18 +23,18 @@ EXPOSURE_PERCENTILE = 85
 def visible_and_proper(parameters: Parameters, pictures: list[Picture]) -> tuple[torch.Tensor, torch.Tensor]:
     """Which Gaussians make up LEAST_PIXELS of some photograph, and which of them are visible mostly on the object rather than on background or darkness; (N,) booleans each."""
     count = len(parameters["means"])
-    most, on, off = (torch.zeros(count, device="cuda") for _ in range(3))
+    maximum, on, off = (torch.zeros(count, device="cuda") for _ in range(3))
     for picture in pictures:
         known = picture.valid * (1 - picture.doubtful)
         regions = [known * picture.alpha, picture.valid * (1 - known * picture.alpha), torch.ones_like(known)]
         shown, spilled, whole = weights(parameters, picture.view_matrix, picture.intrinsics, picture.size, regions)
-        most, on, off = torch.maximum(most, whole), on + shown, off + spilled
-    return most > LEAST_PIXELS, on >= LEAST_ON_OBJECT * (on + off)
+        maximum, on, off = torch.maximum(maximum, whole), on + shown, off + spilled
+    return maximum > MIN_PIXELS, on >= MIN_ON_OBJECT * (on + off)
 
 
 def lonely(means: np.ndarray) -> np.ndarray:
     """Which means (N,3) have no close neighbours, (N,) booleans."""
-    distance = cKDTree(means).query(means, NEIGHBOURS + 1)[0][:, 1:].mean(1)
+    distance = cKDTree(means).query(means, NEIGHBORS + 1)[0][:, 1:].mean(1)
     return distance > LONELY * np.median(distance)
 
 

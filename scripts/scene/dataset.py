@@ -33,7 +33,7 @@ class Picture:
         return self.rgb.shape[2], self.rgb.shape[1]
 
 
-def colours_without_fringe(photograph: np.ndarray, coverage: np.ndarray) -> np.ndarray:
+def colors_without_fringe(photograph: np.ndarray, coverage: np.ndarray) -> np.ndarray:
     """Replaces each pixel that is not well inside the object by the nearest one that is."""
     inside = cv2.erode((coverage > 127).astype(np.uint8), np.ones((2 * EDGE + 1, 2 * EDGE + 1)))
     _, labels = cv2.distanceTransformWithLabels(1 - inside, cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL)
@@ -51,8 +51,8 @@ def load_picture(folder: Path, view: View, capture: Capture, device: str) -> Pic
     rows, columns = np.nonzero(coverage.any(1))[0], np.nonzero(coverage.any(0))[0]
     top, left = max(rows[0] - CROP_MARGIN, 0), max(columns[0] - CROP_MARGIN, 0)
     crop = np.s_[top : rows[-1] + CROP_MARGIN, left : columns[-1] + CROP_MARGIN]
-    colours = np.where(doubtful[..., None], photograph, colours_without_fringe(photograph, coverage))
-    rgb = colours[crop].astype(np.float32) / 255
+    colors = np.where(doubtful[..., None], photograph, colors_without_fringe(photograph, coverage))
+    rgb = colors[crop].astype(np.float32) / 255
     intrinsics = capture.intrinsics.matrix()
     intrinsics[:2, 2] -= [left, top]
     matrix = np.eye(4)

@@ -31,17 +31,17 @@ def shot(parameters: Parameters, degree: int, matrix: np.ndarray, size: int, bac
     )
     view = torch.tensor(matrix, dtype=torch.float32, device="cuda")
     with torch.no_grad():
-        colour, alpha, _ = render(parameters, view, intrinsics, (size, size), degree)
-    picture = colour + background * (1 - alpha)
+        color, alpha, _ = render(parameters, view, intrinsics, (size, size), degree)
+    picture = color + background * (1 - alpha)
     return (picture.clamp(0, 1).permute(1, 2, 0).cpu().numpy() * 255).round().astype(np.uint8)
 
 
 def masked_psnr(parameters: Parameters, degree: int, picture: Picture) -> tuple[float, float]:
     """PSNR of the colour on the object's pixels, and the coverage's mean error on the pixels with known coverage."""
     with torch.no_grad():
-        colour, alpha, _ = render(parameters, picture.view_matrix, picture.intrinsics, picture.size, degree)
+        color, alpha, _ = render(parameters, picture.view_matrix, picture.intrinsics, picture.size, degree)
     inside = ((picture.alpha > 0.99) & (picture.valid > 0) & (picture.doubtful == 0))[0]
-    got, wanted = colour[:, inside], picture.rgb[:, inside]
+    got, wanted = color[:, inside], picture.rgb[:, inside]
     gain = (got * wanted).sum(1, keepdim=True) / (got * got).sum(1, keepdim=True)
     error = (got * gain - wanted).square().mean().item()
     known = picture.valid * (1 - picture.doubtful)

@@ -120,7 +120,7 @@ def voxels(capture: Capture) -> np.ndarray:
 
 
 def from_high(view: View) -> bool:
-    return -view.centre[1] > np.sin(np.radians(HIGH_VIEW_DEGREES)) * np.linalg.norm(view.centre)
+    return -view.center[1] > np.sin(np.radians(HIGH_VIEW_DEGREES)) * np.linalg.norm(view.center)
 
 
 def visual_hull(capture: Capture, masks: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:

@@ -21,7 +21,7 @@ def as_parameters(values: dict[str, np.ndarray], device: str) -> Parameters:
     }
 
 
-def initial_parameters(points: np.ndarray, colours: np.ndarray, sh_degree: int, device: str = "cuda") -> Parameters:
+def initial_parameters(points: np.ndarray, colors: np.ndarray, sh_degree: int, device: str = "cuda") -> Parameters:
     """Round Gaussians at `points` (N,3), as wide as the distance to their neighbours; colours (N,3) in 0..1."""
     distance = cKDTree(points).query(points, 4)[0][:, 1:].mean(1)
     values = {
@@ -29,7 +29,7 @@ def initial_parameters(points: np.ndarray, colours: np.ndarray, sh_degree: int, 
         "scales": np.log(np.clip(distance, 1e-4, 0.03))[:, None].repeat(3, 1),
         "quats": np.random.default_rng(0).normal(size=(len(points), 4)),
         "opacities": np.full(len(points), 0.0),
-        "sh0": ((colours - 0.5) / SH_C0)[:, None],
+        "sh0": ((colors - 0.5) / SH_C0)[:, None],
         "shN": np.zeros((len(points), (sh_degree + 1) ** 2 - 1, 3)),
     }
     return as_parameters(values, device)
@@ -39,7 +39,7 @@ def render(
     parameters: Parameters, view_matrix: torch.Tensor, intrinsics: torch.Tensor, size: tuple[int, int], sh_degree: int
 ) -> tuple[torch.Tensor, torch.Tensor, dict]:
     """Premultiplied colour (3,H,W), alpha (1,H,W) and the inputs of the strategy. size is (width, height)."""
-    colour, alpha, info = rasterization(
+    color, alpha, info = rasterization(
         means=parameters["means"],
         quats=parameters["quats"],
         scales=torch.exp(parameters["scales"]),
@@ -54,7 +54,7 @@ def render(
         packed=False,
         rasterize_mode=RASTERIZE_MODE,
     )
-    return colour[0].permute(2, 0, 1), alpha[0].permute(2, 0, 1), info
+    return color[0].permute(2, 0, 1), alpha[0].permute(2, 0, 1), info
 
 
 def weights(
@@ -66,13 +66,13 @@ def weights(
 ) -> list[torch.Tensor]:
     """How many pixels of each region (1,H,W) each Gaussian makes up: its blending weights summed, (N,) each."""
     # The derivative of the summed image by a Gaussian's grey value is that sum; no second rasterizer needed.
-    grey = torch.ones(len(parameters["means"]), 1, device=view_matrix.device, requires_grad=True)
+    gray = torch.ones(len(parameters["means"]), 1, device=view_matrix.device, requires_grad=True)
     picture, _, _ = rasterization(
         means=parameters["means"].detach(),
         quats=parameters["quats"].detach(),
         scales=torch.exp(parameters["scales"].detach()),
         opacities=torch.sigmoid(parameters["opacities"].detach()),
-        colors=grey,
+        colors=gray,
         viewmats=view_matrix[None],
         Ks=intrinsics[None],
         width=size[0],
@@ -82,7 +82,7 @@ def weights(
         rasterize_mode=RASTERIZE_MODE,
     )
     sums = [(picture[0, ..., 0] * region[0]).sum() for region in regions]
-    return [torch.autograd.grad(total, grey, retain_graph=True)[0][:, 0] for total in sums]
+    return [torch.autograd.grad(total, gray, retain_graph=True)[0][:, 0] for total in sums]
 
 
 def to_gaussians(parameters: Parameters) -> Gaussians:

@@ -10,8 +10,8 @@ from gaussians import Gaussians
 
 # Both as in gsplat: variance added to every screen ellipse, pixels squared; opacity under which nothing is drawn.
 DILATION = 0.3
-LEAST_ALPHA = 1 / 255
-MOST_ALPHA = 0.999
+MIN_ALPHA = 1 / 255
+MAX_ALPHA = 0.999
 OPAQUE = 1e-4
 # Standard deviations past which even an opaque Gaussian is below LEAST_ALPHA.
 REACH = 3.34
@@ -22,7 +22,7 @@ class Ellipses:
     """Gaussians on the screen, nearest first. `index` says which Gaussian each one is."""
 
     index: np.ndarray
-    centres: np.ndarray
+    centers: np.ndarray
     conics: np.ndarray
     opacities: np.ndarray
     reaches: np.ndarray
@@ -56,45 +56,45 @@ def project_ellipses(gaussians: Gaussians, matrix: np.ndarray, focal: float, siz
     after = a * c - b * b
     # A Gaussian thinner than a pixel is drawn wider and, for that, fainter.
     opacity = np.sqrt(np.maximum(before / after, 0)) / (1 + np.exp(-gaussians.opacity_logits))
-    centres = np.stack([focal * x / depth + size[0] / 2, focal * y / depth + size[1] / 2], 1)
+    centers = np.stack([focal * x / depth + size[0] / 2, focal * y / depth + size[1] / 2], 1)
     order = np.argsort(depth, kind="stable")
     conics = np.stack([c / after, -b / after, a / after], 1)
     reaches = REACH * np.sqrt(np.maximum(a, c))
-    return Ellipses(order, centres[order], conics[order], opacity[order], reaches[order])
+    return Ellipses(order, centers[order], conics[order], opacity[order], reaches[order])
 
 
 @numba.njit(cache=False)
-def _blend(centres, conics, opacities, reaches, final, most_thin, thin, solid, transmittance):
+def _blend(centers, conics, opacities, reaches, final, max_thin, thin, solid, transmittance):
     """Front to back. With a final coverage given, sorts each Gaussian's weights into thin and solid pixels."""
     height, width = transmittance.shape
-    for i in range(len(centres)):
-        left, right = max(int(centres[i, 0] - reaches[i]), 0), min(int(centres[i, 0] + reaches[i]) + 2, width)
-        top, bottom = max(int(centres[i, 1] - reaches[i]), 0), min(int(centres[i, 1] + reaches[i]) + 2, height)
+    for i in range(len(centers)):
+        left, right = max(int(centers[i, 0] - reaches[i]), 0), min(int(centers[i, 0] + reaches[i]) + 2, width)
+        top, bottom = max(int(centers[i, 1] - reaches[i]), 0), min(int(centers[i, 1] + reaches[i]) + 2, height)
         for row in range(top, bottom):
             for column in range(left, right):
                 if transmittance[row, column] < OPAQUE:
                     continue
-                dx, dy = column + 0.5 - centres[i, 0], row + 0.5 - centres[i, 1]
+                dx, dy = column + 0.5 - centers[i, 0], row + 0.5 - centers[i, 1]
                 power = 0.5 * (conics[i, 0] * dx * dx + conics[i, 2] * dy * dy) + conics[i, 1] * dx * dy
-                alpha = min(MOST_ALPHA, opacities[i] * np.exp(-power))
-                if alpha < LEAST_ALPHA:
+                alpha = min(MAX_ALPHA, opacities[i] * np.exp(-power))
+                if alpha < MIN_ALPHA:
                     continue
                 weight = alpha * transmittance[row, column]
                 transmittance[row, column] -= weight
-                if final[row, column] < most_thin:
+                if final[row, column] < max_thin:
                     thin[i] += weight
                 else:
                     solid[i] += weight
 
 
-def thin_and_solid(ellipses: Ellipses, size: tuple[int, int], most_thin: float) -> tuple[np.ndarray, np.ndarray]:
+def thin_and_solid(ellipses: Ellipses, size: tuple[int, int], max_thin: float) -> tuple[np.ndarray, np.ndarray]:
     """Each Gaussian's blending weights summed over the pixels whose coverage stays below `most_thin`, and over the
     others; (N,) each, in the order of the Gaussians."""
     count, shape = len(ellipses.index), (size[1], size[0])
     rest = np.ones(shape)
-    drawn = (ellipses.centres, ellipses.conics, ellipses.opacities, ellipses.reaches)
+    drawn = (ellipses.centers, ellipses.conics, ellipses.opacities, ellipses.reaches)
     _blend(*drawn, np.zeros(shape), 0.0, np.zeros(count), np.zeros(count), rest)
     thin, solid = np.zeros(count), np.zeros(count)
-    _blend(*drawn, 1 - rest, most_thin, thin, solid, np.ones(shape))
+    _blend(*drawn, 1 - rest, max_thin, thin, solid, np.ones(shape))
     back = np.argsort(ellipses.index)
     return thin[back], solid[back]

@@ -18,7 +18,7 @@ ANTIALIASED = 1
 # 24-bit fixed point with 16 bits after the point: +-128 units in steps of 1/65536. The scene is about one unit long.
 FRACTIONAL_BITS = 16
 # The constant harmonic as a byte: 0.15 of a unit a full range, so colours may pass 0 and 1 a little.
-COLOUR_SCALE = 0.15
+COLOR_SCALE = 0.15
 # Bits kept of each harmonic's byte, first order and above; gzip gains from the zeros. The reference writer keeps one
 # less of each.
 SH_BITS = (6, 5)
@@ -87,7 +87,7 @@ def write_spz(path: Path, gaussians: Gaussians, antialiased: bool) -> int:
     planes = [
         pack_positions(gaussians.positions),
         to_bytes(opacity * 255),
-        to_bytes(gaussians.sh[:, 0] * (COLOUR_SCALE * 255) + 127.5),
+        to_bytes(gaussians.sh[:, 0] * (COLOR_SCALE * 255) + 127.5),
         to_bytes((gaussians.log_scales + 10) * 16),
         pack_rotations(gaussians.rotations),
         pack_sh(gaussians.sh[:, 1:]),
@@ -116,7 +116,7 @@ def read_spz(path: Path) -> Gaussians:
     fixed = plane(9).reshape(count, 3, 3).astype(np.int32) @ np.array([1, 1 << 8, 1 << 16])
     fixed = np.where(fixed >= 1 << 23, fixed - (1 << 24), fixed)
     opacity = np.clip(plane(1)[:, 0] / 255, 1e-6, 1 - 1e-6)
-    constant = (plane(3) / 255 - 0.5) / COLOUR_SCALE
+    constant = (plane(3) / 255 - 0.5) / COLOR_SCALE
     log_scales = plane(3) / 16 - 10
     rotations = unpack_rotations(plane(4))
     rest = (plane(harmonics * 3).reshape(count, harmonics, 3).astype(np.float32) - 128) / 128

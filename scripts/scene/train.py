@@ -85,10 +85,10 @@ class Poses:
         return delta @ picture.view_matrix
 
 
-def photometric_loss(picture: Picture, colour: torch.Tensor, alpha: torch.Tensor, window: torch.Tensor) -> torch.Tensor:
+def photometric_loss(picture: Picture, color: torch.Tensor, alpha: torch.Tensor, window: torch.Tensor) -> torch.Tensor:
     """Over a random background, new each time: only coverage that is right looks right over all of them. If the photograph is dark and the mask in doubt, the background is black, and anything that is no brighter is right."""
     background = torch.rand(3, 1, 1, device="cuda") * (1 - picture.doubtful)
-    got = colour + background * (1 - alpha)
+    got = color + background * (1 - alpha)
     wanted = picture.rgb * picture.alpha + background * (1 - picture.alpha)
     wanted = torch.where(picture.doubtful > 0, torch.minimum(picture.rgb, got.detach()), wanted)
     got = got * picture.valid + wanted * (1 - picture.valid)
@@ -110,7 +110,7 @@ def start_points(capture, hull: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """COLMAP's points on the object; positions and colours in 0..1."""
     near = np.linalg.norm(capture.points, axis=1) < 1.2 * np.linalg.norm(hull, axis=1).max()
     kept = near & (capture.points[:, 1] < capture.cut_height)
-    return capture.points[kept], capture.colours[kept] / 255
+    return capture.points[kept], capture.colors[kept] / 255
 
 
 def train(pictures: list[Picture], parameters: Parameters, bounds: Bounds, options) -> tuple[Exposures, Poses]:
@@ -132,8 +132,8 @@ def train(pictures: list[Picture], parameters: Parameters, bounds: Bounds, optio
         degree = min(options.degree, step // 1000)
         refining = step >= POSES_FROM
         matrix = poses.moved(picture, index) if refining else picture.view_matrix
-        colour, alpha, info = render(parameters, matrix, picture.intrinsics, picture.size, degree)
-        loss = photometric_loss(picture, colour * exposures.gain(index), alpha, window)
+        color, alpha, info = render(parameters, matrix, picture.intrinsics, picture.size, degree)
+        loss = photometric_loss(picture, color * exposures.gain(index), alpha, window)
         (loss + regularization(parameters, bounds, step / options.steps)).backward()
         for optimizer in [*optimizers.values(), exposures.optimizer, *([poses.optimizer] if refining else [])]:
             optimizer.step()

@@ -26,8 +26,8 @@ FIELD_OF_VIEW = 24.0
 ORBIT_RADIUS = 2.9
 # A pixel covered less than this is translucent, and a Gaussian with more than this fraction of its weight there is
 # haze.
-MOST_THIN = 0.9
-MOST_HAZE = 0.4
+MAX_THIN = 0.9
+MAX_HAZE = 0.4
 # The end of the post is open, its rim thin from everywhere: nothing is haze from here down, this near to its axis.
 POST_TOP = 0.2
 POST_SLACK = 1.1
@@ -36,7 +36,7 @@ CUT_MARGIN = 0.04
 # Gaussians over the cut by their extent only are shrunk until this many standard deviations fit, if they need not
 # shrink beyond recognition: dropping them all would fray the edge.
 CUT_SIGMAS = 2.0
-LEAST_SHRINK = 0.15
+MIN_SHRINK = 0.15
 
 
 def haze(gaussians: Gaussians) -> np.ndarray:
@@ -47,7 +47,7 @@ def haze(gaussians: Gaussians) -> np.ndarray:
         for theta in AZIMUTHS:
             # Rings are turned against each other, so that no side is seen from one column of cameras only.
             matrix = orbit_matrix(theta + 3 * ring, phi, ORBIT_RADIUS)
-            seen = thin_and_solid(project_ellipses(gaussians, matrix, focal, PICTURE), PICTURE, MOST_THIN)
+            seen = thin_and_solid(project_ellipses(gaussians, matrix, focal, PICTURE), PICTURE, MAX_THIN)
             thin, solid = thin + seen[0], solid + seen[1]
     return thin / (thin + solid)
 
@@ -65,8 +65,8 @@ def cut_level(gaussians: Gaussians, height: float) -> Gaussians:
     """Removes Gaussians below the height (y grows downwards) and shrinks those that reach over it."""
     down = np.linalg.norm(axes(gaussians)[:, 1], axis=1)
     room = (height - gaussians.positions[:, 1]) / (CUT_SIGMAS * down)
-    shrunk = np.log(np.clip(room, LEAST_SHRINK, 1)).astype(np.float32)
-    return replace(gaussians, log_scales=gaussians.log_scales + shrunk[:, None]).at(room > LEAST_SHRINK)
+    shrunk = np.log(np.clip(room, MIN_SHRINK, 1)).astype(np.float32)
+    return replace(gaussians, log_scales=gaussians.log_scales + shrunk[:, None]).at(room > MIN_SHRINK)
 
 
 def main() -> None:
@@ -76,7 +76,7 @@ def main() -> None:
     kept = cut_level(whole, capture.cut_height - CUT_MARGIN)
     print(f"{len(whole) - len(kept)} below the cut left out of {len(whole)}", flush=True)
     for _ in range(ROUNDS):
-        hazy = (haze(kept) > MOST_HAZE) & ~near_post(kept, hull, capture.cut_height)
+        hazy = (haze(kept) > MAX_HAZE) & ~near_post(kept, hull, capture.cut_height)
         kept = kept.at(~hazy)
         print(f"{hazy.sum()} of haze left out, {len(kept)} kept", flush=True)
     write_ply(out.with_suffix(".ply"), kept)

@@ -45,7 +45,10 @@ export function sampleInputs(header: OnnxHeader, contract: Contract): Sample[] {
     }
   }
   if (Object.values(contract.inputs).some(({ role }) => role === 'control')) {
-    states.push(['controls at least', stateAt(contract, 0, 0, 0)], ['controls at most', stateAt(contract, 0, 0, 1)]);
+    states.push(
+      ['controls at their minimum', stateAt(contract, 0, 0, 0)],
+      ['controls at their maximum', stateAt(contract, 0, 0, 1)],
+    );
   }
   return states.map(([label, state]) => ({
     label,

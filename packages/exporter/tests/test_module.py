@@ -440,7 +440,7 @@ def test_values_are_checked_where_visitors_go(tmp_path: Path) -> None:
             given = super().forward(t, k)
             return given | {"opacities": given["opacities"] - k}
 
-    with pytest.raises(ExportError, match=r"output opacities, row 0 \(run with controls at least\).*found 1.9"):
+    with pytest.raises(ExportError, match=r"output opacities, row 0 \(run with controls at their minimum\).*found 1.9"):
         gs.export_module(Fading(), SLIDER, out=tmp_path / "x.onnx", quiet=True)
 
 

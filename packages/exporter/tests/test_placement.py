@@ -16,7 +16,7 @@ from gaussian_exporter.errors import ExportError
 from gaussian_exporter.families.classic import export_classic
 from gaussian_exporter.graph import Graph
 from gaussian_exporter.outputs import Options
-from gaussian_exporter.placement import KERNELS, Finding, gpu_findings, told
+from gaussian_exporter.placement import KERNELS, Finding, finding_lines, gpu_findings
 
 from .running import FACTS
 from .test_classic import cloud
@@ -150,7 +150,7 @@ def test_outputs_that_break_the_contract_are_named() -> None:
 def test_what_one_change_mends_is_said_once() -> None:
     one = Finding("fallback", "a", "Add", "x is int64", "compute in int32", "x")
     other = Finding("fallback", "b", "NonZero", "no kernel", "keep every row", "y")
-    lines = told([one, other, one, one])
+    lines = finding_lines([one, other, one, one])
     assert lines == [f"{one} (and 2 more of this kind)", str(other)]
 
 

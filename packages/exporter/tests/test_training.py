@@ -78,11 +78,11 @@ def test_scaffold(views: Path, tmp_path: Path) -> None:
 
     still = common.load_views(views / "still.npz", "cpu")
     points = np.load(views / "still.npy")
-    _, untrained = scaffold.train(still, points, common.Pace(1), 60, 0)
+    _, untrained = scaffold.train(still, points, common.Schedule(1), 60, 0)
     scaffold.main([str(views / "still.npz"), str(views / "still.npy"), str(tmp_path), "--steps", "80", "--count", "40"])
     assert recorded(tmp_path)["whole_picture_psnr"] > untrained["whole_picture_psnr"] + 1
     model = export_scaffold(read_scaffold(tmp_path), FACTS)
-    again, _ = scaffold.train(still, points, common.Pace(3), 60, 0)
+    again, _ = scaffold.train(still, points, common.Schedule(3), 60, 0)
     again.save(tmp_path / "again")
     eye = np.array([0.5, -0.3, -3.0], np.float32)
     exported = export_scaffold(read_scaffold(tmp_path / "again"), FACTS)
@@ -96,10 +96,10 @@ def test_hexplane(views: Path, tmp_path: Path) -> None:
 
     swaying = common.load_views(views / "sway.npz", "cpu")
     points = np.load(views / "sway.npy")
-    _, untrained = hexplane.train(swaying, points, common.Pace(1), 60, 0)
+    _, untrained = hexplane.train(swaying, points, common.Schedule(1), 60, 0)
     hexplane.main([*inputs(views, "sway"), str(tmp_path), "--steps", "60", "--count", "40"])
     assert recorded(tmp_path)["held_out_psnr"] > untrained["held_out_psnr"] + 1
-    again, _ = hexplane.train(swaying, points, common.Pace(20), 60, 0)
+    again, _ = hexplane.train(swaying, points, common.Schedule(20), 60, 0)
     again.save(tmp_path / "again")
     exported = export_hexplane(*read_hexplane(tmp_path / "again"), FACTS)
     assert_agrees(exported, {"time": np.array([0.3])}, again(torch.tensor([0.3])))
@@ -129,8 +129,8 @@ def test_avatar(tmp_path: Path) -> None:
 
     body = tiny_body()
     bank = {"bank": 12, "samples": 3000}
-    _, untrained = avatar.train(body, common.Pace(1), 40, 0, SIZE, **bank)
-    model, pairs = avatar.train(body, common.Pace(50), 40, 0, SIZE, **bank)
+    _, untrained = avatar.train(body, common.Schedule(1), 40, 0, SIZE, **bank)
+    model, pairs = avatar.train(body, common.Schedule(50), 40, 0, SIZE, **bank)
     assert avatar.scores_of(pairs)["held_out_psnr"] > avatar.scores_of(untrained)["held_out_psnr"] + 1
     model.save(tmp_path)
     exported = export_avatar(read_avatar(tmp_path / "avatar.npz"), FACTS)
@@ -170,7 +170,7 @@ def test_feed_forward(views: Path, tmp_path: Path, count: int) -> None:
     rng = np.random.default_rng(0)
     learned, kept = (shots.draw_shots([scene], n, SIZE, count, 2, rng) for n in (12, 4))
     sizes = {"fine": 8, "coarse": 8, "depths": 8}
-    models = [feed_forward.train(learned, common.Pace(n), 0, jitter=False, **sizes) for n in (1, 240)]
+    models = [feed_forward.train(learned, common.Schedule(n), 0, jitter=False, **sizes) for n in (1, 240)]
     before, after = (feed_forward.measure(each, kept) for each in models)
     assert after["psnr"] > before["psnr"] + 2 and after["depth_error"] < before["depth_error"], (before, after)
     # Trainings that end in nothing to be seen begin by losing this, and never get it back.
@@ -219,7 +219,7 @@ def test_style(views: Path, tmp_path: Path, kind: str) -> None:
     style.main(arguments)
     assert recorded(tmp_path)["held_out_psnr"] > 5
     pictures = common.load_views(views / "still.npz", "cpu").pictures
-    model, scores = style.train([pictures], kind, common.Pace(2), 8, 0)
+    model, scores = style.train([pictures], kind, common.Schedule(2), 8, 0)
     pictures = pictures[:, :3]
     assert set(scores) == {"held_out_psnr", "untouched_psnr"}
     model.save(tmp_path, SIZE, SIZE)
@@ -281,12 +281,12 @@ def test_kuwahara_keeps_edges_and_evens_the_rest() -> None:
     assert torch.equal(style.kuwahara(picture, 3), picture)
 
 
-def test_a_pace_ends_by_steps_or_by_the_clock() -> None:
+def test_a_schedule_ends_by_steps_or_by_the_clock() -> None:
     import common
 
-    pace = common.Pace(4)
-    assert list(pace) == [0, 0.25, 0.5, 0.75] and pace.done == 4
-    late = common.Pace(10**9, seconds=0.05)
+    schedule = common.Schedule(4)
+    assert list(schedule) == [0, 0.25, 0.5, 0.75] and schedule.done == 4
+    late = common.Schedule(10**9, seconds=0.05)
     *_, last = late
     assert 0.5 < last < 1 and 0 < late.done < 10**9
 

@@ -54,12 +54,12 @@ class Watch:
         order = torch.argsort(mean, descending=True)
         return order[: int((mean > 0).sum())]
 
-    def alive(self, least: float) -> Tensor:
+    def alive(self, minimum: float) -> Tensor:
         """Which anchors (M) were opaque enough, on average."""
-        return self.opacity / max(self.steps, 1) >= least
+        return self.opacity / max(self.steps, 1) >= minimum
 
 
-def free_cells(candidates: Tensor, taken: Tensor, width: float, most: int) -> Tensor:
+def free_cells(candidates: Tensor, taken: Tensor, width: float, maximum: int) -> Tensor:
     """Indices of at most `most` candidates (C,3), in order, one for each voxel that no taken point (M,3) lies in."""
     low = torch.cat([candidates, taken]).amin(0)
 
@@ -72,4 +72,4 @@ def free_cells(candidates: Tensor, taken: Tensor, width: float, most: int) -> Te
     _, group = torch.unique(cells[free], return_inverse=True)
     first = torch.full((int(group.max()) + 1 if len(group) else 0,), len(free), device=free.device)
     first.scatter_reduce_(0, group, torch.arange(len(free), device=free.device), "amin")
-    return free[torch.sort(first).values[:most]]
+    return free[torch.sort(first).values[:maximum]]

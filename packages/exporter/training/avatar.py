@@ -13,7 +13,7 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from common import Pace, Record, Views, device, fit, options, seed
+from common import Record, Schedule, Views, device, fit, options, seed
 from losses import loss_of, psnr
 from makehuman import PARTS, Body, read_body
 from painted import Painted, interpolated, surface_points
@@ -179,7 +179,7 @@ def held_out_cases(body: Body, where: str, size: int) -> list[Case]:
 
 
 def train(
-    body: Body, pace: Pace, count: int, number: int, size: int, bank: int = BANK, samples: int = SAMPLES
+    body: Body, schedule: Schedule, count: int, number: int, size: int, bank: int = BANK, samples: int = SAMPLES
 ) -> tuple[Avatar, Pairs]:
     """Returns the model, and images (4,H,W) as drawn and as references, in held-out poses and shapes."""
     rng, where = seed(number), device()
@@ -194,7 +194,7 @@ def train(
         pose, shape, camera = cases[index]
         return loss_of(picture(model(pose, shape), camera), pictures[index] / 255)
 
-    fit(range(bank), loss_at, [torch.optim.Adam(groups, eps=1e-15)], pace, rng)
+    fit(range(bank), loss_at, [torch.optim.Adam(groups, eps=1e-15)], schedule, rng)
     with torch.no_grad():
         return model, [(picture(model(*case[:2]), case[2]), truth(case)) for case in held_out_cases(body, where, size)]
 
@@ -210,11 +210,11 @@ def main(argv: Sequence[str] | None = None) -> None:
     """The command."""
     given = options(__doc__ or "", 12_000, argv, "body")
     record = Record(given)
-    body, pace = read_body(given.body), Pace(given.steps, given.seconds)
-    model, pairs = train(body, pace, given.count or 40_000, given.seed, SIZE)
+    body, schedule = read_body(given.body), Schedule(given.steps, given.seconds)
+    model, pairs = train(body, schedule, given.count or 40_000, given.seed, SIZE)
     model.save(given.out)
     counts = {"gaussians": len(model.positions), "joints": len(body.parents)}
-    record.write(**scores_of(pairs), steps=pace.done, **counts)
+    record.write(**scores_of(pairs), steps=schedule.done, **counts)
     found, wanted = zip(*pairs[:6], strict=True)
     sheet(given.out / "held-out.png", wanted, found)
     poses, shapes, cameras = zip(*held_out_cases(body, device(), SIZE)[:6], strict=True)

@@ -16,7 +16,7 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from common import Pace, Record, Views, add_pace, device, fit, held_out_psnr, load_views, seed, split
+from common import Record, Schedule, Views, add_schedule, device, fit, held_out_psnr, load_views, seed, split
 from photographs import Exposures, photograph, photograph_psnr
 from ply import write_ply
 from rasterizer import NEAR, Camera, Splats, covariances, picture
@@ -92,7 +92,7 @@ class Classic:
 class Refinement:
     """gsplat's MCMC strategy, where there is a CUDA device."""
 
-    def __init__(self, model: Classic, optimizers: dict[str, torch.optim.Optimizer], pace: Pace, count: int):
+    def __init__(self, model: Classic, optimizers: dict[str, torch.optim.Optimizer], schedule: Schedule, count: int):
         """`count`: the most Gaussians."""
         from gsplat.strategy import MCMCStrategy
 
@@ -110,7 +110,7 @@ class Refinement:
 
 
 def train(
-    views: Views, points: np.ndarray, pace: Pace, count: int, degree: int, number: int
+    views: Views, points: np.ndarray, schedule: Schedule, count: int, degree: int, number: int
 ) -> tuple[Classic, dict[str, float]]:
     """The model, and its PSNR on held-out views."""
     rng = seed(number)
@@ -123,7 +123,7 @@ def train(
         )
         for name, value in model.parameters.items()
     }
-    refinement = Refinement(model, optimizers, pace, count) if views.pictures.is_cuda else None
+    refinement = Refinement(model, optimizers, schedule, count) if views.pictures.is_cuda else None
 
     def loss_at(index: int, progress: float) -> Tensor:
         p = model.parameters
@@ -142,7 +142,7 @@ def train(
     trained, _ = split(len(views.pictures))
     gains = torch.optim.Adam(exposures.parameters(), lr=2e-3)
     after = None if refinement is None else refinement.after
-    fit(trained, loss_at, [*optimizers.values(), gains], pace, rng, after=after)
+    fit(trained, loss_at, [*optimizers.values(), gains], schedule, rng, after=after)
     return model, {"held_out_psnr": photograph_psnr(views, draw), "whole_picture_psnr": held_out_psnr(views, draw)}
 
 
@@ -153,14 +153,14 @@ def main(argv: Sequence[str] | None = None) -> None:
         parser.add_argument(name, type=Path)
     parser.add_argument("--count", type=int, default=80_000)
     parser.add_argument("--degree", type=int, default=2, choices=(0, 1, 2, 3))
-    add_pace(parser, 15_000)
+    add_schedule(parser, 15_000)
     given = parser.parse_args(argv)
     record = Record(given)
-    pace = Pace(given.steps, given.seconds)
+    schedule = Schedule(given.steps, given.seconds)
     views, points = load_views(given.views, device()), np.load(given.points)
-    model, scores = train(views, points, pace, given.count, given.degree, given.seed)
+    model, scores = train(views, points, schedule, given.count, given.degree, given.seed)
     model.save(given.out)
-    record.write(**scores, steps=pace.done, gaussians=len(model.parameters["means"]))
+    record.write(**scores, steps=schedule.done, gaussians=len(model.parameters["means"]))
     held_out_sheet(given.out / "held-out", views, lambda i: model.draw(views.camera(i), given.degree))
 
 

@@ -69,7 +69,7 @@ def seed(number: int) -> np.random.Generator:
     return np.random.default_rng(number)
 
 
-class Pace:
+class Schedule:
     """How far a training has come, from 0 to 1: by its steps, or by the clock where that runs out first, so that a
     rented machine is given back with a finished model. `done` counts the steps that were taken."""
 
@@ -88,9 +88,9 @@ class Pace:
             yield progress
             self.done += 1
 
-    def part(self, share: float) -> Pace:
+    def part(self, share: float) -> Schedule:
         """Learning rate at this fraction of the training."""
-        return Pace(max(int(self.steps * share), 1), None if self.seconds is None else self.seconds * share)
+        return Schedule(max(int(self.steps * share), 1), None if self.seconds is None else self.seconds * share)
 
 
 Optimizers = Sequence[torch.optim.Optimizer]
@@ -108,7 +108,7 @@ def fit(
     trained: Sequence[int],
     loss_at: Callable[[int, float], Tensor],
     optimizers: Optimizers,
-    pace: Pace,
+    schedule: Schedule,
     rng: np.random.Generator,
     decay: float = 0.05,
     after: Callable[[int, float], None] | None = None,
@@ -117,7 +117,7 @@ def fit(
     gets the step and the progress, and is called before gradients are cleared.
     """
     order: list[int] = []
-    for step, progress in enumerate(pace):
+    for step, progress in enumerate(schedule):
         order = order or rng.permutation(np.asarray(trained)).tolist()
         loss = loss_at(order.pop(), progress)
         decayed(optimizers, progress, decay)
@@ -158,11 +158,11 @@ def options(description: str, steps: int, argv: Sequence[str] | None, *positiona
         parser.add_argument(name, type=Path)
     parser.add_argument("out", type=Path, help="folder for the checkpoint and record.json")
     parser.add_argument("--count", type=int, help="how many anchors, Gaussians or channels; each trainer has its own")
-    add_pace(parser, steps)
+    add_schedule(parser, steps)
     return parser.parse_args(argv)
 
 
-def add_pace(parser: argparse.ArgumentParser, steps: int) -> None:
+def add_schedule(parser: argparse.ArgumentParser, steps: int) -> None:
     """Options that say how long to train."""
     parser.add_argument("--steps", type=int, default=steps)
     parser.add_argument("--seconds", type=float, help="end after these, with all rates brought down, steps or no steps")

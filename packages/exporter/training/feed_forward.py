@@ -21,7 +21,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional as F  # noqa: N812
 
-from common import Pace, Record, Views, add_pace, device, seed
+from common import Record, Schedule, Views, add_schedule, device, seed
 from losses import loss_of, psnr
 from make_views import scene_of
 from rasterizer import Splats, covariances, pictures
@@ -236,7 +236,7 @@ def loss_of_shot(model: Generator, shot: Shot, progress: float) -> Tensor:
 
 
 def train(
-    shots: Sequence[Shot], pace: Pace, number: int, at_once: int = 1, jitter: bool = True, **sizes: int
+    shots: Sequence[Shot], schedule: Schedule, number: int, at_once: int = 1, jitter: bool = True, **sizes: int
 ) -> Generator:
     """The network. `at_once`: shots to a step. `jitter`: turn channels about and change brightness, so that few scenes
     stand for more."""
@@ -246,7 +246,7 @@ def train(
     model = Generator(Shape(width, height, len(shots[0].depths), NEAR, FAR, **depths), **sizes)
     model = model.to(shots[0].pictures.device)
     optimizer = torch.optim.Adam(model.parameters(), lr=RATE)
-    for step, progress in enumerate(pace):
+    for step, progress in enumerate(schedule):
         chosen = [shots[int(i)].unpacked() for i in rng.integers(len(shots), size=at_once)]
         chosen = [tinted(shot, rng) for shot in chosen] if jitter else chosen
         optimizer.zero_grad(set_to_none=True)
@@ -323,9 +323,9 @@ def main(argv: Sequence[str] | None = None) -> None:
     parser.add_argument("--size", type=int, default=256, help="pixels of their sides, a multiple of 4")
     parser.add_argument("--shots", type=int, default=3000, help="how many are drawn to learn from")
     parser.add_argument("--at-once", type=int, default=4, help="shots to a step")
-    add_pace(parser, 20_000)
+    add_schedule(parser, 20_000)
     given = parser.parse_args(argv)
-    record, pace = Record(given), Pace(given.steps, given.seconds)
+    record, schedule = Record(given), Schedule(given.steps, given.seconds)
     rng = np.random.default_rng(given.seed)
 
     def drawn(paths: Sequence[Path], count: int, targets: int) -> list[Shot]:
@@ -336,10 +336,10 @@ def main(argv: Sequence[str] | None = None) -> None:
     unseen = drawn([given.unseen], HELD_OUT, 1) if given.unseen else []
     shots = drawn(given.scenes, given.shots, TARGETS)
     print(f"{len(shots)} shots of {len(shots[0].pictures)} images", flush=True)
-    model = train(shots, pace, given.seed, given.at_once)
+    model = train(shots, schedule, given.seed, given.at_once)
     model.save(given.out)
     known, unknown = measure(model, held), measure(model, unseen) if unseen else {}
-    record.write(held_out_psnr=known["psnr"], held_out=known, unseen=unknown, steps=pace.done, shape=vars(model.shape))
+    record.write(held_out_psnr=known["psnr"], held_out=known, unseen=unknown, steps=schedule.done, shape=vars(model.shape))
     show(given.out / "held-out", model, [*held[: len(given.scenes)], *unseen[:3]])
 
 

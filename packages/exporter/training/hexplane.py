@@ -14,7 +14,7 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from common import Pace, Record, Views, device, fit, held_out_psnr, load_views, options, outline_psnr, seed, split
+from common import Record, Schedule, Views, device, fit, held_out_psnr, load_views, options, outline_psnr, seed, split
 from losses import loss_of
 from ply import write_ply
 from rasterizer import Splats, covariances, picture
@@ -133,7 +133,7 @@ def start_points(points: np.ndarray, count: int, rng: np.random.Generator) -> tu
     return chosen + rng.normal(size=chosen.shape) * spacing * 0.3, spacing
 
 
-def train(views: Views, points: np.ndarray, pace: Pace, count: int, number: int) -> tuple[Moving, dict[str, float]]:
+def train(views: Views, points: np.ndarray, schedule: Schedule, count: int, number: int) -> tuple[Moving, dict[str, float]]:
     """The model, and its PSNR on held-out views, each of which is also a time of its own."""
     rng = seed(number)
     start, spacing = start_points(points, count, rng)
@@ -161,11 +161,11 @@ def train(views: Views, points: np.ndarray, pace: Pace, count: int, number: int)
     def draw(index: int) -> Tensor:
         return picture(model(times[index]), views.camera(index))
 
-    first = pace.part(0.08)
+    first = schedule.part(0.08)
     fit(trained, rest_loss, [still], first, rng, decay=1.0)
-    rest = Pace(max(pace.steps - first.done, 1), None if pace.seconds is None else pace.seconds * 0.92)
+    rest = Schedule(max(schedule.steps - first.done, 1), None if schedule.seconds is None else schedule.seconds * 0.92)
     fit(trained, lambda i, _: loss_of(draw(i), views.pictures[i]) + model.roughness(), optimizers, rest, rng)
-    pace.done = first.done + rest.done
+    schedule.done = first.done + rest.done
     return model, {"held_out_psnr": held_out_psnr(views, draw), "outline_psnr": outline_psnr(views, draw)}
 
 
@@ -174,10 +174,10 @@ def main(argv: Sequence[str] | None = None) -> None:
     given = options(__doc__ or "", 15_000, argv, "views", "points")
     record = Record(given)
     views, points = load_views(given.views, device()), np.load(given.points)
-    pace = Pace(given.steps, given.seconds)
-    model, scores = train(views, points, pace, given.count or 30_000, given.seed)
+    schedule = Schedule(given.steps, given.seconds)
+    model, scores = train(views, points, schedule, given.count or 30_000, given.seed)
     model.save(given.out)
-    record.write(**scores, steps=pace.done, gaussians=len(model.positions))
+    record.write(**scores, steps=schedule.done, gaussians=len(model.positions))
     times = views.extra["times"][:, None]
     held_out_sheet(given.out / "held-out", views, lambda i: picture(model(times[i]), views.camera(i)))
 

@@ -14,7 +14,7 @@ import numpy as np
 # and joints.
 PARTS = {"skin": [(0, 13380)], "eye": [(14598, 14670), (14670, 14742)]}
 # Units of the files are decimeters, y up; the trainers' frame is meters, y down, facing -z (OpenCV's camera at -z).
-TO_METRES = np.array([0.1, -0.1, -0.1])
+TO_METERS = np.array([0.1, -0.1, -0.1])
 
 
 @dataclass
@@ -36,7 +36,7 @@ class Body:
 def read_body(folder: Path, rig: str = "game_engine") -> Body:
     """Reads the mesh, one rig and every target in the folder."""
     lines = (folder / "3dobjs_base.obj").read_text().splitlines()
-    every = np.array([line.split()[1:4] for line in lines if line.startswith("v ")], float) * TO_METRES
+    every = np.array([line.split()[1:4] for line in lines if line.startswith("v ")], float) * TO_METERS
     faces = [[int(c.split("/")[0]) - 1 for c in line.split()[1:]] for line in lines if line.startswith("f ")]
     number, parts = np.full(len(every), -1), np.full(len(every), -1)
     for index, ranges in enumerate(PARTS.values()):
@@ -100,4 +100,4 @@ def read_target(path: Path, count: int) -> np.ndarray:
         fields = line.split()
         if len(fields) == 4 and not line.startswith("#"):
             moves[int(fields[0])] = [float(x) for x in fields[1:]]
-    return moves * TO_METRES
+    return moves * TO_METERS

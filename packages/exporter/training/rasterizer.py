@@ -10,7 +10,7 @@ from torch import Tensor
 
 # As in gsplat's classic mode: variance added to every ellipse (pixels squared), and alpha's limits.
 DILATION = 0.3
-LEAST_ALPHA, MOST_ALPHA = 1 / 255, 0.999
+MIN_ALPHA, MAX_ALPHA = 1 / 255, 0.999
 NEAR = 0.01
 
 
@@ -74,7 +74,7 @@ def pictures_with_depth(splats: Splats, cameras: Sequence[Camera]) -> tuple[Tens
     else:
         both = torch.stack([listed(splats, camera, with_z(splats, camera)) for camera in cameras])
     color, depth, alpha = both.split((3, 1, 1), 1)
-    return torch.cat([color, alpha], 1), depth / alpha.clamp(min=LEAST_ALPHA)
+    return torch.cat([color, alpha], 1), depth / alpha.clamp(min=MIN_ALPHA)
 
 
 def with_z(splats: Splats, camera: Camera) -> Tensor:
@@ -122,7 +122,7 @@ def projected(splats: Splats, camera: Camera) -> Ellipses:
     turn, shift = camera.view[:3, :3], camera.view[:3, 3]
     at = splats.positions @ turn.T + shift
     order = torch.argsort(at[:, 2].detach(), stable=True)
-    order = order[(at[order, 2] > NEAR) & (splats.opacities[order] > LEAST_ALPHA)]
+    order = order[(at[order, 2] > NEAR) & (splats.opacities[order] > MIN_ALPHA)]
     x, y, z = at[order].unbind(1)
     fx, fy = camera.intrinsics[0, 0], camera.intrinsics[1, 1]
     zero = torch.zeros_like(z)
@@ -136,10 +136,10 @@ def projected(splats: Splats, camera: Camera) -> Ellipses:
 @torch.no_grad()
 def touched(ellipses: Ellipses, width: int, height: int) -> tuple[Tensor, Tensor, Tensor]:
     """Which ellipse may reach which pixel: numbers of ellipses, columns and rows of pixels, a pair to an entry."""
-    reach = (2 * torch.log(ellipses.opacities / LEAST_ALPHA)).sqrt()[:, None] * ellipses.covariances[:, ::2].sqrt()
-    most = torch.tensor([width, height])
+    reach = (2 * torch.log(ellipses.opacities / MIN_ALPHA)).sqrt()[:, None] * ellipses.covariances[:, ::2].sqrt()
+    maximum = torch.tensor([width, height])
     low = (ellipses.centers - reach - 0.5).ceil().long().clamp(min=0)
-    size = ((ellipses.centers + reach - 0.5).floor().long() + 1).minimum(most).sub(low).clamp(min=0)
+    size = ((ellipses.centers + reach - 0.5).floor().long() + 1).minimum(maximum).sub(low).clamp(min=0)
     counts = size[:, 0] * size[:, 1]
     which = torch.repeat_interleave(counts)
     at = torch.arange(len(which)) - (counts.cumsum(0) - counts)[which]
@@ -154,9 +154,9 @@ def listed(splats: Splats, camera: Camera, values: Tensor) -> Tensor:
     dx, dy = (torch.stack([column, row], 1) + 0.5 - ellipses.centers[which]).unbind(1)
     xx, xy, yy = ellipses.covariances[which].unbind(1)
     falloff = torch.exp(-0.5 * (yy * dx * dx - 2 * xy * dx * dy + xx * dy * dy) / (xx * yy - xy * xy))
-    alpha = (ellipses.opacities[which] * falloff).clamp(max=MOST_ALPHA)
+    alpha = (ellipses.opacities[which] * falloff).clamp(max=MAX_ALPHA)
     pixel = row * camera.width + column
-    kept = torch.nonzero(alpha.detach() >= LEAST_ALPHA)[:, 0]
+    kept = torch.nonzero(alpha.detach() >= MIN_ALPHA)[:, 0]
     # Stable, so that each pixel's entries stay in the order of depth.
     kept = kept[torch.argsort(pixel[kept], stable=True)]
     alpha, pixel = alpha[kept], pixel[kept]

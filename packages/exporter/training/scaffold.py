@@ -15,7 +15,7 @@ import torch
 from torch import Tensor, nn
 
 from anchors import Watch, free_cells, replace_rows
-from common import Optimizers, Pace, Record, Views, device, fit, held_out_psnr, load_views, options, seed, split
+from common import Optimizers, Record, Schedule, Views, device, fit, held_out_psnr, load_views, options, seed, split
 from photographs import Exposures, photograph, photograph_psnr
 from ply import write_ply
 from rasterizer import Splats, covariances, picture
@@ -26,7 +26,7 @@ OFFSETS = 5
 ROWS = ["anchors", "features", "offsets", "log_scales"]
 # Growth: between these fractions of the training, once in this number of steps.
 GROW_FROM, GROW_UNTIL, GROW_EVERY = 0.03, 0.5, 100
-LEAST_OPACITY = 0.005
+MIN_OPACITY = 0.005
 VOLUME_WEIGHT = 0.01
 
 
@@ -107,9 +107,9 @@ def optimizers_of(model: Scaffold, exposures: Exposures) -> list[torch.optim.Opt
 class Growth:
     """Drops anchors that are not seen, makes new ones where Gaussians are pulled most."""
 
-    def __init__(self, model: Scaffold, optimizers: Optimizers, voxel: float, most: int):
+    def __init__(self, model: Scaffold, optimizers: Optimizers, voxel: float, maximum: int):
         """`voxel`: no two new anchors share a voxel this wide."""
-        self.model, self.optimizers, self.voxel, self.most = model, optimizers, voxel, most
+        self.model, self.optimizers, self.voxel, self.maximum = model, optimizers, voxel, maximum
         self.watch, self.last = self.fresh(), 0.0
 
     def fresh(self) -> Watch:
@@ -129,8 +129,8 @@ class Growth:
     def change(self, splats: Splats, progress: float) -> None:
         """One round; the count grows evenly until GROW_UNTIL."""
         model = self.model
-        kept = torch.nonzero(self.watch.alive(LEAST_OPACITY))[:, 0]
-        room = self.most - len(kept)
+        kept = torch.nonzero(self.watch.alive(MIN_OPACITY))[:, 0]
+        room = self.maximum - len(kept)
         since, self.last = progress - self.last, progress
         share = since / max(GROW_UNTIL - progress, since)
         wanted = self.watch.wanted()[: 8 * room]
@@ -149,7 +149,7 @@ class Growth:
         replace_rows(model, ROWS, kept, added, self.optimizers)
 
 
-def train(views: Views, points: np.ndarray, pace: Pace, count: int, number: int) -> tuple[Scaffold, dict[str, float]]:
+def train(views: Views, points: np.ndarray, schedule: Schedule, count: int, number: int) -> tuple[Scaffold, dict[str, float]]:
     """The model, and its PSNR on held-out views."""
     rng = seed(number)
     anchors, width = voxels(points, max(count // 2, 1))
@@ -172,7 +172,7 @@ def train(views: Views, points: np.ndarray, pace: Pace, count: int, number: int)
         return picture(model(eyes[index]), views.camera(index))
 
     trained, _ = split(len(views.pictures))
-    fit(trained, loss_at, optimizers, pace, rng, after=lambda step, progress: growth.after(latest[0], step, progress))
+    fit(trained, loss_at, optimizers, schedule, rng, after=lambda step, progress: growth.after(latest[0], step, progress))
     alive = torch.stack([model(eye).opacities > 1 / 255 for eye in eyes[:8]]).any(0).float().mean().item()
     scores = {"held_out_psnr": photograph_psnr(views, draw), "whole_picture_psnr": held_out_psnr(views, draw)}
     return model, {**scores, "share_ever_visible": round(alive, 3)}
@@ -183,9 +183,9 @@ def main(argv: Sequence[str] | None = None) -> None:
     given = options(__doc__ or "", 15_000, argv, "views", "points")
     record = Record(given)
     views, points = load_views(given.views, device()), np.load(given.points)
-    pace = Pace(given.steps, given.seconds)
-    model, scores = train(views, points, pace, given.count or 16_000, given.seed)
-    record.write(**scores, steps=pace.done, anchors=len(model.anchors), gaussians=len(model.anchors) * OFFSETS)
+    schedule = Schedule(given.steps, given.seconds)
+    model, scores = train(views, points, schedule, given.count or 16_000, given.seed)
+    record.write(**scores, steps=schedule.done, anchors=len(model.anchors), gaussians=len(model.anchors) * OFFSETS)
     cameras = [views.camera(i) for i in range(len(views.pictures))]
     held_out_sheet(given.out / "held-out", views, lambda i: picture(model(cameras[i].position), cameras[i]))
     model.save(given.out)

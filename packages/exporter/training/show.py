@@ -11,14 +11,14 @@ from torch import Tensor
 
 from common import Draw, Views, split
 
-MOST = 6
+MAX_IMAGES = 6
 
 
 @torch.no_grad()
 def held_out_sheet(path: Path, views: Views, draw: Draw) -> None:
     """Some held-out images: PATH.png to view, PATH.npz with their cameras."""
     _, held = split(len(views.pictures))
-    chosen = held[:: max(len(held) // MOST, 1)][:MOST]
+    chosen = held[:: max(len(held) // MAX_IMAGES, 1)][:MAX_IMAGES]
     sheet(path.with_suffix(".png"), [views.pictures[i] for i in chosen], [draw(i) for i in chosen])
     extra = {name: value[chosen] for name, value in views.extra.items()}
     Views(views.pictures[chosen], views.views[chosen], views.intrinsics[chosen], extra).save(path.with_suffix(".npz"))

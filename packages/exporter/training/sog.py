@@ -30,8 +30,8 @@ def read_sog(path: Path) -> dict[str, np.ndarray]:
             return picture[..., order].reshape(-1, picture.shape[2])[: meta["count"]]
 
         low, high = (pixels(name)[:, :3].astype(np.float64) for name in meta["means"]["files"])
-        least, most = np.array(meta["means"]["mins"]), np.array(meta["means"]["maxs"])
-        squeezed = least + (high * 256 + low) / 65535 * (most - least)
+        minimum, maximum = np.array(meta["means"]["mins"]), np.array(meta["means"]["maxs"])
+        squeezed = minimum + (high * 256 + low) / 65535 * (maximum - minimum)
         scales = np.array(meta["scales"]["codebook"])[pixels(meta["scales"]["files"][0])[:, :3]]
         quats = pixels(meta["quats"]["files"][0])
         sh0 = pixels(meta["sh0"]["files"][0])

@@ -17,7 +17,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional as F  # noqa: N812
 
-from common import Pace, Record, add_pace, decayed, device, load_views, seed, split
+from common import Record, Schedule, add_schedule, decayed, device, load_views, seed, split
 from losses import psnr
 from show import sheet
 
@@ -65,14 +65,14 @@ def kuwahara(image: Tensor, radius: int) -> Tensor:
     size = radius + 1
     padded = F.pad(image, [radius] * 4, mode="replicate")
     mean = F.avg_pool2d(padded, size, 1)
-    grey = padded.mean(1, keepdim=True)
-    varying = F.avg_pool2d(grey * grey, size, 1) - F.avg_pool2d(grey, size, 1) ** 2
+    gray = padded.mean(1, keepdim=True)
+    varying = F.avg_pool2d(gray * gray, size, 1) - F.avg_pool2d(gray, size, 1) ** 2
     height, width = image.shape[2:]
     corners = [(y, x) for y in (0, radius) for x in (0, radius)]
     means = torch.stack([mean[:, :, y : y + height, x : x + width] for y, x in corners])
     spread = torch.stack([varying[:, :, y : y + height, x : x + width] for y, x in corners])
-    least = spread.argmin(0, keepdim=True).expand(1, *image.shape)
-    return means.gather(0, least)[0]
+    minimum = spread.argmin(0, keepdim=True).expand(1, *image.shape)
+    return means.gather(0, minimum)[0]
 
 
 def pair(kind: str, image: Tensor) -> tuple[Tensor, Tensor]:
@@ -88,7 +88,7 @@ def backed(pictures: Tensor, backgrounds: Tensor) -> Tensor:
 
 
 def train(
-    scenes: list[Tensor], kind: str, pace: Pace, channels: int, number: int, halvings: int = 1
+    scenes: list[Tensor], kind: str, schedule: Schedule, channels: int, number: int, halvings: int = 1
 ) -> tuple[Filter, dict[str, float]]:
     """The network for images (V,4,H,W), a tensor for each size; its PSNR on held-out ones, and the PSNR of the
     unchanged images.
@@ -98,7 +98,7 @@ def train(
     # Both kinds learn the difference from the image, because a sigmoid never reaches white.
     model = Filter("noise", channels, halvings).to(where)
     optimizer = torch.optim.Adam(model.parameters(), lr=2e-3)
-    for step, progress in enumerate(pace):
+    for step, progress in enumerate(schedule):
         pictures = scenes[int(rng.integers(len(scenes)))]
         trained, _ = split(len(pictures))
         rows, columns = (side // 2 * 2 for side in pictures.shape[2:])
@@ -139,14 +139,14 @@ def main(argv: Sequence[str] | None = None) -> None:
     parser.add_argument("--kind", choices=("oil", "denoise"), default="oil")
     parser.add_argument("--count", type=int, default=16)
     parser.add_argument("--halvings", type=int, default=1, help="0 keeps every pixel, at four times the work")
-    add_pace(parser, 8_000)
+    add_schedule(parser, 8_000)
     given = parser.parse_args(argv)
-    record, pace = Record(given), Pace(given.steps, given.seconds)
+    record, schedule = Record(given), Schedule(given.steps, given.seconds)
     scenes = [load_views(path, device()).pictures for path in given.views]
-    model, scores = train(scenes, given.kind, pace, given.count, given.seed, given.halvings)
+    model, scores = train(scenes, given.kind, schedule, given.count, given.seed, given.halvings)
     height, width = scenes[0].shape[2:]
     model.save(given.out, width // 4 * 4, height // 4 * 4)
-    record.write(**scores, steps=pace.done)
+    record.write(**scores, steps=schedule.done)
     with torch.no_grad():
         held = [backed(s[4:5], torch.ones(1, 3, device=s.device)) for s in scenes if s.shape == scenes[0].shape]
         pairs = [pair(given.kind, picture) for picture in held]

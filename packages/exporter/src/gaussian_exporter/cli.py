@@ -39,7 +39,7 @@ from .frames import write_frames
 from .graph import Weights
 from .header import contract_faults, header_faults
 from .outputs import Options, refuse_instances, refuse_place, save
-from .placement import gpu_findings, told
+from .placement import finding_lines, gpu_findings
 from .written import Fault
 
 Command = argparse.ArgumentParser
@@ -214,7 +214,7 @@ def raise_faults(faults: Sequence[Fault]) -> None:
 def report_findings(model: onnx.ModelProto) -> None:
     """Prints the nodes that would leave the GPU, or a message that there are none."""
     findings = gpu_findings(model)
-    for line in told(findings):
+    for line in finding_lines(findings):
         print(line)
     if all(finding.kind == "inexact" for finding in findings):
         print("WebGPU: every node has a kernel, shapes are fixed, the graph can be captured")

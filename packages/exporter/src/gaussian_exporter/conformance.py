@@ -174,7 +174,7 @@ def _states(contract: Json, given: dict[str, AnyArray]) -> Iterator[tuple[str, b
             yield f"{share} of the time", True, clocks
     ranges = {name: cast(Any, each)["range"] for name, each in _bindings(contract).items() if each["role"] == "control"}
     for end in (0, 1) if ranges else ():
-        label = f"controls at {('least', 'most')[end]}"
+        label = f"controls at {('their minimum', 'their maximum')[end]}"
         yield label, False, {name: np.full_like(given[name], limits[end]) for name, limits in ranges.items()}
 
 

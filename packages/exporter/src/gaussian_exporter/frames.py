@@ -17,8 +17,8 @@ from .written import Attributes, read
 
 SH_C0 = 0.28209479177387814
 # Logits of opacities 0 and 1 are infinite.
-LEAST_OPACITY = 1e-6
-LEAST_SCALE = 1e-9
+MIN_OPACITY = 1e-6
+MIN_SCALE = 1e-9
 
 
 def write_frames(model: onnx.ModelProto, path: Path, folder: Path, fps: float, duration: float | None) -> int:
@@ -68,13 +68,13 @@ def columns_of(attributes: Attributes, outputs: Json) -> dict[str, AnyArray]:
     kinds = {name: each.activation for name, each in attributes.items()}
     opacities = wide["opacities"]
     if kinds["opacities"] != "logit":
-        kept = np.clip(opacities, LEAST_OPACITY, 1 - LEAST_OPACITY)
+        kept = np.clip(opacities, MIN_OPACITY, 1 - MIN_OPACITY)
         opacities = np.log(kept / (1 - kept))
     if "covariances" in wide:
         log_scales, rotations = axes_of(wide["covariances"])
     else:
         scales, rotations = wide["scales"], wide["rotations"]
-        log_scales = scales if kinds["scales"] == "log" else np.log(np.maximum(scales, LEAST_SCALE))
+        log_scales = scales if kinds["scales"] == "log" else np.log(np.maximum(scales, MIN_SCALE))
     sh = wide["sh"] if "sh" in wide else (wide["colors"] - 0.5) / SH_C0
     # Rows of coefficients with three channels each; files have all red ones first.
     channels = sh.reshape(len(sh), -1, 3)
@@ -107,7 +107,7 @@ def axes_of(covariances: Doubles) -> tuple[Doubles, Doubles]:
     largest = np.argmax(table[:, range(4), range(4)], 1)
     quaternions = table[np.arange(len(table)), largest]
     quaternions /= np.linalg.norm(quaternions, axis=1, keepdims=True)
-    return 0.5 * np.log(np.maximum(values, LEAST_SCALE**2)), quaternions
+    return 0.5 * np.log(np.maximum(values, MIN_SCALE**2)), quaternions
 
 
 def write_ply(path: Path, columns: dict[str, AnyArray]) -> None:

@@ -23,10 +23,10 @@ from .errors import ExportError
 OPSET = 17
 IR_VERSION = 8
 # A WebGPU device of default limits binds 8 storage buffers to a shader: 7 inputs and one output.
-MOST_CONCAT_INPUTS = 7
+MAX_CONCAT_INPUTS = 7
 
 # Tables with fewer numbers stay float32 also in compact files, because they save little.
-LEAST_COMPACT = 4096
+MIN_COMPACT = 4096
 
 # Operators that only give their input another shape: no kernel runs.
 ALIASES = frozenset({"Reshape", "Unsqueeze", "Squeeze", "Flatten", "Identity"})
@@ -218,7 +218,7 @@ class Graph:
         total = row @ self.constant(np.zeros((row.shape[1], 1)), "zeros")
         return total.reshape(each)
 
-    def written_anew(self, tensor: Tensor) -> Tensor:
+    def written_again(self, tensor: Tensor) -> Tensor:
         """Returns an output that a recording of the commands (graph capture) repeats. ONNX Runtime copies reshaped
         results into outputs, and a copy is made in the first run and never again, so a kernel has to write those.
         Constants stay as they are, and pages read them once.
@@ -249,7 +249,7 @@ class Graph:
                 found=f"{int((~np.isfinite(array)).sum())} of {array.size} not finite",
                 remedy="training diverged or the file is damaged; export an earlier checkpoint",
             )
-        if self._weights == "float32" or errors == "none" or array.size < LEAST_COMPACT:
+        if self._weights == "float32" or errors == "none" or array.size < MIN_COMPACT:
             return self._initializer(array, name)
         return self._evenly_spaced(array, name) if errors == "even" else self._halved(array, name)
 
@@ -313,11 +313,11 @@ class Graph:
         return self.node(operator, [left, other], shape)
 
     def concat(self, tensors: Sequence[Tensor], axis: int) -> Tensor:
-        """Tensors one after the other, in steps of at most MOST_CONCAT_INPUTS."""
+        """Tensors one after the other, in steps of at most MAX_CONCAT_INPUTS."""
         if len(tensors) == 1:
             return tensors[0]
-        if len(tensors) > MOST_CONCAT_INPUTS:
-            step = MOST_CONCAT_INPUTS
+        if len(tensors) > MAX_CONCAT_INPUTS:
+            step = MAX_CONCAT_INPUTS
             groups = [self.concat(tensors[i : i + step], axis) for i in range(0, len(tensors), step)]
             return self.concat(groups, axis)
         axis %= len(tensors[0].shape)

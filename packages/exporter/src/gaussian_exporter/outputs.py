@@ -189,7 +189,7 @@ def write_split(graph: Graph, gaussians: Gaussians, options: Options, shape: Sha
     logits = gaussians.opacity_logits if raw else None
     tensors["opacities"] = logits if logits is not None else gaussians.opacity()
     for name, tensor in tensors.items():
-        graph.output(name, graph.written_anew(tensor), not raw)
+        graph.output(name, graph.written_again(tensor), not raw)
 
 
 def refuse_place(path: Path, *read: Path) -> None:

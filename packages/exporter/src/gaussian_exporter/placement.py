@@ -64,7 +64,7 @@ class Finding:
         return f"{self.kind}: {self.operator} '{self.node}': {self.reason}; {self.remedy}"
 
 
-def told(findings: Sequence[Finding]) -> list[str]:
+def finding_lines(findings: Sequence[Finding]) -> list[str]:
     """Findings as lines of text: for each remedy the first finding, and the number of others."""
     by_remedy: dict[tuple[str, str], list[Finding]] = {}
     for finding in findings:
@@ -252,11 +252,11 @@ def _types(node: onnx.NodeProto, opset: int, values: _Values) -> Iterator[Findin
 
 
 def _sizes(node: onnx.NodeProto, opset: int, values: _Values) -> Iterator[Finding]:
-    most = RULES["maxSplitOutputs"]
-    if node.op_type == "Split" and len(node.output) > most:
+    maximum = RULES["maxSplitOutputs"]
+    if node.op_type == "Split" and len(node.output) > maximum:
         reason = f"a Split into {len(node.output)} binds more buffers than a shader may"
         reason += ", and the whole model runs on the CPU"
-        yield _of("failure", node, reason, f"split into at most {most}, or use Gather")
+        yield _of("failure", node, reason, f"split into at most {maximum}, or use Gather")
     if node.op_type == "Conv" and (channels := miscomputed_convolution(node, values.dims.get(node.input[1], []))):
         reason = f"WebGPU computes {channels[0]} channels to {channels[1]} wrongly, so the whole model runs on the CPU"
         yield _of("wrong", node, reason, "pad the channels going in to a multiple of 4")

@@ -158,13 +158,13 @@ def read(
                 faults.append(Fault("rows", name, where, f"at most nMax = {n_max} rows", f"{rows} rows", remedy))
     if faults or first is None:
         return faults, {"image": Attribute(outputs["image"], read["image"])} if "image" in read else {}
-    live = most = min(len(read[first]), n_max or len(read[first]))
+    live = maximum = min(len(read[first]), n_max or len(read[first]))
     if "count" in read:
         name, live = str(outputs["count"]), int(read["count"][0, 0])
-        if not 0 <= live <= most:
-            expected = f"a count of 0 to {most}, the number of rows (or nMax)"
+        if not 0 <= live <= maximum:
+            expected = f"a count of 0 to {maximum}, the number of rows (or nMax)"
             faults.append(Fault("count", name, f"output {name}", expected, str(live), "clamp the count in the model"))
-            live = min(max(0, live), most)
+            live = min(max(0, live), maximum)
     return faults, {each: part for each, part in _attributes(outputs, {k: v[:live] for k, v in read.items()})}
 
 
@@ -268,7 +268,7 @@ _RULES: dict[str, tuple[Any, FaultCode, str, str]] = {
 
 
 # Opacities below this are not drawn: they change no pixel of 8 bits.
-_LEAST_OPACITY = 1 / 255
+_MIN_OPACITY = 1 / 255
 
 
 def box_of(attributes: Attributes) -> tuple[AnyArray, AnyArray] | None:
@@ -280,8 +280,8 @@ def box_of(attributes: Attributes) -> tuple[AnyArray, AnyArray] | None:
     if "opacities" in attributes:
         opacities = attributes["opacities"]
         is_logit = opacities.activation == "logit"
-        least = np.log(_LEAST_OPACITY / (1 - _LEAST_OPACITY)) if is_logit else _LEAST_OPACITY
-        shown &= ~(opacities.rows.reshape(-1).astype(np.float64) < least)
+        minimum = np.log(_MIN_OPACITY / (1 - _MIN_OPACITY)) if is_logit else _MIN_OPACITY
+        shown &= ~(opacities.rows.reshape(-1).astype(np.float64) < minimum)
     centers = centers[shown]
     return (centers.min(0), centers.max(0)) if len(centers) else None
 

@@ -23,7 +23,7 @@ from ..pieces.covariance import UPPER
 
 Rotation4D = Literal["reversed", "straight"]
 # A Gaussian is drawn while its factor of time (0..1) is above this.
-_LEAST = 0.05
+_MIN = 0.05
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ def export_gaussian4d(model: Gaussian4D, facts: Facts, options: Options | None =
     since = now.reshape(1, 1) - graph.constant(model.times, "times", "none")
     share = ((since * since) * graph.constant(-0.5 / cut.variances, "shortness")).unary("Exp")
     # Gaussians that are not drawn get opacity 0, so that every Gaussian keeps its row.
-    seen = graph.node("Greater", [share, graph.scalar(_LEAST)], share.shape)
+    seen = graph.node("Greater", [share, graph.scalar(_MIN)], share.shape)
     share = graph.node("Where", [seen, share, graph.scalar(0.0)], share.shape)
     gaussians = Gaussians(
         positions=since * graph.constant(cut.velocities, "velocities")
@@ -126,7 +126,7 @@ def rotations_4d(left: Floats, right: Floats) -> Doubles:
 
 def reach(model: Gaussian4D, cut: Cuts) -> tuple[Doubles, Doubles]:
     """Corners around all centers while they are visible: they move evenly, so both ends are enough."""
-    lives = np.sqrt(-2 * np.log(_LEAST) * cut.variances)
+    lives = np.sqrt(-2 * np.log(_MIN) * cut.variances)
     ends = [np.clip(model.times + sign * lives, model.start, model.end) - model.times for sign in (-1, 1)]
     places = np.concatenate([model.positions + end * cut.velocities for end in ends])
     return places.min(0), places.max(0)

@@ -19,13 +19,13 @@ from ..conformance import SHARES, check_outputs
 from ..contract import Coordinates, Filter, Json, metadata
 from ..errors import ExportError, listed, require_package
 from ..outputs import refuse_place, save
-from ..placement import Finding, gpu_findings, told
+from ..placement import Finding, finding_lines, gpu_findings
 from ..written import box_of, read
 from .capture import OPSETS, captured, cause, keeping_modes, widened
 from .finish import finish_graph
 from .layouts import Layout, split, with_state
 from .roles import Role
-from .trial import difference, in_torch, said, told_difference, tried, weights_of, wrapped_module
+from .trial import describe_difference, difference, in_torch, said, tried, weights_of, wrapped_module
 
 # Largest allowed difference to PyTorch, as a fraction of the largest number of an output.
 _ALLOWED = 1e-3
@@ -51,7 +51,7 @@ class ExportReport:
         lines += [
             f"  output {name}: differs from PyTorch by {error:.1e} at most" for name, error in self.errors.items()
         ]
-        lines += [f"  {note}" for note in [*self.notes, *told(self.findings)]]
+        lines += [f"  {note}" for note in [*self.notes, *finding_lines(self.findings)]]
         if all(finding.kind == "inexact" for finding in self.findings):
             lines.append("  WebGPU: every node has a kernel, shapes are fixed, the commands can be recorded")
         return "\n".join([*lines, f"  {self.html()}"])
@@ -244,13 +244,13 @@ def _rows(model: onnx.ModelProto, layout: Layout, n_max: int | None, expected: S
     if first.HasField("dim_value"):
         return {"nMax": int(first.dim_value)}
     if n_max is None:
-        most = max(len(tensors[0]) for tensors in expected)
+        maximum = max(len(tensors[0]) for tensors in expected)
         raise ExportError(
             "argument/value",
             where="n_max",
             expected="the most Gaussians that a run writes, since the file may write another number in each",
-            found=f"none; {most} were seen",
-            remedy=f"keep every row, and write opacity 0 into the unused ones; or give n_max={2 * most}",
+            found=f"none; {maximum} were seen",
+            remedy=f"keep every row, and write opacity 0 into the unused ones; or give n_max={2 * maximum}",
         )
     return {"nMax": n_max}
 
@@ -275,6 +275,6 @@ def _errors(
         for name, mine, theirs in zip(layout.outputs, session.run(list(layout.outputs), feeds), wanted, strict=True):
             error = difference(mine, theirs)
             if error > max(errors.values()):
-                worst = f"{name} {told_difference(mine, theirs)}, {said(values, tries)}"
+                worst = f"{name} {describe_difference(mine, theirs)}, {said(values, tries)}"
             errors[name] = max(errors[name], error)
     return errors, worst

@@ -110,8 +110,8 @@ def _write_by_kernels(model: onnx.ModelProto, inputs: Mapping[str, Role]) -> Non
     floats = [v for v in graph.input if v.type.tensor_type.elem_type == TensorProto.FLOAT]
     if not copied or not floats:
         return
-    least = min(floats, key=lambda value: int(np.prod([d.dim_value for d in value.type.tensor_type.shape.dim])))
-    size = int(np.prod([d.dim_value for d in least.type.tensor_type.shape.dim]))
+    minimum = min(floats, key=lambda value: int(np.prod([d.dim_value for d in value.type.tensor_type.shape.dim])))
+    size = int(np.prod([d.dim_value for d in minimum.type.tensor_type.shape.dim]))
     for name, array in (
         ("zero_row", np.array([1, size], np.int64)),
         ("zero_weights", np.zeros((size, 1), np.float32)),
@@ -119,7 +119,7 @@ def _write_by_kernels(model: onnx.ModelProto, inputs: Mapping[str, Role]) -> Non
     ):
         graph.initializer.append(numpy_helper.from_array(array, name))
     nodes = [
-        helper.make_node("Reshape", [least.name, "zero_row"], ["zero_input"], name="zero_input"),
+        helper.make_node("Reshape", [minimum.name, "zero_row"], ["zero_input"], name="zero_input"),
         helper.make_node("MatMul", ["zero_input", "zero_weights"], ["zero_product"], name="zero_product"),
         helper.make_node("Reshape", ["zero_product", "zero_shape"], ["zero"], name="zero"),
     ]

@@ -50,8 +50,8 @@ def tries_of(inputs: Mapping[str, Role]) -> list[dict[str, AnyArray]]:
     """Sets of inputs: all defaults; all other values together, as many sets as the input with the most values; and
     every input at its zero, alone and all together, which reveals a small addend that an exporter drops.
     """
-    most = max((len(role.samples) for role in inputs.values()), default=1)
-    tries = [{name: role.samples[i % len(role.samples)] for name, role in inputs.items()} for i in range(most)]
+    maximum = max((len(role.samples) for role in inputs.values()), default=1)
+    tries = [{name: role.samples[i % len(role.samples)] for name, role in inputs.items()} for i in range(maximum)]
     zeros = {name: role.zero for name, role in inputs.items() if role.zero is not None}
     return [*tries, *({**tries[0], name: zero} for name, zero in zeros.items()), {**tries[0], **zeros}]
 
@@ -135,7 +135,7 @@ def difference(mine: AnyArray, theirs: AnyArray) -> float:
     return float(np.nan_to_num(apart, nan=np.inf, posinf=np.inf).max(initial=0)) / scale
 
 
-def told_difference(mine: AnyArray, theirs: AnyArray) -> str:
+def describe_difference(mine: AnyArray, theirs: AnyArray) -> str:
     """Describes a difference that is too large, as the predicate of an error's sentence."""
     if mine.shape != theirs.shape:
         found = f"is {list(mine.shape)} where the module writes {list(theirs.shape)}"
