@@ -9,7 +9,7 @@ import { join } from 'node:path';
 import { parseArgs } from 'node:util';
 import { root } from './lib/run.mjs';
 import { RETIRED_PARTS, retiredPartOf } from './words/names.mjs';
-import { blocksOfMarkdown, blocksOfPage, sentencesOf, wordsOf } from './words/prose.mjs';
+import { blocksOfMarkdown, blocksOfPage, commentsInCode, sentencesOf, wordsOf } from './words/prose.mjs';
 import { attributeComments, publicComments, sentencesInCode, sentencesInPython } from './words/sources.mjs';
 import { RATES, retiredIn } from './words/terms.mjs';
 
@@ -47,6 +47,8 @@ const documents = [
   'CHANGELOG.md',
   ...filesIn('docs', '.md'),
   ...filesIn('packages', '.md'),
+  ...filesIn('scripts', '.md'),
+  ...filesIn('tests', '.md'),
 ];
 const read = (path) => readFileSync(join(root, path), 'utf8');
 const placed = (path, blocks) => blocks.map((block) => ({ file: path, ...block }));
@@ -65,7 +67,13 @@ const code = FOLDERS.flatMap((folder) => COMMENTED_ENDINGS.flatMap((ending) => f
 const strings = code
   .filter((path) => !path.endsWith('.wgsl'))
   .flatMap((path) => (path.endsWith('.py') ? sentencesInPython : sentencesInCode)(join(root, path)));
-const texts = [...documentsAndPages, ...strings, ...attributeComments(), ...publicComments()];
+const texts = [
+  ...documentsAndPages,
+  ...documents.flatMap((path) => placed(path, commentsInCode(read(path)))),
+  ...strings,
+  ...attributeComments(),
+  ...publicComments(),
+];
 
 let faults = 0;
 const seen = new Set();

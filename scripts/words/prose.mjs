@@ -36,6 +36,16 @@ export function blocksOfMarkdown(source) {
   }
 }
 
+/** @returns {{ line: number, text: string }[]} comments in the code of Markdown. */
+export function commentsInCode(source) {
+  return [...source.matchAll(/^(```|~~~)[^\n]*\n([\s\S]*?)^\1/gm)].flatMap(({ 2: code, index, 0: block }) =>
+    [...code.matchAll(/(?:^|\s)(?:\/\/|#|<!--) (.*)/g)].map((comment) => ({
+      line: lineAt(source, index + block.indexOf(code) + comment.index + 1),
+      text: comment[1].replace(/`[^`]*`/g, CODE),
+    })),
+  );
+}
+
 /** Inline marks taken away: code is one mark, a link its words. */
 function plain(text) {
   return text
