@@ -22,7 +22,7 @@ LOWEST, HIGHEST = -0.25, 0.7
 APART = 0.12, 0.42
 # How far cameras look past the middle (world units) and lean (radians).
 ASIDE, LEAN = 0.12, 0.1
-# The least depth and the greatest at which anything may be: scenes reach 2 around the origin at most.
+# Minimum and maximum depth of content: scenes reach at most 2 around the origin.
 NEAR, FAR = 1.6, 6.4
 
 
