@@ -166,7 +166,7 @@ function show(visits) {
   const head = cells('th', [
     'visit',
     'first preview, ms',
-    'whole picture, ms',
+    'full frame, ms',
     'of it trial of what is likely, ms',
     'of it self-test, ms',
     'then until the choice is made, ms',

@@ -215,7 +215,7 @@ export async function checkLostContext(tab) {
       await restored;
       return before === element.toDataURL();
     })()`);
-    assert(isSame, 'another picture');
+    assert(isSame, 'another frame');
   });
 }
 
@@ -282,7 +282,7 @@ export function paintedShare(bytes, size = SIZE) {
 /** Differences between the colors of two PNG files. Images that show nothing are refused. */
 function psnr(a, b) {
   const [found, expected] = [a, b].map((bytes) => cornerOf(bytes));
-  assert(paintedShare(b) > 500 / expected.length, 'an empty picture');
+  assert(paintedShare(b) > 500 / expected.length, 'an empty frame');
   const sum = found.reduce((total, value, i) => total + (value - expected[i]) ** 2, 0);
   return sum === 0 ? Infinity : 10 * Math.log10((255 ** 2 * found.length) / sum);
 }

@@ -45,7 +45,7 @@ export async function checkPolicies(tab) {
       const { loaded, error, violations, warnings } = await reportOf(tab, `${origin}/policies/secure.html`);
       assert(loaded, error);
       assert(warnings.length === 1 && /worker-src/.test(warnings[0]), warnings.join('; '));
-      return `violations: ${[...new Set(violations)].join(', ') || 'none told'}`;
+      return `violations: ${[...new Set(violations)].join(', ') || 'none reported'}`;
     }),
   );
   await withServer(CORS, (cdn) =>

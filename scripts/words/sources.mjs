@@ -116,7 +116,7 @@ export function attributeComments() {
   });
 }
 
-/** Texts in code of four words or more: errors, warnings, and what pages and the element say. */
+/** Texts in code of two words or more: errors, warnings, and what pages and the element say. */
 export function sentencesInCode(path) {
   const file = parse(path);
   const found = [];
@@ -149,9 +149,7 @@ export function sentencesInPython(path) {
 
 /** A sentence, or a label such as "First frame": no identifier, selector or code. */
 const isProse = (text) =>
-  /^[^{}]*$/.test(text) &&
-  /[a-z] [A-Za-z]/.test(text) &&
-  (text.match(/[A-Za-z]{2,}/g) ?? []).length >= (/^\s*[A-Z][a-z]/.test(text) ? 2 : 4);
+  /^[^{}]*$/.test(text) && /[a-z] [A-Za-z]/.test(text) && (text.match(/[A-Za-z]{2,}/g) ?? []).length >= 2;
 
 function textOf(node) {
   if (ts.isStringLiteral(node) || ts.isNoSubstitutionTemplateLiteral(node)) return node.text;

@@ -95,7 +95,7 @@ const CASES: readonly [what: string, header: OnnxHeader, contract: Contract, fau
   ['rotation matrices', fed([1, 24, 3, 3]), withInput({ role: 'pose', format: 'matrix' }), []],
   ['flat matrices of no number of joints', fed([10]), withInput({ role: 'pose', format: 'matrix' }), ['shape x']],
   ['images of two views', fed([1, 2, 3, 8, 8]), withInput({ role: 'image' }), []],
-  ['a picture with alpha', fed([1, 4, 8, 8]), withInput({ role: 'image' }), []],
+  ['an image with alpha', fed([1, 4, 8, 8]), withInput({ role: 'image' }), []],
   [
     'a state',
     headerWith([tensor('x', [5, 3])], [GAUSSIANS, tensor('next', [5, 3])]),
@@ -149,7 +149,7 @@ const CASES: readonly [what: string, header: OnnxHeader, contract: Contract, fau
   ['a symbolic control', fed(['k']), withInput({ role: 'control', range: [0, 9], default: 3 }), ['shape x']],
   ['a control of text', fed([1], 'string'), withInput({ role: 'control', range: [0, 9], default: 3 }), ['dtype x']],
   ['an image of open size', fed([1, 3, 'h', 'w']), withInput({ role: 'image' }), []],
-  ['a gray picture', fed([1, 1, 8, 8]), withInput({ role: 'image' }), ['shape x']],
+  ['a gray image', fed([1, 1, 8, 8]), withInput({ role: 'image' }), ['shape x']],
   ['a newer opset', { ...ready, opsets: new Map([['ai.onnx', 27]]) }, PACKED, ['opset opset of ai.onnx']],
   ['an old opset', { ...ready, opsets: new Map([['ai.onnx', 6]]) }, PACKED, ['opset opset of ai.onnx']],
   ['no opset', { ...ready, opsets: new Map(), operators: new Map([['Add', 1]]) }, PACKED, ['opset opset of ai.onnx']],

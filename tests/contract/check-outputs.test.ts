@@ -189,7 +189,7 @@ test('declared bounds of one Gaussian are its center, rounded', () => {
   assert.deepEqual(codes(checkBounds({ ...PACKED, bounds }, checkOutputs(PACKED, { gaussians: moved }))), ['conflict']);
 });
 
-test('pictures are finite', () => {
+test('images are finite', () => {
   const contract: Contract = { version: 1, inputs: {}, outputs: { layout: 'image', image: 'out' } };
   const out = (value: number): OutputTensor => ({
     dtype: 'float32',

@@ -202,7 +202,7 @@ for (const [name, cutOf] of [
     const expected = await evaluator.compare(cloud, 'heldOut');
     found.errors.forEach((error, k) => {
       assert.ok(error > 1e-9, 'something is lost');
-      assert.ok(Math.abs(error - expected[k]) < 0.01 * expected[k], `view ${k}: ${error}, drawn anew ${expected[k]}`);
+      assert.ok(Math.abs(error - expected[k]) < 0.01 * expected[k], `view ${k}: ${error}, drawn again ${expected[k]}`);
     });
   });
 }

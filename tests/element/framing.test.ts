@@ -79,7 +79,7 @@ test('a single standing person is shown from head to feet at any aspect ratio, a
   for (const places of [alone, [...alone, ...specks]]) {
     const { outside, across } = shown(boundsOf(cloudOf(places)), opaque(cloudOf(alone)));
     assert.ok(outside <= 0.001, `${outside} outside`);
-    assert.ok(across > 0.5, `${across} of the picture`);
+    assert.ok(across > 0.5, `${across} of the frame`);
   }
 });
 
@@ -115,7 +115,7 @@ for (const name of ['angel.sog', 'massa.sog', 'st-peter.sog', 'plant.splat', 'an
     const cloud = await readScene(sharedFile(`scenes/${name}`), { name });
     const { outside, across } = shown(boundsOf(cloud), opaque(cloud));
     assert.ok(outside <= 0.0015, `${outside} outside`);
-    assert.ok(across > 0.5, `${across} of the picture`);
+    assert.ok(across > 0.5, `${across} of the frame`);
   });
 }
 
@@ -135,5 +135,5 @@ test('an avatar is shown from head to feet by the bounds that its contract decla
     [x, max[1], z],
   ]);
   assert.equal(outside, 0);
-  assert.ok(across > 0.5, `${across} of the picture`);
+  assert.ok(across > 0.5, `${across} of the frame`);
 });

@@ -41,7 +41,7 @@ for (const file of files) {
   test(`${file}: each level down loses more and takes less`, () => {
     for (let k = 1; k < QUALITY_LEVELS.length; k++) {
       const [above, below] = [lineOf(QUALITY_LEVELS[k - 1].name), lineOf(QUALITY_LEVELS[k].name)];
-      assert.ok(below.psnr < above.psnr, `dB of ${QUALITY_LEVELS[k].name}`);
+      assert.ok(below.psnr < above.psnr, `PSNR of ${QUALITY_LEVELS[k].name}`);
       const wins = QUALITY_LEVELS[k].scale >= SMALLEST_THAT_WINS ? 1 / NOISE : NOISE;
       assert.ok(below.ratio < above.ratio * wins, `${QUALITY_LEVELS[k].name}: ${below.ratio} after ${above.ratio}`);
     }

@@ -63,7 +63,7 @@ for (const wholeMs of [20, 100, 200, 214]) {
     assert.equal(
       quality.plan({ now: now + waited, pixels: PIXELS, hasChanged: false, goesOn: false }).level,
       0,
-      'the true image',
+      'the accurate frame',
     );
     // A hand that continues at once moves as before.
     assert.ok(quality.plan({ now: now + waited + 5, pixels: PIXELS, hasChanged: true, goesOn: true }).level > 0);
@@ -177,10 +177,7 @@ test('frames that are already small are not made smaller, for any duration', () 
     assert.ok(scale === 1 || (scale * side) ** 2 >= 8192, `${scale} of ${side}`);
     assert.equal(scale < 1, side > 100, `${scale} of ${side}`);
   }
-  assert.ok(
-    scaleOf(levelOf(1024 ** 2)) < scaleOf(levelOf(128 ** 2)),
-    'a frame that shrinks resets the chosen level',
-  );
+  assert.ok(scaleOf(levelOf(1024 ** 2)) < scaleOf(levelOf(128 ** 2)), 'a frame that shrinks resets the chosen level');
 });
 
 test('an element of another size is measured again: a small frame that gains nothing from fewer pixels predicts nothing for a large one', () => {
@@ -260,7 +257,7 @@ test('a scene that changes in every other refresh of the display is in motion in
     now += INTERVAL;
   }
   assert.ok(asked.length === 1, 'rest is checked');
-  assert.equal(frame(false), 0, 'the true image');
+  assert.equal(frame(false), 0, 'the accurate frame');
   quality.stop();
 });
 

@@ -182,7 +182,7 @@ test('the counter sees what it is there to see', async () => {
     { submits, computePasses, dispatches, buffersCreated, bytesAllocated, bytesWritten },
     { submits: 1, computePasses: 1, dispatches: 0, buffersCreated: 1, bytesAllocated: 64, bytesWritten: 16 },
   );
-  assert.equal(counter.take().submits, 0, 'and starts anew');
+  assert.equal(counter.take().submits, 0, 'and starts again');
 });
 
 after(() => {

@@ -202,7 +202,7 @@ describe('code that documents recommend', { skip }, () => {
     }
   });
 
-  it('HTML shows a picture', { timeout: 200_000 }, async () => {
+  it('HTML shows an image', { timeout: 200_000 }, async () => {
     // Children of the element are opened by tests/element/browser/scenes.test.ts.
     const copied = snippets('html').filter(
       ({ code }) =>

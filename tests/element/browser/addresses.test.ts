@@ -21,7 +21,7 @@ async function asked(name: string): Promise<number> {
 const sequence = (frames: string[], framesPerSecond = 10): string =>
   JSON.stringify({ gaussianSplatSequence: 1, framesPerSecond, frames });
 
-describe('scenes of strangers', () => {
+describe('untrusted scenes', () => {
   afterEach(() => {
     GaussianSplatElement.sceneLimits = {};
   });

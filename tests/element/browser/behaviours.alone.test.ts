@@ -190,7 +190,7 @@ describe('auto-rotate', () => {
     await element.updateComplete;
     element.autoRotate = true;
     element.autoRotateDelay = 50;
-    await until(() => theta(element) < rest, 'to go on');
+    await until(() => theta(element) < rest, 'to continue');
   });
 
   it('stands still for people who want less motion, and while the keyboard is on it', async () => {

@@ -43,11 +43,11 @@ describe('levels of detail of a plain file', () => {
     );
     const few = (await element.updateStats())!.drawn!;
     assert(few < 0.5 * all, `${few} of ${all} drawn`);
-    assert((await imageOf(element)) !== whole, 'another picture');
+    assert((await imageOf(element)) !== whole, 'another frame');
     // The levels are loaded, and none of them is drawn.
     element.detail = 'auto';
     await frames(2);
-    assert((await imageOf(element)) === whole, 'the whole picture');
+    assert((await imageOf(element)) === whole, 'the full frame');
     assert(/merged splats.*only in motion/.test(element.stats!.reasons.join()), 'frames in motion may have some');
     element.quality = 'default';
     await frames(2);

@@ -219,7 +219,7 @@ describe('the loss of the device', () => {
       devices[devices.length - 1].destroy();
       await nextEvent(element, 'error');
       assertEqual([element.error?.code, element.error?.reason], ['device-lost', 'device-lost/unrecoverable'], 'codes');
-      assert(before.middleOf(isRed), 'a picture before');
+      assert(before.middleOf(isRed), 'a frame before');
       assertEqual((await screenOf(element)).differences(before), 0, 'color values of the last frame that differ');
       const { message } = element.error!;
       const said =
@@ -460,7 +460,7 @@ describe('without WebGPU, where the page asks for it', () => {
       const element = show(ASKED);
       const own = document.createElement('p');
       own.slot = 'fallback';
-      own.textContent = 'A picture instead';
+      own.textContent = 'An image instead';
       element.append(own);
       await nextEvent(element, 'error');
       await element.updateComplete;

@@ -36,7 +36,7 @@ async function asked({ log }: Served, path: string): Promise<readonly string[]> 
     if (paths.includes(path)) return paths;
     await new Promise((resolve) => setTimeout(resolve, 50));
   }
-  throw new Error(`nobody asks for ${path}: ${(await log()).join(' ')}`);
+  throw new Error(`no request for ${path}: ${(await log()).join(' ')}`);
 }
 
 /** Colors of the current frame. */
@@ -106,7 +106,7 @@ describe('a streamed SOG scene', () => {
     const served = await serve('webgl');
     const element = show({ src: served.src, 'camera-orbit': NEAR, renderer: 'webgl' });
     await element.ready;
-    assertEqual([element.error, element.stats?.renderer, element.stats?.total], [null, 'webgl', 14_000], 'on show');
+    assertEqual([element.error, element.stats?.renderer, element.stats?.total], [null, 'webgl', 14_000], 'visible');
     assertEqual((await served.log()).at(-1), '0_0/meta.json', 'asked for last');
     await close(element);
   });
@@ -142,7 +142,7 @@ describe('a streamed SOG scene', () => {
     const element = show({ src: served.src, detail: '0.1px', 'camera-orbit': NEAR });
     await element.ready;
     await until(() => warned.some((message) => message.includes('404')), 'a word on the missing file');
-    assert(element.loaded && element.error === null, 'still on show');
+    assert(element.loaded && element.error === null, 'still visible');
     for (const [path, bytes] of folder.files) if (path.startsWith('1_0')) await served.put(path, bytes);
     // Every frame checks for missing files; a file is requested again after four seconds.
     const turning = setInterval(() => (element.cameraOrbit = `${30 + (performance.now() % 7)}deg 60deg 9m`), 200);

@@ -137,7 +137,7 @@ describe('another src', () => {
     await nextEvent(element, 'load');
     await delay(3500);
     assert(element.loaded && element.stats !== null, 'it is gone');
-    assert(element.toDataURL().startsWith('data:image/png'), 'its picture');
+    assert(element.toDataURL().startsWith('data:image/png'), 'its frame');
   });
 
   it('while counts are read back: they are those of now, or none', async () => {

@@ -36,7 +36,7 @@ async function findQuality(element: GaussianSplatElement): Promise<void> {
     element.stats?.dynamicQuality.moving !== 'whole' && element.stats?.dynamicQuality.frameMs !== null;
   const end = performance.now() + 20_000;
   while (!isFound() && performance.now() < end) await turnFor(element, 300);
-  assert(isFound(), `no pace but ${JSON.stringify(element.stats?.dynamicQuality)}`);
+  assert(isFound(), `no dynamic quality but ${JSON.stringify(element.stats?.dynamicQuality)}`);
 }
 
 /** Ends the camera's motion at a place. @returns when it was last drawn there */
@@ -58,7 +58,7 @@ describe('dynamic quality', () => {
     for (let round = 0; round < 3; round++) {
       paceds.push(...(await turnFor(auto, 1_000)).slice(1));
       await comeToRest(auto);
-      await until(() => auto.stats?.dynamicQuality.drawn === 'whole', 'the true image');
+      await until(() => auto.stats?.dynamicQuality.drawn === 'whole', 'the accurate frame');
       // Full frames in motion, too: a page at rest leaves more CPU time.
       wholes.push(...(await turnFor(unhurried, 1_000)).slice(1));
     }
@@ -88,7 +88,7 @@ describe('dynamic quality', () => {
       await gpuIdle();
       await turnFor(auto, 500);
       const rested = await comeToRest(auto);
-      await until(() => auto.stats?.dynamicQuality.drawn === 'whole', 'the true image');
+      await until(() => auto.stats?.dynamicQuality.drawn === 'whole', 'the accurate frame');
       await gpuIdle();
       waited = Math.min(waited, performance.now() - rested);
     }

@@ -70,7 +70,7 @@ describe('a scene of 500,000 splats', () => {
   });
 });
 
-describe('previews on show', () => {
+describe('visible previews', () => {
   // Worker, device and pipelines are loaded before the measurement starts.
   beforeEach(async () => void (await showLoaded({ src: '/tests/element/browser/fixtures/compass.ply' })));
 

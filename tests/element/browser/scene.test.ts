@@ -118,7 +118,7 @@ describe('a scene', () => {
     await isOut;
     element.src = COMPASS;
     await frames(3);
-    assertEqual([element.progress, element.loaded], [0, false], 'out of sight');
+    assertEqual([element.progress, element.loaded], [0, false], 'off-screen');
   });
 
   it('ends its progress also if the server does not report the length', async () => {

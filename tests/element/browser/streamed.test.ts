@@ -166,7 +166,7 @@ describe('a streamed scene', () => {
     const element = show({ src: '/net/kept/gaps/detail.json', 'camera-orbit': '30deg 60deg 2m' });
     await element.ready;
     await until(() => warned.some((message) => message.includes('404')), 'a word on the missing page');
-    assert(element.loaded && element.error === null, 'still on show');
+    assert(element.loaded && element.error === null, 'still visible');
     await close(element);
     some.stop();
     console.warn = original;

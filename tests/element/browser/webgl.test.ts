@@ -83,7 +83,7 @@ function decibels(a: Uint8ClampedArray, b: Uint8ClampedArray): number {
   assertEqual(a.length, b.length, 'pixels');
   assert(
     b.some((value) => value !== b[0]),
-    'an empty picture',
+    'an empty frame',
   );
   const sum = a.reduce((total, value, i) => total + (value - b[i]) ** 2, 0);
   return sum === 0 ? Infinity : 10 * Math.log10((255 ** 2 * a.length) / sum);
@@ -147,7 +147,7 @@ describe('renderer="webgl"', () => {
     await element.flyTo({ orbit: '90deg 70deg 6m' }, { duration: 200 });
     assert(Math.abs(element.getCameraOrbit().theta - Math.PI / 2) < 1e-6, String(element.getCameraOrbit()));
     await delay(200);
-    assertEqual(element.shadowRoot!.querySelector('canvas')!.toDataURL(), element.toDataURL(), 'the picture');
+    assertEqual(element.shadowRoot!.querySelector('canvas')!.toDataURL(), element.toDataURL(), 'the frame');
   });
 
   itInLab('an image that is read at once has the current camera', async () => {
@@ -237,7 +237,7 @@ describe('renderer="webgl"', () => {
     const parts = draws - before;
     assert(parts >= 16, `${parts} parts`);
     const inParts = element.shadowRoot!.querySelector('canvas')!.toDataURL();
-    assertEqual(inParts, element.toDataURL(), 'the picture');
+    assertEqual(inParts, element.toDataURL(), 'the frame');
     // Reading draws the frame once.
     assert(draws - before - parts <= 1, `${draws - before - parts} later draws`);
     element.remove();
@@ -306,7 +306,7 @@ describe('renderer="webgl"', () => {
       await claimComing(/no worker could be started \(refused\)/);
       element.setAttribute('camera-orbit', '180deg 70deg 6m');
       await delay(300);
-      assertEqual(element.shadowRoot!.querySelector('canvas')!.toDataURL(), element.toDataURL(), 'the picture');
+      assertEqual(element.shadowRoot!.querySelector('canvas')!.toDataURL(), element.toDataURL(), 'the frame');
     } finally {
       ElementClass.sceneLoader = original;
     }

@@ -227,7 +227,7 @@ describe('a generator in the element', () => {
     await free.updateFraming();
     free.up = null;
     await free.updateComplete;
-    assertEqual(free.getCameraTarget().toString(), before, 'framed anew');
+    assertEqual(free.getCameraTarget().toString(), before, 'framed again');
   });
 
   it('an invalid pose is reported once, and the last good frame stays', async () => {
@@ -294,7 +294,7 @@ describe('a generator in the element', () => {
     console.log(`${frames} frames and ${shown.length} runs in ${Math.round(elapsed)} ms`);
     assert(frames >= 15, `${frames} frames were drawn`);
     assert(shown.length <= frames, `${shown.length} runs for ${frames} frames`);
-    assertEqual(element.currentTime, 1 + 29 / 10, 'time on show');
+    assertEqual(element.currentTime, 1 + 29 / 10, 'visible time');
   });
 
   const faults: Readonly<Record<string, readonly [attributes: Record<string, string>, reason: string]>> = {

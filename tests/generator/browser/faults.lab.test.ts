@@ -164,7 +164,7 @@ describe('a fault that the scene survives', () => {
       element.setAttribute('camera-target', '0m 0m 0m');
       element.setAttribute('camera-orbit', '0deg 75deg 4m');
       const end = performance.now() + 10_000;
-      while ((await coverOf(element)) < 300) assert(performance.now() < end, 'no picture');
+      while ((await coverOf(element)) < 300) assert(performance.now() < end, 'no image');
     }
   });
 

@@ -82,7 +82,7 @@ before(async () => {
   device = await makeDevice();
 });
 
-describe('a picture as a tensor', () => {
+describe('an image as a tensor', () => {
   for (const [from, to, fit, dtype] of [
     [[16, 12], [16, 12], 'stretch', 'float32'],
     [[40, 20], [8, 8], 'cover', 'float32'],

@@ -65,7 +65,7 @@ describe('a post-processor in the element', () => {
       const plainBytes = element.stats!.bytes.frames;
       element.setAttribute('control-gain', '0');
       element.setAttribute('postprocess', FIXTURES + name);
-      await untilLight(element, (mean) => mean < plain.mean - 2, 'a darker picture');
+      await untilLight(element, (mean) => mean < plain.mean - 2, 'a darker frame');
       const dark = await lightOf(element);
       // Three images of its size, eight bytes a pixel, and the tensor for the model.
       assert(element.stats!.bytes.frames > plainBytes + 24 * 120 * 100, 'stats count its images');
@@ -74,9 +74,9 @@ describe('a post-processor in the element', () => {
       element.setAttribute('control-gain', '1');
       await untilLight(element, (mean) => Math.abs(mean - plain.mean) < 1.5, 'the unprocessed frame');
       element.setAttribute('control-gain', '0');
-      await untilLight(element, (mean) => mean < plain.mean - 2, 'a darker picture');
+      await untilLight(element, (mean) => mean < plain.mean - 2, 'a darker frame');
       element.removeAttribute('postprocess');
-      await untilLight(element, (mean) => Math.abs(mean - plain.mean) < 0.5, 'the plain picture');
+      await untilLight(element, (mean) => Math.abs(mean - plain.mean) < 0.5, 'the plain frame');
     });
   }
 
@@ -85,7 +85,7 @@ describe('a post-processor in the element', () => {
       { src: COMPASS, postprocess: `${FIXTURES}post-fixed.onnx`, 'control-gain': '0' },
       STYLE,
     );
-    await untilLight(element, (mean) => mean < 250, 'the processed picture');
+    await untilLight(element, (mean) => mean < 250, 'the processed frame');
     await delay(300);
     const { createBuffer, mapAsync, createBindGroup } = calls;
     await delay(1000);
@@ -101,7 +101,7 @@ describe('a post-processor in the element', () => {
       { src: COMPASS, postprocess: `${FIXTURES}post-slow.onnx`, 'control-gain': '0' },
       STYLE,
     );
-    await untilLight(element, (mean) => mean < 250, 'the processed picture');
+    await untilLight(element, (mean) => mean < 250, 'the processed frame');
     let moves = 0;
     element.addEventListener('camera-change', () => moves++);
     for (let i = 0; i < 20; i++) {
@@ -130,7 +130,7 @@ describe('a post-processor in the element', () => {
     const element = await showLoaded({ src: COMPASS, 'control-gain': '0' }, STYLE);
     const plain = await lightOf(element);
     element.setAttribute('postprocess', `${FIXTURES}post.onnx`);
-    await untilLight(element, (mean) => mean < plain.mean - 20, 'the processed picture');
+    await untilLight(element, (mean) => mean < plain.mean - 20, 'the processed frame');
     const before = await lightOf(element);
     element.style.cssText = 'width: 200px; height: 160px; background: white';
     await delay(300);
@@ -142,7 +142,7 @@ describe('a post-processor in the element', () => {
       { src: COMPASS, postprocess: `${FIXTURES}post-slow.onnx`, 'control-gain': '0' },
       STYLE,
     );
-    await untilLight(element, (mean) => mean < 250, 'the processed picture');
+    await untilLight(element, (mean) => mean < 250, 'the processed frame');
     const live = new Set<GPUTexture>();
     const { createTexture } = GPUDevice.prototype;
     const { destroy } = GPUTexture.prototype;
@@ -197,7 +197,7 @@ describe('a post-processor in the element', () => {
       assertEqual((await event).detail.reason, reason);
       element.setAttribute('camera-orbit', '1deg 75deg auto');
       await delay(300);
-      assert(element.loaded && Math.abs((await lightOf(element)).mean - plain.mean) < 1, 'the picture stays');
+      assert(element.loaded && Math.abs((await lightOf(element)).mean - plain.mean) < 1, 'the frame stays');
     });
   }
 
@@ -206,11 +206,11 @@ describe('a post-processor in the element', () => {
       { src: COMPASS, postprocess: `${FIXTURES}post-fixed.onnx`, 'control-gain': '0' },
       STYLE,
     );
-    await untilLight(element, (mean) => mean < 250, 'the processed picture');
+    await untilLight(element, (mean) => mean < 250, 'the processed frame');
     const restored = nextEvent(element, 'contextrestored');
     devices[devices.length - 1].destroy();
     await restored;
-    await untilLight(element, (mean) => mean < 250, 'the processed picture');
+    await untilLight(element, (mean) => mean < 250, 'the processed frame');
   });
 });
 
@@ -239,7 +239,7 @@ describe('a chain in the element', () => {
   });
 });
 
-describe('a picture as a control', () => {
+describe('an image as a control', () => {
   /** Red and blue halves. */
   async function photo(left: string, right: string): Promise<string> {
     const canvas = new OffscreenCanvas(16, 16);

@@ -37,17 +37,17 @@ describe('S22: a crash of the GPU process', () => {
     await kill();
     while (!isBack) {
       const blob = await element.toBlob().catch(() => undefined);
-      if (blob) assertEqual(await alphaOf(blob), expected, 'alpha of a picture');
+      if (blob) assertEqual(await alphaOf(blob), expected, 'alpha of a frame');
       await new Promise((resolve) => setTimeout(resolve, 20));
     }
     await restored;
     assertEqual(events, ['contextlost', 'contextrestored'], 'events');
-    assert((await screenOf(element)).middleOf(isRed) !== null, 'the picture');
+    assert((await screenOf(element)).middleOf(isRed) !== null, 'the frame');
     if ((globalThis as { STABILITY?: string }).STABILITY !== 'full') return;
     await kill();
     await until(() => element.error !== null, 'what the element says', 60_000);
     assertEqual(element.error?.reason, 'device-lost/unrecoverable');
     await until(() => element.loaded, 'the frame, without a reload', BLOCKED_MS);
-    assert((await screenOf(element)).middleOf(isRed) !== null, 'the picture');
+    assert((await screenOf(element)).middleOf(isRed) !== null, 'the frame');
   });
 });

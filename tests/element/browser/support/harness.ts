@@ -131,7 +131,7 @@ export async function atRest(element: GaussianSplatElement, quietMs = 400, limit
     return now - since > quietMs && passed > 4;
   };
   try {
-    await until(isQuiet, 'the true image', limitMs);
+    await until(isQuiet, 'the accurate frame', limitMs);
   } finally {
     waits = false;
   }

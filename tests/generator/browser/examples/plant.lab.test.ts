@@ -19,5 +19,5 @@ async function assertOilReported(page: Document): Promise<void> {
   assert(words.includes('0.09 MB') && words.includes('28.2 dB') && !words.includes('Gaussians'), words);
   const image = card.querySelector('img')!;
   await image.decode();
-  assert(image.naturalWidth > 100, 'its picture');
+  assert(image.naturalWidth > 100, 'its frame');
 }

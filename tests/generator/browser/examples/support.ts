@@ -40,7 +40,7 @@ export async function open(name: string): Promise<OpenExample> {
     fallbacks.push(String((event as CustomEvent).detail.reason)),
   );
   element.scrollIntoView({ block: 'center' });
-  await until(() => element.loaded || element.error !== null, `${name} on show`, TIMEOUT_MS);
+  await until(() => element.loaded || element.error !== null, `${name} visible`, TIMEOUT_MS);
   assertEqual(element.error?.message, undefined, name);
   await until(() => card.querySelector('.cost')!.childElementCount > 0, `${name}: its cost`);
   // Cards above may have grown meanwhile.
