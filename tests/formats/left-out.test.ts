@@ -57,7 +57,7 @@ test('triangles beside splats, in PLY and glTF', async () => {
   // A hint reports the file's meshes: callers that draw them, as the element does, omit nothing.
   const both = await readScene(glb({ meshes, extensionsUsed }), { name: 'a.glb' });
   assert.deepEqual([both.hints?.meshes, both.warnings ?? []], [true, []]);
-  assert.match((await warningsOf(glb({ animations: [{}] }), 'a.glb'))[0], /^1 animations are left out for splats/);
+  assert.match((await warningsOf(glb({ animations: [{}] }), 'a.glb'))[0], /^1 animations are left out: the splats/);
   assert.match((await warningsOf(glb({ extensionsUsed }), 'a.glb'))[0], /not known are left out: EXT_splat_motion\./);
 });
 
