@@ -89,8 +89,8 @@ async function untilKept(keys, longest) {
 }
 
 /**
- * What a visit's page noted of the choice: milliseconds of trying the likely variants before its first picture, of the first self-test without the
- * compilation of pipelines, and of the search, without its pauses; undefined for what was not done.
+ * Autotuning of a visit's page: milliseconds of trying the likely variants before its first frame, of the first self-test without the
+ * compilation of pipelines, and of the search, without its pauses; undefined for steps that were not run.
  */
 function choiceTimes({ contentWindow: { performance } }) {
   const [start] = performance.getEntriesByName('gaussian-splat.start');

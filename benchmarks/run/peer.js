@@ -1,4 +1,4 @@
-/** Another renderer, or another build of ours, as a subject (see measure.js): it runs in a frame of its own, where its page has a function `openSubject`. */
+/** Another renderer, or another build of this one, as a subject (see measure.js). It runs in an iframe whose page has a function `openSubject`. */
 
 export const PEERS = ['playcanvas', 'spark', 'ours'];
 

@@ -59,7 +59,9 @@ function makeScales(points, { width, height, margin }) {
 function drawTitle({ environment, scene }, { margin, isSmall, font }) {
   const about = `${adapterName(environment.adapter)}, ${scene.width}×${scene.height}, ${scene.splats.toLocaleString('en')} splats`;
   const left = isSmall ? font : margin.left;
-  const lines = isSmall ? [`${about}.`, 'Left is faster, up is more accurate.'] : [`${about}. Left is faster, up is more accurate.`];
+  const lines = isSmall
+    ? [`${about}.`, 'Left is faster, up is more accurate.']
+    : [`${about}. Left is faster, up is more accurate.`];
   return [
     words(left, 26, isSmall ? 'Time of a frame against accuracy' : 'Time of a frame against accuracy of its image', {
       'font-size': 1.15 * font + (isSmall ? 0 : 4),

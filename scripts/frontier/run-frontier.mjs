@@ -24,7 +24,7 @@ const USAGE = `usage: npm run lab:frontier -- [options]
   --query TEXT      further parameters for the page's address, for example "reference=renderer"
   --python FILE     measures LPIPS, too, with a Python that has packages/cli/src/lib/gate/requirements.txt
   --from FILE       draws a report that the page posted on another machine; with images=1 in the page's address, LPIPS too
-  --adapter NAME    the GPU's name, where the browser tells no more than its vendor
+  --adapter NAME    the GPU's name, if the browser reports only its vendor
   --out FOLDER      where frontier-ADAPTER.json and .svg go (default docs/frontier)
 
 The table is scripts/frontier/configurations.mjs. SwiftShader draws; GAUSSIAN_SPLAT_GPU=system takes this machine's GPU.

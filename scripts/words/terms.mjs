@@ -20,7 +20,10 @@ export const RETIRED = [
   [/\b(one|the|each|measured) choice of variants\b/i, 'autotune'],
   [/\bknown answers?\b/i, 'self-test'],
   [/\blive (generators?|models?|scenes?)\b/i, 'generator, dynamic'],
-  [/(?<!\.)\b(some|any|no|every)body('s|’s)?\b|\bwho(so)?ever\b|\bwhom\b/i, 'visitors, authors, callers; or the passive'],
+  [
+    /(?<!\.)\b(some|any|no|every)body('s|’s)?\b|\bwho(so)?ever\b|\bwhom\b/i,
+    'visitors, authors, callers; or the passive',
+  ],
   [/\bwhatever\b/i, 'name what: any, all, each'],
   [/\bso (many|much)\b/i, 'a number: n, as many as'],
   [/\bso (far|long)\b/i, 'until now, as long as, up to there'],

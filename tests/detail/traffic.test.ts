@@ -133,7 +133,11 @@ test('pages that two feedback passes do not request are canceled, and may be req
   const stale = all.server.open.splice(0);
   all.look(() => 0);
   assert.equal(all.traffic.next(), undefined, 'no page is placed that the last feedback pass does not request');
-  assert.equal(all.traffic.underWay, 2 * MAX_FETCHES, 'one feedback pass alone cancels nothing, because another view may follow');
+  assert.equal(
+    all.traffic.underWay,
+    2 * MAX_FETCHES,
+    'one feedback pass alone cancels nothing, because another view may follow',
+  );
   all.look(() => 0);
   assert.equal(all.traffic.underWay, 0);
   assert.equal(all.traffic.abandoned, 2 * MAX_FETCHES);

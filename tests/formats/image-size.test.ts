@@ -1,6 +1,6 @@
 /**
  * Sizes of image files by their headers, before a browser decodes them.
- * SECURITY.md: "A scene costs what it weighs".
+ * SECURITY.md: "The size of a file bounds its cost".
  */
 import assert from 'node:assert/strict';
 import { test } from 'node:test';

@@ -40,7 +40,7 @@ function assertWithinSteps(found: GaussianCloud, expected: GaussianCloud, what: 
   assertNear(found.sh, expected.sh, 0.5 / 255 / 0.282 + 1e-5, `${what}, harmonics`);
 }
 
-test('what was written is read, whatever its cells, with z up', async () => {
+test('written scenes are read, with any cells, with z up', async () => {
   for (const shDegree of [3, 0] as const) {
     const cloud = smallCloud(50, shDegree);
     for (const cellSize of [Infinity, 50, 16, 1]) {

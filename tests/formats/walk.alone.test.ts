@@ -1,6 +1,6 @@
 /**
  * Floors: found in splats and voxels, stored, walked on, and bounded in work.
- * SECURITY.md: "A scene costs what it weighs".
+ * SECURITY.md: "The size of a file bounds its cost".
  */
 import assert from 'node:assert/strict';
 import { spawnSync } from 'node:child_process';

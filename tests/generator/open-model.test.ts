@@ -93,7 +93,7 @@ test('generators are loaded again for another device, as after the loss of the f
   assert.ok(counts[0] === counts[1] && counts[2] === 2 * counts[0], counts.join());
 });
 
-test('a generator that nobody uses does not stay in memory as long as its device', async () => {
+test('an unused generator does not stay in memory as long as its device', async () => {
   const server = createServer((_, response) => response.end(fixtureBytes('packed.onnx')));
   await new Promise<void>((resolve) => server.listen(0, '127.0.0.1', resolve));
   const url = `http://127.0.0.1:${(server.address() as AddressInfo).port}/packed.onnx`;

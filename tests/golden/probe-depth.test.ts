@@ -33,11 +33,7 @@ for (const rasterizer of RASTERIZERS) {
     const turned = cameraAt([3, 1, -6], [0, 0, 0], { width: 96, height: 64 });
     const gaussians = await GaussianBuffers.upload(device, packGaussians(cloud));
     const renderer = new Renderer(device, { rasterizer });
-    assert.deepEqual(
-      await renderer.probe([{ x: 1, y: 1 }]),
-      [],
-      'before the first frame there is nothing to probe',
-    );
+    assert.deepEqual(await renderer.probe([{ x: 1, y: 1 }]), [], 'before the first frame there is nothing to probe');
     const random = randomSource(3);
     for (const [i, camera] of [near, turned, turned].entries()) {
       const pixels = await capture(device, renderer, { gaussians, camera });

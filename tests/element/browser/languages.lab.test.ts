@@ -38,7 +38,7 @@ describe('the words of the element', () => {
     await until(() => roleOf(element) === '3D-Ansicht', 'German words');
   });
 
-  it('give way to those of the page', async () => {
+  it('are replaced by those of the page', async () => {
     const element = await showLoaded({ 'camera-controls': '', lang: 'es', a11y: '{"role": "Mi visor"}' });
     await until(() => keysOf(element)?.textContent.startsWith('Las flechas') === true, 'Spanish keys');
     assertEqual(roleOf(element), 'Mi visor', 'role');

@@ -148,7 +148,7 @@ describe('meshes', () => {
     assert(max <= 24, `lit grays ${lit.join()} for ${shown.join()}`);
   });
 
-  it('are shown whatever bounds their file states, and opaque where their glass is', async () => {
+  it('are shown with any bounds in their file, and opaque where their glass is', async () => {
     const canvas = new OffscreenCanvas(1, 1);
     canvas.getContext('2d')!.fillRect(0, 0, 1, 1);
     const bytes = new Uint8Array(await (await canvas.convertToBlob()).arrayBuffer());
@@ -184,7 +184,7 @@ describe('meshes', () => {
     assert(await comesToShow(element, (screen) => screen.middleOf(isRed) !== null), 'it is drawn');
   });
 
-  itInLab('are in pictures of toBlob(), over a color and over nothing, and hide splats there', async () => {
+  itInLab('are in images of toBlob(), over a color and over nothing, and hide splats there', async () => {
     const element = place({ src: GREEN });
     element.append(mesh({ half: [0.2, 0.2, 0.1] }, { position: '0 0 3m' }));
     await element.ready;

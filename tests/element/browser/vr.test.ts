@@ -184,7 +184,7 @@ describe('VR', () => {
     }
   });
 
-  it("takes a session from the browser's own button, which is offered anew after each", async () => {
+  it("takes a session from the browser's own button, which is offered again after each", async () => {
     headset();
     const offers: ((session: unknown) => void)[] = [];
     const system = xr() as XrLike & { offerSession?: unknown };
@@ -197,7 +197,7 @@ describe('VR', () => {
       assertEqual(offers.length, 1, 'offers');
       offers[0](await xr().requestSession('immersive-vr', {}));
       await until(() => element.getAttribute('vr-status') === 'session-started', 'the session', LIMIT_MS);
-      await until(() => isDrawn(), 'a picture in the headset', LIMIT_MS);
+      await until(() => isDrawn(), 'a frame in the headset', LIMIT_MS);
       await leave(element);
       await until(() => offers.length === 2, 'another offer', LIMIT_MS);
       element.remove();
