@@ -11,6 +11,7 @@ export {
   Raycaster,
   RenderTarget,
   Scene,
+  Sphere,
   Texture,
   Vector3,
   WebGPUCoordinateSystem,

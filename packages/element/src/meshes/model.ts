@@ -5,12 +5,14 @@ import { unpackedViews } from './unpack.js';
 import {
   AnimationMixer,
   Box3,
+  type BufferGeometry,
   GLTFLoader,
   type GLTFParser,
   type Group,
   type Material,
   type Mesh,
   type Object3D,
+  Sphere,
   Texture,
   type Vector3 as Vector,
 } from './three.js';
@@ -51,8 +53,7 @@ export class Model {
       if ('isLight' in object) lights++;
     });
     this.#meshes = meshes;
-    // The loader takes bounds from the file, where they may be wrong. Without them, three.js computes them.
-    for (const { geometry } of meshes) geometry.boundingBox = geometry.boundingSphere = null;
+    for (const { geometry } of meshes) bound(geometry);
     this.hasLights = lights > 0;
     this.triangles = meshes.reduce((sum, { geometry: { index, attributes } }) => {
       return sum + Math.floor((index ?? attributes.position)?.count / 3 || 0);
@@ -174,6 +175,15 @@ class DrawableBox extends Box3 {
 
 const isNear = ({ x, y, z }: Vector): boolean =>
   Math.abs(x) <= FARTHEST && Math.abs(y) <= FARTHEST && Math.abs(z) <= FARTHEST;
+
+/** Computes the bounds of a geometry, because those that a file states may be wrong. */
+function bound(geometry: BufferGeometry): void {
+  const box = new DrawableBox().setFromBufferAttribute(geometry.attributes.position);
+  // Morph targets may leave the box: three.js computes their bounds.
+  const isMorphed = geometry.morphAttributes.position !== undefined;
+  geometry.boundingBox = isMorphed ? null : box;
+  geometry.boundingSphere = isMorphed ? null : box.getBoundingSphere(new Sphere());
+}
 
 function boundsOf(root: Group): Bounds {
   root.updateMatrixWorld(true);

@@ -28,12 +28,17 @@ export class Raycaster {
   /** Returns all intersections, the nearest first. */
   intersectObject(object: Object3D, recursive: boolean): Intersection[];
 }
+export class Sphere {
+  radius: number;
+}
 export class Box3 {
   min: Vector3;
   max: Vector3;
   expandByPoint(point: Vector3): this;
   union(box: Box3): this;
   setFromObject(object: Object3D, precise?: boolean): this;
+  setFromBufferAttribute(attribute: Attribute): this;
+  getBoundingSphere(target: Sphere): Sphere;
   isEmpty(): boolean;
 }
 /** Layers of an object or camera, as bits of 32: a camera draws the objects that share one of its layers. */
@@ -136,7 +141,8 @@ export class BufferGeometry {
   attributes: Readonly<Record<string, Attribute>>;
   setIndex(indices: number[]): this;
   boundingBox: Box3 | null;
-  boundingSphere: object | null;
+  boundingSphere: Sphere | null;
+  readonly morphAttributes: { readonly position?: readonly Attribute[] };
   dispose(): void;
 }
 /** Triangles, lines (`Line`) or points (`Points`). */
