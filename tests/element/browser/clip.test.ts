@@ -89,7 +89,7 @@ describe('a clip', () => {
     for (const { localName, paused, currentTime } of [element, child])
       assertEqual([paused, currentTime], [true, 0.35], `paused and time of ${localName}`);
     element.src = child.src = CLIP;
-    await until(() => element.currentTime > 0.4 && child.currentTime > 0.4, 'later scenes to play by themselves');
+    await until(() => element.currentTime > 0.4 && child.currentTime > 0.4, 'later scenes to play automatically');
     const played = element.play().catch(({ name }: Error) => name);
     element.src = `${CLIP}?frames=8`;
     assertEqual(await played, 'AbortError', 'a promise of the scene before');

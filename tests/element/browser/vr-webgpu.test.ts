@@ -200,7 +200,7 @@ describe('VR by WebGPU', () => {
     };
     try {
       buttonOf(element)!.click();
-      await until(() => binding!.frames > 1, 'a picture in the headset', LIMIT_MS);
+      await until(() => binding!.frames > 1, 'a frame in the headset', LIMIT_MS);
       assertEqual(budget, 0, 'budget of a scene without levels');
       const folder = detailFolder(pebbles(2_000));
       for (const [name, body] of folder.files) await fetch(`/net/kept/session/${name}`, { method: 'PUT', body });
@@ -214,7 +214,7 @@ describe('VR by WebGPU', () => {
     await leave(element);
   });
 
-  itInLab('what moves in the page plays in the headset, and goes on from there', async () => {
+  itInLab('what moves in the page plays in the headset, and continues from there', async () => {
     headset();
     binding = fakeBinding('array', 1);
     const page = (element = await showVr('<splat-scene src="/net/clip/ball.gsv"></splat-scene>'));
