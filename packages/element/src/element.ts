@@ -26,8 +26,9 @@ const CAMERA_SETTINGS: ReadonlyMap<unknown, keyof CameraSettings> = new Map([
 
 /** Returns the language of a node: of its nearest ancestor with `lang`, which may be outside of its shadow tree. */
 function languageAt(node: HTMLElement): string {
+  // The root of a removed element may be a link, whose `host` is a text.
   const { host } = node.getRootNode() as Partial<ShadowRoot>;
-  return node.closest<HTMLElement>('[lang]')?.lang ?? (host ? languageAt(host as HTMLElement) : '');
+  return node.closest<HTMLElement>('[lang]')?.lang ?? (host?.closest ? languageAt(host as HTMLElement) : '');
 }
 
 /** Names of the custom states, for `gaussian-splat:state(ready)` in CSS. */
