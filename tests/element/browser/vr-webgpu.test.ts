@@ -121,20 +121,14 @@ describe('VR by WebGPU', () => {
       }
       assertEqual(await sortsIn(binding, 5), 1, 'sorts a frame');
       const before = await binding.pixels('left');
-      for (const [name, value] of [
-        ['filter', 'antialiased'],
-        ['quality', 'fast'],
-      ]) {
-        element.setAttribute(name, value);
-        const next = binding.frames + 3;
-        await until(() => binding!.frames >= next, `frames with another ${name}`, LIMIT_MS);
-        const after = await binding.pixels('left');
-        assert(
-          after.some((byte, i) => byte !== before[i]),
-          `${name} has no effect`,
-        );
-        before.set(after);
-      }
+      element.setAttribute('filter', 'antialiased');
+      const next = binding.frames + 3;
+      await until(() => binding!.frames >= next, 'frames with another filter', LIMIT_MS);
+      const after = await binding.pixels('left');
+      assert(
+        after.some((byte, i) => byte !== before[i]),
+        'the filter has no effect',
+      );
       assertEqual(headset().layer, undefined, 'a WebGL layer');
       assertEqual(binding.errors, [], 'errors of the GPU');
       assert(binding.isCompatible, 'the adapter was not asked for as compatible with headsets');
