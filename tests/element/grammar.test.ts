@@ -1,7 +1,13 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import fc from 'fast-check';
-import { credentialsOf, readAttributes, type RawAttributes } from '../../packages/element/src/attributes.js';
+import {
+  ATTRIBUTES,
+  credentialsOf,
+  readAttributes,
+  type RawAttributes,
+} from '../../packages/element/src/attributes.js';
+import { MESH_ATTRIBUTES, SCENE_ATTRIBUTES } from '../../packages/element/src/composition/attributes.js';
 import {
   fieldOfViewGrammar,
   numberGrammar,
@@ -18,6 +24,12 @@ const orbit = orbitGrammar('0deg 75deg auto');
 const DEGREE = Math.PI / 180;
 
 const ABSENT = {} as RawAttributes;
+
+test('the default of each attribute fits its own grammar', () => {
+  for (const table of [ATTRIBUTES, SCENE_ATTRIBUTES, MESH_ATTRIBUTES] as const)
+    for (const [name, { grammar }] of Object.entries(table as Record<string, { grammar?: AttributeGrammar<unknown> }>))
+      if (grammar) assert.notEqual(grammar.parse(grammar.fallback), null, name);
+});
 
 test('detail: a word, or pixels', () => {
   const detailOf = (detail: string): unknown => readAttributes({ ...ABSENT, detail }, assert.fail).detail;
