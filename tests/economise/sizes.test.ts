@@ -25,12 +25,12 @@ test('a GLB of 4 GiB is refused before its memory is allocated; one below is all
   };
   const pool = { ...inline, allocate };
   // A splat of degree 3 has 4 * (3 + 1 + 3 + 48) + 8 bytes.
-  const most = Math.floor((2 ** 32 - 16_384) / 228);
+  const maxCount = Math.floor((2 ** 32 - 16_384) / 228);
   const splats = (count: number): Promise<unknown> =>
     writeGlb({ cloud: declaring(count), degrees: new Uint8Array(count).fill(3) }, pool);
-  await assert.rejects(splats(most + 100), tooLarge);
+  await assert.rejects(splats(maxCount + 100), tooLarge);
   assert.deepEqual(lengths, []);
-  await assert.rejects(splats(most), tooMuch);
+  await assert.rejects(splats(maxCount), tooMuch);
   assert.ok(lengths.length === 1 && lengths[0] < 2 ** 32 && lengths[0] > 2 ** 32 - 20_000, `${lengths.join()} bytes`);
 });
 

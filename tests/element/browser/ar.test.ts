@@ -65,7 +65,7 @@ async function nextView(): Promise<ArrayLike<number>> {
   let camera: { worldToCamera: ArrayLike<number> } | undefined;
   GlRenderer.prototype.render = function (request, quads) {
     if (request.shDegree > 0) ({ camera } = request);
-    render.call(this, request, quads);
+    return render.call(this, request, quads);
   };
   try {
     await until(() => camera !== undefined, 'an image', LIMIT_MS);

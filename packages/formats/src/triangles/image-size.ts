@@ -93,7 +93,7 @@ function avifHeader(bytes: Uint8Array): ImageHeader | undefined {
     .flatMap((properties) => boxesIn(properties, 'ispe'))
     .filter(({ length }) => length >= 12)
     .map(viewOf);
-  const max = (at: number): number => sizes.reduce((most, view) => Math.max(most, view.getUint32(at)), 0);
+  const max = (at: number): number => sizes.reduce((largest, view) => Math.max(largest, view.getUint32(at)), 0);
   return { type: 'image/avif', width: max(4), height: max(8) };
 }
 
