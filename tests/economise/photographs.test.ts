@@ -56,7 +56,7 @@ test('views name their photographs; every Nth is held out', () => {
   for (const other of [{ views: [{ width: 40 }] }, [null], [{ img_name: 'a' }]])
     assert.throws(() => readPhotographs(file('none.json', other)), /found neither/);
   writeFileSync(join(folder, 'prose.json'), 'hello');
-  assert.throws(() => readPhotographs(join(folder, 'prose.json')), /prose\.json is no JSON/);
+  assert.throws(() => readPhotographs(join(folder, 'prose.json')), /prose\.json is not JSON/);
 });
 
 test('the first target loses the limit if errors are independent', () => {

@@ -1,5 +1,5 @@
 import { constants, layouts } from './generated/shaders.js';
-import { readBack } from './gpu/read-back.js';
+import { BUFFER_USAGE } from './gpu/kernel.js';
 import type { Scratch } from './scratch.js';
 
 /** Counts of one frame. */
@@ -39,18 +39,35 @@ export async function readFrameStats(
   pairPlan: GPUBuffer | undefined,
 ): Promise<FrameStats> {
   if (!scratch) return { visible: 0, overflow: 0, pairs: 0, pairOverflow: 0, unusable: 0, budgetError: 0, covered: 0 };
-  const { cullStats, chunkShares } = scratch;
-  // `overflow` follows `visible`, which a test of the layouts checks.
-  const counts = { byteOffset: layouts.Plan.fields.visible.offset, byteLength: 8 };
-  const parts = [
-    { buffer: scratch.plan, ...counts },
-    { buffer: cullStats, byteOffset: 4 * constants.UNUSABLE, byteLength: 4 },
-    { buffer: cullStats, byteOffset: 4 * constants.COVERED, byteLength: 4 },
-    { buffer: chunkShares, byteOffset: chunkShares.size - 4, byteLength: 4 },
-    ...(pairPlan ? [{ buffer: pairPlan, ...counts }] : []),
+  const { visible, overflow } = layouts.Plan.fields;
+  const sources: [GPUBuffer | undefined, number][] = [
+    [scratch.plan, visible.offset],
+    [scratch.plan, overflow.offset],
+    [pairPlan, visible.offset],
+    [pairPlan, overflow.offset],
+    [scratch.cullStats, 4 * constants.UNUSABLE],
+    [scratch.chunkShares, scratch.chunkShares.size - 4],
+    [scratch.cullStats, 4 * constants.COVERED],
   ];
-  const read = (await readBack(device, parts)).map((bytes) => new Uint32Array(bytes));
-  const [[visible, overflow], [unusable], [covered], share, [pairs, pairOverflow] = [0, 0]] = read;
-  const [budgetError] = new Float32Array(share.buffer);
-  return { visible, overflow, pairs, pairOverflow, unusable, budgetError, covered: covered / constants.COVERED_UNIT };
+  const staging = device.createBuffer({
+    label: 'gs.statistics',
+    size: 4 * sources.length,
+    usage: BUFFER_USAGE.mapRead | BUFFER_USAGE.copyDestination,
+  });
+  const encoder = device.createCommandEncoder();
+  sources.forEach(([buffer, offset], i) => buffer && encoder.copyBufferToBuffer(buffer, offset, staging, 4 * i, 4));
+  device.queue.submit([encoder.finish()]);
+  await staging.mapAsync(0x1);
+  const words = new Uint32Array(staging.getMappedRange().slice(0));
+  staging.destroy();
+  const [budgetError] = new Float32Array(words.buffer, 4 * 5, 1);
+  return {
+    visible: words[0],
+    overflow: words[1],
+    pairs: words[2],
+    pairOverflow: words[3],
+    unusable: words[4],
+    budgetError,
+    covered: words[6] / constants.COVERED_UNIT,
+  };
 }
