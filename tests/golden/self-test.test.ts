@@ -3,7 +3,7 @@ import assert from 'node:assert/strict';
 import { after, test } from 'node:test';
 import { passesSelfTest } from '@gaussian-splat/renderer/stages';
 import { autotune, type RasterizerName } from '@gaussian-splat/renderer';
-import { faultsOf, loadFirstUse, type Threads } from '@gaussian-splat/renderer/tools';
+import { faultsOf, type Threads } from '@gaussian-splat/renderer/tools';
 import { isLab } from '../support/extent.js';
 import { miscompiling, type Miscompilation } from '../support/miscompilation.js';
 import { endNodeDevice, nodeDevice } from '../support/node-device.js';
@@ -230,101 +230,6 @@ for (const { what, threads = 'serial', rasterizer = 'quads', ...fault } of isLab
     assert.ok(befallen.length > 0, `${fault.shader.source} has "${fault.from}"`);
   });
 }
-
-/** Stages that few scenes need, which are tested when a device first needs them. */
-const FIRST_USES: readonly (Mutant & { readonly stage: 'packsTensors' | 'selectsLevels' })[] = [
-  {
-    what: 'rows of later workgroups are those of the first',
-    stage: 'packsTensors',
-    shader: /gs.ingest$/,
-    from: 'gaussians[row] = ingest_row(row, lane);',
-    to: 'gaussians[row] = ingest_row(row % 2048u, lane);',
-  },
-  {
-    what: 'subnormal and normal halves are confused',
-    stage: 'packsTensors',
-    shader: /gs.ingest$/,
-    from: '(magnitude << 13u) + 0x38000000u',
-    to: '(magnitude << 13u) + 0x37800000u',
-  },
-  {
-    what: 'quaternions are read with w last',
-    stage: 'packsTensors',
-    shader: /gs.ingest$/,
-    from: 'if (ingest.is_w_first != 0u)',
-    to: 'if (ingest.is_w_first > 1u)',
-  },
-  {
-    what: 'a number of a covariance is lost',
-    stage: 'packsTensors',
-    shader: /gs.ingest$/,
-    from: 'ratio(b.y - zx * yx, yy)',
-    to: 'ratio(b.y, yy)',
-  },
-  {
-    what: 'harmonics by channel are read by coefficient',
-    stage: 'packsTensors',
-    shader: /gs.ingest$/,
-    from: 'default: { return bits_of(COLORS, ingest.colors, row, (k % 3u) * coefficients + k / 3u); }',
-    to: 'default: { return bits_of(COLORS, ingest.colors, row, k); }',
-  },
-  {
-    what: 'bounds of a chunk lack the upper half of its rows',
-    stage: 'packsTensors',
-    shader: /gs.ingest$/,
-    from: 'for (var half = CULL_GROUP / 2u; half > 0u; half /= 2u)',
-    to: 'for (var half = CULL_GROUP / 4u; half > 0u; half /= 2u)',
-  },
-  {
-    what: 'the children of a chunk never replace it',
-    stage: 'selectsLevels',
-    shader: /gs.cull_chunks$/,
-    from: 'if (pixels > allowed) { return FADE_STEPS; }',
-    to: '',
-  },
-  {
-    what: 'the parent of a chunk has its sphere',
-    stage: 'selectsLevels',
-    shader: /gs.cull_chunks$/,
-    from: 'select(d.full_error, d.parent_error, is_above)',
-    to: 'd.parent_error',
-  },
-  {
-    what: 'splats of a chunk are not counted twice',
-    stage: 'selectsLevels',
-    shader: /gs.detail_count$/,
-    from: 'atomicAdd(&own_counts[DETAIL_BUCKETS + bucket_of(above)], splats);',
-    to: '',
-  },
-  {
-    what: 'sums of the upper half of the buckets are lost',
-    stage: 'selectsLevels',
-    shader: /gs.detail_allow$/,
-    from: 'looked_at[lane] = more - fewer;',
-    to: 'looked_at[lane] = select(0u, more - fewer, lane < 128u);',
-  },
-];
-
-for (const { what, stage, ...fault } of isLab ? FIRST_USES : FIRST_USES.filter((_, i) => i % 3 === 0)) {
-  test(`found at the first use: ${what}`, async () => {
-    const { device, befallen } = miscompiling(await nodeDevice(), [fault]);
-    const firstUse = await loadFirstUse();
-    const settings = { threads: 'serial', rasterizer: 'quads', accumulation: 'rgba16float' } as const;
-    assert.equal(await firstUse[stage](device, settings), false);
-    assert.ok(befallen.length > 0, `${fault.shader.source} has "${fault.from}"`);
-    assert.match(faultsOf(device).join(), /errors of this GPU/);
-  });
-}
-
-test('stages of a first use pass where nothing is broken', async () => {
-  const device = await nodeDevice();
-  const { packsTensors, selectsLevels } = await loadFirstUse();
-  const start = performance.now();
-  assert.ok(await packsTensors(device));
-  const packed = performance.now();
-  assert.ok(await selectsLevels(device, { threads: 'serial', rasterizer: 'quads', accumulation: 'rgba16float' }));
-  console.log(`ingest ${(packed - start).toFixed(0)} ms, levels ${(performance.now() - packed).toFixed(0)} ms`);
-});
 
 test(
   'what is broken is named, and another variant draws',

@@ -74,4 +74,3 @@ export { RankedHeap } from './ranked-heap.js';
 export { untilItHasRoom } from './until-it-has-room.js';
 export { faultsOf } from './variants.js';
 export { packAnimation, type Motions, type PackedAnimation } from './pack/pack-animated.js';
-export { loadFirstUse } from './autotune/load-first-use.js';

@@ -3,14 +3,14 @@
  * them.
  */
 import { DetailedGaussians } from '@gaussian-splat/renderer';
-import { loadFirstUse, readPacked, type PackedLevels } from '@gaussian-splat/renderer/tools';
+import { readPacked, type PackedLevels } from '@gaussian-splat/renderer/tools';
 import type { LoadedGaussians } from '../gpu/loaded-gaussians.js';
 import { buffersOf } from '../loading/protocol.js';
 import type { SceneLoader } from '../loading/scene-loader.js';
 
 /**
  * Builds levels of detail for the splats of a scene, in the worker, and uploads them. Returns undefined for a scene
- * that is too small for levels, if the page does not allow workers, and if the GPU selects wrong levels.
+ * that is too small for levels, and if the page does not allow workers.
  * @param memoryBudget Maximum GPU memory of the scene and its levels, in bytes; undefined if only the device limits it.
  * @throws GaussianSplatError `out-of-memory/*`, or the signal's reason.
  */
@@ -21,7 +21,6 @@ export async function buildLevels(
   signal: AbortSignal,
 ): Promise<DetailedGaussians | undefined> {
   const { place, gaussians } = scene;
-  if (!(await (await loadFirstUse()).selectsLevels(place.device))) return undefined;
   const packed = await readPacked(place.device, gaussians, () => {
     signal.throwIfAborted();
     // A sequence frees the splats when it replaces them.

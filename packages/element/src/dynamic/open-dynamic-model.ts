@@ -5,7 +5,6 @@ import { SPLAT_FILTERS } from '@gaussian-splat/core';
 import { Generator, setRuntimeLocation, type GeneratorModel, type ModelSource } from '@gaussian-splat/generator';
 import { DynamicGaussians } from '@gaussian-splat/renderer';
 import { pickInitialVariants } from '@gaussian-splat/renderer';
-import { loadFirstUse } from '@gaussian-splat/renderer/tools';
 import { LoadedGaussians } from '../gpu/loaded-gaussians.js';
 import { limitScenes } from '../gpu/memory-budget.js';
 import { images as frames, unlessWrong } from '../gpu/initial-frames.js';
@@ -126,7 +125,6 @@ async function openDynamicModel(
   try {
     const { models, model } = generator;
     for (const { notes, url } of models) for (const note of notes) console.warn(`<gaussian-splat>: ${url}: ${note}.`);
-    await (await loadFirstUse()).requirePacking(device);
     gaussians = await DynamicGaussians.create(device, model.layout, {
       ...(model.contract.filter ? SPLAT_FILTERS[model.contract.filter] : { antialiased: model.contract.antialiased }),
       memoryBudget: request.memoryBudget,

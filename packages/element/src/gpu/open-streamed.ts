@@ -2,7 +2,7 @@
 import { fileRequest } from '@gaussian-splat/core/fetch';
 import { loadModule } from '@gaussian-splat/core';
 import { MemoryLedger, pickInitialVariants, StreamedGaussians, type PoolOptions } from '@gaussian-splat/renderer';
-import { levelSource, loadFirstUse } from '@gaussian-splat/renderer/tools';
+import { levelSource } from '@gaussian-splat/renderer/tools';
 import type { LoadedBoxes, ProgressListener, SceneLimits, SceneRequest } from '../loading/protocol.js';
 import type { SceneWorker, SceneLoader } from '../loading/scene-loader.js';
 import type { ClipPlayer } from '../dynamic/clip-player.js';
@@ -70,19 +70,13 @@ async function openStreamed(request: SceneRequest, device: GPUDevice, options: S
       console.warn(sentence);
     },
   };
-  const testing = loadFirstUse().then(({ requireLevels }) => requireLevels(device));
-  testing.catch(() => undefined);
   const isSog = new URL(request.url).pathname.endsWith('lod-meta.json');
   const gaussians = await (isSog ? openBoxes : openPages)(request, device, options, pool);
   const { bounds, order } = gaussians;
-  try {
-    await testing;
-    signal.throwIfAborted();
-  } catch (error) {
-    gaussians.destroy();
-    throw error;
-  }
-  return { ...{ gaussians, bounds, order, warnings }, detail: { detail: DETAIL, splatBudget: caps.splats } };
+  if (!signal.aborted)
+    return { ...{ gaussians, bounds, order, warnings }, detail: { detail: DETAIL, splatBudget: caps.splats } };
+  gaussians.destroy();
+  throw signal.reason;
 }
 
 async function openClip(request: SceneRequest, device: GPUDevice, options: StreamedOptions): Promise<OpenedStream> {
