@@ -98,7 +98,7 @@ test('invalid arguments are reported in a line, without a stack trace, and at on
     [/expected one SCENE/],
     [/--out is missing/, scene],
     [/is a folder, not a scene/, folder, '--out', out],
-    [/is no folder/, scene, '--out', scene],
+    [/is not a folder/, scene, '--out', scene],
     [/is not empty/, scene, '--out', folder],
     [/--spacing: expected a length/, scene, '--out', out, '--tile', '2x2', '--spacing', 'Infinity'],
     [/--spacing: expected a length/, scene, '--out', out, '--tile', '20x2', '--spacing', '1e38'],

@@ -204,9 +204,9 @@ test('what cannot be written, or would replace what is read, is said before the 
     [/--out: the folder .*nowhere does not exist/, 'floor', 'gltf/scene.gltf', '--out', 'nowhere/a.floor'],
     [/--up: expected x, .* found "toString"/, 'floor', 'gltf/scene.gltf', '--out', 'a.floor', '--up', 'toString'],
     [/--out: the folder .*nowhere does not exist/, 'sequence', 'camera.json', '--out', 'nowhere/a.gsv'],
-    [/--out: .*camera\.json is no folder/, 'sequence', 'camera.json', '--out', 'camera.json/a'],
-    [/camera\.json is no folder/, 'page', 'gltf/scene.gltf', 'camera.json/a', '--no-serve'],
-    [/--out: .*camera\.json is no folder/, 'video', 'gltf/scene.gltf', '--turntable', '--out', 'camera.json/a'],
+    [/--out: .*camera\.json is not a folder/, 'sequence', 'camera.json', '--out', 'camera.json/a'],
+    [/camera\.json is not a folder/, 'page', 'gltf/scene.gltf', 'camera.json/a', '--no-serve'],
+    [/--out: .*camera\.json is not a folder/, 'video', 'gltf/scene.gltf', '--turntable', '--out', 'camera.json/a'],
   ];
   for (const [sentence, ...args] of someOf(cases, 2)) refused(2, sentence, ...args);
   assert.deepEqual(readFileSync(inFolder('gltf', 'scene.gltf')), scene);

@@ -235,7 +235,8 @@ describe('renderer="webgl"', () => {
     await element.ready;
     assert(element.loaded, element.error?.message ?? 'loaded');
     const parts = draws - before;
-    assert(parts >= 16, `${parts} parts`);
+    // The first part has a seventh of the pixels, and each next one at most four times as many.
+    assert(parts >= 3, `${parts} parts`);
     const inParts = element.shadowRoot!.querySelector('canvas')!.toDataURL();
     assertEqual(inParts, element.toDataURL(), 'the frame');
     // Reading draws the frame once.
