@@ -104,7 +104,7 @@ async function filesOf(scene, source, cloud, views) {
       return file(`SOG, ours, ${decibels} dB`, sog);
     });
     const folder = made(`pages-${decibels}`);
-    const asked = ['--out', folder, '--min-psnr', decibels];
+    const asked = ['--out', folder, '--min-psnr', decibels, '--views', views];
     makers.push(async () => {
       if (!(await make(folder, process.execPath, own('detail', source, ...asked), values.kept))) return undefined;
       const { bytes } = await readFolder(folder);

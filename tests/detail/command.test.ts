@@ -105,6 +105,7 @@ test('invalid arguments are reported in a line, without a stack trace, and at on
     [/--min-psnr: expected 30 to 60/, scene, '--out', out, '--min-psnr', '70'],
     [/--score-views: expected a whole number from 24 to 2000/, scene, '--out', out, '--score-views', '5'],
     [/--degree/, scene, '--out', out, '--degree', '4'],
+    [/found no list "views"/, scene, '--out', out, '--views', 'package.json'],
   ];
   for (const [expected, ...args] of someOf(cases, 3)) {
     const { status, text } = detail(...args);

@@ -4,7 +4,7 @@
  */
 import { existsSync, mkdirSync, readdirSync, rmSync, statSync, writeFileSync } from 'node:fs';
 import { dirname, join, resolve } from 'node:path';
-import { readScene, toDegree, upright } from '@gaussian-splat/formats';
+import { readScene, toDegree, upright, uprightRotation } from '@gaussian-splat/formats';
 import { deviceDescriptor, pickInitialVariants } from '@gaussian-splat/renderer';
 import {
   buildDetailTree,
@@ -17,6 +17,7 @@ import {
 } from '@gaussian-splat/economise/pages';
 import { parseSceneOptions, runCommand, sayWarnings, UsageError } from './lib/command.mjs';
 import { deflate, deflateQuickly } from './lib/encoders.mjs';
+import { dealViews, parseViews } from './lib/given-views.mjs';
 import { obstacleToFolder, writeWhole } from './lib/output-file.mjs';
 import { readWhole } from './lib/input-file.mjs';
 
@@ -25,6 +26,7 @@ const USAGE = `usage: gaussian-splat detail SCENE --out FOLDER [options]
   --out FOLDER    an empty folder, one that does not exist yet, or one where a run was ended early: detail.json and pages/, docs/lod-format.md describes them
   --degree D      spherical harmonics up to this degree, 0 to 3; default: those of the scene
   --min-psnr DB   PSNR to SCENE over the covered pixels of held-out views that the finest pages reach, 30 to 60 (default 50): files are as small as that allows
+  --views FILE    {views: [{width, height, K, worldToCamera}, ...]}, eight or more: where people will look from, in place of views around the scene. Rooms need it
   --score-views N views from all directions that measure the visibility of splats, 24 to 2000 (default 216): harmonics that are hardly visible are rounded more
   --quantized     pages as the GPU reads them, not compressed: 66 dB and more, in two to three times the bytes
   --exact         the same with centers, shapes and opacities as float32 keeps them, in three to four times the bytes
@@ -40,6 +42,7 @@ function parseOptions(args) {
     tile: text,
     spacing: text,
     'min-psnr': { ...text, default: '50' },
+    views: text,
     'score-views': { ...text, default: '216' },
     quantized: { type: 'boolean' },
     exact: { type: 'boolean' },
@@ -70,11 +73,11 @@ function parseOptions(args) {
   const scored = Number(values['score-views']);
   if (!(Number.isInteger(scored) && scored >= 24 && scored <= 2000))
     throw new UsageError(`--score-views: expected a whole number from 24 to 2000, found "${values['score-views']}"`);
+  const views = values.views === undefined ? undefined : resolve(values.views);
   return {
-    scene,
-    out,
-    degree,
-    scored,
+    ...{ scene, out, degree, scored },
+    // The file is read first, so that its faults are reported before the work.
+    given: views && { path: views, views: parseViews(views) },
     geometry: values.exact ? undefined : 'quantized',
     minPsnr: values.exact || values.quantized ? undefined : minPsnr,
     columns: Number(tile[1]),
@@ -107,12 +110,12 @@ async function deviceToMeasure() {
 }
 
 /** Coding of the files, and its accuracy; undefined for uncompressed files. */
-async function chooseCoding({ tree, cloud, minPsnr, scored }) {
+async function chooseCoding({ tree, cloud, minPsnr, scored, views }) {
   if (minPsnr === undefined) return undefined;
   const device = await deviceToMeasure();
   if (device === undefined) return { coding: codingFor(DEFAULT_STEPS), deflate };
   const { steps, ...found } = await findPageSteps({
-    ...{ tree, pages: cutPages(tree), cloud, device, minPsnr, scored, deflate: deflateQuickly },
+    ...{ tree, pages: cutPages(tree), cloud, device, minPsnr, scored, views, deflate: deflateQuickly },
     onStep: (step) => console.log(`  ${step}`),
   });
   return { coding: codingFor(steps), deflate, ...found };
@@ -141,19 +144,20 @@ function writeFolder(out, tree, coded, places) {
   }
 }
 
-async function main({ scene, out, degree, geometry, minPsnr, scored, columns, rows, spacing }) {
+async function main({ scene, out, degree, geometry, minPsnr, scored, given, columns, rows, spacing }) {
   const openFile = (path) => readWhole(join(dirname(scene), path));
   const read = await readScene(await readWhole(scene), { name: scene, openFile });
   sayWarnings(scene, read, 'detail.json');
   // Pages store no up direction, so the scene is rotated to the default, (0, -1, 0).
   const cloud = upright(toDegree(Math.min(degree, read.shDegree), read));
+  const views = given && dealViews(given.views, given.path, uprightRotation(read)).dealt;
   const start = performance.now();
   const tree = buildDetailTree(cloud, { geometry });
   const built = performance.now();
   const isTiled = columns * rows > 1;
   if (isTiled && tree.levels.length === 1) throw new UsageError('--tile: expected a scene of more than 256 splats');
   const places = isTiled ? placesOnGrid(columns, rows, spacing ?? 2.5 * tree.bounds.radius) : undefined;
-  const choice = await chooseCoding({ tree, cloud, minPsnr, scored });
+  const choice = await chooseCoding({ tree, cloud, minPsnr, scored, views });
   const coded = performance.now();
   const { manifest, bytes } = writeFolder(out, tree, choice, places);
   const pages = manifest.instances.reduce((sum, { tree: t }) => sum + manifest.trees[t].pages.length, 0);

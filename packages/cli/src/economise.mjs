@@ -1,9 +1,8 @@
 /** Implementation of `gaussian-splat economise`: reads a scene, compresses it, writes it, and reports the result. */
 import { existsSync, mkdirSync, readdirSync, statSync } from 'node:fs';
 import { basename, dirname, join, resolve } from 'node:path';
-import { boundsOf, cameraFromCalibration } from '@gaussian-splat/core';
+import { boundsOf } from '@gaussian-splat/core';
 import {
-  dealOwnViews,
   dealtViewsOfVisitors,
   economise,
   economisePassing,
@@ -25,7 +24,6 @@ import { holdOut, readPhotographs } from './lib/gate/photographs.mjs';
 import { deviceDescriptor } from '@gaussian-splat/renderer';
 import { requestNodeAdapter } from './lib/node-gpu.mjs';
 import { checkOutput, isSameFile, obstacleTo, obstacleToFolder, writeWhole } from './lib/output-file.mjs';
-import { readJson } from './lib/input-file.mjs';
 import { startReading } from './lib/scene-in-parts.mjs';
 import { ThreadPool, usualThreads } from './lib/thread-pool.mjs';
 
@@ -122,39 +120,8 @@ function writeOut(out, bytes) {
   }
 }
 
-function parseViews(path) {
-  const views = readJson(path)?.views;
-  if (Array.isArray(views)) return views;
-  throw new UsageError(
-    `--views: expected {views: [{width, height, K, worldToCamera}, ...]}, found no list "views" in ${path}`,
-  );
-}
-
 /** Every n-th photograph judges files. Training usually holds out the same fraction. */
 const JUDGING = 8;
-
-/** Maximum side of a view in pixels, as in training. Larger images need gigabytes, or exceed limits of the GPU. */
-const MAX_SIDE = 1600;
-
-/** Returns a camera with a reduced resolution if a side exceeds {@link MAX_SIDE}; otherwise the same camera. */
-function scaledToMaxSide(camera) {
-  const share = MAX_SIDE / Math.max(camera.width, camera.height);
-  if (share >= 1) return camera;
-  const [width, height] = [camera.width, camera.height].map((side) => Math.max(1, Math.round(share * side)));
-  const [x, y] = [width / camera.width, height / camera.height];
-  return { ...camera, width, height, fx: x * camera.fx, fy: y * camera.fy, cx: x * camera.cx, cy: y * camera.cy };
-}
-
-/** Divides the views of a file by their purpose. Throws UsageError for fewer than 8 views. */
-function dealViews(views, path) {
-  const cameras = views.map((view, k) => cameraFromCalibration(view, `${path}, view ${k}`));
-  const drawn = cameras.map(scaledToMaxSide);
-  const smaller = drawn.filter((camera, k) => camera !== cameras[k]).length;
-  if (smaller > 0) console.log(`views        ${smaller} of ${views.length} in fewer pixels, ${MAX_SIDE} a side`);
-  const dealt = dealOwnViews(drawn);
-  if (dealt.heldOut.length > 0) return { dealt, range: `of ${path} and between them` };
-  throw new UsageError(`${path}: expected 8 views or more to make files with, found ${views.length}`);
-}
 
 /** Returns the most frequent size of views as text, for example `640 x 360`. */
 function sizeOf(views) {

@@ -3,7 +3,7 @@ import { cloudOfChunks, decodePage } from '@gaussian-splat/renderer/tools';
 import { GpuEvaluator } from '../gpu/gpu-evaluator.js';
 import { decibels, mean, meanSquareOf } from '../measure.js';
 import { findSteps, type Steps } from '../steps.js';
-import { viewsAround, viewsFromEverywhere } from '../views.js';
+import { viewsAround, viewsFromEverywhere, type ViewSplit } from '../views.js';
 import { manifestOf, type BuiltPage, type DetailTree } from './build-pages.js';
 import { codingFor, PageEncoder, DEFAULT_STEPS, type PageSteps } from './encode-page.js';
 import type { Deflate } from './page-planes.js';
@@ -20,6 +20,11 @@ export interface PageStepsOptions {
   readonly minPsnr: number;
   /** Number of views that measure the visibility of splats, on which the quantization of harmonics depends. */
   readonly scored: number;
+  /**
+   * Views in the frame of the cloud that measure visibility and errors. Default: views around the scene from outside,
+   * which say little about the inside of a room.
+   */
+  readonly views?: ViewSplit | undefined;
   /** Compresses temporary pages that are only measured; a fast setting is sufficient. */
   readonly deflate: Deflate;
   /** Called with a sentence about each measurement. */
@@ -46,7 +51,7 @@ export async function findPageSteps(options: PageStepsOptions): Promise<FoundPag
   const around = (count: number, seed: number) => viewsAround(boundsOf(cloud), count, { seed });
   const { shDegree } = tree.levels[0];
   const everywhere = viewsFromEverywhere(boundsOf(cloud), shDegree > 0 ? scored : 1);
-  const views = { scored: everywhere, searched: around(4, 1), heldOut: around(12, 2) };
+  const views = options.views ?? { scored: everywhere, searched: around(4, 1), heldOut: around(12, 2) };
   const evaluator = await GpuEvaluator.create(device, cloud, views, {
     onScored: (done, all) => onStep(`${done} of ${all} views show how splats are seen`),
   });
