@@ -11,6 +11,7 @@ import { GaussianSplatError } from '@gaussian-splat/core';
 import { openUrl } from '@gaussian-splat/core/onnx';
 import { fetchRange, fetchScene, type FetchSceneOptions } from '@gaussian-splat/formats';
 import { fetchBytes } from '../../packages/generator/src/runtime/fetch-bytes.js';
+import { someOf } from '../support/extent.js';
 
 const CONTENT = Uint8Array.from({ length: 300_000 }, (_, i) => (i * i) >> 7);
 const OTHER = CONTENT.map((byte) => byte ^ 1);
@@ -226,7 +227,9 @@ after(() => {
   server.close();
 });
 
-names.forEach((name, k) => {
+/** Every other server; all of them in the laboratory. */
+for (const name of someOf(names, Math.ceil(names.length / 2))) {
+  const k = names.indexOf(name);
   const [outcome] = SERVERS[name];
   test(`${name}: ${outcome}`, { timeout: 120_000 }, async () => {
     const start = performance.now();
@@ -241,7 +244,7 @@ names.forEach((name, k) => {
     assert.ok(took < 400_000, `${Math.round(took)} ms`);
     assert.ok(requests <= 25, `${requests} requests`);
   });
-});
+}
 
 test('a time limit ends what is slow', async () => {
   const silent = address(names.indexOf('headers, then silence'));
@@ -265,7 +268,7 @@ const OTHERS: Readonly<Record<string, (url: string) => Promise<unknown>>> = {
 
 for (const [what, open] of Object.entries(OTHERS))
   test(`servers that never answer, stop or drip end ${what}, too`, { timeout: 120_000 }, async () => {
-    for (const name of ['headers, then silence', 'a part, then silence', 'a byte at a time', 'no answer']) {
+    for (const name of someOf(['headers, then silence', 'no answer', 'a byte at a time', 'a part, then silence'], 2)) {
       const k = names.indexOf(name);
       assert.ok(k >= 0, name);
       const found = await open(address(k)).then(

@@ -291,7 +291,7 @@ test('a grid of more columns than a floor may have is refused before they are se
 
 test(
   'the room of the gallery has the floor of its mesh',
-  { skip: !existsSync('demo/scenes/room.spz') && 'demo/scenes/room.spz is missing' },
+  { skip: onlyInLab || (!existsSync('demo/scenes/room.spz') && 'demo/scenes/room.spz is missing') },
   async () => {
     const cloud = await readScene(readFileSync('demo/scenes/room.spz'), { name: 'room.spz' });
     const before = process.cpuUsage();

@@ -9,7 +9,7 @@ import { referenceViews } from '../support/cameras.js';
 import { closeness, compareWithOracle, describeCloseness, renderCloud } from '../support/compare.js';
 import { halfTurned, needsSharedData, sharedFile } from '../support/data.js';
 import { psnr } from '../support/metrics.js';
-import { isFull } from '../support/extent.js';
+import { isFull, onlyInLab } from '../support/extent.js';
 import { endNodeDevice, serialDevice } from '../support/node-device.js';
 import { resized } from '../support/scenes.js';
 
@@ -69,7 +69,7 @@ test('one scene through every format', { skip: needsSharedData }, async () => {
   }
 });
 
-test('captured scenes in SOG of both versions', { skip: needsSharedData }, async () => {
+test('captured scenes in SOG of both versions', { skip: onlyInLab || needsSharedData }, async () => {
   const camera = viewOfAll();
   for (const file of OTHERS) {
     const close = await compareWithOracle(await serialDevice(), await load(file), camera, 'classic');
