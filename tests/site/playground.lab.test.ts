@@ -170,7 +170,7 @@ describe('the playground', { skip: isBuilt ? false : 'no site: npm run build' },
       // Two at one place within half a second are a double click, which turns the camera to it.
       await tab.waitForTimeout(600);
     }
-    assert.deepEqual(answers, ['Nothing o', 'Two more.', 'One more.', 'Upright. ']);
+    assert.deepEqual(answers, ['There is ', 'Two more.', 'One more.', 'Upright. ']);
     const found = (await tab.inputValue('#attribute-up')).split(' ').map(Number);
     const angle =
       (Math.acos(
