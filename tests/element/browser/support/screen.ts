@@ -63,13 +63,14 @@ export async function screenOf(element: Element): Promise<Screen> {
   return new Screen(context.getImageData(0, 0, image.width, image.height), width);
 }
 
-/** Waits until an element shows content: images are decoded, and frames composited, asynchronously. */
+/** Waits until an element shows content: images are decoded, pipelines compiled, and frames composited, asynchronously. */
 export async function comesToShow(
   element: Element,
   isShown: (screen: Screen) => boolean,
   tries = 20,
 ): Promise<boolean> {
-  for (let i = 0; i < tries; i++) if (isShown(await screenOf(element))) return true;
+  const end = performance.now() + 30_000;
+  for (let i = 0; i < tries || performance.now() < end; i++) if (isShown(await screenOf(element))) return true;
   return false;
 }
 
