@@ -21,6 +21,7 @@ import { encodeWebp } from './lib/encoders.mjs';
 import { filesBeside } from './lib/files-beside.mjs';
 import { checkPython, Gate, neededDecibels } from './lib/gate/gate.mjs';
 import { holdOut, readPhotographs } from './lib/gate/photographs.mjs';
+import { dealViews, parseViews } from './lib/given-views.mjs';
 import { deviceDescriptor } from '@gaussian-splat/renderer';
 import { requestNodeAdapter } from './lib/node-gpu.mjs';
 import { checkOutput, isSameFile, obstacleTo, obstacleToFolder, writeWhole } from './lib/output-file.mjs';
