@@ -1,5 +1,5 @@
 // Counts the bins that each splat touches: one thread for each splat, in depth order; also sums each group of 256.
-#import shared/bin_side
+#import shared/bins
 #import shared/coverage
 #import shared/plan
 #import shared/group
@@ -15,7 +15,7 @@
 
 fn bin_rect(s: ProjectedSplat) -> u32 {
   let c = coverage_of(s);
-  let size = bin_size();
+  let size = bin_size(view);
   // Only pixel centers count, which are half a pixel inside the edges.
   let low = clamp(c.center - c.extent - 0.5, vec2f(0.0), view.viewport - 1.0);
   let high = clamp(c.center + c.extent + 0.5, vec2f(0.0), view.viewport - 1.0);

@@ -1,6 +1,6 @@
 // Finds the range of each bin in the pairs sorted by bin. Also sets, for each tile of a bin, one bit for each pair that
 // touches it, so that a tile skips all other pairs.
-#import shared/bin_side
+#import shared/bins
 #import shared/coverage
 #import shared/plan
 #import shared/group
@@ -22,8 +22,8 @@ var<workgroup> masks: array<u32, MASK_ROW * PAIR_WORDS>;
 
 // Mask of the tiles of a bin that a splat touches: one bit each, in rows of eight.
 fn touched_tiles(c: Coverage, bin: vec2u) -> u32 {
-  let corner = vec2f(bin) * bin_size();
-  let tile = f32(tile_side);
+  let corner = vec2f(bin) * bin_size(view);
+  let tile = f32(view.tile_side);
   // Row k holds the pixel centers k·tile + 0.5 ... (k + 1)·tile - 0.5. The loop covers only the rows that the splat
   // touches, because neighboring threads touch other rows.
   let low = c.center.y - c.extent.y - corner.y - RIM;

@@ -5,32 +5,36 @@
 
 @group(0) @binding(0) var<uniform> view: BinView;
 @group(0) @binding(1) var<storage, read> ranges: array<vec2u>;
+// Followed by the number of long bins.
 @group(0) @binding(2) var<storage, read_write> bin_order: array<u32>;
 
-// Four classes for each doubling of the number of pairs.
-const ORDER_CLASSES = 128u;
-// The class of a list with one pair, if classes were counted from the shortest list.
-const FIRST_CLASS = 508u;
-var<workgroup> places: array<atomic<u32>, ORDER_CLASSES>;
+// There are four classes for each doubling of the number of pairs.
+// Exponent and first two bits of the mantissa of the float32 2^31, which is more pairs than a buffer holds, and 3.
+const LONGEST = 635u;
+// Zero at the beginning, as WGSL says. By class: its number of bins, then the place of its first bin.
+var<workgroup> places: array<atomic<u32>, PREFIX_THREADS>;
+var<workgroup> pairs: atomic<u32>;
 
-// The class counted from the longest list: exponent and first two bits of the mantissa of a float32.
-fn class_of(bin: u32) -> u32 {
-  let range = ranges[bin];
-  let quarters = (bitcast<u32>(f32(max(range.y - range.x, 1u))) >> 21u) - FIRST_CLASS;
-  return ORDER_CLASSES - 1u - min(quarters, ORDER_CLASSES - 1u);
-}
+fn pairs_of(bin: u32) -> u32 { return ranges[bin].y - ranges[bin].x; }
+
+// The class counted from the longest list: 127 for one pair or none.
+fn class_of(count: u32) -> u32 { return LONGEST - (bitcast<u32>(f32(max(count, 1u))) >> 21u); }
 
 @compute @workgroup_size(PREFIX_THREADS)
 fn main(@builtin(local_invocation_index) lane: u32) {
   let bins = view.bins.x * view.bins.y;
-  if (lane < ORDER_CLASSES) { atomicStore(&places[lane], 0u); }
+  for (var bin = lane; bin < bins; bin += PREFIX_THREADS) {
+    let count = pairs_of(bin);
+    atomicAdd(&places[class_of(count)], 1u);
+    atomicAdd(&pairs, count);
+  }
   workgroupBarrier();
-  for (var bin = lane; bin < bins; bin += PREFIX_THREADS) { atomicAdd(&places[class_of(bin)], 1u); }
-  workgroupBarrier();
-  var own = 0u;
-  if (lane < ORDER_CLASSES) { own = atomicLoad(&places[lane]); }
+  let own = atomicLoad(&places[lane]);
   let upto = inclusive_sum(own, lane, PREFIX_THREADS);
-  if (lane < ORDER_CLASSES) { atomicStore(&places[lane], upto - own); }
+  atomicStore(&places[lane], upto - own);
+  if (lane == class_of(atomicLoad(&pairs) / LONG_BINS)) { bin_order[bins] = upto - own; }
   workgroupBarrier();
-  for (var bin = lane; bin < bins; bin += PREFIX_THREADS) { bin_order[atomicAdd(&places[class_of(bin)], 1u)] = bin; }
+  for (var bin = lane; bin < bins; bin += PREFIX_THREADS) {
+    bin_order[atomicAdd(&places[class_of(pairs_of(bin))], 1u)] = bin;
+  }
 }

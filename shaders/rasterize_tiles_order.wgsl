@@ -17,7 +17,7 @@
 @group(0) @binding(13) var second_depth: texture_2d<f32>;
 @group(0) @binding(14) var second_color: texture_2d<f32>;
 
-const SIDE: u32 = SORTED_TILE;
+const SIDE: u32 = SMALL_TILE;
 const COLUMN: u32 = 1u;
 
 override tests_depth: bool = false;

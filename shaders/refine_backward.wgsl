@@ -100,7 +100,7 @@ fn unblend(pixel: ptr<function, Pixel>, k: u32) {
 fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_index) lane: u32) {
   let corner = workgroup_id.xy * PATCH;
   let position = corner + vec2u(lane % PATCH, lane / PATCH);
-  let tile = corner / TILE;
+  let tile = corner / view.tile_side;
   let bin = tile / vec2u(BIN_COLUMNS, BIN_ROWS);
   let in_bin = tile % vec2u(BIN_COLUMNS, BIN_ROWS);
   let tile_in_bin = in_bin.y * BIN_COLUMNS + in_bin.x;
@@ -113,11 +113,11 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
     pixel.slope = 2.0 * clamp(painted - expected.xyz, vec3f(-MAX_DIFFERENCE), vec3f(MAX_DIFFERENCE));
     pixel.behind = painted;
   }
-  var list = begin_list(bin.y * view.bins.x + bin.x);
+  var list = begin_list(bin.y * view.bins.x + bin.x, tile_in_bin, 0u);
   loop {
     if (lane == 0u) { atomicStore(&unfinished, 0u); }
     for (var k = lane; k < BACKWARD_BATCH * SCREEN_NUMBERS; k += TILE_THREADS) { atomicStore(&sums[k], 0); }
-    let count = load_batch(&list, BACKWARD_BATCH, tile_in_bin, vec2f(corner), lane);
+    let count = load_batch(&list, BACKWARD_BATCH, vec2f(corner), lane);
     if (count == 0u) { break; }
     workgroupBarrier();
     for (var k = 0u; k < count; k++) {

@@ -1,11 +1,17 @@
 // Screen tiles on two scales. A bin is a block of 8 x 4 tiles: splats are listed for each bin, in depth order, and a
-// 32-bit mask has one bit for each tile of the bin that a splat touches. These are the sides of a tile in pixels;
-// SORTED_TILE is for pixels that sort their own splats, which takes more registers.
+// 32-bit mask has one bit for each tile of the bin that a splat touches. A tile has SMALL_TILE pixels a side where a
+// frame has few bins, or where pixels sort their own splats, which takes more registers; otherwise TILE. Four small
+// tiles are rasterized together, except those of the bins with the longest lists.
 const TILE = 32u;
-const SORTED_TILE = 16u;
+const SMALL_TILE = 16u;
 const BIN_COLUMNS = 8u;
 const BIN_ROWS = 4u;
 const TILES_PER_BIN = BIN_COLUMNS * BIN_ROWS;
+// Squares of four small tiles that are rasterized together.
+const SQUARES_PER_ROW = BIN_COLUMNS / 2u;
+const SQUARES_PER_BIN = 2u * SQUARES_PER_ROW;
+// A bin is long if it has more than this part of all pairs: there are fewer long bins.
+const LONG_BINS = 128u;
 
 // Words of 32 bits with one bit for each of the 256 pairs that are contiguous in `tile_bits`.
 const PAIR_WORDS = 8u;
@@ -32,4 +38,11 @@ struct BinView {
   parts: u32,
   // A pixel is finished before a splat that would reduce its transmittance to this value or below.
   transmittance_min: f32,
+  // Side of a tile of the lists in pixels: TILE or SMALL_TILE.
+  tile_side: u32,
+}
+
+// Width and height of a bin in pixels.
+fn bin_size(view: BinView) -> vec2f {
+  return f32(view.tile_side) * vec2f(f32(BIN_COLUMNS), f32(BIN_ROWS));
 }

@@ -1,6 +1,7 @@
 // Rasterizes tiles, one workgroup each, front to back in float32 registers, and stops when nothing behind is visible.
 // The importing module defines:
-// - `SIDE` of a tile and `COLUMN`, the pixels of a thread, one above the other: SIDE · SIDE = 256 · COLUMN;
+// - `SIDE` in pixels of what a workgroup rasterizes at most: a tile, or a square of four small tiles; and `COLUMN`, the
+//   pixels of a thread, one above the other: SIDE · SIDE = 256 · COLUMN. Only 64 threads have pixels of a single tile;
 // - `Pixels`, a thread's pixels, with `start_pixels`, `paint_batch`, `are_finished` and `finish_pixels`;
 // - additional data for each splat: `packed_color`, `load_more`, `aux_clear` and `aux_store`.
 #import shared/bits
@@ -8,7 +9,7 @@
 #import shared/tile_list
 #import shared/tile_image
 
-// Bins in rasterization order.
+// Bins in rasterization order, followed by the number of long bins.
 @group(0) @binding(6) var<storage, read> bin_order: array<u32>;
 
 // True to reject the splat that would reduce the transmittance below the threshold, as trainers do at REFUSED; false to
@@ -22,10 +23,9 @@ const BATCH_WORDS = BATCH / 32u;
 // A tile has 4 x 4 blocks of pixels; neighboring threads draw one block, and skip splats that do not touch it together.
 const BLOCK_COLUMNS = 4u;
 const BLOCK_ROWS = 4u;
-const BLOCK_WIDTH = SIDE / BLOCK_COLUMNS;
-const BLOCK_HEIGHT = SIDE / BLOCK_ROWS;
 const BLOCKS = BLOCK_COLUMNS * BLOCK_ROWS;
-const BLOCK_THREADS = TILE_THREADS / BLOCKS;
+// Coordinate of the pixel of a thread without one: outside of any image.
+const NOWHERE = 0x1000000u;
 // Minimum transmittance of a pixel in training.
 const REFUSED = 1e-4;
 // Index of the placeholder for a missing splat, and log2 of its opacity.
@@ -44,35 +44,28 @@ var<workgroup> paints: array<vec4u, BATCH + 1u>;
 var<workgroup> block_hits: array<atomic<u32>, BLOCKS * BATCH_WORDS>;
 var<workgroup> unfinished: atomic<u32>;
 var<workgroup> is_open: u32;
-
-// The topmost pixel of a thread.
-fn pixel_in_tile(lane: u32) -> vec2u {
-  let number = lane / BLOCK_THREADS;
-  let in_block = lane % BLOCK_THREADS;
-  let x = (number % BLOCK_COLUMNS) * BLOCK_WIDTH + in_block % BLOCK_WIDTH;
-  let y = (number / BLOCK_COLUMNS) * BLOCK_HEIGHT + in_block / BLOCK_WIDTH * COLUMN;
-  return vec2u(x, y);
-}
+// Side of a block in pixels.
+var<private> block_side: u32;
 
 // Sets the bits of splat k of the batch in the blocks of the tile that it touches.
 fn hit_blocks(k: u32, s: ProjectedSplat, tile_corner: vec2f) {
   let c = coverage_of(s);
   let word = k / 32u;
   let bit = 1u << (k % 32u);
-  let size = vec2f(f32(BLOCK_WIDTH), f32(BLOCK_HEIGHT));
+  let size = f32(block_side);
   // Row k holds the pixel centers k·height + 0.5 ... (k + 1)·height - 0.5. The loop covers only the rows that the splat
   // touches, because neighboring threads touch other rows.
   let low = c.center.y - c.extent.y - tile_corner.y - RIM;
   let high = c.center.y + c.extent.y - tile_corner.y + RIM;
-  let first_row = clamp(ceil((low + 0.5) / size.y) - 1.0, 0.0, f32(BLOCK_ROWS));
-  let end_row = clamp(floor((high - 0.5) / size.y) + 1.0, 0.0, f32(BLOCK_ROWS));
+  let first_row = clamp(ceil((low + 0.5) / size) - 1.0, 0.0, f32(BLOCK_ROWS));
+  let end_row = clamp(floor((high - 0.5) / size) + 1.0, 0.0, f32(BLOCK_ROWS));
   for (var row = u32(first_row); row < u32(end_row); row++) {
-    let top = tile_corner.y + f32(row) * size.y + 0.5;
-    let range = band_range(c, top - RIM, top + size.y - 1.0 + RIM) + vec2f(-RIM, RIM) - tile_corner.x;
+    let top = tile_corner.y + f32(row) * size + 0.5;
+    let range = band_range(c, top - RIM, top + size - 1.0 + RIM) + vec2f(-RIM, RIM) - tile_corner.x;
     if (range.x > range.y) { continue; }
     // Columns likewise.
-    let first = max(ceil((range.x + 0.5) / size.x) - 1.0, 0.0);
-    let last = min(floor((range.y - 0.5) / size.x), f32(BLOCK_COLUMNS) - 1.0);
+    let first = max(ceil((range.x + 0.5) / size) - 1.0, 0.0);
+    let last = min(floor((range.y - 0.5) / size), f32(BLOCK_COLUMNS) - 1.0);
     if (first > last) { continue; }
     let end = u32(last) + 1u;
     for (var column = u32(first); column < end; column++) {
@@ -98,28 +91,47 @@ fn load_splat(k: u32, slot: u32, tile_corner: vec2f) {
 @compute @workgroup_size(TILE_THREADS)
 fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_index) lane: u32) {
   let number = group_index(workgroup_id) * view.parts + view.part;
-  if (number >= view.bins.x * view.bins.y * TILES_PER_BIN) { return; }
-  let bin = bin_order[number / TILES_PER_BIN];
-  let tile_in_bin = number % TILES_PER_BIN;
+  let bins = view.bins.x * view.bins.y;
+  // The small tiles of long bins come first, one by one, then those of the other bins, four at a time.
+  var single_bins = bins;
+  if (view.tile_side < SIDE) { single_bins = bin_order[bins]; }
+  var nth = number / TILES_PER_BIN;
+  var tile_in_bin = number % TILES_PER_BIN;
+  let step = u32(nth >= single_bins);
+  block_side = view.tile_side / (BLOCK_COLUMNS >> step);
+  if (step == 1u) {
+    let square = tile_in_bin % SQUARES_PER_BIN;
+    nth += 3u * (nth - single_bins) + tile_in_bin / SQUARES_PER_BIN;
+    // Two rows of squares are two rows of tiles each.
+    tile_in_bin = 2u * (square + (square & SQUARES_PER_ROW));
+  }
+  if (nth >= bins) { return; }
+  let bin = bin_order[nth];
   let tile = vec2u(bin % view.bins.x, bin / view.bins.x) * vec2u(BIN_COLUMNS, BIN_ROWS)
     + vec2u(tile_in_bin % BIN_COLUMNS, tile_in_bin / BIN_COLUMNS);
-  let corner = tile * SIDE;
+  let corner = tile * view.tile_side;
   // Bins at the edges have tiles outside the image.
   if (any(vec2f(corner) >= view.viewport)) { return; }
-  let position = corner + pixel_in_tile(lane);
-  let place = vec2f(pixel_in_tile(lane)) + 0.5;
-  let own_block = lane / BLOCK_THREADS;
+  let threads = block_side * block_side / COLUMN;
+  let own_block = lane / threads;
+  let in_block = lane % threads;
+  // The topmost pixel of the thread, relative to the corner.
+  var own_pixel = vec2u(own_block % BLOCK_COLUMNS, own_block / BLOCK_COLUMNS) * block_side
+    + vec2u(in_block % block_side, in_block / block_side * COLUMN);
+  if (own_block >= BLOCKS) { own_pixel.x = NOWHERE; }
+  let position = corner + own_pixel;
+  let place = vec2f(own_pixel) + 0.5;
   let min_power = log2(ALPHA_MIN);
 
   var pixels = start_pixels(position);
   if (lane == 0u) { paints[NO_SPLAT].y = bitcast<u32>(NO_POWER); }
-  var list = begin_list(bin);
+  var list = begin_list(bin, tile_in_bin, step);
   loop {
-    for (var i = lane; i < BLOCKS * BATCH_WORDS; i += TILE_THREADS) { atomicStore(&block_hits[i], 0u); }
+    if (lane < BLOCKS * BATCH_WORDS) { atomicStore(&block_hits[lane], 0u); }
     if (lane == 0u) { atomicStore(&unfinished, 0u); }
     aux_clear(lane);
     workgroupBarrier();
-    let count = load_batch(&list, BATCH, tile_in_bin, vec2f(corner), lane);
+    let count = load_batch(&list, BATCH, vec2f(corner), lane);
     if (count == 0u) { break; }
     workgroupBarrier();
 

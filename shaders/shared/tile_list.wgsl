@@ -24,6 +24,9 @@ var<workgroup> found: u32;
 struct ListPlace {
   // First and end of the bin's pairs.
   range: vec2u,
+  // Number of the tile within the bin, or of the first of a square of four; 0 for one tile, 1 for a square.
+  tile: u32,
+  step: u32,
   // First word of the window and the one after it; pairs found in the window, and the number of them already loaded.
   first_word: u32,
   next_word: u32,
@@ -31,18 +34,23 @@ struct ListPlace {
   loaded: u32,
 }
 
-fn begin_list(bin: u32) -> ListPlace {
+fn begin_list(bin: u32, tile: u32, step: u32) -> ListPlace {
   let range = ranges[bin];
   let first_word = range.x / 32u;
-  return ListPlace(range, first_word, first_word, 0u, 0u);
+  return ListPlace(range, tile, step, first_word, first_word, 0u, 0u);
 }
 
-// Moves the window to the words from `first` on. Ends with a barrier.
-fn move_window(first: u32, range: vec2u, tile_in_bin: u32, lane: u32) {
-  let word = first + lane;
+fn bits_of(word: u32, tile: u32) -> u32 { return tile_bits[tile_word(word, tile)]; }
+
+// Moves the window to the words from `first_word` on. Ends with a barrier.
+fn move_window(place: ListPlace, lane: u32) {
+  let range = place.range;
+  let word = place.first_word + lane;
   var hits = 0u;
   if (32u * word < range.y) {
-    hits = tile_bits[tile_word(word, tile_in_bin)];
+    let below = place.tile + place.step * BIN_COLUMNS;
+    hits = bits_of(word, place.tile) | bits_of(word, place.tile + place.step)
+      | bits_of(word, below) | bits_of(word, below + place.step);
     // The first and the last word may hold pairs of other bins.
     if (32u * word < range.x) { hits &= 0xffffffffu << (range.x - 32u * word); }
     if (32u * word + 32u > range.y) { hits &= 0xffffffffu >> (32u * word + 32u - range.y); }
@@ -76,14 +84,14 @@ fn found_pair(nth: u32) -> u32 {
 
 // Loads the next `limit` splats of the tile, or fewer at the end of the list, from as many windows as necessary. A
 // barrier must follow. Returns their number.
-fn load_batch(place: ptr<function, ListPlace>, limit: u32, tile_in_bin: u32, tile_corner: vec2f, lane: u32) -> u32 {
+fn load_batch(place: ptr<function, ListPlace>, limit: u32, tile_corner: vec2f, lane: u32) -> u32 {
   var count = 0u;
   while (count < limit) {
     if ((*place).loaded == (*place).in_window) {
       if (32u * (*place).next_word >= (*place).range.y) { break; }
       (*place).first_word = (*place).next_word;
       (*place).next_word += TILE_THREADS;
-      move_window((*place).first_word, (*place).range, tile_in_bin, lane);
+      move_window(*place, lane);
       (*place).in_window = workgroupUniformLoad(&found);
       (*place).loaded = 0u;
     }

@@ -146,8 +146,9 @@ describe('renderer="webgl"', () => {
     const element = await showLoaded(WEBGL);
     await element.flyTo({ orbit: '90deg 70deg 6m' }, { duration: 200 });
     assert(Math.abs(element.getCameraOrbit().theta - Math.PI / 2) < 1e-6, String(element.getCameraOrbit()));
-    await delay(200);
-    assertEqual(element.shadowRoot!.querySelector('canvas')!.toDataURL(), element.toDataURL(), 'the frame');
+    // Frames in motion may have fewer pixels.
+    const canvas = element.shadowRoot!.querySelector('canvas')!;
+    await until(() => canvas.toDataURL() === element.toDataURL(), 'the frame of the new view');
   });
 
   itInLab('an image that is read at once has the current camera', async () => {

@@ -79,7 +79,7 @@ describe('S12: all scenes of a page together', () => {
       const second = show({ src: `${COMPASS}?second` });
       await nextEvent(second, 'error');
       assertEqual(second.error?.reason, 'out-of-memory/budget', 'reason');
-      assert(/what is left of a budget of/.test(second.error?.message ?? ''), String(second.error?.message));
+      assert(/left of a budget of/.test(second.error?.message ?? ''), String(second.error?.message));
       assert(first.loaded, 'the first is still there');
       // A removed element keeps its scene for a while, unless others lack the room.
       first.remove();

@@ -56,7 +56,7 @@ export class PixelOrder {
       ...depth?.overrides,
     };
     return {
-      tile: constants.SORTED_TILE,
+      tile: constants.SMALL_TILE,
       kernel: (variant) => rasterizeKernel(this.#device, rasterizeTilesOrder, variant, overrides),
       bind: (kernel, painted) =>
         this.#bound.bind(kernel, painted, {

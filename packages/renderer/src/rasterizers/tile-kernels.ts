@@ -18,17 +18,14 @@ export interface ListingKernels {
   readonly order: ComputeKernel<typeof binOrder>;
 }
 
-/** Returns the kernels that list splats for bins. @param tile Side of a tile in pixels. */
-export function listingKernels(device: GPUDevice, tile: number): ListingKernels {
-  const side = { tile_side: tile };
-  return {
-    count: kernelOf(device, binCount, side),
-    plan: kernelOf(device, binPlan),
-    emit: kernelOf(device, binEmit),
-    index: kernelOf(device, binIndex, side),
-    order: kernelOf(device, binOrder),
-  };
-}
+/** Returns the kernels that list splats for bins. */
+export const listingKernels = (device: GPUDevice): ListingKernels => ({
+  count: kernelOf(device, binCount),
+  plan: kernelOf(device, binPlan),
+  emit: kernelOf(device, binEmit),
+  index: kernelOf(device, binIndex),
+  order: kernelOf(device, binOrder),
+});
 
 /** Kernel that rasterizes tiles. Most variants have more bindings than `rasterize_tiles`. */
 export type RasterizeKernel = ComputeKernel<typeof rasterizeTiles>;

@@ -5,7 +5,7 @@ import { rasterizeKernel, type PaintedTiles, type RasterizeKernel, type Rasteriz
 
 /** A variant of tile rasterization. */
 export interface TilePainter {
-  /** Side of the tiles in pixels. */
+  /** Side in pixels of what a workgroup rasterizes at most: `SIDE` of its shader. */
   readonly tile: number;
   /** Returns the kernel with the pipeline for a variant. */
   kernel(variant: RasterizeVariant): RasterizeKernel;

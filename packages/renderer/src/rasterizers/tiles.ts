@@ -12,28 +12,42 @@ import type {
   Rasterizer,
   RasterizerInputs,
   Slice,
+  Surface,
 } from './rasterizer.js';
 import { pairBuffers, releasableBytesOf, type PairBuffers } from './pair-buffers.js';
 import { listingKernels, type ListingKernels, type PaintedTiles, type RasterizeVariant } from './tile-kernels.js';
 import { PlainPainter, type TilePainter } from './tile-painter.js';
 
-const { BIN_COLUMNS, BIN_ROWS, PREFIX_THREADS, PROJECT_GROUP, TILES_PER_BIN } = constants;
+const { BIN_COLUMNS, BIN_ROWS, DIGITS, PREFIX_THREADS, PROJECT_GROUP, SMALL_TILE, TILES_PER_BIN } = constants;
 
 const groupsOf = (splats: number): number => Math.ceil(splats / PREFIX_THREADS);
 
-/** Number of columns and rows of bins in an image, and number of bits of the index of a bin. */
+/** The bins of an image. */
 interface Grid {
+  /** Side of a tile of the lists in pixels. */
+  readonly tile: number;
   readonly columns: number;
   readonly rows: number;
+  /** columns times rows */
+  readonly count: number;
+  /** Number of bits of the index of a bin. */
   readonly bits: number;
 }
 
-/** Bindings for one scratch, one number of bins and one tile size. */
+/** Returns the bins for an image: of small tiles if one pass sorts the pairs by their bins. */
+function gridFor({ width, height }: Pick<Surface, 'width' | 'height'>, painter: TilePainter, tile: number = SMALL_TILE): Grid {
+  const columns = Math.ceil(width / (BIN_COLUMNS * tile));
+  const rows = Math.ceil(height / (BIN_ROWS * tile));
+  const count = columns * rows;
+  if (count > DIGITS && tile < painter.tile) return gridFor({ width, height }, painter, painter.tile);
+  return { tile, columns, rows, count, bits: Math.ceil(Math.log2(count)) };
+}
+
+/** Bindings for one scratch and one grid of bins. */
 interface GridBindings {
   readonly grid: Grid;
-  readonly kernels: ListingKernels;
   readonly ranges: GPUBuffer;
-  /** Indices of the bins in the order of rasterization: longest lists first. */
+  /** Indices of the bins in the order of rasterization, longest lists first, and the number of long bins. */
   readonly binOrder: GPUBuffer;
   readonly count: GPUBindGroup;
   readonly emit: GPUBindGroup;
@@ -61,8 +75,9 @@ const TRANSPARENT = [0, 0, 0, 0] as const;
 
 /**
  * Rasterizes splats with compute shaders on two scales of tiles. Splats are listed, in depth order, for bins of 8 x 4
- * tiles: pairs of splat and bin are counted, written, and sorted by bin with a stable sort. Each tile then blends the
- * splats of its bin front to back, and stops when all its pixels are opaque. Bins with the longest lists come first.
+ * tiles: pairs of splat and bin are counted, written, and sorted by bin with a stable sort. A workgroup then blends the
+ * splats of a tile front to back, or of four tiles in a short list, and stops when all its pixels are opaque. Bins with
+ * the longest lists come first.
  *
  * Pairs beyond the capacity are dropped. They belong to the farthest splats.
  */
@@ -72,12 +87,13 @@ export class TilesRasterizer extends BufferOwner implements Rasterizer {
   readonly #device: GPUDevice;
   readonly #accumulation: AccumulationFormat;
   readonly #plain: TilePainter;
+  readonly #kernels: ListingKernels;
   readonly #sort: SortStage;
   readonly #view: GPUBuffer;
   readonly #viewBytes = new ArrayBuffer(layouts.BinView.size);
   #inputs: RasterizerInputs | undefined;
   #buffers: PairBuffers | undefined;
-  /** Bindings by tile size and number of columns and rows of bins, because images in motion may have fewer pixels. */
+  /** Bindings by grid, because images in motion may have fewer pixels. */
   readonly #bound = new Map<string, GridBindings>();
 
   constructor(device: GPUDevice, accumulation: AccumulationFormat, threads: Threads) {
@@ -85,7 +101,7 @@ export class TilesRasterizer extends BufferOwner implements Rasterizer {
     this.#device = device;
     this.#accumulation = accumulation;
     this.#plain = new PlainPainter(device);
-    listingKernels(device, this.#plain.tile);
+    this.#kernels = listingKernels(device);
     this.#sort = new SortStage(device, threads, 'given');
     const usage = BUFFER_USAGE.uniform | BUFFER_USAGE.copyDestination;
     this.#view = this.memory.buffer('gs.rasterize.view', layouts.BinView.size, usage);
@@ -107,7 +123,6 @@ export class TilesRasterizer extends BufferOwner implements Rasterizer {
   }
 
   prepare(settings: RasterSettings, format: GPUTextureFormat, painter: TilePainter = this.#plain): void {
-    listingKernels(this.#device, painter.tile);
     const prepare = (own: Pick<RasterizeVariant, 'format' | 'isFinal'>): unknown =>
       painter.kernel({ ...own, refusesLast: refusesLast(settings) }).prepare();
     if (this.finishes(format)) prepare({ format, isFinal: true });
@@ -117,10 +132,10 @@ export class TilesRasterizer extends BufferOwner implements Rasterizer {
   /** Records the lists of splats for all bins. */
   prepareFrame(encoder: GPUCommandEncoder, painting: Painting): void {
     if (this.#inputs === undefined || this.#buffers === undefined) return;
-    const bound = this.#gridFor(painting, this.#inputs, this.#buffers);
+    const bound = this.#boundFor(painting, this.#inputs, this.#buffers);
     this.#writeView(painting, bound.grid, { index: 0, count: 1 });
 
-    const { count, plan, emit, index, order } = bound.kernels;
+    const { count, plan, emit, index, order } = this.#kernels;
     const timestampWrites = painting.timer?.timestampWrites('bin');
     const bin = encoder.beginComputePass({ label: 'gs.bin', timestampWrites });
     // Dispatches groups for the whole capacity; those beyond the actual splats and pairs end at once.
@@ -137,10 +152,9 @@ export class TilesRasterizer extends BufferOwner implements Rasterizer {
   record(encoder: GPUCommandEncoder, painting: Painting, slice: Slice): void {
     const { surface, settings, background, painter = this.#plain, timer } = painting;
     if (this.#inputs === undefined || this.#buffers === undefined) return;
-    const bound = this.#gridFor(painting, this.#inputs, this.#buffers);
-    // Each slice contains every `count`-th tile, so that all slices have long and short lists.
-    const tiles = bound.grid.columns * bound.grid.rows * TILES_PER_BIN;
-    const groups = Math.ceil((tiles - slice.index) / slice.count);
+    const bound = this.#boundFor(painting, this.#inputs, this.#buffers);
+    // Each slice contains every `count`-th workgroup, so that all slices have long and short lists.
+    const groups = Math.ceil((bound.grid.count * TILES_PER_BIN - slice.index) / slice.count);
     if (groups <= 0) return;
     // An undivided frame uses the view with which its splats were listed.
     if (slice.count > 1) this.#writeView(painting, bound.grid, slice);
@@ -163,23 +177,19 @@ export class TilesRasterizer extends BufferOwner implements Rasterizer {
     this.#buffers = undefined;
   }
 
-  #gridFor(
-    { surface: { width, height }, painter = this.#plain }: Painting,
+  #boundFor(
+    { surface, painter = this.#plain }: Painting,
     inputs: RasterizerInputs,
     buffers: PairBuffers,
   ): GridBindings {
-    const columns = Math.ceil(width / (BIN_COLUMNS * painter.tile));
-    const rows = Math.ceil(height / (BIN_ROWS * painter.tile));
-    const key = `${painter.tile} ${columns} ${rows}`;
+    const grid = gridFor(surface, painter);
+    const key = JSON.stringify(grid);
     const known = this.#bound.get(key);
     if (known) return known;
     if (this.#bound.size >= MAX_GRIDS) this.#forgetGrids();
-    const bins = columns * rows;
-    const grid = { columns, rows, bits: Math.ceil(Math.log2(bins)) };
     const own = {
-      kernels: listingKernels(this.#device, painter.tile),
-      ranges: this.memory.buffer('gs.bin.ranges', 8 * bins, BUFFER_USAGE.storage | BUFFER_USAGE.copyDestination),
-      binOrder: this.memory.buffer('gs.bin.order', 4 * bins, BUFFER_USAGE.storage),
+      ranges: this.memory.buffer('gs.bin.ranges', 8 * grid.count, BUFFER_USAGE.storage | BUFFER_USAGE.copyDestination),
+      binOrder: this.memory.buffer('gs.bin.order', 4 * (grid.count + 1), BUFFER_USAGE.storage),
     };
     const bound = { grid, ...own, ...this.#bindings(inputs, buffers, grid.bits, own) };
     this.#bound.set(key, bound);
@@ -198,11 +208,11 @@ export class TilesRasterizer extends BufferOwner implements Rasterizer {
     { plan, splats, order }: RasterizerInputs,
     { rects, groupPairs, plan: pairPlan, bins, pairs, digitCounts, digitTotals }: PairBuffers,
     bits: number,
-    { kernels, ranges, binOrder }: Pick<GridBindings, 'kernels' | 'ranges' | 'binOrder'>,
-  ): Omit<GridBindings, 'grid' | 'kernels' | 'ranges' | 'binOrder'> {
+    { ranges, binOrder }: Pick<GridBindings, 'ranges' | 'binOrder'>,
+  ): Omit<GridBindings, 'grid' | 'ranges' | 'binOrder'> {
     const view = this.#view;
     const sorted = sortedIn(bits);
-    const { count, plan: planKernel, emit, index, order: orderKernel } = kernels;
+    const { count, plan: planKernel, emit, index, order: orderKernel } = this.#kernels;
     const shared = { view, plan, order, rects, group_pairs: groupPairs };
     return {
       count: count.bind({ ...shared, splats }),
@@ -237,13 +247,14 @@ export class TilesRasterizer extends BufferOwner implements Rasterizer {
 
   #writeView(
     { surface: { width, height }, settings, background = TRANSPARENT }: Painting,
-    { columns, rows }: Grid,
+    { tile, columns, rows }: Grid,
     { index, count }: Slice,
   ): void {
     const { capacity, pairCapacity } = this.#inputs!;
     const room = { pair_capacity: pairCapacity, splat_groups: groupsOf(capacity) };
     const image = { viewport: [width, height], bins: [columns, rows], background, part: index, parts: count };
-    writeStruct(layouts.BinView, { ...room, ...image, transmittance_min: settings.transmittanceMin }, this.#viewBytes);
+    const own = { transmittance_min: settings.transmittanceMin, tile_side: tile };
+    writeStruct(layouts.BinView, { ...room, ...image, ...own }, this.#viewBytes);
     this.#device.queue.writeBuffer(this.#view, 0, this.#viewBytes);
   }
 }
