@@ -76,8 +76,9 @@ export class CopyTarget implements GpuTarget {
   readonly format = navigator.gpu.getPreferredCanvasFormat();
   readonly #gl: WebGL2RenderingContext;
   readonly #layer: XrLayer;
-  readonly #canvas: OffscreenCanvas;
-  readonly #context: GPUCanvasContext;
+  readonly #size: { readonly width: number; readonly height: number };
+  /** Context of a canvas that nothing else refers to, until the session ends. */
+  #context: GPUCanvasContext | undefined;
   readonly #copied: WebGLFramebuffer;
 
   private constructor(session: XrSession, device: GPUDevice, gl: WebGL2RenderingContext) {
@@ -86,8 +87,8 @@ export class CopyTarget implements GpuTarget {
     this.#layer = makeLayer(session, gl);
     this.renderState = { baseLayer: this.#layer };
     const { framebufferWidth: width, framebufferHeight: height } = this.#layer;
-    this.#canvas = new OffscreenCanvas(width, height);
-    const context = this.#canvas.getContext('webgpu');
+    this.#size = { width, height };
+    const context = new OffscreenCanvas(width, height).getContext('webgpu');
     if (!context) throw unsupported('a WebGPU canvas', 'none');
     context.configure({ device, format: this.format, alphaMode: 'opaque' });
     this.#context = context;
@@ -104,23 +105,23 @@ export class CopyTarget implements GpuTarget {
   }
 
   begin(_frame: XrFrame, views: readonly XrView[]): Map<XrView, GpuImage> {
-    const texture = this.#context.getCurrentTexture().createView();
+    const texture = this.#context!.getCurrentTexture().createView();
     return new Map(
       views.flatMap((view) => {
         const at = this.#layer.getViewport(view);
         if (!at) return [];
         const { x, width, height } = at;
         // WebGL counts rows from below.
-        return [[view, { texture, at: { x, y: this.#canvas.height - at.y - height, width, height } }]];
+        return [[view, { texture, at: { x, y: this.#size.height - at.y - height, width, height } }]];
       }),
     );
   }
 
   end(): void {
     const gl = this.#gl;
-    const { width, height } = this.#canvas;
+    const { width, height } = this.#size;
     // An ImageBitmap is a faster source than the canvas itself.
-    const image = this.#canvas.transferToImageBitmap();
+    const image = (this.#context!.canvas as OffscreenCanvas).transferToImageBitmap();
     gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, gl.RGBA, gl.UNSIGNED_BYTE, image);
     image.close();
     gl.bindFramebuffer(gl.READ_FRAMEBUFFER, this.#copied);
@@ -130,7 +131,8 @@ export class CopyTarget implements GpuTarget {
 
   destroy(): void {
     this.onLost = () => undefined;
-    this.#context.unconfigure();
+    this.#context?.unconfigure();
+    this.#context = undefined;
     this.#gl.getExtension('WEBGL_lose_context')?.loseContext();
   }
 }

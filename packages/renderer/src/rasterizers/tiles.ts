@@ -35,7 +35,11 @@ interface Grid {
 }
 
 /** Returns the bins for an image: of small tiles if one pass sorts the pairs by their bins. */
-function gridFor({ width, height }: Pick<Surface, 'width' | 'height'>, painter: TilePainter, tile: number = SMALL_TILE): Grid {
+function gridFor(
+  { width, height }: Pick<Surface, 'width' | 'height'>,
+  painter: TilePainter,
+  tile: number = SMALL_TILE,
+): Grid {
   const columns = Math.ceil(width / (BIN_COLUMNS * tile));
   const rows = Math.ceil(height / (BIN_ROWS * tile));
   const count = columns * rows;
