@@ -11,7 +11,7 @@ const TILES_PER_BIN = BIN_COLUMNS * BIN_ROWS;
 const SQUARES_PER_ROW = BIN_COLUMNS / 2u;
 const SQUARES_PER_BIN = 2u * SQUARES_PER_ROW;
 // A bin is long if it has more than this part of all pairs: there are fewer long bins.
-const LONG_BINS = 128u;
+const LONG_BINS = 64u;
 
 // Words of 32 bits with one bit for each of the 256 pairs that are contiguous in `tile_bits`.
 const PAIR_WORDS = 8u;

@@ -13,7 +13,7 @@ import { scaleRotationFactor } from './factor.js';
 import { mortonOrder } from './morton.js';
 import { recentered } from './recenter.js';
 import { choosePrecision, noiseIn, packSh } from './sh.js';
-import { GEOMETRY_WORDS, SH_PRECISION, type ShPrecision } from './words.js';
+import { GEOMETRY_WORDS, SH_PRECISION, type ShPrecision, wordRows } from './words.js';
 
 /** Options of {@link packGaussians}. */
 export interface PackOptions {
@@ -115,19 +115,22 @@ export function usableIndices(cloud: GaussianCloud): Uint32Array {
   return indices.subarray(0, kept);
 }
 
-/** Returns [kept, 8] geometry words of the splats `kept`. */
-export function packGeometry(cloud: GaussianCloud, kept: Uint32Array): Uint32Array {
-  const words = new Uint32Array(kept.length * GEOMETRY_WORDS);
+/** Writes the geometry words of the splats `kept`; returns the memory, by default [kept, 8]. */
+export function packGeometry(
+  cloud: GaussianCloud,
+  kept: Uint32Array,
+  { words, first, stride } = wordRows(kept.length, GEOMETRY_WORDS),
+): Uint32Array {
   const floats = new Float32Array(words.buffer);
   const factor = new Float64Array(6);
-  let at = 0;
+  let at = first;
   for (const i of kept) {
     floats[at] = cloud.positions[3 * i];
     floats[at + 1] = cloud.positions[3 * i + 1];
     floats[at + 2] = cloud.positions[3 * i + 2];
     scaleRotationFactor(cloud, i, factor);
     packShape(words, at + 3, factor, Math.min(1, cloud.opacities[i]));
-    at += GEOMETRY_WORDS;
+    at += stride;
   }
   return words;
 }

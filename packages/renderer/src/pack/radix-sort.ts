@@ -11,12 +11,13 @@ const itemsOf = (count: number): Items => ({ values: new Uint32Array(count), key
 /**
  * Returns values in ascending order of their keys; values with equal keys keep their order. Radix sort with 11 bits in
  * each pass. The arguments are not modified.
+ * @param keyBits Number of low bits that keys have; higher bits are 0.
  */
-export function sortByKey(values: Uint32Array, keys: Uint32Array): Uint32Array {
+export function sortByKey(values: Uint32Array, keys: Uint32Array, keyBits = 32): Uint32Array {
   let from: Items = { values, keys };
   let to = itemsOf(values.length);
   let other = itemsOf(values.length);
-  for (let shift = 0; shift < 32; shift += DIGIT_BITS) {
+  for (let shift = 0; shift < keyBits; shift += DIGIT_BITS) {
     moveByDigit(from, to, shift);
     [from, to, other] = [to, other, to];
   }

@@ -1,6 +1,6 @@
-import { shCoefficientCount, type GaussianCloud } from '@gaussian-splat/core';
+import { shCoefficientCount, type GaussianCloud, type ShDegree } from '@gaussian-splat/core';
 import { halfBits } from './half.js';
-import { type ShPrecision, shWords } from './words.js';
+import { type ShPrecision, shWords, type WordRows, wordRows } from './words.js';
 
 /** Number of coefficients of bands 1, 2 and 3; each has three channels. */
 export const BAND_SIZES = [3, 5, 7] as const;
@@ -45,6 +45,13 @@ export function noiseIn({ sh, shDegree }: Pick<GaussianCloud, 'sh' | 'shDegree'>
     }
     return noise;
   };
+}
+
+/** Returns the same from harmonics that {@link packSh} has written as `int8`, at byte `at`. */
+export function noiseOfPacked(bytes: Uint8Array, at: number, shDegree: ShDegree): number {
+  let noise = 0;
+  for (let band = 0; band < shDegree; band++) noise += BAND_SIZES[band] * CODE_NOISE[bytes[at + SCALE_BYTES[band]]];
+  return noise;
 }
 
 /**
@@ -101,20 +108,25 @@ export const CODE_NOISE = Float64Array.from(
  * largest magnitude of the band, rounded up to an eighth of an octave), and its coefficients as multiples of 1/127 of
  * that scale.
  */
-export function packSh(cloud: GaussianCloud, kept: Uint32Array, precision: ShPrecision): Uint32Array {
-  return precision === 'float16' ? packHalf(cloud, kept) : packInt8(cloud, kept);
+export function packSh(
+  cloud: GaussianCloud,
+  kept: Uint32Array,
+  precision: ShPrecision,
+  rows = wordRows(kept.length, shWords(cloud.shDegree, precision)),
+): Uint32Array {
+  if (precision === 'float16') packHalf(cloud, kept, rows);
+  else packInt8(cloud, kept, rows);
+  return rows.words;
 }
 
-function packHalf({ sh, shDegree }: GaussianCloud, kept: Uint32Array): Uint32Array {
+function packHalf({ sh, shDegree }: GaussianCloud, kept: Uint32Array, { words, first, stride }: WordRows): void {
   const numbers = 3 * shCoefficientCount(shDegree);
-  const stride = 2 * shWords(shDegree, 'float16');
-  const halves = new Uint16Array(kept.length * stride);
-  let at = 0;
+  const halves = new Uint16Array(words.buffer);
+  let at = 2 * first;
   for (const i of kept) {
     for (let k = 0; k < numbers; k++) halves[at + k] = halfBits(sh[i * numbers + k]);
-    at += stride;
+    at += 2 * stride;
   }
-  return new Uint32Array(halves.buffer);
 }
 
 /**
@@ -125,14 +137,13 @@ const PER_UNIT = Float64Array.from({ length: MAX_CODE + 1 }, (_, code) =>
   code && code < MAX_CODE ? 127 / scaleOf(code) : 0,
 );
 
-function packInt8({ sh, shDegree }: GaussianCloud, kept: Uint32Array): Uint32Array {
+function packInt8({ sh, shDegree }: GaussianCloud, kept: Uint32Array, rows: WordRows): void {
   const numbers = 3 * shCoefficientCount(shDegree);
-  const words = new Uint32Array(kept.length * shWords(shDegree, 'int8'));
-  const bytes = new Uint8Array(words.buffer);
-  const halves = new Uint16Array(words.buffer);
-  const stride = 4 * shWords(shDegree, 'int8');
+  const { buffer } = rows.words;
+  const bytes = new Uint8Array(buffer);
+  const halves = new Uint16Array(buffer);
   const bits = bitsOf(sh);
-  let at = 0;
+  let at = 4 * rows.first;
   for (const splat of kept) {
     let first = splat * numbers;
     for (let channel = 0; channel < 3; channel++) halves[at / 2 + channel] = halfBits(sh[first++]);
@@ -146,9 +157,8 @@ function packInt8({ sh, shDegree }: GaussianCloud, kept: Uint32Array): Uint32Arr
       if (shDegree === 1) bytes[at + SCALE_BYTES[1]] = codeOf(sh[--end] * perUnit);
       while (first < end) bytes[code++] = codeOf(sh[first++] * perUnit);
     }
-    at += stride;
+    at += 4 * rows.stride;
   }
-  return words;
 }
 
 /**

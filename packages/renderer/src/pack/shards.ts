@@ -17,7 +17,7 @@ import { codesAlong, curveThrough, isOfPlanes, type Curve } from './morton.js';
 import { packGeometry, usableIndices, type PackedGaussians, type PackedHead, type PackOptions } from './pack.js';
 import { recentered } from './recenter.js';
 import { sortByKey } from './radix-sort.js';
-import { noiseIn, packSh, PART, precisionFor } from './sh.js';
+import { noiseIn, noiseOfPacked, packSh, PART, precisionFor } from './sh.js';
 import { unpackSplat } from './unpack.js';
 import { CHUNK_NUMBERS, GEOMETRY_WORDS, type ShPrecision, shWords } from './words.js';
 
@@ -97,26 +97,26 @@ export function packShard(given: GaussianCloud, layout: ShareLayout): PackedShar
   const usable = usableIndices(cloud);
   const kept = isMoved ? withinReach(cloud.positions, usable) : usable;
   const codes = curve && codesAlong(curve, cloud.positions, kept);
-  const order = codes ? sortByKey(kept, cellsOf(codes)) : kept;
-  const codeOf = codes && sortByKey(codes, cellsOf(codes));
-  const [stride, shStride] = [wordsOf(layout), shWords(shDegree, shPrecision)];
+  const places = codes && sortByKey(upTo(kept.length), codes.map(cellOf), CELL_BITS);
+  const order = places ? places.map((place) => kept[place]) : kept;
+  const codeOf = places?.map((place) => codes![place]);
+  const stride = wordsOf(layout);
   const words = new Uint32Array(stride * kept.length);
   const floats = new Float32Array(words.buffer);
-  const geometry = packGeometry(cloud, order);
-  const sh = packSh(cloud, order, shPrecision);
+  const bytes = new Uint8Array(words.buffer);
+  packGeometry(cloud, order, { words, first: 0, stride });
+  packSh(cloud, order, shPrecision, { words, first: GEOMETRY_WORDS, stride });
   const noiseOf = noiseIn(cloud);
-  for (let k = 0, at = 0; k < order.length; k++) {
-    for (let w = 0; w < GEOMETRY_WORDS; w++) words[at++] = geometry[GEOMETRY_WORDS * k + w];
-    for (let w = 0; w < shStride; w++) words[at++] = sh[shStride * k + w];
-    floats[at++] = reachOf(cloud, order[k]);
-    floats[at++] = noiseOf(order[k]);
-    words[at++] = codeOf?.[k] ?? 0;
+  for (let k = 0, at = stride - FACT_WORDS; k < order.length; k++, at += stride) {
+    floats[at] = reachOf(cloud, order[k]);
+    const sh = 4 * (stride * k + GEOMETRY_WORDS);
+    floats[at + 1] = shPrecision === 'int8' ? noiseOfPacked(bytes, sh, shDegree) : noiseOf(order[k]);
+    words[at + 2] = codeOf?.[k] ?? 0;
   }
   return { count: order.length, words, ends: endsOf(codeOf) };
 }
 
 const cellOf = (code: number): number => code >>> (32 - CELL_BITS);
-const cellsOf = (codes: Uint32Array): Uint32Array => codes.map(cellOf);
 
 /** Returns the index after the last splat of each cell. @param codes Codes in the order of their cells. */
 function endsOf(codes: Uint32Array | undefined): Uint32Array<ArrayBuffer> {
