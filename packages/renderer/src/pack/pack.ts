@@ -13,7 +13,7 @@ import { scaleRotationFactor } from './factor.js';
 import { mortonOrder } from './morton.js';
 import { recentered } from './recenter.js';
 import { choosePrecision, noiseIn, packSh } from './sh.js';
-import { GEOMETRY_WORDS, SH_PRECISION, type ShPrecision, wordRows } from './words.js';
+import { GEOMETRY_WORDS, SH_PRECISION, type ShPrecision } from './words.js';
 
 /** Options of {@link packGaussians}. */
 export interface PackOptions {
@@ -115,15 +115,20 @@ export function usableIndices(cloud: GaussianCloud): Uint32Array {
   return indices.subarray(0, kept);
 }
 
-/** Writes the geometry words of the splats `kept`; returns the memory, by default [kept, 8]. */
+/**
+ * Writes the geometry words of the splats `kept`.
+ * @param words Zeroed memory with `stride` words for each splat, the first of which are written.
+ * @returns `words`; by default [kept, 8]
+ */
 export function packGeometry(
   cloud: GaussianCloud,
   kept: Uint32Array,
-  { words, first, stride } = wordRows(kept.length, GEOMETRY_WORDS),
+  stride = GEOMETRY_WORDS,
+  words = new Uint32Array(kept.length * stride),
 ): Uint32Array {
   const floats = new Float32Array(words.buffer);
   const factor = new Float64Array(6);
-  let at = first;
+  let at = 0;
   for (const i of kept) {
     floats[at] = cloud.positions[3 * i];
     floats[at + 1] = cloud.positions[3 * i + 1];

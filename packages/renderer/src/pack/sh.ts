@@ -1,6 +1,6 @@
-import { shCoefficientCount, type GaussianCloud, type ShDegree } from '@gaussian-splat/core';
+import { shCoefficientCount, type GaussianCloud } from '@gaussian-splat/core';
 import { halfBits } from './half.js';
-import { type ShPrecision, shWords, type WordRows, wordRows } from './words.js';
+import { type ShPrecision, shWords } from './words.js';
 
 /** Number of coefficients of bands 1, 2 and 3; each has three channels. */
 export const BAND_SIZES = [3, 5, 7] as const;
@@ -45,13 +45,6 @@ export function noiseIn({ sh, shDegree }: Pick<GaussianCloud, 'sh' | 'shDegree'>
     }
     return noise;
   };
-}
-
-/** Returns the same from harmonics that {@link packSh} has written as `int8`, at byte `at`. */
-export function noiseOfPacked(bytes: Uint8Array, at: number, shDegree: ShDegree): number {
-  let noise = 0;
-  for (let band = 0; band < shDegree; band++) noise += BAND_SIZES[band] * CODE_NOISE[bytes[at + SCALE_BYTES[band]]];
-  return noise;
 }
 
 /**
@@ -107,25 +100,33 @@ export const CODE_NOISE = Float64Array.from(
  * `float16` stores all coefficients. `int8` stores the three of degree 0 in float16. Each band then has a scale (the
  * largest magnitude of the band, rounded up to an eighth of an octave), and its coefficients as multiples of 1/127 of
  * that scale.
+ * @param words Zeroed memory with `stride` words for each splat, from word `first` on.
  */
 export function packSh(
   cloud: GaussianCloud,
   kept: Uint32Array,
   precision: ShPrecision,
-  rows = wordRows(kept.length, shWords(cloud.shDegree, precision)),
+  stride = shWords(cloud.shDegree, precision),
+  words = new Uint32Array(kept.length * stride),
+  first = 0,
 ): Uint32Array {
-  if (precision === 'float16') packHalf(cloud, kept, rows);
-  else packInt8(cloud, kept, rows);
-  return rows.words;
+  (precision === 'float16' ? packHalf : packInt8)(cloud, kept, words.buffer, 4 * first, 4 * stride);
+  return words;
 }
 
-function packHalf({ sh, shDegree }: GaussianCloud, kept: Uint32Array, { words, first, stride }: WordRows): void {
+/** @param at Byte offset of the first splat. @param stride Bytes from one splat to the next. */
+function packHalf(
+  { sh, shDegree }: GaussianCloud,
+  kept: Uint32Array,
+  buffer: ArrayBuffer,
+  at: number,
+  stride: number,
+): void {
   const numbers = 3 * shCoefficientCount(shDegree);
-  const halves = new Uint16Array(words.buffer);
-  let at = 2 * first;
+  const halves = new Uint16Array(buffer);
   for (const i of kept) {
-    for (let k = 0; k < numbers; k++) halves[at + k] = halfBits(sh[i * numbers + k]);
-    at += 2 * stride;
+    for (let k = 0; k < numbers; k++) halves[at / 2 + k] = halfBits(sh[i * numbers + k]);
+    at += stride;
   }
 }
 
@@ -137,13 +138,18 @@ const PER_UNIT = Float64Array.from({ length: MAX_CODE + 1 }, (_, code) =>
   code && code < MAX_CODE ? 127 / scaleOf(code) : 0,
 );
 
-function packInt8({ sh, shDegree }: GaussianCloud, kept: Uint32Array, rows: WordRows): void {
+/** Parameters as in {@link packHalf}. */
+function packInt8(
+  { sh, shDegree }: GaussianCloud,
+  kept: Uint32Array,
+  buffer: ArrayBuffer,
+  at: number,
+  stride: number,
+): void {
   const numbers = 3 * shCoefficientCount(shDegree);
-  const { buffer } = rows.words;
   const bytes = new Uint8Array(buffer);
   const halves = new Uint16Array(buffer);
   const bits = bitsOf(sh);
-  let at = 4 * rows.first;
   for (const splat of kept) {
     let first = splat * numbers;
     for (let channel = 0; channel < 3; channel++) halves[at / 2 + channel] = halfBits(sh[first++]);
@@ -157,7 +163,7 @@ function packInt8({ sh, shDegree }: GaussianCloud, kept: Uint32Array, rows: Word
       if (shDegree === 1) bytes[at + SCALE_BYTES[1]] = codeOf(sh[--end] * perUnit);
       while (first < end) bytes[code++] = codeOf(sh[first++] * perUnit);
     }
-    at += 4 * rows.stride;
+    at += stride;
   }
 }
 

@@ -17,7 +17,7 @@ import { codesAlong, curveThrough, isOfPlanes, type Curve } from './morton.js';
 import { packGeometry, usableIndices, type PackedGaussians, type PackedHead, type PackOptions } from './pack.js';
 import { recentered } from './recenter.js';
 import { sortByKey } from './radix-sort.js';
-import { noiseIn, noiseOfPacked, packSh, PART, precisionFor } from './sh.js';
+import { BAND_SIZES, CODE_NOISE, noiseIn, packSh, PART, precisionFor, SCALE_BYTES } from './sh.js';
 import { unpackSplat } from './unpack.js';
 import { CHUNK_NUMBERS, GEOMETRY_WORDS, type ShPrecision, shWords } from './words.js';
 
@@ -104,8 +104,8 @@ export function packShard(given: GaussianCloud, layout: ShareLayout): PackedShar
   const words = new Uint32Array(stride * kept.length);
   const floats = new Float32Array(words.buffer);
   const bytes = new Uint8Array(words.buffer);
-  packGeometry(cloud, order, { words, first: 0, stride });
-  packSh(cloud, order, shPrecision, { words, first: GEOMETRY_WORDS, stride });
+  packGeometry(cloud, order, stride, words);
+  packSh(cloud, order, shPrecision, stride, words, GEOMETRY_WORDS);
   const noiseOf = noiseIn(cloud);
   for (let k = 0, at = stride - FACT_WORDS; k < order.length; k++, at += stride) {
     floats[at] = reachOf(cloud, order[k]);
@@ -114,6 +114,13 @@ export function packShard(given: GaussianCloud, layout: ShareLayout): PackedShar
     words[at + 2] = codeOf?.[k] ?? 0;
   }
   return { count: order.length, words, ends: endsOf(codeOf) };
+}
+
+/** Returns the noise of {@link noiseIn} from harmonics that {@link packSh} has written as `int8`, at byte `at`. */
+function noiseOfPacked(bytes: Uint8Array, at: number, shDegree: ShDegree): number {
+  let noise = 0;
+  for (let band = 0; band < shDegree; band++) noise += BAND_SIZES[band] * CODE_NOISE[bytes[at + SCALE_BYTES[band]]];
+  return noise;
 }
 
 const cellOf = (code: number): number => code >>> (32 - CELL_BITS);

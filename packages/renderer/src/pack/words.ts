@@ -11,18 +11,6 @@ export const CHUNK_NUMBERS = layouts.Chunk.size / 4;
 /** Storage of the spherical harmonics of a scene: see `packSh`. */
 export type ShPrecision = 'int8' | 'float16';
 
-/** Where packed data of splats are written: at word `first`, then every `stride` words. */
-export interface WordRows {
-  readonly words: Uint32Array<ArrayBuffer>;
-  readonly first: number;
-  readonly stride: number;
-}
-
-/** Returns zeroed memory for `size` words of each of `count` splats. */
-export const wordRows = (count: number, size: number): WordRows => ({
-  ...{ words: new Uint32Array(count * size), first: 0, stride: size },
-});
-
 /** Value of `View.sh_encoding` for each precision. */
 export const SH_PRECISION: Record<ShPrecision, number> = { int8: 0, float16: 1 };
 
