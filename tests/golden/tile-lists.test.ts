@@ -16,10 +16,10 @@ const WHOLE = { width: 257, height: 5_441 };
 const PART = { left: 5, top: 2_201, width: 250, height: 1_003 };
 /**
  * Largest difference of a channel. Centers of splats are rounded otherwise, so that a pixel may have one splat more or
- * less at its rim, where alpha is 1/255; and the share of the pixels that may differ by more than a hundredth of that.
+ * less at its rim, where alpha is 1/255; and the fraction of the pixels that may differ by more than a hundredth of it.
  */
 const MAX_DIFFERENCE = 1.1 / 255;
-const MAX_SHARE = 0.01;
+const MAX_FRACTION = 0.01;
 
 test('tiles: large lists, small lists, long lists and squares of tiles give the same pixels', async () => {
   const random = seededRandom(32);
@@ -59,6 +59,6 @@ test('tiles: large lists, small lists, long lists and squares of tiles give the 
   const pixels = PART.width * PART.height;
   console.log(`${covered} of ${pixels} pixels covered, ${different} different, by ${worst} at most`);
   assert.ok(covered > 0.5 * pixels, `${covered} pixels are covered`);
-  assert.ok(different <= MAX_SHARE * pixels, `${different} pixels differ`);
+  assert.ok(different <= MAX_FRACTION * pixels, `${different} pixels differ`);
   assert.ok(worst <= MAX_DIFFERENCE, `a pixel differs by ${worst}`);
 });
