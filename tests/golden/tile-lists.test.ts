@@ -23,15 +23,19 @@ const MAX_FRACTION = 0.01;
 
 test('tiles: large lists, small lists, long lists and squares of tiles give the same pixels', async () => {
   const random = seededRandom(32);
-  const splat = (spread: number, size: number): object => ({
+  const splat = (spread: number, size: number) => ({
     position: [random.uniform(-0.4, 0.4) * spread, random.uniform(-8, 8) * spread, random.uniform(-0.05, 0.05)],
-    scale: [random.logUniform(0.3, 1) * size, random.logUniform(0.3, 1) * size, random.logUniform(0.3, 1) * size],
+    scale: [
+      random.logUniform(0.3, 1) * size,
+      random.logUniform(0.3, 1) * size,
+      random.logUniform(0.3, 1) * size,
+    ] as const,
     rotation: random.rotation(),
     opacity: random.uniform(0.05, 0.9),
-    color: [random.uniform(0, 1), random.uniform(0, 1), random.uniform(0, 1)],
+    color: [random.uniform(0, 1), random.uniform(0, 1), random.uniform(0, 1)] as const,
   });
   // Most splats lie in a few bins near the middle, whose lists are long.
-  const cloud = cloudOf([...repeat(500, () => splat(1, 0.2)), ...repeat(2_000, () => splat(0.1, 0.01))] as never);
+  const cloud = cloudOf([...repeat(500, () => splat(1, 0.2)), ...repeat(2_000, () => splat(0.1, 0.01))]);
   const camera: Camera = { ...cameraAt([0, 0, -4], [0, 0, 0], WHOLE), fx: 1_300, fy: 1_300 };
   const part: Camera = {
     ...camera,

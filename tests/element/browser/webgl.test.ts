@@ -356,28 +356,6 @@ describe('renderer="webgl"', () => {
     }
   });
 
-  itInLab('the first frame of a scene in pages comes within 1.5 times of what it takes with WebGPU', async () => {
-    const pages = await putPages('webgl-first');
-    const firstFrameMs = async (renderer: string): Promise<number> => {
-      const begin = performance.now();
-      const element = show({ ...pages, renderer });
-      // The coarsest page is a preview with WebGL, if the others do not arrive at once.
-      await Promise.race(['preview', 'load'].map((type) => nextEvent(element, type)));
-      const took = performance.now() - begin;
-      await element.ready;
-      assertEqual(element.stats?.renderer, renderer, 'renderer');
-      element.remove();
-      return took;
-    };
-    const times: Record<string, number[]> = { webgpu: [], webgl: [] };
-    for (let round = 0; round < 4; round++)
-      for (const renderer of ['webgpu', 'webgl']) times[renderer].push(await firstFrameMs(renderer));
-    // The first round compiles shaders.
-    const [webgpu, webgl] = ['webgpu', 'webgl'].map((renderer) => Math.min(...times[renderer].slice(1)));
-    console.log(`first frame of a scene in pages: ${webgpu.toFixed(0)} ms with WebGPU, ${webgl.toFixed(0)} with WebGL`);
-    assert(webgl <= 1.5 * webgpu, `${webgl} of ${webgpu} ms`);
-  });
-
   it('what it cannot show is an error by name, the poster stays, and nothing is fetched', async () => {
     const generators = '/tests/fixtures/generators/';
     const cases: readonly (readonly [Readonly<Record<string, string>>, RegExp])[] = [
