@@ -24,7 +24,11 @@ const MAX_FRACTION = 0.01;
 test('tiles: large lists, small lists, long lists and squares of tiles give the same pixels', async () => {
   const random = seededRandom(32);
   const splat = (spread: number, size: number) => ({
-    position: [random.uniform(-0.4, 0.4) * spread, random.uniform(-8, 8) * spread, random.uniform(-0.05, 0.05)],
+    position: [
+      random.uniform(-0.4, 0.4) * spread,
+      random.uniform(-8, 8) * spread,
+      random.uniform(-0.05, 0.05),
+    ] as const,
     scale: [
       random.logUniform(0.3, 1) * size,
       random.logUniform(0.3, 1) * size,
