@@ -10,7 +10,7 @@ const TILES_PER_BIN = BIN_COLUMNS * BIN_ROWS;
 // Squares of four small tiles that are rasterized together.
 const SQUARES_PER_ROW = BIN_COLUMNS / 2u;
 const SQUARES_PER_BIN = 2u * SQUARES_PER_ROW;
-// A bin is long if it has more than this part of all pairs: there are fewer long bins.
+// A bin is long if it has more than 1 / LONG_BINS of all pairs, so fewer than LONG_BINS bins are long.
 const LONG_BINS = 64u;
 
 // Words of 32 bits with one bit for each of the 256 pairs that are contiguous in `tile_bits`.
