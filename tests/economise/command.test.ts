@@ -74,7 +74,7 @@ test('what cannot be written or read is said before the work, for people', () =>
     [['none.ply', '--out', 'a.obj'], 1, /expected a name that ends in .*\[argument\/value\]/],
     [['none.ply', '--out', 'a.glb'], 1, /^ENOENT: no such file.*none\.ply'$/m],
     [['scene.ply', '--out', 'a.glb', '--views', 'cameras.json'], 2, /found no list "views"/],
-    [['scene.ply', '--out', 'a.glb', '--views', 'prose.json'], 2, /prose\.json is no JSON/],
+    [['scene.ply', '--out', 'a.glb', '--views', 'prose.json'], 2, /prose\.json is not JSON/],
     [['scene.ply', '--out', 'a.glb', '--views', '.'], 1, /^EISDIR/m],
   ] as const;
   for (const [args, status, reason] of someOf<(typeof cases)[number]>(cases, 3)) {
