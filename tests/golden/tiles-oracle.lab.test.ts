@@ -110,7 +110,7 @@ async function bytesOf(device: GPUDevice, cloud: GaussianCloud, camera: Camera):
   return bytes;
 }
 
-/** 8,000 splats over all 9 bins of the image: 72,000 pairs, and room for 65,536. The nearest few hide all others. */
+/** 8,000 splats over all 18 bins of the image: 144,000 pairs, and room for 65,536. The nearest few hide all others. */
 const crowd = cloudOf(
   repeat(8000, (i) => ({
     position: [0, 0, 0.0006 * i],
@@ -130,7 +130,7 @@ test('tiles: over capacity the farthest pairs are left out, the frame says so, a
   const target = device.createTexture({ size: [64, 1100], format: 'rgba16float', usage: 0x8 | 0x10 });
   renderer.render({ gaussians, camera: crowdCamera, target });
   const first = await renderer.stats();
-  assert.deepEqual([first.pairs, first.pairOverflow], [65_536, 72_000 - 65_536]);
+  assert.deepEqual([first.pairs, first.pairOverflow], [65_536, 144_000 - 65_536]);
   await incomplete;
   const close = closeness(
     await capture(device, renderer, { gaussians, camera: crowdCamera }),
@@ -139,7 +139,7 @@ test('tiles: over capacity the farthest pairs are left out, the frame says so, a
   console.log(describeCloseness('tiles with room again', close));
   assert.ok(close.psnr >= LIMITS.psnr && close.max <= worstOf(''), `${close.psnr} dB, worst ${255 * close.max}/255`);
   const second = await renderer.stats();
-  assert.deepEqual([second.pairs, second.pairOverflow], [72_000, 0]);
+  assert.deepEqual([second.pairs, second.pairOverflow], [144_000, 0]);
 });
 
 for (const [what, cameras, pauseMs] of [
