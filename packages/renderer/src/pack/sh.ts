@@ -114,21 +114,17 @@ export function packSh(
   return words;
 }
 
-/** @param at Byte offset of the first splat. @param stride Bytes from one splat to the next. */
-function packHalf(
-  { sh, shDegree }: GaussianCloud,
-  kept: Uint32Array,
-  buffer: ArrayBuffer,
-  at: number,
-  stride: number,
-): void {
+/** Writes the splats `kept` from byte `at` on, every `stride` bytes. */
+type Packer = (cloud: GaussianCloud, kept: Uint32Array, buffer: ArrayBuffer, at: number, stride: number) => void;
+
+const packHalf: Packer = ({ sh, shDegree }, kept, buffer, at, stride) => {
   const numbers = 3 * shCoefficientCount(shDegree);
   const halves = new Uint16Array(buffer);
   for (const i of kept) {
     for (let k = 0; k < numbers; k++) halves[at / 2 + k] = halfBits(sh[i * numbers + k]);
     at += stride;
   }
-}
+};
 
 /**
  * Factor from a coefficient to its code, for each code of a scale; 0 for bands that are too small or too large for a
@@ -138,14 +134,7 @@ const PER_UNIT = Float64Array.from({ length: MAX_CODE + 1 }, (_, code) =>
   code && code < MAX_CODE ? 127 / scaleOf(code) : 0,
 );
 
-/** Parameters as in {@link packHalf}. */
-function packInt8(
-  { sh, shDegree }: GaussianCloud,
-  kept: Uint32Array,
-  buffer: ArrayBuffer,
-  at: number,
-  stride: number,
-): void {
+const packInt8: Packer = ({ sh, shDegree }, kept, buffer, at, stride) => {
   const numbers = 3 * shCoefficientCount(shDegree);
   const bytes = new Uint8Array(buffer);
   const halves = new Uint16Array(buffer);
@@ -165,7 +154,7 @@ function packInt8(
     }
     at += stride;
   }
-}
+};
 
 /**
  * Rounds to the nearest integer, halves up: codes are multiples of 1/127 of the scale. Truncation rounds down above 0,
