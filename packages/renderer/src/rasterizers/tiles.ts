@@ -34,7 +34,7 @@ interface Grid {
   readonly bits: number;
 }
 
-/** Returns the bins for an image: of small tiles if one pass sorts the pairs by their bins. */
+/** Returns the bins for an image. Their tiles are small if one pass sorts the pairs by their bins. */
 function gridFor(
   { width, height }: Pick<Surface, 'width' | 'height'>,
   painter: TilePainter,
