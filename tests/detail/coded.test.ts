@@ -63,7 +63,7 @@ for (const degree of [0, 1, 2, 3] as const) {
   test(`degree ${degree}: rows are those of pages that are not coded, and splats are where they were`, async () => {
     const cloud = withHarmonics(pebbles(6_000), degree);
     const tree = buildDetailTree(cloud, { geometry: 'quantized' });
-    const coding = codingFor(FINE);
+    const coding = codingFor(FINE, tree);
     const encoder = new PageEncoder(tree, coding, { deflate });
     const scene = manifestOf(tree, [], String, coding);
     const parts = [];
@@ -138,7 +138,7 @@ test('harmonics of a splat that is seen from one side are rounded to what that s
 
 test('coarser levels, which are far from the scene anyway, have coarser coordinates and harmonics', async () => {
   const tree = buildDetailTree(withHarmonics(pebbles(6_000), 1), { geometry: 'quantized' });
-  const coding = codingFor(DEFAULT_STEPS);
+  const coding = codingFor(DEFAULT_STEPS, tree);
   const encoder = new PageEncoder(tree, coding, { deflate });
   const scene = manifestOf(tree, [], String, coding);
   const steps: number[][] = tree.levels.map(() => []);
@@ -158,7 +158,7 @@ test('coarser levels keep the harmonics that show', async () => {
   const tree = buildDetailTree(withHarmonics(pebbles(6_000), 2), { geometry: 'quantized' });
   const [usual, fine] = await Promise.all(
     [DEFAULT_STEPS, FINE].map(async (steps) => {
-      const coding = codingFor(steps);
+      const coding = codingFor(steps, tree);
       const encoder = new PageEncoder(tree, coding, { deflate });
       const parts = [];
       for (const page of cutPages(tree)) {
@@ -213,9 +213,38 @@ test('a scene streamed from coded pages is as near to the whole one as its steps
   assert.ok(fine.decibels > 55 && fine.decibels > usual.decibels + 8, 'fine steps');
 });
 
+test('small splats beside large ones keep their size with the smallest steps', async () => {
+  const random = randomSource(4);
+  const even = pebbles(3_000);
+  const cloud = { ...even, scales: even.scales.slice() };
+  for (let i = 0; i < cloud.count; i++) {
+    const smaller = 2 ** (-12 * random());
+    for (let k = 0; k < 3; k++) cloud.scales[3 * i + k] *= smaller;
+  }
+  const tree = buildDetailTree(cloud, { geometry: 'quantized' });
+  const coding = codingFor(FINE, tree);
+  const encoder = new PageEncoder(tree, coding, { deflate });
+  const parts = [];
+  for (const page of cutPages(tree)) {
+    const file = { chunks: page.chunks, upper: page.upper, shDegree: tree.levels[0].shDegree, coding };
+    const words = new Uint32Array(await decodePage('page', encoder.encode(page), file));
+    const leaves = page.holds.flatMap(([level], chunk) => (level === 0 ? [chunk] : []));
+    if (leaves.length > 0) parts.push({ words, of: page.chunks, chunks: leaves });
+  }
+  const decoded = cloudOfChunks(manifestOf(tree, [], String, coding), parts);
+  const sizesOf = ({ scales }: GaussianCloud): Float64Array =>
+    Float64Array.from({ length: scales.length / 3 }, (_, i) =>
+      Math.log2(Math.max(scales[3 * i], scales[3 * i + 1], scales[3 * i + 2])),
+    ).sort();
+  const [found, expected] = [sizesOf(decoded), sizesOf(cloud)];
+  assert.equal(found.length, expected.length);
+  const worst = found.reduce((max, size, k) => Math.max(max, Math.abs(size - expected[k])), 0);
+  assert.ok(worst < 0.1, `a size is off by ${worst} octaves`);
+});
+
 test('what is no coded page is refused, and no more is decompressed than a page can have', async () => {
   const tree = buildDetailTree(withHarmonics(pebbles(1_500), 1), { geometry: 'quantized' });
-  const coding = codingFor(DEFAULT_STEPS);
+  const coding = codingFor(DEFAULT_STEPS, tree);
   const [page] = cutPages(tree);
   const whole = new PageEncoder(tree, coding, { deflate }).encode(page);
   const file = { chunks: page.chunks, upper: page.upper, shDegree: 1, coding } as const;
@@ -242,7 +271,7 @@ test('what is no coded page is refused, and no more is decompressed than a page 
 test('a manifest says how its files are coded', () => {
   const tree = buildDetailTree(pebbles(600), { geometry: 'quantized' });
   const manifest = JSON.parse(
-    JSON.stringify(manifestOf(tree, cutPages(tree), String, codingFor(DEFAULT_STEPS))),
+    JSON.stringify(manifestOf(tree, cutPages(tree), String, codingFor(DEFAULT_STEPS, tree))),
   ) as object;
   assert.equal(checkManifest(manifest, 'detail.json').version, 4);
   const { coding } = manifest as { coding: object };

@@ -28,8 +28,9 @@ export function detailFolder(
   { coded, ...options }: DetailFolderOptions = {},
 ): DetailFolder {
   const files = new Map<string, ArrayBuffer>();
-  const manifest = writePages(buildDetailTree(cloud, options), {
-    coded: coded && { coding: codingFor(coded.steps), deflate: coded.deflate },
+  const tree = buildDetailTree(cloud, options);
+  const manifest = writePages(tree, {
+    coded: coded && { coding: codingFor(coded.steps, tree), deflate: coded.deflate },
     places,
     put: (path, bytes) => files.set(path, bytes.buffer),
   });

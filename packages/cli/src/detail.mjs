@@ -113,12 +113,12 @@ async function deviceToMeasure() {
 async function chooseCoding({ tree, cloud, minPsnr, scored, views }) {
   if (minPsnr === undefined) return undefined;
   const device = await deviceToMeasure();
-  if (device === undefined) return { coding: codingFor(DEFAULT_STEPS), deflate };
+  if (device === undefined) return { coding: codingFor(DEFAULT_STEPS, tree), deflate };
   const { steps, ...found } = await findPageSteps({
     ...{ tree, pages: cutPages(tree), cloud, device, minPsnr, scored, views, deflate: deflateQuickly },
     onStep: (step) => console.log(`  ${step}`),
   });
-  return { coding: codingFor(steps), deflate, ...found };
+  return { coding: codingFor(steps, tree), deflate, ...found };
 }
 
 /**
@@ -171,6 +171,10 @@ async function main({ scene, out, degree, geometry, minPsnr, scored, given, colu
   if (choice?.psnr !== undefined)
     console.log(
       `${choice.psnr.toFixed(2)} dB to the scene in held-out views together, ${choice.worstPsnr.toFixed(2)} dB in the worst`,
+    );
+  if (choice?.psnr < minPsnr)
+    console.log(
+      `Expected ${minPsnr} dB, found none better with the smallest steps that pages can have. Write them with --quantized or --exact, or ask for less.`,
     );
 }
 

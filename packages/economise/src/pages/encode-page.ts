@@ -21,7 +21,7 @@ import {
   shNumbers,
   type SplatLevel,
 } from '@gaussian-splat/renderer/tools';
-import type { BuiltPage, DetailTree } from './build-pages.js';
+import { cutPages, type BuiltPage, type DetailTree } from './build-pages.js';
 import { headOf, joined, Planes, type Deflate } from './page-planes.js';
 import { differencesOf, HarmonicRounder } from './round-harmonics.js';
 import type { SplatVisibility } from './splat-visibility.js';
@@ -71,12 +71,12 @@ export interface WrittenCoding extends PageCoding {
   readonly place: number;
 }
 
-/** Returns the coding with the nearest steps that files can represent. */
-export function codingFor(steps: PageSteps): WrittenCoding {
+/** Returns the coding with the nearest steps that the files of a tree can represent. */
+export function codingFor(steps: PageSteps, tree: DetailTree): WrittenCoding {
   const odd = 2 * Math.round((1 / steps.direction - 1) / 2) + 1;
   const scale = Math.round(SCALE_STEPS * (Math.log2(127 * steps.harmonics) + SCALE_BIAS));
   return {
-    size: Math.min(1, Math.max(1 / 48, steps.size)),
+    size: Math.min(1, Math.max(1 / 48, minSizeStep(tree), steps.size)),
     directions: Math.min(255, Math.max(3, odd)),
     opacity: Math.min(512, Math.max(MIN_OPACITY_STEP, Math.round(QUANTIZED_OPAQUE * steps.opacity))),
     color: steps.color,
@@ -84,6 +84,40 @@ export function codingFor(steps: PageSteps): WrittenCoding {
     scale: Math.min(255 - CLASS_STEP * (CLASSES - 1), Math.max(0, scale)),
     place: steps.place,
   };
+}
+
+/**
+ * Smallest ratio of an extent of a splat to its largest one that pages must represent. A thinner splat may become this
+ * thick.
+ */
+const MIN_RATIO = 2 ** -8;
+
+const minSizeSteps = new WeakMap<DetailTree, number>();
+
+/**
+ * Returns the smallest step of the binary logarithm of sizes with which the codes of a page cover the sizes of all of its
+ * splats. With a smaller one, small splats would become larger. At most the default step, whose codes cover 16 octaves.
+ */
+function minSizeStep(tree: DetailTree): number {
+  const known = minSizeSteps.get(tree);
+  if (known !== undefined) return known;
+  const ranges = tree.levels.map((level) =>
+    Array.from({ length: Math.ceil(level.count / CULL_GROUP) }, (_, chunk) => {
+      const first = CULL_GROUP * chunk;
+      return sizeRange(level, first, Math.min(CULL_GROUP, level.count - first));
+    }),
+  );
+  // A scene in several places has pages without the top.
+  const pages = [true, false].flatMap((withTop) => cutPages(tree, withTop));
+  const octaves = pages.map(({ holds }) => {
+    const own = holds.map(([level, chunk]) => ranges[level][chunk]);
+    const largest = own.reduce((max, range) => Math.max(max, range.largest), 0);
+    const smallest = own.reduce((min, range) => Math.min(min, range.smallest), Infinity);
+    return largest > 0 ? Math.log2(largest / smallest) : 0;
+  });
+  const step = Math.min(DEFAULT_STEPS.size, octaves.reduce((a, b) => Math.max(a, b), 0) / MAX_SIZES);
+  minSizeSteps.set(tree, step);
+  return step;
 }
 
 /** Options of {@link PageEncoder} besides a tree and its coding. */
@@ -128,7 +162,7 @@ export class PageEncoder {
       shDegree,
     );
     const largest = holds.reduce(
-      (max, [level, chunk], k) => Math.max(max, largestOf(levels[level], CULL_GROUP * chunk, counts[k])),
+      (max, [level, chunk], k) => Math.max(max, sizeRange(levels[level], CULL_GROUP * chunk, counts[k]).largest),
       0,
     );
     const min = Math.fround((largest > 0 ? Math.log2(largest) : 0) - MAX_SIZES * this.#coding.size);
@@ -232,14 +266,17 @@ const rowOf = ({ spheres, errors }: ChunkErrors, chunk: number): number[] => [
   errors[chunk],
 ];
 
-function largestOf({ factors }: SplatLevel, first: number, count: number): number {
+/** Returns the largest and the smallest extent of the splats of a chunk along an axis; see {@link MIN_RATIO}. */
+function sizeRange({ factors }: SplatLevel, first: number, count: number): { largest: number; smallest: number } {
   const lengths = new Float64Array(3);
-  let largest = 0;
+  let [largest, smallest] = [0, Infinity];
   for (let i = first; i < first + count; i++) {
     rowLengths(factors, FACTOR_NUMBERS * i, lengths);
-    largest = Math.max(largest, lengths[0], lengths[1], lengths[2]);
+    const own = Math.max(lengths[0], lengths[1], lengths[2]);
+    largest = Math.max(largest, own);
+    if (own > 0) smallest = Math.min(smallest, Math.max(Math.min(lengths[0], lengths[1], lengths[2]), MIN_RATIO * own));
   }
-  return largest;
+  return { largest, smallest };
 }
 
 /** Returns the smallest extent of the splat at the rank `SIZE_RANK` of a chunk. */

@@ -89,7 +89,7 @@ async function cloudOfPages(
   steps: PageSteps,
   seen: SplatVisibility | undefined,
 ): Promise<GaussianCloud> {
-  const coding = codingFor(steps);
+  const coding = codingFor(steps, tree);
   const encoder = new PageEncoder(tree, coding, { deflate, seen });
   const scene = manifestOf(tree, [], String, coding);
   const parts = [];
