@@ -97,8 +97,8 @@ test(
     assert.equal(report.error, undefined);
     const [{ elements, target, span, interval, timed, restMs, wholeMs, levels }] = report.steps;
     assert.equal(elements, 2);
-    // Two subjects divide the display's time for one: 0.8 of an interval of 60 Hz or less.
-    assert.ok(target > 0 && target <= (0.8 * 1000) / 60 / 2 + 0.01, `${target} ms`);
+    // Two subjects divide the display's time for one: 0.8 of an interval of 60 Hz or less, which is measured.
+    assert.ok(target > 0 && target <= (1.02 * 0.8 * 1000) / 60 / 2, `${target} ms`);
     assert.ok(timed > 0 && span.p95 >= span.p50 && span.p50 > 0, JSON.stringify(span));
     assert.ok(interval.p50 > 0 && wholeMs > 0 && restMs >= 0);
     assert.ok(levels.length > 0 && levels[0].at < 200);

@@ -11,7 +11,7 @@ import { encodingsFor, viewsAround } from '@gaussian-splat/economise';
 import { readScene } from '@gaussian-splat/formats';
 import { writeWhole } from '../../packages/cli/src/lib/output-file.mjs';
 import { smallCloud } from '../formats/support/small-cloud.js';
-import { onlyInLab, someOf } from '../support/extent.js';
+import { onlyInFull, onlyInLab, someOf } from '../support/extent.js';
 
 const script = fileURLToPath(new URL('../../packages/cli/bin/gaussian-splat.mjs', import.meta.url));
 const folder = mkdtempSync(join(tmpdir(), 'economise-'));
@@ -117,7 +117,7 @@ test(
 );
 
 /** Few splats and the fewest views, because the search measures each step in excerpts at the size of screens. */
-test('SOG is tuned to the figure, or to the bytes, that are asked for', { skip: onlyInLab }, async () => {
+test('SOG is tuned to the figure, or to the bytes, that are asked for', { skip: onlyInFull }, async () => {
   const few = smallCloud(40, 1);
   const file = await encodingsFor('a.ply')[0].write({ cloud: few, degrees: new Uint8Array(40).fill(1) });
   writeFileSync(join(folder, 'few.ply'), file);
