@@ -174,7 +174,7 @@ async function main({ scene, out, degree, geometry, minPsnr, scored, given, colu
     );
   if (choice?.psnr < minPsnr)
     console.log(
-      `Expected ${minPsnr} dB, found none better with the smallest steps that pages can have. Write them with --quantized or --exact, or ask for less.`,
+      `Expected ${minPsnr} dB: these are the most accurate files that were found. Ask for less, or add --quantized or --exact.`,
     );
 }
 
