@@ -54,6 +54,15 @@ test('documents link to files of the repository that are there', { skip }, () =>
   assert.deepEqual(broken, []);
 });
 
+test('headings of documents do not hold the text below them', { skip }, () => {
+  const headings = pagesOf()
+    .filter((url) => url.startsWith('/docs/'))
+    .flatMap((url) => [...read(url).matchAll(/<h[1-6][^>]*>([^]*?)<\/h[1-6]>/g)].map(([, text]) => `${url}: ${text}`));
+  assert.ok(headings.length > 100, `${headings.length} headings`);
+  const glued = headings.filter((heading) => /<strong>|\d{4}-\d\d-\d\d$|: .{120}/.test(heading));
+  assert.deepEqual(glued, []);
+});
+
 test('every page is reached from the first', { skip }, () => {
   const reached = new Set<string>();
   const visit = (url: string): void => {
