@@ -110,7 +110,9 @@ for (const isOne of [false, true]) {
     const image = await target();
     const first = await renderer();
     const drawing = [first, isOne ? first : await renderer()];
-    for (const isMoving of [false, true]) {
+    // Without pauses, and with frames that take longer than a view waits for its feedback pass.
+    for (const pauseMs of [undefined, 4, 150]) {
+      const isMoving = pauseMs !== undefined;
       const { scene, live } = await open(folder);
       const [still, start] = [besides([60, 0, 0], 3, 0), performance.now()];
       const draw = (): void => {
@@ -122,10 +124,11 @@ for (const isOne of [false, true]) {
         // As many as pages take to be requested, fetched and placed, more if other tests use the same CPU; and some
         // more, in which they might be evicted again.
         const isThere = (): boolean => copiesOf(scene).every((pages) => pages >= MAX_COPY_SHARE);
-        for (let [frame, after] = [0, 0]; after < 40 && frame < 2400; after += isThere() ? 1 : 0, frame++) {
+        const maxFrames = pauseMs > 100 ? 120 : 2400;
+        for (let [frame, after] = [0, 0]; after < 40 && frame < maxFrames; after += isThere() ? 1 : 0, frame++) {
           draw();
           await (await anyDevice()).queue.onSubmittedWorkDone();
-          await pause(4);
+          await pause(pauseMs);
         }
       } else {
         const took = await live(MAX_TURNS, draw);

@@ -60,6 +60,11 @@ export class PageFeedback implements PageRequests {
   /** Time in milliseconds until which views with a feedback pass are skipped in favor of others. */
   #givesWayUntil = -Infinity;
   #frames = INTERVAL;
+  /** Views that were drawn since the last {@link #sample}, up to one more than are tracked. */
+  readonly #drawn = new Set<string>();
+  /** Number of samples with several drawn views, and of draws after the last one that get no feedback pass. */
+  #samples = 0;
+  #passedOver = 0;
   #timer: ReturnType<typeof setTimeout> | undefined;
   #isReading = false;
   /** Matrix of the last camera. */
@@ -87,7 +92,10 @@ export class PageFeedback implements PageRequests {
     const { isMoving } = this.#motion;
     const [view, version] = [`${nameOf(camera, settings)} ${changes}`, this.#options.version()];
     const isSeen = this.#views.draw(view, version);
-    const isEarly = this.#frames < (isMoving ? MOVING_INTERVAL : INTERVAL) || this.#isReading;
+    if (this.#drawn.size <= MAX_VIEWS) this.#drawn.add(view);
+    const isPassedOver = this.#passedOver > 0;
+    if (isPassedOver) this.#passedOver--;
+    const isEarly = this.#frames < (isMoving ? MOVING_INTERVAL : INTERVAL) || this.#isReading || isPassedOver;
     const isDue = !isEarly && !(isSeen && now < this.#givesWayUntil);
     this.#frames = isDue ? 1 : this.#frames + 1;
     if (isDue) this.#views.begin(view, version, !isMoving);
@@ -111,6 +119,10 @@ export class PageFeedback implements PageRequests {
 
   #sample(): void {
     this.#frames = INTERVAL;
+    // Views that are drawn in turns get passes in turns, even if every frame is later than this timer.
+    const views = this.#drawn.size;
+    this.#passedOver = views > 1 && views <= MAX_VIEWS ? this.#samples++ % views : 0;
+    this.#drawn.clear();
     this.#unseen.clear();
     this.#givesWayUntil = performance.now() + STALE_MS;
     this.#options.onStale();
