@@ -95,8 +95,8 @@ const MIN_RATIO = 2 ** -8;
 const minSizeSteps = new WeakMap<DetailTree, number>();
 
 /**
- * Returns the smallest step of the binary logarithm of sizes with which the codes of a page cover the sizes of all of its
- * splats. With a smaller one, small splats would become larger. At most the default step, whose codes cover 16 octaves.
+ * Returns the smallest step of the binary logarithm of sizes for which the codes of a page cover the sizes of all of its
+ * splats: a smaller one would enlarge small splats. At most the default step, whose codes cover 16 octaves.
  */
 function minSizeStep(tree: DetailTree): number {
   const known = minSizeSteps.get(tree);
