@@ -20,6 +20,7 @@ import {
   packPage,
   PageEncoder,
   DEFAULT_STEPS,
+  type DetailTree,
   type PageSteps,
   HarmonicRounder,
 } from '@gaussian-splat/economise/pages';
@@ -154,21 +155,25 @@ test('coarser levels, which are far from the scene anyway, have coarser coordina
   assert.ok(coarse > 4 * fine, `${coarse} and ${fine} between two coordinates`);
 });
 
+/** A level of a tree, read from its pages. */
+async function decodedLevel(tree: DetailTree, steps: PageSteps, wanted: number): Promise<GaussianCloud> {
+  const coding = codingFor(steps, tree);
+  const encoder = new PageEncoder(tree, coding, { deflate });
+  const parts = [];
+  for (const page of cutPages(tree)) {
+    const { chunks, upper, holds } = page;
+    const file = { chunks, upper, shDegree: tree.levels[0].shDegree, coding };
+    const words = new Uint32Array(await decodePage('page', encoder.encode(page), file));
+    parts.push({ words, of: chunks, chunks: holds.flatMap(([level], chunk) => (level === wanted ? [chunk] : [])) });
+  }
+  return cloudOfChunks(manifestOf(tree, [], String, coding), parts);
+}
+
 test('coarser levels keep the harmonics that show', async () => {
   const tree = buildDetailTree(withHarmonics(pebbles(6_000), 2), { geometry: 'quantized' });
   const [usual, fine] = await Promise.all(
     [DEFAULT_STEPS, FINE].map(async (steps) => {
-      const coding = codingFor(steps, tree);
-      const encoder = new PageEncoder(tree, coding, { deflate });
-      const parts = [];
-      for (const page of cutPages(tree)) {
-        const { chunks, upper, holds } = page;
-        const words = new Uint32Array(
-          await decodePage('page', encoder.encode(page), { chunks, upper, shDegree: 2, coding }),
-        );
-        parts.push({ words, of: chunks, chunks: holds.flatMap(([level], chunk) => (level === 1 ? [chunk] : [])) });
-      }
-      const { sh } = cloudOfChunks(manifestOf(tree, [], String, coding), parts);
+      const { sh } = await decodedLevel(tree, steps, 1);
       return sh.reduce((sum, value, k) => sum + (k % 27 < 3 ? 0 : value * value), 0);
     }),
   );
@@ -222,16 +227,7 @@ test('small splats beside large ones keep their size with the smallest steps', a
     for (let k = 0; k < 3; k++) cloud.scales[3 * i + k] *= smaller;
   }
   const tree = buildDetailTree(cloud, { geometry: 'quantized' });
-  const coding = codingFor(FINE, tree);
-  const encoder = new PageEncoder(tree, coding, { deflate });
-  const parts = [];
-  for (const page of cutPages(tree)) {
-    const file = { chunks: page.chunks, upper: page.upper, shDegree: tree.levels[0].shDegree, coding };
-    const words = new Uint32Array(await decodePage('page', encoder.encode(page), file));
-    const leaves = page.holds.flatMap(([level], chunk) => (level === 0 ? [chunk] : []));
-    if (leaves.length > 0) parts.push({ words, of: page.chunks, chunks: leaves });
-  }
-  const decoded = cloudOfChunks(manifestOf(tree, [], String, coding), parts);
+  const decoded = await decodedLevel(tree, FINE, 0);
   const sizesOf = ({ scales }: GaussianCloud): Float64Array =>
     Float64Array.from({ length: scales.length / 3 }, (_, i) =>
       Math.log2(Math.max(scales[3 * i], scales[3 * i + 1], scales[3 * i + 2])),
