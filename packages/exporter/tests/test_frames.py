@@ -106,6 +106,50 @@ def test_orders_of_quaternions_and_harmonics_are_those_of_the_contract(tmp_path:
     assert all(np.array_equal(first[name], second[name]) for name in first)
 
 
+def test_frames_follow_a_state_and_say_what_their_contract_says(tmp_path: Path) -> None:
+    def given(name: str, value: Any) -> onnx.TensorProto:
+        return numpy_helper.from_array(np.array(value, np.float32), name)
+
+    def float32(name: str, shape: list[int]) -> onnx.ValueInfoProto:
+        return helper.make_tensor_value_info(name, onnx.TensorProto.FLOAT, shape)
+
+    # Each frame is at the place of the frame before, one meter further; time changes nothing.
+    nodes = [
+        helper.make_node("Mul", ["time", "zero"], ["still"]),
+        helper.make_node("Add", ["place", "still"], ["positions"]),
+        helper.make_node("Add", ["positions", "one"], ["next"]),
+    ]
+    fixed: dict[str, Any] = {
+        "scales": [[0.1] * 3],
+        "rotations": [[1, 0, 0, 0]],
+        "colors": [[0.5] * 3],
+        "opacities": [[0.5]],
+    }
+    nodes += [helper.make_node("Identity", [f"{name}_stored"], [name]) for name in fixed]
+    stored = [given("zero", [0]), given("one", [1]), *(given(f"{name}_stored", value) for name, value in fixed.items())]
+    widths = {"positions": 3, "next": 3} | {name: len(value[0]) for name, value in fixed.items()}
+    outputs = [float32(name, [1, width]) for name, width in widths.items()]
+    graph = helper.make_graph(nodes, "g", [float32("time", [1]), float32("place", [1, 3])], outputs, stored)
+    model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 17)], ir_version=8)
+    contract: Any = {
+        "version": 1,
+        "inputs": {"time": {"role": "time"}, "place": {"role": "state", "output": "next", "default": 2}},
+        "outputs": {"layout": "split", "positions": "positions"} | {name: name for name in fixed},
+        "nMax": 1,
+        "duration": 1,
+        "coordinates": {"up": "+z"},
+        "antialiased": True,
+    }
+    onnx.save(model, tmp_path / "a.onnx")
+    for settings, comment in (({"filter": "mip"}, b"SplatRenderMode: mip"), ({}, b"antialiased 1")):
+        (tmp_path / "a.contract.json").write_text(json.dumps(contract | settings))
+        assert main(["frames", str(tmp_path / "a.onnx"), str(tmp_path / "a"), "--fps", "3"]) == 0
+        frames = [tmp_path / "a" / f"frame-000{frame}.ply" for frame in (1, 2, 3)]
+        assert [float(read_ply(path)["x"][0]) for path in frames] == [2, 3, 4]
+        head = frames[0].read_bytes().partition(b"end_header")[0]
+        assert b"comment Vertical Axis: +z\n" in head and b"comment " + comment + b"\n" in head
+
+
 def test_what_does_not_move_has_no_frames(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     from gaussian_exporter.families.classic import export_classic
 

@@ -12,6 +12,9 @@ import pytest
 
 from gaussian_exporter.arrays import AnyArray, Doubles
 from gaussian_exporter.checkpoints.networks import read_feed_forward, read_image_filter
+from gaussian_exporter.cli import main
+from gaussian_exporter.conformance import default_feeds
+from gaussian_exporter.contract import of_metadata
 from gaussian_exporter.errors import ExportError
 from gaussian_exporter.families.feed_forward import (
     SHARPENING,
@@ -77,6 +80,26 @@ def test_image_filters(output: str, norm: bool) -> None:
         found = run(exported, {"image": picture[None], "strength": np.array([strength])})["processed"]
         expected = filtered(model, picture.astype(np.float64), strength)
         assert error(found.reshape(-1, 1), expected.reshape(-1, 1)) < 1e-5
+
+
+def test_options_of_generators_are_refused_for_image_filters(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    place = [str(tmp_path), str(tmp_path / "a.onnx"), "--license", "MIT", "--attribution", "me"]
+    for option in (["--weights", "compact"], ["--dtype", "float16"], ["--layout", "packed"], ["--instances", "3"]):
+        assert main(["image-filter", *place, *option]) == 1
+        assert option[0] in capsys.readouterr().err
+
+
+def test_a_filter_of_any_size_is_checked_with_an_image_that_it_can_halve() -> None:
+    model = export_image_filter(image_filter(), WIDTH, HEIGHT, FACTS)
+    for value in (*model.graph.input, *model.graph.output):
+        dims = value.type.tensor_type.shape.dim
+        if len(dims) == 4:
+            dims[2].dim_param, dims[3].dim_param = "H", "W"
+    [image] = [value.name for value in model.graph.input if len(value.type.tensor_type.shape.dim) == 4]
+    contract = of_metadata({prop.key: prop.value for prop in model.metadata_props}, "a")
+    assert default_feeds(model, contract)[image].shape == (1, 3, 64, 64)
 
 
 def test_sizes_that_cannot_be_halved_are_refused() -> None:

@@ -339,7 +339,9 @@ def main(argv: Sequence[str] | None = None) -> None:
     model = train(shots, schedule, given.seed, given.at_once)
     model.save(given.out)
     known, unknown = measure(model, held), measure(model, unseen) if unseen else {}
-    record.write(held_out_psnr=known["psnr"], held_out=known, unseen=unknown, steps=schedule.done, shape=vars(model.shape))
+    record.write(
+        held_out_psnr=known["psnr"], held_out=known, unseen=unknown, steps=schedule.done, shape=vars(model.shape)
+    )
     show(given.out / "held-out", model, [*held[: len(given.scenes)], *unseen[:3]])
 
 

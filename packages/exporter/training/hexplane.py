@@ -133,7 +133,9 @@ def start_points(points: np.ndarray, count: int, rng: np.random.Generator) -> tu
     return chosen + rng.normal(size=chosen.shape) * spacing * 0.3, spacing
 
 
-def train(views: Views, points: np.ndarray, schedule: Schedule, count: int, number: int) -> tuple[Moving, dict[str, float]]:
+def train(
+    views: Views, points: np.ndarray, schedule: Schedule, count: int, number: int
+) -> tuple[Moving, dict[str, float]]:
     """The model, and its PSNR on held-out views, each of which is also a time of its own."""
     rng = seed(number)
     start, spacing = start_points(points, count, rng)

@@ -52,8 +52,8 @@ def loss_of(found: Tensor, wanted: Tensor) -> Tensor:
 
 @dataclass
 class Photograph:
-    """`picture` (4,H,W): colors of the object and, for dark pixels that cannot be assigned to object or room (doubtful),
-    those of the photograph; coverage. valid (1,H,W): 0 for occluded pixels. doubtful (1,H,W).
+    """`picture` (4,H,W): colors of the object and, for dark pixels of object or room (doubtful), those of the
+    photograph; coverage. valid (1,H,W): 0 for occluded pixels. doubtful (1,H,W).
     """
 
     picture: Tensor

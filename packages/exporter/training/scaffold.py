@@ -149,7 +149,9 @@ class Growth:
         replace_rows(model, ROWS, kept, added, self.optimizers)
 
 
-def train(views: Views, points: np.ndarray, schedule: Schedule, count: int, number: int) -> tuple[Scaffold, dict[str, float]]:
+def train(
+    views: Views, points: np.ndarray, schedule: Schedule, count: int, number: int
+) -> tuple[Scaffold, dict[str, float]]:
     """The model, and its PSNR on held-out views."""
     rng = seed(number)
     anchors, width = voxels(points, max(count // 2, 1))
@@ -172,7 +174,14 @@ def train(views: Views, points: np.ndarray, schedule: Schedule, count: int, numb
         return picture(model(eyes[index]), views.camera(index))
 
     trained, _ = split(len(views.pictures))
-    fit(trained, loss_at, optimizers, schedule, rng, after=lambda step, progress: growth.after(latest[0], step, progress))
+    fit(
+        trained,
+        loss_at,
+        optimizers,
+        schedule,
+        rng,
+        after=lambda step, progress: growth.after(latest[0], step, progress),
+    )
     alive = torch.stack([model(eye).opacities > 1 / 255 for eye in eyes[:8]]).any(0).float().mean().item()
     scores = {"held_out_psnr": photograph_psnr(views, draw), "whole_picture_psnr": held_out_psnr(views, draw)}
     return model, {**scores, "share_ever_visible": round(alive, 3)}

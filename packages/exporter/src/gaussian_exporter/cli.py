@@ -291,7 +291,7 @@ def _feed_forward(given: argparse.Namespace, facts: Facts, options: Options) -> 
 
 
 def _feed_forward_options(family: Command) -> None:
-    what = "squared pixels added to every Gaussian, against gaps if it is viewed larger than its training images; default 0"
+    what = "squared pixels added to every Gaussian, against gaps in views larger than the training images; default 0"
     family.add_argument("--widen", type=float, default=0.0, help=what)
 
 
@@ -314,6 +314,14 @@ def size(text: str) -> tuple[int, int]:
 
 def _image_filter(given: argparse.Namespace, facts: Facts, options: Options) -> onnx.ModelProto:
     refuse_instances(options, "image_filter")
+    if options != Options():
+        raise ExportError(
+            "argument/value",
+            where="image-filter",
+            expected="a command without --layout, --dtype and --weights, which are options of generators",
+            found="one of them",
+            remedy="leave it out; a post-processor is written in float32",
+        )
     model, config = read_image_filter(given.checkpoint, given.ignore)
     width, height = given.size or (int(config["width"]), int(config["height"]))
     return export_image_filter(model, width, height, facts)

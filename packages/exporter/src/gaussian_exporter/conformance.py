@@ -16,6 +16,8 @@ from .contract import Json, of_metadata
 from .errors import ExportError
 from .written import Fault, bounds_faults, read, value_faults
 
+# Sizes that replace symbolic dimensions: pixels of each side of an image, and rows of Gaussians of another model.
+SYMBOLIC = {"image": 64, "depth": 64, "gaussians": 16}
 # Fractions of the duration. Simple ones would test a looping motion in the same state each time.
 SHARES = (0.13, 0.25, 0.37, 0.5, 0.62, 0.75, 0.89, 1.0)
 
@@ -33,10 +35,13 @@ def default_feeds(model: onnx.ModelProto, contract: Json) -> dict[str, AnyArray]
 
 def _default(value: onnx.ValueInfoProto, binding: Json | None, contract: Json) -> AnyArray:
     tensor = value.type.tensor_type
-    shape = [dim.dim_value or 1 for dim in tensor.shape.dim]
     dtype = helper.tensor_dtype_to_np_dtype(tensor.elem_type)
     if binding is None:
         raise _violation("unbound-input", value.name, "a role for every input", "none", "name it in the contract")
+    symbolic = SYMBOLIC.get(str(binding["role"]), 1)
+    shape = [dim.dim_value or symbolic for dim in tensor.shape.dim]
+    if "instances" in contract and shape and tensor.shape.dim[0].dim_value == 0:
+        shape[0] = 1
     if binding["role"] == "camera_position":
         box = cast(dict[str, list[float]], contract.get("bounds", {"min": [0.0] * 3, "max": [0.0] * 3}))
         low, high = np.array(box["min"]), np.array(box["max"])

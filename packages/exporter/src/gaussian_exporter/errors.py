@@ -33,7 +33,7 @@ class ExportError(Exception):
 
 
 def require_package(name: str, extra: str) -> None:
-    """Raises argument/package if a package is missing that only some calls need. `extra`: the extra that installs it."""
+    """Raises argument/package if a package that only some calls need is missing. `extra` installs it."""
     if find_spec(name) is None:
         raise ExportError(
             "argument/package",

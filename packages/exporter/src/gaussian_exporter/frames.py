@@ -23,7 +23,8 @@ MIN_SCALE = 1e-9
 
 def write_frames(model: onnx.ModelProto, path: Path, folder: Path, fps: float, duration: float | None) -> int:
     """Runs a generator at the times of all frames and writes one PLY file each, as INRIA's trainer does, and
-    frames.json. Returns the number of frames. Raises contract/... and argument/... errors; needs onnxruntime.
+    frames.json. A state goes from each frame to the next, and the first frame has its default. Returns the number of
+    frames. Raises contract/... and argument/... errors; needs onnxruntime.
     """
     require_package("onnxruntime", "check")
     import onnxruntime as ort
@@ -39,6 +40,8 @@ def write_frames(model: onnx.ModelProto, path: Path, folder: Path, fps: float, d
         session = ort.InferenceSession(str(path), providers=["CPUExecutionProvider"])
     names = [output.name for output in session.get_outputs()]
     feeds = default_feeds(model, contract)
+    states = {name: cast(str, each["output"]) for name, each in inputs.items() if each["role"] == "state"}
+    comments = comments_of(contract)
     count = max(1, round(seconds * fps))
     folder.mkdir(parents=True, exist_ok=True)
     for frame in range(count):
@@ -48,14 +51,29 @@ def write_frames(model: onnx.ModelProto, path: Path, folder: Path, fps: float, d
         faults, attributes = read(cast(Json, contract["outputs"]), written, cast("int | None", contract.get("nMax")))
         if faults:
             raise faults[0].error(f" (frame {frame})")
-        write_ply(folder / f"frame-{frame + 1:04}.ply", columns_of(attributes, cast(Json, contract["outputs"])))
+        feeds |= {name: written[output] for name, output in states.items()}
+        columns = columns_of(attributes, cast(Json, contract["outputs"]))
+        write_ply(folder / f"frame-{frame + 1:04}.ply", columns, comments)
     manifest = {"gaussianSplatSequence": 1, "framesPerSecond": fps, "frames": "frame-{0001}.ply", "count": count}
     (folder / "frames.json").write_text(json.dumps(manifest) + "\n")
     return count
 
 
+def comments_of(contract: Json) -> list[str]:
+    """Comments of a PLY file, as nerfstudio, Brush and the trainer of gsplat write them: the axis that points up, and
+    the filter of the training.
+    """
+    up = cast("dict[str, str]", contract.get("coordinates", {})).get("up")
+    comments = [] if up is None else [f"Vertical Axis: {up}"]
+    if contract.get("filter") == "mip":
+        comments.append("SplatRenderMode: mip")
+    elif contract.get("antialiased"):
+        comments.append("antialiased 1")
+    return comments
+
+
 def columns_of(attributes: Attributes, outputs: Json) -> dict[str, AnyArray]:
-    """Properties of INRIA's PLY files. `outputs`: those of the contract, for the orders of quaternions and harmonics."""
+    """Properties of INRIA's PLY files. `outputs`: those of the contract, with orders of quaternions and harmonics."""
     wide = {name: np.asarray(each.rows, np.float64) for name, each in attributes.items()}
     if "rotations" in wide and outputs.get("rotationOrder") == "xyzw":
         wide["rotations"] = wide["rotations"][:, [3, 0, 1, 2]]
@@ -110,10 +128,11 @@ def axes_of(covariances: Doubles) -> tuple[Doubles, Doubles]:
     return 0.5 * np.log(np.maximum(values, MIN_SCALE**2)), quaternions
 
 
-def write_ply(path: Path, columns: dict[str, AnyArray]) -> None:
-    """A binary PLY file with one float property for each name."""
+def write_ply(path: Path, columns: dict[str, AnyArray], comments: list[str]) -> None:
+    """A binary PLY file with one float property for each name, and comments in its header."""
     count = len(next(iter(columns.values())))
-    header = ["ply", "format binary_little_endian 1.0", f"element vertex {count}"]
+    header = ["ply", "format binary_little_endian 1.0", *(f"comment {text}" for text in comments)]
+    header += [f"element vertex {count}"]
     header += [f"property float {name}" for name in columns] + ["end_header", ""]
     rows: Any = np.stack([np.asarray(values, "<f4") for values in columns.values()], 1)
     path.write_bytes("\n".join(header).encode() + rows.tobytes())

@@ -364,7 +364,9 @@ def _outputs(written: Mapping[str, Tensor], contract: Mapping[str, Any]) -> Iter
         where, found = f"output {tensor.name}", f"N = {count}"
         if count != fixed[0][1]:
             expected = f"N = {fixed[0][1]}, as {fixed[0][0].name} has"
-            yield _fault("rows", tensor.name, where, expected, found, "write the same number of rows for every attribute")
+            yield _fault(
+                "rows", tensor.name, where, expected, found, "write the same number of rows for every attribute"
+            )
         if n_max is not None and count > n_max and "count" not in outputs:
             yield _fault("rows", tensor.name, where, f"at most nMax = {n_max} rows", found, "raise nMax")
     if shapes and not fixed and n_max is None:

@@ -158,7 +158,7 @@ def refuse_instances(options: Options, family: str) -> None:
         raise ExportError(
             "argument/value",
             where="instances",
-            expected="a family whose files have an axis for instances: avatar or hexplane",
+            expected="a family whose files have an axis for instances: avatar, hexplane or spacetime",
             found=family,
             remedy="leave out --instances; instances of this file run one after the other",
         )

@@ -117,7 +117,7 @@ class _Values:
 
 
 def gpu_findings(model: onnx.ModelProto) -> list[Finding]:
-    """All findings that keep a file from running entirely on the GPU with its graph captured; empty if there are none."""
+    """All findings that keep a file from running entirely on the GPU with its graph captured; empty without any."""
     values = _Values(model)
     opset = next((entry.version for entry in model.opset_import if entry.domain in ("", "ai.onnx")), 0)
     found = list(_of_file(model, opset, values))
@@ -217,7 +217,9 @@ def _kernel(node: onnx.NodeProto, opset: int, values: _Values) -> Iterator[Findi
         yield _of("fallback", node, "control flow ends the recording", "unroll it")
     elif node.op_type not in KERNELS:
         remedy = INSTEAD.get(node.op_type, "write it in other operators")
-        yield _of("fallback", node, "WebGPU has no kernel for it: every run is interrupted by a wait for the GPU", remedy)
+        yield _of(
+            "fallback", node, "WebGPU has no kernel for it: every run is interrupted by a wait for the GPU", remedy
+        )
     elif node.op_type == "GridSample" and opset > RULES["gridSampleOpset"]:
         reason = f"WebGPU has kernels for it up to opset {RULES['gridSampleOpset']}"
         yield _of("fallback", node, f"{reason}: every run is interrupted by a wait for the GPU", _EXPORT)

@@ -181,7 +181,7 @@ def blended_matrices(avatar: Avatar, matrices: Tensor) -> Tensor:
 def skinned(
     avatar: Avatar, graph: Graph, points: Tensor, carried: Tensor, translation: Tensor, inputs: list[Input]
 ) -> Gaussians:
-    """Gaussians in world coordinates; points (...,N,4) x y z 1 at rest, and the matrix of each in carried (...,N,3,4)."""
+    """Gaussians in world coordinates; points (...,N,4) x y z 1 at rest; carried (...,N,3,4), the matrix of each."""
     count = len(avatar.positions)
     placed = (carried @ points.reshape(*points.shape, 1)).reshape(*graph.lead, count, 3) + translation
     half = graph.constant(rotation_matrices(avatar.rotations) * avatar.scales[:, None, :], "halves")

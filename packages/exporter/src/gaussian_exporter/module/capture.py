@@ -67,7 +67,7 @@ def folded(model: Any) -> onnx.ModelProto:
     with silenced("onnx_ir"):
         ir.passes.Sequential(
             passes.RemoveUnusedNodesPass(),
-            passes.RemoveUnusedFunctionsPass(),  # type: ignore[no-untyped-call]
+            passes.RemoveUnusedFunctionsPass(),  # type: ignore[no-untyped-call, unused-ignore]
             passes.RemoveUnusedOpsetsPass(),
             passes.LiftConstantsToInitializersPass(lift_all_constants=True, size_limit=0),
             passes.DeduplicateInitializersPass(),

@@ -16,7 +16,7 @@ ATTRIBUTES = ("positions", "covariances", "scales", "rotations", "colors", "sh",
 
 @dataclass(frozen=True)
 class Layout:
-    """`names` are those of the outputs in the file, in the module's order; `words` are further fields of the contract."""
+    """`names` are those of the outputs in the file, in the module's order; `words`: further fields of the contract."""
 
     kind: Literal["split", "packed", "image"]
     names: tuple[str, ...]
