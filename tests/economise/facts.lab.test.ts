@@ -1,6 +1,7 @@
 /** Every writer stores a file's metadata, up, order and filter, or the splats are turned, or the conversion is refused. */
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
+import { strFromU8, unzipSync } from 'fflate';
 import { encodingsFor, writeSog, writeStreamedSog, type SogOptions } from '@gaussian-splat/economise';
 import { buildDetailTree, cutPages, manifestOf } from '@gaussian-splat/economise/pages';
 import { readScene } from '@gaussian-splat/formats';
@@ -113,6 +114,20 @@ for (const [name, written] of Object.entries(WRITERS)) {
     });
   }
 }
+
+test('codebooks of SOG have the 256 values that its specification wants, and say whether splats are compensated', async () => {
+  const { 'meta.json': json } = unzipSync(
+    await writeSog(sourceWith({}), { ...fine, steps: { ...fine.steps, size: 1, color: 1 } }),
+  );
+  const meta = JSON.parse(strFromU8(json)) as Record<'scales' | 'sh0' | 'shN', { codebook: number[] }> & {
+    antialias?: boolean;
+  };
+  for (const name of ['scales', 'sh0', 'shN'] as const) {
+    assert.equal(meta[name].codebook.length, 256, name);
+    assert.ok(meta[name].codebook.every(Number.isFinite), name);
+  }
+  assert.equal(meta.antialias, false);
+});
 
 test('pages of a scene with another up are turned, and their manifest names the order', () => {
   const source = sourceWith({ up: [0, 0, 1], order: 'pixel' });

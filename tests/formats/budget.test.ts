@@ -10,6 +10,7 @@ import { join } from 'node:path';
 import { after, test } from 'node:test';
 import { fileURLToPath } from 'node:url';
 import { readScene, type LoadLimits } from '@gaussian-splat/formats';
+import { LoadBudget } from '../../packages/formats/dist/budget.js';
 import { isLab, someOf } from '../support/extent.js';
 import { expectRefusal } from './support/expect.js';
 import { MULTIPLIED, type Multiplied } from './support/multiplied.js';
@@ -30,6 +31,11 @@ const OWN_BYTES = 100e6;
 
 const folder = mkdtempSync(join(tmpdir(), 'budget-'));
 after(() => rmSync(folder, { recursive: true }));
+
+test('no charge takes the budget away: a number of bytes that is none is refused', () => {
+  const budget = new LoadBudget(1_000);
+  assert.throws(() => budget.take(NaN, 'a'), { code: 'out-of-memory/budget' });
+});
 
 interface Cost {
   readonly cpuMs: number;

@@ -193,6 +193,15 @@ test('LCC2 is read from its bundles at a level, with what is around it, and z up
   }
 });
 
+test('LCC2 is read without the bundle of its surroundings, and with commas before closing brackets', async () => {
+  const description = JSON.stringify(LCC2['with lists']).replace(/[\]}]/g, ',$&');
+  const { 'd/e.sog': around, ...bundles } = BUNDLES;
+  assert.ok(around);
+  const found = await read({ 'meta.lcc': new TextEncoder().encode(description), ...bundles });
+  assert.equal(found.count, 81);
+  assert.match(found.warnings!.join(), /surroundings \(d\/e\.sog\) are left out/);
+});
+
 test('LCC2 that is damaged, or has parts of another kind, is refused by name', async () => {
   const base = LCC2['with lists'] as { root: object };
   const cases: readonly (readonly [object, RegExp])[] = [

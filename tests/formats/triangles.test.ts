@@ -100,6 +100,13 @@ const REFUSED: Readonly<Record<string, [file: object, message: RegExp]>> = {
     }),
     /byteStride: expected a stride.*decode\/header/,
   ],
+  'a stride that is a text, of no elements': [
+    changed({
+      accessors: [{ ...triangle.accessors[0], count: 0 }],
+      bufferViews: [{ buffer: 0, byteLength: 36, byteStride: 'x' as never }],
+    }),
+    /byteStride: expected a stride.*decode\/header/,
+  ],
   'a primitive that is none': [changed({ meshes: [{ primitives: [null] }] }), /decode\/header/],
 };
 

@@ -69,7 +69,8 @@ export class LoadBudget {
   take(bytes: number, where: string): void {
     this.#taken += bytes;
     const { allowed } = this;
-    if (this.#taken > allowed)
+    // The negated comparison refuses NaN, too.
+    if (!(this.#taken <= allowed))
       refuse(
         where,
         `at most ${grouped(allowed)} bytes of memory for ${grouped(this.#arrived)} that arrived`,

@@ -15,14 +15,18 @@ const BYTES_PER_CHARACTER = 16;
  * @throws GaussianSplatError `decode/corrupt`, `decode/truncated` if the text does not end with `}`, or
  * `out-of-memory/budget`
  */
-export function parseJson({ bytes, name, budget }: JsonSource, maxBytes: number): Json {
+export function parseJson(
+  { bytes, name, budget }: JsonSource,
+  maxBytes: number,
+  parse: (text: string) => unknown = JSON.parse,
+): Json {
   if (bytes.length > maxBytes) {
     throw damaged(name, `a description of at most ${grouped(maxBytes)} bytes`, grouped(bytes.length));
   }
   budget.take(BYTES_PER_CHARACTER * bytes.length, name);
   let value: unknown;
   try {
-    value = JSON.parse(new TextDecoder().decode(bytes));
+    value = parse(new TextDecoder().decode(bytes));
   } catch (cause) {
     const isCut = !/\}\s*$/.test(asciiOf(bytes, Math.max(0, bytes.length - 64)));
     const code = isCut ? 'decode/truncated' : 'decode/corrupt';

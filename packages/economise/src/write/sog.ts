@@ -102,13 +102,13 @@ export async function sogFiles(
   const meta = {
     version: 2,
     count: order.length,
-    ...(cloud.antialiased && { antialias: true }),
+    antialias: cloud.antialiased,
     ...(cloud.antialiased && cloud.filterVariance === 0.1 && { model: 'antialiased' }),
     ...(cloud.hints?.order && { sortingMethod: cloud.hints.order }),
     means: { ...means, files: ['means_l.webp', 'means_u.webp'] },
-    scales: { codebook: scales.values, files: ['scales.webp'] },
+    scales: { codebook: ofAllCodes(scales.values), files: ['scales.webp'] },
     quats: { files: ['quats.webp'] },
-    sh0: { codebook: colors.values, files: ['sh0.webp'] },
+    sh0: { codebook: ofAllCodes(colors.values), files: ['sh0.webp'] },
     ...(harmonics && { shN: { ...harmonics.meta, files: ['shN_centroids.webp', 'shN_labels.webp'] } }),
   };
   const files = new Map<string, Uint8Array>([['meta.json', new TextEncoder().encode(JSON.stringify(meta))]]);
@@ -233,6 +233,10 @@ function codebook(
   return { values, codes };
 }
 
+/** Returns a codebook of 256 values, as its specification wants; some readers refuse fewer. The last one is repeated. */
+const ofAllCodes = (values: readonly number[]): number[] =>
+  Array.from({ length: MAX_CODES + 1 }, (_, code) => values[Math.min(code, values.length - 1)]);
+
 /** Encoded palette of harmonics: its properties in `meta.json`, its images, and its effect on colors. */
 interface Harmonics {
   readonly meta: { readonly count: number; readonly bands: number; readonly codebook: readonly number[] };
@@ -263,7 +267,7 @@ function harmonicsOf(
     }
   }
   return {
-    meta: { count: palette.size, bands: shDegree, codebook: values },
+    meta: { count: palette.size, bands: shDegree, codebook: ofAllCodes(values) },
     images: new Map([
       ['shN_centroids.webp', image],
       ['shN_labels.webp', ofSplats(order.length, (k, c) => [labels[k] & 255, labels[k] >> 8, 0, 255][c])],

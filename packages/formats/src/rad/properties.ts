@@ -6,10 +6,12 @@ import type { SceneSource } from '../scene-format.js';
 import type { RadProperty } from './container.js';
 
 /** Bytes of a value of each encoding. */
-const WIDTHS: Readonly<Record<string, number>> = {
-  ...{ f32: 4, f16: 2, f32_lebytes: 4, f16_lebytes: 2, ln_f16: 2, u16: 2, u32: 4 },
-  ...{ r8: 1, r8_delta: 1, s8: 1, s8_delta: 1, ln_0r8: 1, oct88r8: 1 },
-};
+const WIDTHS: ReadonlyMap<string, number> = new Map(
+  Object.entries({
+    ...{ f32: 4, f16: 2, f32_lebytes: 4, f16_lebytes: 2, ln_f16: 2, u16: 2, u32: 4 },
+    ...{ r8: 1, r8_delta: 1, s8: 1, s8_delta: 1, ln_0r8: 1, oct88r8: 1 },
+  }),
+);
 /** Number of logarithmic steps between the bounds, for codes 1 to 255. Code 0 is the scale 0. */
 const LOGARITHM_STEPS = 254;
 
@@ -28,7 +30,7 @@ export function valuesOf(
   { budget, name }: Pick<SceneSource, 'budget' | 'name'>,
 ): Float32Array {
   const where = `${name}, ${property.name}`;
-  const width = WIDTHS[property.encoding];
+  const width = WIDTHS.get(property.encoding);
   if (width === undefined) throw damaged(where, 'a known encoding', property.encoding, 'decode/unsupported');
   const expected = count === undefined ? undefined : count * size * width;
   const bytes = contentOf(property, expected, where, budget);

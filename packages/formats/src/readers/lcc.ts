@@ -6,6 +6,7 @@ import { checkedPart } from '../foreign-signatures.js';
 import { parseLccIndex, parseLccMeta, type LccMeta, type LccRanges, type LccRun } from '../lcc/meta.js';
 import { mergeClouds } from '../merge-clouds.js';
 import type { SceneSource } from '../scene-format.js';
+import { optionalPart } from './optional-part.js';
 import { noParts } from './sog.js';
 
 /** Bytes of a splat in `data.bin`, and of its harmonics in `shcoef.bin`. `environment.bin` has both in turn. */
@@ -68,15 +69,13 @@ async function withEnvironment(
   source: SceneSource,
 ): Promise<DraftCloud> {
   const path = 'environment.bin';
-  const bytes = await part(path).catch((error: unknown) => {
-    source.signal?.throwIfAborted();
-    const code = error instanceof GaussianSplatError ? error.code : '';
-    if (code.startsWith('out-of-memory')) throw error;
-    if (/^network\/(?!status)/.test(code))
-      warn(cloud, `The surroundings (${path}) are left out: ${(error as Error).message}`);
-    return undefined;
-  });
-  if (!bytes || bytes.length === 0) return cloud;
+  const bytes = await optionalPart(part(path), source.signal);
+  if (bytes instanceof Error) {
+    if (bytes instanceof GaussianSplatError && /^network\/(?!status)/.test(bytes.code))
+      warn(cloud, `The surroundings (${path}) are left out: ${bytes.message}`);
+    return cloud;
+  }
+  if (bytes.length === 0) return cloud;
   const stride = SPLAT_BYTES + (hasHarmonics ? HARMONICS_BYTES : 0);
   if (bytes.length % stride !== 0)
     throw damaged(

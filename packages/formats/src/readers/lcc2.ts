@@ -1,10 +1,11 @@
 import type { GaussianCloud } from '@gaussian-splat/core';
 import { checkedPart } from '../foreign-signatures.js';
-import { damaged } from '../faults.js';
+import { damaged, warn } from '../faults.js';
 import { isObject, parseJson, show, type Json, type JsonSource } from '../json.js';
 import { MAX_INDEX_BYTES, MAX_PATH } from '../lod/meta.js';
 import { mergeClouds } from '../merge-clouds.js';
 import type { SceneSource } from '../scene-format.js';
+import { optionalPart } from './optional-part.js';
 import { readSogPart } from '../sog/read-sog.js';
 import { noParts } from './sog.js';
 
@@ -24,8 +25,8 @@ interface Lcc2Meta {
 
 /**
  * Reads LCC2 of XGRIDS: a description (`.lcc2`) of an octree, whose nodes have SOG bundles. The level of detail is
- * `source.level`; 0 is the finest. The splats of the environment are added at every level. The z axis points up, which
- * becomes `hints.up`.
+ * `source.level`; 0 is the finest. The splats of the environment are added at every level, if their file exists. The z
+ * axis points up, which becomes `hints.up`.
  */
 export async function readLcc2(source: SceneSource): Promise<GaussianCloud> {
   const { name, level = 0, maxSplats = Infinity, budget, signal } = source;
@@ -34,11 +35,17 @@ export async function readLcc2(source: SceneSource): Promise<GaussianCloud> {
   while (own < levels.length - 1 && Number(counts[own]) > maxSplats) own++;
   const open = source.openFile ?? noParts(name, 'scene.zip');
   const clouds: GaussianCloud[] = [];
+  let leftOut: string | undefined;
   for (const file of [...levels[own], ...(environment === undefined ? [] : [environment])]) {
     signal?.throwIfAborted();
     const path = files[file];
     const where = `${name}, ${path}`;
-    const bytes = await checkedPart(await open(path), where);
+    const asked = open(path).then((found) => checkedPart(found, where));
+    const bytes = await (file === environment ? optionalPart(asked, signal) : asked);
+    if (bytes instanceof Error) {
+      leftOut = `The surroundings (${path}) are left out: ${bytes.message}`;
+      continue;
+    }
     const folder = path.slice(0, path.lastIndexOf('/') + 1);
     clouds.push(await readSogPart({ bytes, name: where, budget, signal }, (part) => open(folder + part)));
   }
@@ -46,13 +53,14 @@ export async function readLcc2(source: SceneSource): Promise<GaussianCloud> {
     clouds.map((cloud) => ({ cloud, first: 0, count: cloud.count })),
     source,
   );
+  if (leftOut !== undefined) warn(whole, leftOut);
   whole.hints = { ...whole.hints, up: [0, 0, 1] };
   return whole;
 }
 
 /** Parses a description. Its earlier form has other names, and paths without `.sog`. */
 function parseLcc2Meta(source: JsonSource): Lcc2Meta {
-  const json = parseJson(source, MAX_INDEX_BYTES);
+  const json = parseJson(source, MAX_INDEX_BYTES, parseWithTrailingCommas);
   const fail = (path: string, expected: string, found: unknown): never => {
     throw damaged(`${source.name}, ${path}`, expected, show(found), 'decode/header');
   };
@@ -88,6 +96,18 @@ function parseLcc2Meta(source: JsonSource): Lcc2Meta {
   if (levels[0].length === 0) fail('root.child', 'files of the finest level', 'none');
   const counts = Array.isArray(lodSplats) ? lodSplats : Array.isArray(earlier) ? [...earlier].reverse() : [];
   return { files, levels: levels.filter((own) => own.length > 0), counts, environment };
+}
+
+/** Parses JSON that may have commas before closing brackets, which some exporters of LCC2 write. */
+function parseWithTrailingCommas(text: string): unknown {
+  try {
+    return JSON.parse(text);
+  } catch (error) {
+    // Strings are matched as a whole, with an optional end, so that the time is linear.
+    const plain = text.replace(/("(?:[^"\\]|\\.)*"?)|,(?=\s*[}\]])/gs, (_, string: string | undefined) => string ?? '');
+    if (plain === text) throw error;
+    return JSON.parse(plain);
+  }
 }
 
 /** Returns the paths of the bundles; undefined if they are no list of texts. */

@@ -17,6 +17,12 @@ export interface MeshoptView {
 }
 
 const MODES = ['ATTRIBUTES', 'TRIANGLES', 'INDICES'];
+/** Bytes of an index of a sparse accessor, by component type. */
+const INDEX_BYTES: ReadonlyMap<unknown, number> = new Map([
+  [5121, 1],
+  [5123, 2],
+  [5125, 4],
+]);
 const FILTERS = ['NONE', 'OCTAHEDRAL', 'QUATERNION', 'EXPONENTIAL', 'COLOR'];
 
 /** Buffer views of the accessors that a scene uses. The constructor validates the ranges of these accessors. */
@@ -91,11 +97,11 @@ export class Views {
     const { byteStride = width } = document.item('bufferViews', accessor.bufferView);
     const isStride = document.isIndex(byteStride) && byteStride >= width && byteStride <= 252;
     // GPUs need strides of whole words.
-    if (count > 0 && (!isStride || (byteStride !== width && byteStride % 4 > 0)))
-      document.fail(`${path}, byteStride`, 'a stride that its elements fit in', byteStride);
-    const span = count === 0 ? 0 : (count - 1) * (byteStride as number) + width;
+    if (!isStride || (byteStride !== width && byteStride % 4 > 0))
+      return document.fail(`${path}, byteStride`, 'a stride that its elements fit in', byteStride);
+    const span = count === 0 ? 0 : (count - 1) * byteStride + width;
     this.#checkRange(accessor, span, componentBytes, path);
-    const stored = count * (byteStride as number);
+    const stored = count * byteStride;
     // Each accessor may have a GPU buffer of its own, with the bytes between its elements.
     document.take(stored - byteLength);
     return stored;
@@ -105,7 +111,7 @@ export class Views {
     const document = this.#document;
     const { indices, values } = sparse;
     const own = document.isIndex(sparse.count) && sparse.count <= count ? sparse.count : undefined;
-    const size = isObject(indices) ? { 5121: 1, 5123: 2, 5125: 4 }[String(indices.componentType)] : undefined;
+    const size = isObject(indices) ? INDEX_BYTES.get(indices.componentType) : undefined;
     if (own === undefined || size === undefined || !isObject(indices) || !isObject(values))
       return document.fail(`${path}.sparse`, 'a count, indices and values', sparse);
     this.#checkRange(indices, own * size, size, `${path}.sparse.indices`);
