@@ -192,13 +192,13 @@ test(
 );
 
 test('--draft writes the contract that a file lacks, asks about properties that no header has, and never overwrites one', () => {
-  const path = join(folder, 'drafted.onnx');
+  const path = join(folder, 'drafted #1.onnx');
   const header = fixtureBytes('split.onnx');
   writeFileSync(path, header);
   const first = command(path, '--draft');
   assert.equal(first.status, 0, first.text);
   assert.match(first.text, /opacityActivation/);
-  const contract = JSON.parse(readFileSync(join(folder, 'drafted.contract.json'), 'utf8')) as {
+  const contract = JSON.parse(readFileSync(join(folder, 'drafted #1.contract.json'), 'utf8')) as {
     outputs: Record<string, string>;
   };
   assert.deepEqual(contract.outputs.layout, 'split');
@@ -209,6 +209,12 @@ test('--draft writes the contract that a file lacks, asks about properties that 
   const again = command(path, '--draft');
   assert.equal(again.status, 1);
   assert.match(again.text, /exists already/);
+  const carrying = join(folder, 'carrying.onnx');
+  writeFileSync(carrying, fixtureBytes('packed.onnx'));
+  const refused = command(carrying, '--draft');
+  assert.equal(refused.status, 1);
+  assert.match(refused.text, /contains its contract/);
+  assert.equal(command(carrying, '--draft', '--run').status, 2);
 });
 
 /**

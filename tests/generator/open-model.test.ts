@@ -66,6 +66,33 @@ test('a sidecar that another server forbids to read counts as missing, unless th
   }
 });
 
+test('a contract beside the model that a server cannot send now is asked for again, and never counts as missing', async () => {
+  let [asked, failures] = [0, 2];
+  const server = createServer((request, response) => {
+    const name = (request.url ?? '').slice(1);
+    if (name.endsWith('.onnx')) return response.end(fixtureBytes(name));
+    asked++;
+    if (asked <= failures) return response.writeHead(503).end();
+    return response.writeHead(404).end();
+  });
+  await new Promise<void>((resolve) => server.listen(0, '127.0.0.1', resolve));
+  const url = `http://127.0.0.1:${(server.address() as AddressInfo).port}/canonical.onnx`;
+  try {
+    assert.ok((await openModel({ url })).notes.length > 0);
+    assert.equal(asked, 3);
+    [asked, failures] = [0, Infinity];
+    await assert.rejects(openModel({ url }), { code: 'network/status', message: /503/ });
+    const { faults } = await checkModel(url);
+    assert.deepEqual(
+      faults.map(({ code }) => code),
+      ['network/status'],
+    );
+  } finally {
+    server.closeAllConnections();
+    server.close();
+  }
+});
+
 test('generators are loaded again for another device, as after the loss of the first one', async () => {
   let requests = 0;
   const server = createServer((_, response) => {

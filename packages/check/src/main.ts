@@ -1,7 +1,7 @@
 import { parseArgs } from 'node:util';
 import { writeFile } from 'node:fs/promises';
 import { basename } from 'node:path';
-import { describeFault, sidecarName, type ReportSection } from '@gaussian-splat/core/contract';
+import { carriesContract, describeFault, sidecarPath, type ReportSection } from '@gaussian-splat/core/contract';
 import { readOnnxHeader } from '@gaussian-splat/core/onnx';
 import { draftContract } from './draft-contract.js';
 import { openModel } from './model-location.js';
@@ -40,6 +40,12 @@ export async function main(args: readonly string[]): Promise<number> {
     console.error(`Expected one model, found ${positionals.length}.\n\n${USAGE}`);
     return 2;
   }
+  if (values.draft && (values.run || values.contract !== undefined)) {
+    console.error(
+      `--draft writes a contract and checks nothing: expected no --run or --contract beside it.\n\n${USAGE}`,
+    );
+    return 2;
+  }
   if (values.draft) return draft(positionals[0]);
   const report = await checkModel(positionals[0], { contract: values.contract, run: values.run });
   console.log(formatReport(positionals[0], report, values.run ?? false));
@@ -63,11 +69,15 @@ function parse(args: readonly string[]) {
 async function draft(model: string): Promise<number> {
   const isRemote = URL.canParse(model) && /^https?:/i.test(model);
   // A contract for a model on a server is written to the working directory.
-  const path = sidecarName(isRemote ? basename(new URL(model).pathname) : model);
+  const path = sidecarPath(isRemote ? basename(new URL(model).pathname) : model);
   try {
     const location = await openModel(model);
     const header = await readOnnxHeader(location.source);
     await location.close();
+    if (carriesContract(header)) {
+      console.error(`${model} contains its contract, which is read before a file beside it: check it without --draft.`);
+      return 1;
+    }
     const { contract, questions } = draftContract(header);
     await writeFile(path, `${JSON.stringify(contract, undefined, 2)}\n`, { flag: 'wx' });
     console.log([`wrote ${path}. To be decided:`, ...questions.map((question) => `  ${question}`)].join('\n'));

@@ -1,7 +1,7 @@
 import { readFile } from 'node:fs/promises';
 import { dirname, join } from 'node:path';
 import { GaussianSplatError } from '@gaussian-splat/core';
-import { sidecarName } from '@gaussian-splat/core/contract';
+import { sidecarName, sidecarPath } from '@gaussian-splat/core/contract';
 import { externalUrl, openUrl, type ByteSource, type ExternalFile } from '@gaussian-splat/core/onnx';
 import { externalSizes, FileSource } from './file-source.js';
 
@@ -40,7 +40,7 @@ async function openLocal(path: string): Promise<ModelLocation> {
   const source = await openFile(path);
   return {
     source,
-    sidecar: () => readTextIfThere(sidecarName(path)),
+    sidecar: () => readTextIfThere(sidecarPath(path)),
     externalSizes: (files) => externalSizes(path, files),
     bytes: () => whole(source),
     external: async (location) => {
@@ -87,7 +87,9 @@ async function readTextIfThere(path: string): Promise<string | undefined> {
  */
 async function fetchTextIfThere(url: string): Promise<string | undefined> {
   const text = await readText(url).catch((error: unknown) => {
-    if (error instanceof GaussianSplatError && error.code === 'network/status') return undefined;
+    // A server that is busy or fails may have the file.
+    const isFailing = /HTTP status (429|5\d\d)/.test((error as Error).message);
+    if (error instanceof GaussianSplatError && error.code === 'network/status' && !isFailing) return undefined;
     throw error;
   });
   return text === undefined || /^\s*</.test(text) ? undefined : text;

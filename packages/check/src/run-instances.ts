@@ -1,5 +1,11 @@
 import { halfToNumber } from '@gaussian-splat/core';
-import { outputsOfInstance, type Contract, type ContractFault, type OutputTensor } from '@gaussian-splat/core/contract';
+import {
+  outputsOfInstance,
+  tensorNames,
+  type Contract,
+  type ContractFault,
+  type OutputTensor,
+} from '@gaussian-splat/core/contract';
 import type { OnnxHeader } from '@gaussian-splat/core/onnx';
 import { groupInstances, inputsOfInstances, stackInputs, type Inputs } from '@gaussian-splat/generator';
 import type { Sample } from './sample-inputs.js';
@@ -41,7 +47,8 @@ export async function compareTogether(
     for (const [i, { label }] of group.entries()) {
       const found = outputsOfInstance(together, i);
       const expected = await runAlone(feed, header, contract, inputs[i]);
-      const name = Object.keys(expected).find((output) => differs(found[output], expected[output]));
+      const names = tensorNames(contract.outputs).map(([, output]) => output);
+      const name = names.find((output) => differs(found[output], expected[output]));
       if (name !== undefined) return [otherTogether(name, label, group.length)];
     }
   }

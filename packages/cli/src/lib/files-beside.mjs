@@ -41,8 +41,8 @@ const leadsOut = (scene, file) => {
 const isJson = (path) => extname(path).toLowerCase() === '.json';
 
 /** Returns the name of a model's contract; undefined for other files. A model may have none. */
-const sidecarOf = (scene, { sidecarName }) =>
-  extname(scene).toLowerCase() === '.onnx' ? sidecarName(basename(scene)) : undefined;
+const sidecarOf = (scene, { sidecarPath }) =>
+  extname(scene).toLowerCase() === '.onnx' ? sidecarPath(basename(scene)) : undefined;
 
 async function namedBy(file) {
   const readers = {

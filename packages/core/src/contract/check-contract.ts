@@ -63,10 +63,12 @@ function unboundInput({ name, ...tensor }: OnnxTensor): ContractFault {
 }
 
 function missingInputs(header: OnnxHeader, { inputs }: Contract): ContractFault[] {
+  const found = new Set(header.inputs.map(({ name }) => name));
+  const optional = new Set(header.optionalInputs);
   return Object.keys(inputs)
-    .filter((name) => !findTensor(header.inputs, name))
+    .filter((name) => !found.has(name))
     .map((name) =>
-      header.optionalInputs.includes(name)
+      optional.has(name)
         ? optionalInput(name, inputs[name].role)
         : missingTensor('input', name, inputs[name].role, header.inputs),
     );

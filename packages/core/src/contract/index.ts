@@ -5,13 +5,14 @@ export { checkBounds, checkOutputs, compareRuns, type OutputReport, type OutputT
 export { ContractError, describeFault, type ContractErrorData, type ContractFault } from './contract-error.js';
 export { hasInstances, ofInstances, oneInstance, outputsOfInstance } from './instances.js';
 export { gaussianLayout, type AttributeSlice, type GaussianLayout } from './layout.js';
-export { CONTRACT_VERSION, parseContract } from './parse-contract.js';
+export { CONTRACT_VERSION, parseContract, tensorNames } from './parse-contract.js';
 export { contractReport, type ReportSection } from './report.js';
 export {
   carriesContract,
   CONTRACT_METADATA_KEY,
   resolveContract,
   sidecarName,
+  sidecarPath,
   type ContractSource,
   type ContractSources,
   type ResolvedContract,

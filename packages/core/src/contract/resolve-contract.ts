@@ -48,8 +48,11 @@ export function resolveContract({ header, explicit, sidecar }: ContractSources):
 /** Whether the file contains its contract, so that no sidecar is needed. */
 export const carriesContract = ({ metadata }: OnnxHeader): boolean => metadata.has(CONTRACT_METADATA_KEY);
 
-/** Returns the name or address of a model's sidecar: `NAME.contract.json` for `NAME.onnx`; a query is kept. */
+/** Returns the path of a model's sidecar: `NAME.contract.json` for `NAME.onnx`. */
+export const sidecarPath = (model: string): string => `${model.replace(/\.(onnx|ort)$/i, '')}.contract.json`;
+
+/** Returns the address of a model's sidecar, which has the query of the model. */
 export function sidecarName(model: string): string {
   const [, path, rest] = /^([^?#]*)(.*)$/s.exec(model)!;
-  return `${path.replace(/\.(onnx|ort)$/i, '')}.contract.json${rest}`;
+  return sidecarPath(path) + rest;
 }

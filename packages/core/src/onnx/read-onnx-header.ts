@@ -195,7 +195,8 @@ function readGraphField(bytes: LoadedBytes, field: FieldCursor, draft: Draft): v
 
 function keep(draft: Draft, harvest: Harvest): void {
   const { operators, initializers, externalFiles, initializerBytes } = harvest;
-  draft.nodes.push(...harvest.nodes);
+  // Not `push(...nodes)`: a call has at most about 100,000 arguments.
+  for (const node of harvest.nodes) draft.nodes.push(node);
   for (const [name, value] of harvest.stored) if (name !== '') draft.stored.set(name, value);
   for (const name of operators) draft.operators.set(name, (draft.operators.get(name) ?? 0) + 1);
   for (const name of initializers) draft.initializers.add(name);

@@ -17,9 +17,14 @@ export interface FetchOptions {
   readonly maxBytes?: number;
 }
 
+/** Number of retries while the server is temporarily unavailable (429, 503), as for scenes. */
+const RETRIES = 3;
+/** Milliseconds before the first retry; each further delay is twice as long. */
+const RETRY_DELAY_MS = 250;
+
 /**
- * Fetches a whole file, with the same retries as scenes. Returns undefined if `mayBeMissing` is true and the server
- * reports that the file is missing.
+ * Fetches a whole file. A server that is temporarily unavailable is asked again. Returns undefined if `mayBeMissing` is
+ * true and the server refuses the request by a status below 500; one that fails may have the file.
  * @throws GaussianSplatError `network/unreachable`, `network/status`, `network/interrupted`; the reason of the signal.
  */
 export async function fetchBytes(
@@ -31,14 +36,11 @@ export async function fetchBytes(
   url: string,
   options: FetchOptions & { readonly mayBeMissing?: boolean } = {},
 ): Promise<Uint8Array<ArrayBuffer> | undefined> {
-  const { credentials = 'same-origin', signal, mayBeMissing } = options;
-  const response = await fetchPatiently(url, { credentials, signal }).catch((cause: unknown) => {
-    signal?.throwIfAborted();
-    throw unreachable(url, cause);
-  });
+  const { signal, mayBeMissing } = options;
+  const response = await request(url, options);
   if (!response.ok) {
     await response.body?.cancel().catch(() => undefined);
-    if (mayBeMissing) return undefined;
+    if (mayBeMissing && response.status < 500 && !isBusy(response)) return undefined;
     throw badStatus(url, response.status);
   }
   try {
@@ -46,6 +48,21 @@ export async function fetchBytes(
   } catch (cause) {
     signal?.throwIfAborted();
     throw interrupted(url, cause);
+  }
+}
+
+const isBusy = ({ status }: Response): boolean => status === 429 || status === 503;
+
+async function request(url: string, { credentials = 'same-origin', signal }: FetchOptions): Promise<Response> {
+  for (let tries = 0; ; tries++) {
+    const response = await fetchPatiently(url, { credentials, signal }).catch((cause: unknown) => {
+      signal?.throwIfAborted();
+      throw unreachable(url, cause);
+    });
+    if (tries >= RETRIES || !isBusy(response)) return response;
+    await response.body?.cancel().catch(() => undefined);
+    await new Promise((resolve) => setTimeout(resolve, RETRY_DELAY_MS * 2 ** tries));
+    signal?.throwIfAborted();
   }
 }
 
@@ -117,7 +134,12 @@ const badStatus = (url: string, status: number): GaussianSplatError =>
     where: shorten(url),
     expected: 'HTTP status 200',
     found: `HTTP status ${status}`,
-    remedy: status === 404 ? 'check the path and the spelling, capital letters included' : 'check the address',
+    remedy:
+      status === 404
+        ? 'check the path and the spelling, capital letters included'
+        : status === 429 || status >= 500
+          ? 'try again later; the server is busy or fails'
+          : 'check the address',
   });
 
 const interrupted = (url: string, cause: unknown): GaussianSplatError =>

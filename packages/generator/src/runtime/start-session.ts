@@ -198,13 +198,16 @@ function otherInputs(options: StartOptions): OwnInputs {
   const { inputs, buffers } = replaceGpuInputs(options, filled);
   const changed = Object.entries(inputs).map(([name, value]): [string, InputValue] => {
     if (isOnGpu(value)) return [name, value];
-    if (value.dtype === 'float32') return [name, { ...value, data: numbers(value.data).map((x) => 0.75 * x + 0.125) }];
+    if (value.dtype === 'float32') return [name, { ...value, data: numbers(value.data).map(otherNumber) }];
     // Uses 0 and 1, the integers most likely to be valid as indices.
     if (value.dtype === 'int32') return [name, { ...value, data: numbers(value.data).map((x) => (x === 0 ? 1 : 0)) }];
     return [name, value];
   });
   return { inputs: Object.fromEntries(changed), buffers };
 }
+
+/** Returns a number that differs from each number, and lies in 0..1 if that does. */
+const otherNumber = (x: number): number => (x < 0.5 ? 0.75 * x + 0.25 : 0.75 * x);
 
 const numbers = (data: unknown): Float32Array | Int32Array => data as Float32Array | Int32Array;
 
