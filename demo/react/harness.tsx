@@ -50,6 +50,7 @@ export function Harness() {
           alt="A scene in a React app"
           loading="eager"
           cameraControls
+          cameraOrbit="0deg 75deg auto"
           inputValues={CONTROLS}
           style={{ width: '100%', maxWidth: 320, height: 240 }}
           onLoad={({ detail }) => {

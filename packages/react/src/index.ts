@@ -4,6 +4,7 @@ import '@gaussian-splat/element';
 import { GaussianSplatElement, type SettableProperties } from '@gaussian-splat/element';
 import { createComponent } from '@lit/react';
 import * as React from 'react';
+import { assignedOnChange } from './assigned-on-change.js';
 import { HANDLERS, type Listeners } from './events.js';
 
 export type { HandlerName, Handlers, Listeners } from './events.js';
@@ -23,19 +24,25 @@ export type GaussianSplatProps = Omit<
 
 /**
  * Component for `<gaussian-splat>`. Props set properties of the element without conversion, handlers listen to its
- * events, and `ref` receives the element.
+ * events, and `ref` receives the element. A prop that does not change leaves the camera and the clock where they are.
  *
  * ```tsx
  * <GaussianSplat src="scene.ply" alt="A skull" cameraControls onLoad={({ detail }) => console.log(detail.url)} />
  * ```
  */
-export const GaussianSplat: React.ForwardRefExoticComponent<GaussianSplatProps> = createComponent({
-  react: React,
-  tagName: 'gaussian-splat',
-  elementClass: GaussianSplatElement,
-  events: HANDLERS,
-  displayName: 'GaussianSplat',
-});
+export const GaussianSplat: React.ForwardRefExoticComponent<GaussianSplatProps> = assignedOnChange<
+  GaussianSplatElement,
+  GaussianSplatProps
+>(
+  createComponent({
+    react: React,
+    tagName: 'gaussian-splat',
+    elementClass: GaussianSplatElement,
+    events: HANDLERS,
+    displayName: 'GaussianSplat',
+  }),
+  ['cameraOrbit', 'cameraTarget', 'fieldOfView', 'currentTime'],
+);
 
 export {
   SplatCut,

@@ -14,6 +14,7 @@ import {
 } from '@gaussian-splat/element/scenes.js';
 import { createComponent, type EventName } from '@lit/react';
 import * as React from 'react';
+import { assignedOnChange } from './assigned-on-change.js';
 
 export type { SplatCutElement, SplatMeshElement, SplatSceneElement } from '@gaussian-splat/element/scenes.js';
 
@@ -54,6 +55,9 @@ type ChildProps<E, Settable> = Omit<React.HTMLAttributes<E>, ChildHandler | keyo
 export type SplatSceneProps = ChildProps<SplatSceneElement, SettableSceneProperties>;
 export type SplatMeshProps = ChildProps<SplatMeshElement, SettableMeshProperties>;
 
+/** Props that give a child a clock of its own, also if their value is equal. */
+const CLOCK = ['currentTime', 'playbackRate'] as const;
+
 const shared = { react: React, events: EVENTS as unknown as { [Name in ChildHandler]: EventName<EventOf<Name>> } };
 
 /**
@@ -65,20 +69,32 @@ const shared = { react: React, events: EVENTS as unknown as { [Name in ChildHand
  * </GaussianSplat>
  * ```
  */
-export const SplatScene: React.ForwardRefExoticComponent<SplatSceneProps> = /* @__PURE__ */ createComponent({
-  ...shared,
-  tagName: 'splat-scene',
-  elementClass: SplatSceneElement,
-  displayName: 'SplatScene',
-});
+export const SplatScene: React.ForwardRefExoticComponent<SplatSceneProps> = /* @__PURE__ */ assignedOnChange<
+  SplatSceneElement,
+  SplatSceneProps
+>(
+  /* @__PURE__ */ createComponent({
+    ...shared,
+    tagName: 'splat-scene',
+    elementClass: SplatSceneElement,
+    displayName: 'SplatScene',
+  }),
+  CLOCK,
+);
 
 /** Component for `<splat-mesh>`, a triangle mesh: `<SplatMesh src="chair.glb" autoplay loop />`. */
-export const SplatMesh: React.ForwardRefExoticComponent<SplatMeshProps> = /* @__PURE__ */ createComponent({
-  ...shared,
-  tagName: 'splat-mesh',
-  elementClass: SplatMeshElement,
-  displayName: 'SplatMesh',
-});
+export const SplatMesh: React.ForwardRefExoticComponent<SplatMeshProps> = /* @__PURE__ */ assignedOnChange<
+  SplatMeshElement,
+  SplatMeshProps
+>(
+  /* @__PURE__ */ createComponent({
+    ...shared,
+    tagName: 'splat-mesh',
+    elementClass: SplatMeshElement,
+    displayName: 'SplatMesh',
+  }),
+  CLOCK,
+);
 
 export type SplatCutProps = Omit<React.HTMLAttributes<SplatCutElement>, keyof SettableCutProperties> &
   SettableCutProperties &

@@ -7,7 +7,7 @@ interface Splat extends HTMLElement {
   readonly src: string;
   currentTime: number;
   readonly cameraControls: boolean;
-  getCameraOrbit(): object;
+  getCameraOrbit(): { readonly theta: number };
 }
 type Scope = Window & {
   readonly GPUDevice: typeof GPUDevice;
@@ -85,6 +85,8 @@ export function describeApp(name: string, { page, mounts, effects }: AppUnderTes
       assertEqual(splat.querySelector('button')?.assignedSlot?.name, 'hotspot-forehead', 'the hotspot');
       splat.setAttribute('camera-orbit', '40deg 75deg auto');
       await until(() => Number(app.text('moves')) > 3, 'camera-change');
+      // The app renders at each of these events, with the orbit of before among its properties.
+      await until(() => Math.abs(splat.getCameraOrbit().theta - (40 * Math.PI) / 180) < 1e-2, 'the new orbit');
     });
 
     it('swaps its source on the same element, and is notified of the time of an animated scene', async () => {
