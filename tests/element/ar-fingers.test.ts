@@ -42,7 +42,8 @@ test('two fingers have a middle, a distance and an angle', () => {
   near(angle, Math.atan2(1, 2));
 });
 
-test('rays that miss the plane, and those of controllers, are no fingers', () => {
+test('rays that miss the plane or meet it far away, and those of controllers, are no fingers', () => {
+  assert.equal(fingersOn(FLOOR, frameOf([[0, 0, -30]]), {} as never), undefined);
   assert.equal(fingersOn(FLOOR, frameOf([[0, 2, -1]]), {} as never), undefined);
   assert.equal(fingersOn(FLOOR, frameOf([[0, 0, -1]], 'tracked-pointer'), {} as never), undefined);
 });

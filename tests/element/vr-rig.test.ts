@@ -21,9 +21,9 @@ interface Stick {
   readonly ray?: readonly number[];
 }
 
-function rigAt(heading = 0, stepsOnly = false, onLeave = (): void => undefined, hasMap = true) {
+function rigAt(heading = 0, stepsOnly = false, onLeave = (): void => undefined, hasMap = true, floor = map) {
   const rig = new VrRig({ eye: [0, 2.6, 0], heading, toViewer: identity, isFloor: true, stepsOnly }, onLeave);
-  if (hasMap) rig.map = map as never;
+  if (hasMap) rig.map = floor as never;
   /** Position of the head in the space of the session. */
   const place = { x: 0.1, y: 1.6, z: 0.2 };
   /** @returns the position of the head in the scene */
@@ -77,6 +77,17 @@ test('walking stays on the floor, and not at all for those who ask for less moti
   for (let i = 0; i < 100; i++) at = frame([{ handedness: 'left', axes: [0, 0, 1, -0.3] }]);
   assert.ok(Math.abs(at[0]) < 2 && Math.abs(at[2]) < 2 && Math.abs(at[1] - 2.6) < 1e-3, String(at));
   near(rigAt(0, true).frame([{ handedness: 'left', axes: [0, 0, 0, -1] }]), [0, 2.6, 0]);
+});
+
+test('the eyes reach their height above a step, also when the stick comes to rest on it', () => {
+  const height = (i: number): number => (Math.floor(i / side) < 30 ? 1.25 : 1);
+  const steps = { ...map, layers: [Float32Array.from({ length: side * side }, (_, i) => height(i))] };
+  const { frame } = rigAt(0, false, undefined, true, steps);
+  let at = frame();
+  while (at[2] > -0.5) at = frame([{ handedness: 'left', axes: [0, 0, 0, -1] }], 0.02);
+  assert.ok(at[1] < 2.8, `on the way up, at ${at[1]}`);
+  for (let i = 0; i < 40; i++) at = frame([{ handedness: 'left' }], 0.02);
+  assert.ok(Math.abs(at[1] - 2.85) < 1e-3, `above the step, at ${at[1]}`);
 });
 
 /** From 1.5 m above the floor, ahead and down by 45 degrees to a side. */
@@ -212,6 +223,23 @@ test('both grips move, turn and scale the scene, whose points stay under the han
     );
     const then = sceneOf(walking, [place.x, place.y, place.z]);
     assert.ok(Math.abs(2 * Math.hypot(...then.map((value, k) => value - first[k])) - 0.14) < 1e-6, 'speed');
+  }
+});
+
+test('in a scene of a twentieth of its size, each aim at the floor meets it', () => {
+  const { rig, frame } = rigAt();
+  const hands = (apart: number): Stick[] => [
+    { handedness: 'left', pressed: [1], ray: at(-apart / 2, 1, 0) },
+    { handedness: 'right', pressed: [1], ray: at(apart / 2, 1, 0) },
+  ];
+  frame();
+  frame(hands(1));
+  frame(hands(0.05));
+  // The floor is 20 cm wide, 5 cm below the hands.
+  for (let z = -0.08; z < 0.08; z += 0.005) {
+    const back = [0, 0.55, 0.3 - z].map((value) => value / Math.hypot(0.55, 0.3 - z));
+    frame([{ handedness: 'right', pressed: [0], ray: [1, 0, 0, 0, 0, 1, 0, 0, ...back, 0, 0, 1.5, 0.3, 1] }]);
+    assert.ok(rig.target && Math.abs(rig.target[1] - 1) < 1e-6, `aim at ${z}: ${rig.target}`);
   }
 });
 

@@ -1,7 +1,6 @@
 import { Lazy, type Camera } from '@gaussian-splat/core';
 import type { FrameTarget } from '@gaussian-splat/renderer';
 import type { ProbeAnswer, ProbePoint } from '@gaussian-splat/renderer/tools';
-import type { ReactiveControllerHost } from 'lit';
 import type { Attributes } from './attributes.js';
 import { Behaviors, type BehaviorHost } from './behaviors.js';
 import type { ViewerFrame } from './camera/orbit.js';
@@ -45,7 +44,7 @@ import type { A11yStrings } from './strings.js';
 export class ElementCore
   implements SourceOwner, ViewHost, RevealHost, HotspotHost, InputHost, BehaviorHost, QueryHost, TourHost
 {
-  readonly element: ReactiveControllerHost & HTMLElement;
+  readonly element: SourceOwner['element'];
   readonly camera: CameraController;
   /** The element's own source and those of its children. */
   readonly sources: SourceList;
@@ -158,7 +157,7 @@ export class ElementCore
   /** Template of the prompt, reset button and keyboard help; undefined until the code for input is loaded. */
   handsView: TemplateModel['handsView'];
 
-  constructor(element: ReactiveControllerHost & HTMLElement, attributes: Attributes, host: ElementHost) {
+  constructor(element: SourceOwner['element'], attributes: Attributes, host: ElementHost) {
     this.element = element;
     this.attributes = attributes;
     ({ services: this.services, source: this.source, part: this.#part, warn: this.warn } = host);
@@ -313,9 +312,9 @@ export class ElementCore
     return !this.#visibility.isKnownHidden;
   }
 
-  /** Whether the scene would be visible if it were loaded. */
+  /** Whether the scene would be visible if it were loaded, in the page or in a headset. */
   get isInSight(): boolean {
-    return this.isVisible && this.reveal.mayReveal;
+    return (this.isVisible || this.isImmersed) && this.reveal.mayReveal;
   }
 
   /** Whether the element is in view and no poster covers the scene. */

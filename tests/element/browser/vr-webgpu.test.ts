@@ -4,7 +4,7 @@ import { executeServerCommand } from '@web/test-runner-commands';
 import type { GaussianCloud } from '@gaussian-splat/core';
 import type { GaussianSplatElement } from '@gaussian-splat/element';
 import { fetchScene, readScene } from '@gaussian-splat/formats';
-import { Stereo } from '@gaussian-splat/renderer';
+import { MemoryLedger, Stereo } from '@gaussian-splat/renderer';
 import { renderOracle, toRgba } from '../../oracle/oracle.js';
 import { detailFolder } from '../../support/detail-folder.js';
 import { itInLab } from '../../support/extent-in-pages.js';
@@ -12,7 +12,7 @@ import { psnr } from '../../support/metrics.js';
 import { pebbles } from '../../support/scenes/pebbles.js';
 import { fakeBinding, type FakeBinding, type Layout } from './support/gpu-binding.js';
 import { EYE, headset } from './support/headset.js';
-import { assert, assertEqual, claimComing, COMPASS, nextEvent, showLoaded, until } from './support/harness.js';
+import { assert, assertEqual, claimComing, COMPASS, devices, nextEvent, showLoaded, until } from './support/harness.js';
 import { cameraOf } from './support/vr-camera.js';
 
 const STILL = { 'interpolation-decay': '0', 'interaction-prompt': 'none', 'camera-orbit': '30deg 80deg 6m' };
@@ -199,11 +199,31 @@ describe('VR by WebGPU', () => {
       const folder = detailFolder(pebbles(2_000));
       for (const [name, body] of folder.files) await fetch(`/net/kept/session/${name}`, { method: 'PUT', body });
       await fetch('/net/kept/session/detail.json', { method: 'PUT', body: JSON.stringify(folder.manifest) });
-      element.loading = 'eager';
       element.innerHTML = '<splat-scene src="/net/kept/session/detail.json"></splat-scene>';
       await until(() => budget > 0, 'frames within the budget of the child', 2 * LIMIT_MS);
     } finally {
       Stereo.prototype.draw = draw;
+    }
+    await leave(element);
+  });
+
+  it('keeps its scene while other loads need the memory of scenes that are out of view', async () => {
+    headset();
+    binding = fakeBinding('array', 1);
+    element = await showVr();
+    const ledger = MemoryLedger.of(devices[devices.length - 1]);
+    const { unseenBytes } = ledger;
+    ledger.unseenBytes = 0;
+    try {
+      buttonOf(element)!.click();
+      await until(() => binding!.frames > 1, 'a frame in the headset', LIMIT_MS);
+      await element.updateComplete;
+      ledger.reserve('another load', 1_000).release();
+      const { frames } = binding;
+      await until(() => binding!.frames > frames + 3, 'further frames', LIMIT_MS);
+      assert(element.loaded && hasStatus(element, 'session-started')(), 'the scene in the headset');
+    } finally {
+      ledger.unseenBytes = unseenBytes;
     }
     await leave(element);
   });

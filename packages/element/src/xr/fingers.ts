@@ -2,6 +2,12 @@
 import { cross, dot, type Vector3 } from '@gaussian-splat/core';
 import type { XrFrame, XrInput, XrSpace } from './webxr.js';
 
+/**
+ * Maximum length of a finger's ray, meters. Rays that are almost parallel to the plane meet it far away, where the
+ * subject would be lost.
+ */
+const REACH = 10;
+
 /** Plane with two perpendicular unit axes, in the reference space of the session. */
 export interface Plane {
   readonly point: Vector3;
@@ -21,7 +27,7 @@ export interface Fingers extends PlanePoint {
   readonly apart: number;
 }
 
-/** Returns the fingers whose rays meet the plane; undefined if there are none. */
+/** Returns the fingers whose rays meet the plane within reach; undefined if there are none. */
 export function fingersOn(plane: Plane, frame: XrFrame, space: XrSpace): Fingers | undefined {
   const [a, b = a] = [...frame.session.inputSources].flatMap((input) => pointOf(plane, frame, space, input) ?? []);
   if (!a) return undefined;
@@ -42,5 +48,5 @@ function pointOf(
   const normal = cross(first, second);
   const far = dot(normal, [m[12] - x, m[13] - y, m[14] - z]) / dot(normal, [m[8], m[9], m[10]]);
   const met: Vector3 = [m[12] - far * m[8], m[13] - far * m[9], m[14] - far * m[10]];
-  return far > 0 ? { u: dot(first, met), v: dot(second, met) } : undefined;
+  return far > 0 && far <= REACH ? { u: dot(first, met), v: dot(second, met) } : undefined;
 }

@@ -223,7 +223,8 @@ export class VrRig {
    * -1..1.
    */
   #walk(x: number, y: number, pose: XrPose, seconds: number): void {
-    if (this.#start.stepsOnly || Math.hypot(x, y) < DEAD_ZONE || seconds === 0) return;
+    if (this.#start.stepsOnly || seconds === 0) return;
+    if (Math.hypot(x, y) < DEAD_ZONE) return this.#settle(seconds);
     const m = pose.transform.matrix;
     const ahead = this.#turned([-m[8], 0, -m[10]]);
     const length = Math.hypot(ahead[0], ahead[2]) || 1;
@@ -243,6 +244,15 @@ export class VrRig {
     walker.step(time, dx, dz);
     const { at, eyeFloor } = walker;
     this.#origin = [origin[0] + at[0] - before[0], this.#floorY(eyeFloor), origin[2] + at[2] - before[2]];
+  }
+
+  /** Moves the eyes on to their height above the floor, which they may not have reached when the stick came to rest. */
+  #settle(seconds: number): void {
+    const walker = this.#walker;
+    if (!walker?.isMoving) return;
+    walker.step(seconds / this.#scale, 0, 0);
+    const [x, , z] = this.#origin!;
+    this.#origin = [x, this.#floorY(walker.eyeFloor), z];
   }
 
   /**
@@ -284,7 +294,9 @@ export class VrRig {
     const from = this.#turned([m[12], m[13], m[14]]);
     const way = this.#turned([-m[8], -m[9], -m[10]]);
     const origin = this.#origin!;
-    for (let far = RAY_STEP; far < REACH; far += RAY_STEP) {
+    // A step in a reduced scene must not be longer than the range of heights that `floorAt` accepts.
+    const step = RAY_STEP * Math.min(1, this.#scale);
+    for (let far = step; far < REACH; far += step) {
       const [x, y, z] = [0, 1, 2].map((k) => origin[k] + from[k] + far * way[k]);
       const floor = this.#map ? floorAt(this.#map, x, z, y) : 2 * origin[1] - this.#floorY(origin[1]);
       if (floor !== undefined && y <= floor) return [x, floor, z];

@@ -18,6 +18,8 @@ import type { XrGuide } from './xr-session.js';
 
 /** Color behind the splats, premultiplied red, green, blue and alpha, 0..1. */
 const BACKGROUND = [0.1, 0.1, 0.11, 1] as const;
+/** Features of each session, if the headset has them. */
+const FEATURES = ['local-floor', 'hand-tracking'];
 /** Minimum area of a floor, m². */
 const MIN_AREA = 4;
 
@@ -49,14 +51,9 @@ export function vrKind(core: XrHost): XrKind {
     ...{ mode: 'immersive-vr', name: 'vr', word: 'vr' },
     isWanted: () => core.attributes.vr,
     canShow: () => core.walkable !== null || isDrawnByGpu(core),
-    options: () => ({
-      optionalFeatures: ['local-floor', 'hand-tracking', ...(mayUseBinding() ? ['webgpu'] : [])],
-    }),
-    simplify: () => {
-      const wasAsked = mayUseBinding();
-      isUsable = false;
-      return wasAsked;
-    },
+    options: () => ({ optionalFeatures: [...FEATURES, ...(mayUseBinding() ? ['webgpu'] : [])] }),
+    simplerOptions: () => (mayUseBinding() ? { optionalFeatures: FEATURES } : undefined),
+    simplerGranted: () => (isUsable = false),
     open: (session, source) =>
       drawingOf(core, session, source).catch((error: unknown) => {
         // A session with WebGPU has no WebGL layer, so this one ends. The next click requests a session with WebGL.

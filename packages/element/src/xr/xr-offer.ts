@@ -20,11 +20,10 @@ export interface XrKind {
   readonly isWanted: () => boolean;
   /** Returns the options for `requestSession`. Called in the click handler. */
   options(): object;
-  /**
-   * Makes the next {@link options} omit those that the browser may have refused.
-   * @returns whether there are such options
-   */
-  simplify?(): boolean;
+  /** Returns options without those that the browser may have refused; undefined if there are none. */
+  simplerOptions?(): object | undefined;
+  /** Called when a session was refused with {@link options} and granted with the simpler ones. */
+  simplerGranted?(): void;
   /** Whether sessions can show what the element displays. */
   canShow(): boolean;
   /** Opens the drawing of a session. */
@@ -122,12 +121,13 @@ export class XrOffer implements ReactiveController {
   }
 
   /**
-   * Whether the session must end: another source is requested, which does not load while the element is out of view, or
-   * the page's splats that the session draws were replaced or destroyed.
+   * Whether the session must end: another source is requested, or the page's splats that the session draws were replaced
+   * or destroyed.
    */
   #isOutdated({ drawing, shown }: Running): boolean {
-    const { scene } = this.core.sources.ownEntry;
-    return scene.isOutgoing || (drawing?.isOfPage === true && scene.scene !== shown);
+    const { sources } = this.core;
+    const { scene } = sources.ownEntry;
+    return scene.isOutgoing || (drawing?.isOfPage === true && (scene.scene !== shown || sources.shown.length === 0));
   }
 
   hostDisconnected(): void {
@@ -163,12 +163,16 @@ export class XrOffer implements ReactiveController {
     if (!xr || !this.canActivate) return Promise.reject(unsupported('a headset or a phone, and a scene file', 'none'));
     if (this.#isStarting || this.#running) return Promise.resolve();
     this.#isStarting = true;
-    const request = (): Promise<XrSession> => xr.requestSession(this.kind.mode, this.kind.options());
-    return request()
-      .catch((error: unknown) => {
-        // The browser accepts a second request, because the activation by the click has not expired.
-        if ((error as Error).name !== 'SecurityError' && this.kind.simplify?.()) return request();
-        throw error;
+    const { kind } = this;
+    return xr
+      .requestSession(kind.mode, kind.options())
+      .catch(async (error: unknown) => {
+        const simpler = (error as Error).name === 'SecurityError' ? undefined : kind.simplerOptions?.();
+        if (!simpler) throw error;
+        // The browser accepts a second request, unless the activation by the click has expired.
+        const session = await xr.requestSession(kind.mode, simpler).catch(() => Promise.reject(error));
+        kind.simplerGranted?.();
+        return session;
       })
       .then(
         (session) => this.#start(session),
