@@ -20,6 +20,8 @@ export { record, recordFrames } from './recording.js';
 /** Color with premultiplied alpha, each component 0..1. */
 export type Rgba = readonly [red: number, green: number, blue: number, alpha: number];
 
+/** Maximum number of runs of the post-processor that an image waits for. A page that moves may need another each time. */
+const MAX_RUNS = 10;
 /** Message for an image whose device was lost. */
 const LOST = 'The GPU device was lost before the image was drawn: take it again after the event contextrestored';
 
@@ -28,14 +30,30 @@ export async function takeImage(host: ImageHost, options: ImageOptions): Promise
   await host.present();
   const { backend } = host.view;
   const pixels = backend && sizeOf(options, host.canvas, backend.place.limits.maxTextureDimension2D);
-  const drawn = host.drawNow(pixels ?? undefined, background === undefined ? undefined : rgbaOf(background));
-  if (drawn === null) throw nothingToDraw();
+  const color = background === undefined ? undefined : rgbaOf(background);
+  const draw = (): HTMLCanvasElement => {
+    // A post-processor gets the frame without a color behind it, as in the page.
+    const isFiltered = host.view.backend?.filter !== undefined;
+    const canvas = host.drawNow(pixels ?? undefined, isFiltered ? undefined : color);
+    if (canvas === null) throw nothingToDraw();
+    return isFiltered && color ? onColor(canvas, background!) : canvas;
+  };
+  // Draws the frame of the page again. Browsers present a canvas only after this task, so the image does not flash.
+  const restore = (): void => {
+    if (pixels || color) host.drawNow();
+  };
+  let drawn = draw();
+  // The post-processor needs more time than this task, and a run for another frame may come first.
+  for (let tries = 0; host.view.backend?.filter?.isPending && tries < MAX_RUNS; tries++) {
+    restore();
+    await host.view.backend.filter.idle;
+    drawn = draw();
+  }
   const blob = new Promise<Blob | null>((resolve) =>
     withFilters(host, drawn).toBlob(resolve, mimeType, qualityArgument),
   );
-  // Draws the frame again in the size of the element. Browsers present a canvas only after this task, so the image does
-  // not flash.
-  if (pixels || background !== undefined) host.drawNow();
+  restore();
+  backend?.filter?.forgetCapture();
   const taken = await blob;
   // If the device was lost before drawing, the image is empty, and the loss is reported only later.
   if (backend && (await wasLost(backend))) throw new DOMException(LOST, 'InvalidStateError');
@@ -81,12 +99,20 @@ function rgbaOf(color: string): Rgba {
   return [red * alpha, green * alpha, blue * alpha, alpha];
 }
 
+function onColor(drawn: HTMLCanvasElement, color: string): HTMLCanvasElement {
+  const context = paper(drawn.width, drawn.height);
+  context.fillStyle = color;
+  context.fillRect(0, 0, drawn.width, drawn.height);
+  context.drawImage(drawn, 0, 0);
+  return context.canvas;
+}
+
 /**
  * Returns a copy of the canvas with the CSS filters of canvas and element applied, or the canvas itself if there are
  * none.
  */
 function withFilters(host: ImageHost, drawn: HTMLCanvasElement): HTMLCanvasElement {
-  const filter = [drawn, host.element]
+  const filter = [host.canvas!, host.element]
     .map((node) => getComputedStyle(node).filter)
     .filter((text) => text !== '' && text !== 'none')
     .join(' ');

@@ -1,5 +1,5 @@
 import { Lazy, type Camera } from '@gaussian-splat/core';
-import type { ReactiveControllerHost } from 'lit';
+import type { ReactiveControllerHost, ReactiveElement } from 'lit';
 import type { Attributes } from './attributes.js';
 import type { DetailHost } from './controllers/detail-controller.js';
 import {
@@ -68,7 +68,7 @@ export interface EntryList {
 
 /** Owner of an entry's source: the element itself, or a child of it. */
 export interface SourceOwner {
-  readonly element: ReactiveControllerHost & HTMLElement;
+  readonly element: ReactiveControllerHost & HTMLElement & Pick<ReactiveElement, 'isUpdatePending'>;
   readonly source: Source;
   readonly dynamicValues: DynamicHost['owner']['dynamicValues'];
   /** False if the source follows the clock of its parent element. */
@@ -220,7 +220,8 @@ export class SourceEntry implements SceneHost, SourceHost, PlaybackHost, Dynamic
   /** Prevents the automatic start of the source, or of the one that its owner has just requested. */
   begin(): void {
     this.#hasBegun = true;
-    this.#isForNext = this.isLeaving;
+    // The attributes that are set but not read yet may request another source.
+    this.#isForNext = this.owner.element.isUpdatePending;
   }
 
   /**

@@ -69,6 +69,12 @@ describe('a clip', () => {
     assertEqual([element.loaded, element.paused, element.currentTime], [true, true, 0], 'loaded, paused, time');
     await element.play();
     await until(() => element.currentTime > 0, 'a script starts it');
+    element.setAttribute('renderer', 'webgpu');
+    element.pause();
+    await element.updateComplete;
+    await until(() => element.loaded, 'the scene again');
+    await delay(200);
+    assertEqual([element.paused, element.currentTime], [true, 0], 'paused and time after another attribute');
   });
 
   it('what a script says just after another src is about that scene, and what it said before is not', async () => {

@@ -160,13 +160,19 @@ describe('meshes', () => {
     const bottle = mesh({ color: [0, 1, 0], half, clearWhere: black }, { position: '2 0 0' });
     const orange = { surface: 'unlit', color: [1, 0.2122, 0], half: [0.02, 0.02, 0.02] } as const;
     const points = mesh({ ...orange, drawnAs: 'points' }, { position: '0 1 0' });
-    element.append(elsewhere, bottle, points);
-    await until(() => [elsewhere, bottle, points].every(({ loaded }) => loaded), 'all');
+    const cut = (alpha: number, position: string): SplatMeshElement =>
+      mesh({ color: [0, 1, 0], half: [0.3, 0.3, 0.05], clearWhere: black, alpha, cutoff: 0.5 }, { position });
+    const [kept, gone] = [cut(0.7, '1 -1 0'), cut(0.3, '-1 -1 0')];
+    const all = [elsewhere, bottle, points, kept, gone];
+    element.append(...all);
+    await until(() => all.every(({ loaded }) => loaded), 'all');
     await frames();
     const screen = await screenOf(element);
     const at = (x: number, y = 0): Rgb => screen.at(60 + x * METER, 50 - y * METER);
     assert(isRed(at(-2)), `a box that says that it is elsewhere: ${at(-2).join()}`);
     assert(isGreen(at(2)), `glass whose texture says that no light passes: ${at(2).join()}`);
+    assert(at(1, -1)[0] < 150, `alpha above the cutoff of glass: ${at(1, -1).join()}`);
+    assert(at(-1, -1)[0] > 250, `alpha below the cutoff of glass: ${at(-1, -1).join()}`);
     const near = [-0.1, 0, 0.1].flatMap((x) => [0.9, 1, 1.1].map((y) => at(x, y)));
     const [, green, blue] = near.reduce((min, color) => (color[2] < min[2] ? color : min));
     // Points cover parts of pixels of a white page.

@@ -75,6 +75,16 @@ describe('the frames of a path', () => {
     assertEqual(await maxDifference(frames, shown), 0, 'difference');
   });
 
+  it('of another shape than the element frame the scene as an element of that shape does', async () => {
+    const options = { path: 'turntable', frames: 1, width: 120, height: 60, background: 'white' } as const;
+    const [tall, wide] = [
+      await showLoaded(STILL, 'width: 60px; height: 120px'),
+      await showLoaded(STILL, 'width: 120px; height: 60px'),
+    ];
+    const [ofTall, ofWide] = [await framesOf(tall.recordFrames(options)), await framesOf(wide.recordFrames(options))];
+    assertEqual(await maxDifference(ofTall, ofWide), 0, 'difference');
+  });
+
   it('end where they are to end, and say what they lack', async () => {
     const element = await showLoaded({ ...STILL, views: '[]' }, STYLE);
     for await (const image of element.recordFrames({ path: 'turntable', frames: 100 })) {

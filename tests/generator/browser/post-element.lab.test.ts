@@ -96,6 +96,31 @@ describe('a post-processor in the element', () => {
     );
   });
 
+  it('images of any size and background are processed, and the page keeps its own', async () => {
+    const element = await showLoaded({ src: COMPASS }, STYLE);
+    const plain = await lightOf(element);
+    element.setAttribute('control-gain', '0');
+    element.setAttribute('postprocess', `${FIXTURES}post-fixed.onnx`);
+    await untilLight(element, (mean) => mean < plain.mean - 2, 'the processed frame');
+    const { mean } = await lightOf(element);
+    for (const options of [
+      {},
+      { background: 'white' },
+      { width: 60, height: 50 },
+      { width: 240, background: '#fff' },
+    ]) {
+      const image = await createImageBitmap(await element.toBlob(options));
+      const context = new OffscreenCanvas(image.width, image.height).getContext('2d')!;
+      context.fillStyle = 'white';
+      context.fillRect(0, 0, image.width, image.height);
+      context.drawImage(image, 0, 0);
+      const { data } = context.getImageData(0, 0, image.width, image.height);
+      const light = data.reduce((sum, value, i) => sum + (i % 4 < 3 ? value : 0), 0) / (3 * (data.length / 4));
+      assert(Math.abs(light - mean) < 0.8, `${JSON.stringify(options)}: ${light}, in the page ${mean}`);
+    }
+    assert(Math.abs((await lightOf(element)).mean - mean) < 0.2, 'the page');
+  });
+
   itInLab('that is slow does not delay the camera, and shows its image at rest', async () => {
     const element = await showLoaded(
       { src: COMPASS, postprocess: `${FIXTURES}post-slow.onnx`, 'control-gain': '0' },

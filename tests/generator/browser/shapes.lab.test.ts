@@ -117,8 +117,17 @@ describe('inputs of models, reported to the page', () => {
       Math.abs(pose[4]) < 0.01 && Math.abs(pose[5] + 1) < 0.01,
       `a quarter turn around x: ${pose.slice(0, 9).join(' ')}`,
     );
+    const resets = (): string => part('controls-panel')!.querySelector('button')!.textContent;
+    assertEqual(resets(), 'Reset', 'in English');
+    element.a11y = JSON.stringify({ 'controls-reset': 'Back' });
+    await until(() => resets() === 'Back', 'the words of the page');
     element.removeAttribute('controls-panel');
     await until(() => part('controls-panel')!.hidden === true, 'no panel');
+    const german = await showLoaded({ src: `${FIXTURES}state.onnx`, 'controls-panel': '', lang: 'de' });
+    await until(
+      () => german.shadowRoot!.querySelector('[part=controls-panel] summary')?.textContent === 'Regler',
+      'the words of the language',
+    );
   });
 
   it('a panel shows what the page sets, and turns the pose that there is', async () => {

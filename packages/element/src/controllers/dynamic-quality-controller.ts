@@ -156,13 +156,14 @@ export class DynamicQualityController {
     // Uses full resolution until the errors of lower resolutions are known.
     const isUnknown = this.#drawn.scale < 1 && !this.#losses;
     if (isUnknown) this.#drawn = this.#levels.findLast(({ scale }) => scale === 1)!;
-    const drawn = new Promise<void>((resolve) =>
-      render(this.#drawn.settings, (time) => {
-        resolve();
-        if (plan.level === 0) this.#fade.start(canvas);
-        if (!isUnknown) this.sample(plan, time);
-      }),
-    );
+    let resolve!: () => void;
+    const drawn = new Promise<void>((done) => (resolve = done));
+    // Not in the executor of the promise, which would keep the errors of the renderer.
+    render(this.#drawn.settings, (time) => {
+      resolve();
+      if (plan.level === 0) this.#fade.start(canvas);
+      if (!isUnknown) this.sample(plan, time);
+    });
     if (this.#measuring) return;
     if (isUnknown || (plan.level === 0 && this.#state.level > 0)) this.#measure(canvas, occasion.pixels, drawn);
   }

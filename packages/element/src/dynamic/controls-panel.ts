@@ -1,7 +1,7 @@
 /** The panel of controls. The module is loaded only for the attribute `controls-panel`, if a model has inputs. */
 import { css, type ReactiveElement } from 'lit';
 import { adoptStyles } from '../styles.js';
-import { readSpokenStrings, type A11yStrings } from '../strings.js';
+import type { A11yStrings } from '../strings.js';
 import type { GeneratorInput } from './inputs.js';
 import { poseOf, turnsOf } from './pose-of.js';
 import { readNumbers, valueOf, type ControlValues, type Numbers } from './values.js';
@@ -20,6 +20,8 @@ const MAX_SLIDERS = 24;
 /** Range of coefficients for which the contract declares none, in standard deviations of body shapes. */
 const SHAPE_RANGE = [-3, 3] as const;
 const SLIDER_STEPS = 200;
+/** The formats of images that inputs accept: see input-images.ts. */
+const IMAGES = 'image/png, image/jpeg, image/webp, image/avif';
 const SLIDES = ['control', 'shape'];
 
 const STYLES = css`
@@ -80,7 +82,8 @@ type Pose = Numbers | null | undefined;
 /** Interface of the element for the panel. */
 interface PanelHost extends Owner {
   readonly controlsPanel: boolean;
-  readonly a11y: unknown;
+  /** `strings`: the words of the page, and those of its language as soon as they are loaded. */
+  readonly core: { readonly strings: A11yStrings };
   readonly duration: number;
   currentTime: number;
 }
@@ -90,7 +93,6 @@ const panels = new WeakMap<PanelHost, ControlsPanel>();
 /** A panel of controls for visitors, which is generated from the inputs of the current models. */
 export class ControlsPanel {
   readonly #element: PanelHost;
-  readonly #strings: A11yStrings;
   readonly #box: HTMLElement;
   /**
    * Poses with joint rotations, which visitors edit as axis-angle. `given` is the pose that the page has set, and
@@ -105,7 +107,6 @@ export class ControlsPanel {
 
   private constructor(element: PanelHost) {
     this.#element = element;
-    this.#strings = readSpokenStrings(element.a11y) ?? {};
     this.#box = make('section', { part: 'controls-panel' });
     const root = element.shadowRoot!;
     adoptStyles(root, STYLES);
@@ -113,6 +114,8 @@ export class ControlsPanel {
     element.addEventListener('inputs-change', () => this.#update());
     element.addEventListener('timeupdate', () => this.#follow());
     element.addEventListener('emptied', () => this.#update());
+    // An element is also updated when its words change.
+    element.addController({ hostUpdated: () => this.#update() });
     // Observes removals, because the events of a removed child do not reach the element. Its controls disappear.
     new MutationObserver(() => this.#update()).observe(element, {
       attributeFilter: ['controls-panel'],
@@ -127,11 +130,12 @@ export class ControlsPanel {
     panel.#update();
   }
 
-  /** Rebuilds the controls if their set has changed. */
+  /** Rebuilds the controls if their set or their words have changed. */
   #update(): void {
     const owners = this.#owners;
     this.#box.hidden = !this.#element.controlsPanel || owners.length === 0;
-    const reported = JSON.stringify(owners.map((owner) => [this.#titleOf(owner), owner.inputs]));
+    const { strings } = this.#element.core;
+    const reported = JSON.stringify([strings, owners.map((owner) => [this.#titleOf(owner), owner.inputs])]);
     if (reported === this.#reported || this.#box.hidden) return;
     this.#reported = reported;
     this.#followers = [];
@@ -148,7 +152,8 @@ export class ControlsPanel {
     if (takesTime && Number.isFinite(this.#element.duration)) controls.unshift(this.#time());
     const title = this.#word('controls-panel');
     this.#box.setAttribute('aria-label', title);
-    if (Object.keys(this.#strings).length === 0) this.#box.lang = 'en';
+    if (Object.keys(strings).length === 0) this.#box.lang = 'en';
+    else this.#box.removeAttribute('lang');
     const details = make('details', {});
     details.open = true;
     const summary = make('summary', { textContent: title });
@@ -211,7 +216,7 @@ export class ControlsPanel {
   }
 
   #image(owner: Owner, { name, label, views = 1 }: GeneratorInput): HTMLElement {
-    const field = make('input', { type: 'file', accept: 'image/*', multiple: views > 1, part: 'control-input' });
+    const field = make('input', { type: 'file', accept: IMAGES, multiple: views > 1, part: 'control-input' });
     field.addEventListener('change', () => {
       const files = [...(field.files ?? [])].slice(0, views);
       if (files.length === views) set(owner, name, views > 1 ? files : files[0]);
@@ -288,7 +293,7 @@ export class ControlsPanel {
   }
 
   #word(key: keyof typeof PANEL_WORDS): string {
-    return (this.#strings as Readonly<Record<string, string | undefined>>)[key] ?? PANEL_WORDS[key];
+    return (this.#element.core.strings as Readonly<Record<string, string | undefined>>)[key] ?? PANEL_WORDS[key];
   }
 }
 

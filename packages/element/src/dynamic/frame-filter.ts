@@ -12,6 +12,8 @@ export interface Frame {
   readonly settings?: Partial<PerFrameSettings> | undefined;
   /** Receives the depth of the splats, if present. */
   readonly depth?: SceneDepth | undefined;
+  /** Whether a script reads the canvas in the same task. */
+  readonly isRead?: boolean;
 }
 
 /**
@@ -31,6 +33,12 @@ export interface FrameFilter {
    * @param draw Renders a frame into the target of its argument.
    */
   render(frame: Frame, content: string, draw: (frame: Frame) => void): void;
+  /** Whether the last frame was presented unprocessed, although a run may process it. */
+  readonly isPending: boolean;
+  /** Fulfills when no run is in progress. Never rejects. */
+  readonly idle: Promise<void>;
+  /** Frees the images of frames of another size than those of the page, which scripts have read. */
+  forgetCapture(): void;
   /** Call if the last frame was incomplete, so that the next one is drawn even if nothing has changed. */
   invalidate(): void;
   close(): void;

@@ -172,13 +172,14 @@ async function pixelsOf(
   }
   if (typeof source !== 'string' && !(source instanceof Blob)) return source;
   const blob = typeof source === 'string' ? await fetchImage(source, options) : source;
-  boundedImageHeader(new Uint8Array(await blob.arrayBuffer()), `control ${name}`);
+  const fail = (cause: unknown): never => {
+    throw unreadable(name, typeof source === 'string' ? source : source.type, cause);
+  };
+  const header = boundedImageHeader(new Uint8Array(await blob.arrayBuffer()), `control ${name}`);
+  // Other formats have no bound, for example a GIF of a few bytes that takes gigabytes after decoding.
+  if (header === undefined) return fail(new Error('the header is that of another format'));
   // The image is rotated as the file declares.
-  return createImageBitmap(blob, { imageOrientation: 'from-image', premultiplyAlpha: 'premultiply' }).catch(
-    (cause: unknown) => {
-      throw unreadable(name, typeof source === 'string' ? source : source.type, cause);
-    },
-  );
+  return createImageBitmap(blob, { imageOrientation: 'from-image', premultiplyAlpha: 'premultiply' }).catch(fail);
 }
 
 async function fetchImage(url: string, options: InputImagesOptions): Promise<Blob> {
@@ -197,8 +198,8 @@ function ownSize(pixels: GPUCopyExternalImageSource): { width: number; height: n
 const unreadable = (name: string, found: string, cause: unknown): GaussianSplatError =>
   new GaussianSplatError('decode/unknown-format', {
     where: `control ${name}`,
-    expected: 'an image that this browser reads',
+    expected: 'a PNG, JPEG, WebP or AVIF image that this browser reads',
     found: `${found.slice(0, 200)} (${(cause as Error)?.message ?? 'unknown cause'})`,
-    remedy: 'use PNG, JPEG or WebP',
+    remedy: 'save the image in one of these formats',
     cause,
   });

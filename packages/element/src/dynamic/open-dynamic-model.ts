@@ -198,6 +198,7 @@ function liveModel(
   const { models, model } = generator;
   const up = upOf(model.contract);
   const reader = new StateReader(models, listeners.onError);
+  let isClosed = false;
   return {
     gaussians,
     inputs: inputsOf(models),
@@ -211,9 +212,13 @@ function liveModel(
       reader.checkPose(state);
       // Several images and the pose of their cameras belong together, so no run may mix old and new ones. When the last
       // image has arrived, a frame requests the run again.
-      if (!images.isLoading) generator.request(reader.read(state, camera, images.tensors, ownsControls() ? [] : null));
+      if (images.isLoading) return;
+      generator.request(reader.read(state, camera, images.tensors, ownsControls() ? [] : null));
+      // A state that is shown already is not run, and a run that fails shows none. A seek ends in both cases.
+      void generator.idle.then(() => isClosed || listeners.onShown(state.timeSeconds));
     },
     close: () => {
+      isClosed = true;
       generator.close();
       images.destroy();
     },

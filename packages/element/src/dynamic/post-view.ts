@@ -33,6 +33,18 @@ const TOO_LATE_MS = 50;
 /** Delay of the next run after a failure, ms. */
 const RETRY_MS = 1_000;
 
+/** The last frame of one size and its result. */
+class Shown {
+  surface: FilteredFrame | undefined;
+  /** Inputs of the post-processor: the frame, and its depth if a model uses it. */
+  tensor: GpuTensor | undefined;
+  depth: GpuTensor | undefined;
+  /** Keys of the last drawn frame, of the last input of the post-processor, and of its last output; empty for none. */
+  drawn = '';
+  handed = '';
+  filtered = '';
+}
+
 /**
  * Shows frames that a post-processor has processed. A frame at rest is always shown processed, as soon as the result is
  * ready. While frames change, processed frames are shown one run late if the post-processor is fast enough, otherwise
@@ -44,15 +56,13 @@ export class PostView implements FrameFilter {
   readonly #post: PostProcessor;
   readonly #reader: StateReader;
   readonly #images: InputImages;
-  #surface: FilteredFrame | undefined;
-  #tensor: GpuTensor | undefined;
-  #depth: GpuTensor | undefined;
-  /** The surface whose frame is the input of the current run. */
-  #pending: FilteredFrame | undefined;
-  /** Keys of the last drawn frame, of the last input of the post-processor, and of its last output; empty for none. */
-  #drawn = '';
-  #handed = '';
-  #filtered = '';
+  /** The frames of the page, and those of another size that a script reads. */
+  readonly #page = new Shown();
+  #capture = new Shown();
+  /** The frame that is the input of the current run, and its surface. */
+  #pending: Shown | undefined;
+  #pendingSurface: FilteredFrame | undefined;
+  isPending = false;
   /**
    * State at the start of the last run, and of the last failed run. The failed state is not tried again. No state is
    * tried before the time `#retryAt`, in milliseconds of `performance.now()`.
@@ -110,7 +120,7 @@ export class PostView implements FrameFilter {
   }
 
   get byteLength(): number {
-    return this.#surface?.byteLength ?? 0;
+    return (this.#page.surface?.byteLength ?? 0) + (this.#capture.surface?.byteLength ?? 0);
   }
 
   /** Inputs of the models, without the image of the frame, which the page does not set. */
@@ -119,25 +129,37 @@ export class PostView implements FrameFilter {
   }
 
   render(frame: Frame, content: string, draw: (frame: Frame) => void): void {
-    const surface = this.#surfaceFor(frame);
+    const shown = frame.isRead && !hasSizeOf(this.#page, frame) ? this.#capture : this.#page;
+    const surface = this.#surfaceFor(shown, frame);
     const key = `${content} ${JSON.stringify(frame.camera)} ${String(frame.background)}`;
-    if (key !== this.#drawn) draw({ ...frame, target: surface.drawn, depth: surface.depth });
-    this.#drawn = key;
-    if (!this.#post.isBusy && this.#isDue(key)) this.#offer(surface, frame, key);
-    surface.present(this.#shows(key) ? 'filtered' : 'drawn', frame.target);
+    if (key !== shown.drawn) draw({ ...frame, target: surface.drawn, depth: surface.depth });
+    shown.drawn = key;
+    if (!this.#post.isBusy && this.#isDue(key)) this.#offer(shown, surface, frame, key);
+    this.isPending = shown.filtered !== key && this.#said(key) !== this.#failed;
+    surface.present(this.#shows(shown, key) ? 'filtered' : 'drawn', frame.target);
+  }
+
+  get idle(): Promise<void> {
+    return this.#post.idle;
+  }
+
+  forgetCapture(): void {
+    this.#retire(this.#capture.surface);
+    this.#capture = new Shown();
   }
 
   invalidate(): void {
-    this.#drawn = '';
+    this.#page.drawn = this.#capture.drawn = '';
   }
 
   close(): void {
     clearTimeout(this.#retry);
-    const surface = this.#surface;
-    this.#surface = undefined;
+    const { surface } = this.#page;
+    this.#page.surface = undefined;
     this.#post.close();
     this.#images.destroy();
     this.#retire(surface);
+    this.forgetCapture();
   }
 
   /**
@@ -145,17 +167,17 @@ export class PostView implements FrameFilter {
    * because many sizes may occur during one run.
    */
   #retire(surface: FilteredFrame | undefined): void {
-    if (surface !== this.#pending || !this.#post.isBusy) surface?.destroy();
+    if (surface !== this.#pendingSurface || !this.#post.isBusy) surface?.destroy();
     else void this.#post.idle.then(() => surface?.destroy());
   }
 
-  #surfaceFor({ camera: { width, height } }: Frame): FilteredFrame {
-    if (this.#surface?.width === width && this.#surface.height === height) return this.#surface;
-    this.#retire(this.#surface);
-    this.#surface = new FilteredFrame(this.#device, width, height, this.#post.depth !== undefined);
-    this.#tensor = this.#depth = undefined;
-    this.#drawn = this.#handed = this.#filtered = '';
-    return this.#surface;
+  #surfaceFor(shown: Shown, frame: Frame): FilteredFrame {
+    if (shown.surface && hasSizeOf(shown, frame)) return shown.surface;
+    this.#retire(shown.surface);
+    const { width, height } = frame.camera;
+    const surface = new FilteredFrame(this.#device, width, height, this.#post.depth !== undefined);
+    Object.assign(shown, new Shown(), { surface });
+    return surface;
   }
 
   /** Returns a key of all values that a run depends on: the frame, controls, time and images. */
@@ -177,54 +199,58 @@ export class PostView implements FrameFilter {
   }
 
   /** Passes the drawn frame and the state of the page to the post-processor, which runs if any of them has changed. */
-  #offer(surface: FilteredFrame, { camera }: Frame, key: string): void {
+  #offer(shown: Shown, surface: FilteredFrame, { camera }: Frame, key: string): void {
     this.#tried = this.#said(key);
     const { input } = this.#post;
     const state = this.#request.state();
     this.#images.update(state.images);
-    if (this.#tensor === undefined || this.#handed !== this.#drawn) {
+    if (shown.tensor === undefined || shown.handed !== shown.drawn) {
       const { width = surface.width, height = surface.height, dtype, channels } = input;
-      this.#tensor = surface.handOver({ width, height, dtype, channels });
+      shown.tensor = surface.handOver({ width, height, dtype, channels });
       const { depth } = this.#post;
-      this.#depth =
+      shown.depth =
         depth &&
         surface.handOverDepth({
           width: depth.width ?? surface.width,
           height: depth.height ?? surface.height,
           dtype: depth.dtype,
         });
-      this.#handed = this.#drawn;
+      shown.handed = shown.drawn;
     }
-    this.#pending = surface;
+    [this.#pending, this.#pendingSurface] = [shown, surface];
     try {
       const read = this.#reader.read(state, camera, this.#images.tensors, this.#request.others());
-      this.#post.request(this.#tensor, { ...read, depth: this.#depth });
+      this.#post.request(shown.tensor, { ...read, depth: shown.depth });
     } catch (error) {
       this.#request.onError(error);
     }
     void this.#post.idle.then(() => {
-      if (this.#handed !== this.#drawn || this.#post.isConverging) this.#request.onChange();
+      if (shown.handed !== shown.drawn || this.#post.isConverging) this.#request.onChange();
     });
   }
 
   #accept(image: GpuTensor): void {
+    const [shown, surface] = [this.#pending, this.#pendingSurface];
     // The element may have been resized during the run.
-    if (this.#pending !== this.#surface || image.dtype === 'int32') return;
+    if (!shown || !surface || shown.surface !== surface || image.dtype === 'int32') return;
     const { buffer, dims, dtype } = image;
-    this.#surface?.accept({ buffer, dims, dtype });
-    this.#filtered = this.#handed;
+    surface.accept({ buffer, dims, dtype });
+    shown.filtered = shown.handed;
     this.#request.onChange();
   }
 
   #fail(): void {
-    this.#filtered = '';
+    if (this.#pending) this.#pending.filtered = '';
     this.#failed = this.#tried;
     this.#retryAt = performance.now() + RETRY_MS;
   }
 
-  #shows(key: string): boolean {
+  #shows({ filtered }: Shown, key: string): boolean {
     const { milliseconds = Infinity } = this.#post;
     this.#isInTime = milliseconds <= (this.#isInTime ? TOO_LATE_MS : IN_TIME_MS);
-    return this.#filtered !== '' && (this.#filtered === key || this.#isInTime);
+    return filtered !== '' && (filtered === key || this.#isInTime);
   }
 }
+
+const hasSizeOf = ({ surface }: Shown, { camera: { width, height } }: Frame): boolean =>
+  surface?.width === width && surface.height === height;

@@ -134,8 +134,7 @@ export class SceneLoader {
   ): Promise<T> {
     const run = (asked: WorkerRequest): Promise<T> =>
       this.#pool.run(asked, signal, async () => here(await this.#code()), options);
-    const isHidden = origin === 'null' && (request.type === 'load' || request.type === 'file');
-    return isHidden ? withFile(request).then(run) : run(request);
+    return origin === 'null' ? withFile(request).then(run) : run(request);
   }
 
   async #code(): Promise<SceneWorker> {
@@ -155,12 +154,13 @@ export class SceneLoader {
  * Adds the content of a `blob:` address to a request. Workers cannot read such addresses of pages without an origin,
  * which are opened from a disk or in a sandboxed frame.
  */
-async function withFile<T extends { readonly request: FileRequest }>(asked: T): Promise<T> {
-  const { url } = asked.request;
-  if (!url.startsWith('blob:')) return asked;
+async function withFile(asked: WorkerRequest): Promise<WorkerRequest> {
+  const { request } = asked as { readonly request?: Partial<FileRequest> };
+  const url = request?.url;
+  if (!url?.startsWith('blob:')) return asked;
   const file = await fetch(url).then(
     (response) => response.blob(),
     () => undefined,
   );
-  return { ...asked, request: { ...asked.request, file } };
+  return { ...asked, request: { ...request, file } } as WorkerRequest;
 }

@@ -267,7 +267,7 @@ export class MeshLayer {
       // Transparent surfaces write depth, because each splat is drawn either in front of them or behind them.
       for (const material of isGlass ? materials : []) {
         material.depthWrite = true;
-        material.alphaTest = 1 / 255;
+        material.alphaTest = Math.max(material.alphaTest, 1 / 255);
       }
     });
     if (model.hasLights) return;

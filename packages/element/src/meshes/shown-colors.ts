@@ -29,14 +29,20 @@ export function showAsDisplayed(material: Material): void {
 
 /**
  * Replaces the transmission of a material by transparency, like `alphaMode: BLEND`. Glass does not tint what is behind
- * it, because a layer has one alpha for red, green and blue.
+ * it, because a layer has one alpha for red, green and blue. The cutoff of `alphaMode: MASK` stays a limit of the alpha
+ * in the file.
  */
 export function showThrough(material: Material): void {
   const { transmission, transmissionMap } = material;
   if (!transmission) return;
-  if (transmissionMap)
-    material.opacityNode = materialOpacity.mul(texture(transmissionMap).r.mul(transmission).oneMinus());
-  else material.opacity *= 1 - transmission;
+  if (transmissionMap) {
+    const opaque = texture(transmissionMap).r.mul(transmission).oneMinus();
+    material.opacityNode = materialOpacity.mul(opaque);
+    if (material.alphaTest > 0) material.alphaTestNode = opaque.mul(material.alphaTest);
+  } else {
+    material.opacity *= 1 - transmission;
+    material.alphaTest *= 1 - transmission;
+  }
   material.transmission = 0;
   material.transparent = true;
 }

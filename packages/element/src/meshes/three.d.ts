@@ -126,6 +126,8 @@ export class Material {
   opacity: number;
   depthWrite: boolean;
   alphaTest: number;
+  /** Value that is used instead of {@link alphaTest}. */
+  alphaTestNode?: ShaderNode;
   /** Fraction of light that passes through, 0..1: glTF's `KHR_materials_transmission`. */
   transmission?: number;
   /** Texture whose red channel is a factor of {@link transmission}. */

@@ -113,6 +113,7 @@ export class ShadowController implements ReactiveController, Mover {
 
   hostDisconnected(): void {
     clearTimeout(this.#timer);
+    this.#timer = undefined;
   }
 
   advance(now: number): boolean {

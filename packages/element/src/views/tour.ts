@@ -4,10 +4,11 @@ import type { Attributes } from '../attributes.js';
 import { adoptStyles } from '../styles.js';
 import type { Behaviors } from '../behaviors.js';
 import type { CameraPose } from '../camera/orbit.js';
+import { poseOf } from '../camera/settings.js';
 import type { CameraController } from '../controllers/camera-controller.js';
 import { prefersReducedMotion, type Mover } from '../controllers/motion.js';
 import { languageOf, type A11yStrings, type ViewString } from '../strings.js';
-import { fail, poseOfView, type CameraView } from './camera-view.js';
+import { fail, poseOfView, type CameraView, type ViewContext } from './camera-view.js';
 import { Flight } from './flight.js';
 import { pathOfList, turntable, type CameraPath, type PathName } from './camera-path.js';
 import { easingOf, pathThrough, unwound, type Easing } from './path.js';
@@ -192,9 +193,9 @@ export class Tour implements ReactiveController, Mover {
    */
   async path(name: PathName = 'views', aspect = this.#of.camera.context.aspect): Promise<CameraPath | null> {
     const list = await this.#ready();
-    const { from, ...context } = this.#of.camera.context;
-    if (name === 'turntable') return turntable(from);
-    const place = JSON.stringify({ ...context, aspect });
+    const { context } = this.#of.camera;
+    if (name === 'turntable') return turntable(poseFor(aspect, context));
+    const place = JSON.stringify({ ...context, from: undefined, aspect });
     if (!this.#known || this.#known.place !== place || !isSameList(this.#known.list, list))
       this.#known = { list, place, path: pathOfList(list, { ...context, aspect }) };
     return this.#known.path;
@@ -351,6 +352,12 @@ export class Tour implements ReactiveController, Mover {
     else return;
     event.preventDefault();
   };
+}
+
+/** Returns the pose of the camera for frames of a shape. A camera at the distance of the attributes frames that shape. */
+function poseFor(aspect: number, { settings, bounds, aspect: own, from }: ViewContext): CameraPose {
+  const isFramed = from.radius === poseOf(settings, bounds, own).radius;
+  return isFramed ? { ...from, radius: poseOf(settings, bounds, aspect).radius } : from;
 }
 
 /** Maximum size of a file of views, bytes: it is parsed on the main thread. */

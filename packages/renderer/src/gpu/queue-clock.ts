@@ -82,11 +82,17 @@ export class QueueClock {
     return { ...observed, before };
   }
 
-  /** Measures the GPU time of the work that `submit` submits. Rejects if the device is lost. */
-  async time(submit: () => void): Promise<WorkTime> {
+  /**
+   * Measures the GPU time of the work that `submit` submits. Rejects if the device is lost.
+   * @throws the errors of `submit`, before the method returns
+   */
+  time(submit: () => void): Promise<WorkTime> {
     if (this.isShared) this.done().catch(() => undefined);
     submit();
-    const submitted = performance.now();
+    return this.#timeSince(performance.now());
+  }
+
+  async #timeSince(submitted: number): Promise<WorkTime> {
     const { now, since, before } = await this.done();
     // A shorter time than ever before is a better estimate of the latency.
     this.#latency = Math.min(this.#latency, now - submitted);

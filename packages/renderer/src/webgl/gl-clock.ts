@@ -39,12 +39,17 @@ export class GlClock {
 
   /**
    * Measures the duration of the commands that `draw` issues. Rejects if the context is lost.
+   * @throws the errors of `draw`, before the method returns
    * @param min Lower bound of the result in milliseconds. Some browsers wait for frames on the main thread, so that
    * little else is known.
    */
-  async time(draw: () => void, min = 0): Promise<WorkTime> {
+  time(draw: () => void, min = 0): Promise<WorkTime> {
     const begin = performance.now();
     draw();
+    return this.#timeSince(begin, min);
+  }
+
+  async #timeSince(begin: number, min: number): Promise<WorkTime> {
     // If the browser draws synchronously, the thread was busy for the whole time.
     const busy = performance.now() - begin;
     const observed = await drawn(this.#gl);

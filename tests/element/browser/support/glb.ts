@@ -34,6 +34,8 @@ export interface BoxOptions {
   readonly surface?: 'shining' | 'unlit' | 'rough';
   /** Whether it is transparent. */
   readonly alpha?: number;
+  /** Alpha up to which nothing is drawn: `alphaMode` MASK. */
+  readonly cutoff?: number;
   /** Its movement along x within a second. */
   readonly moves?: number;
   /** Whether a bone moves it. */
@@ -58,6 +60,7 @@ export function boxGlb({
   color = [1, 0, 0],
   surface = 'shining',
   alpha = 1,
+  cutoff,
   moves,
   isSkinned = false,
   names: [mesh, wood] = ['', ''],
@@ -120,7 +123,7 @@ export function boxGlb({
     nodes: isSkinned ? [{ mesh: 0, skin: 0 }, { name: 'bone' }] : [{ mesh: 0 }],
     ...(isSkinned && { skins: [{ joints: [1] }] }),
     meshes: [{ name: mesh, primitives }],
-    materials: [{ name: wood, ...material(surface, color, alpha), ...(clearWhere !== undefined && CLEAR) }],
+    materials: [{ name: wood, ...material(surface, color, alpha, cutoff), ...(clearWhere !== undefined && CLEAR) }],
     ...(clearWhere !== undefined && { textures: [{ source: 0 }], images: [{ uri: clearWhere }] }),
     extensionsUsed: ['KHR_materials_unlit', ...(splat ? ['KHR_gaussian_splatting'] : [])],
     ...(animations.length > 0 && { animations }),
@@ -136,11 +139,17 @@ const CLEAR = {
   extensions: { KHR_materials_transmission: { transmissionFactor: 1, transmissionTexture: { index: 0 } } },
 };
 
-function material(surface: 'shining' | 'unlit' | 'rough', color: readonly number[], alpha: number): object {
+function material(
+  surface: 'shining' | 'unlit' | 'rough',
+  color: readonly number[],
+  alpha: number,
+  cutoff?: number,
+): object {
   const base = surface === 'shining' ? [0, 0, 0] : color;
   return {
     pbrMetallicRoughness: { baseColorFactor: [...base, alpha], metallicFactor: 0 },
     ...(alpha < 1 && { alphaMode: 'BLEND' }),
+    ...(cutoff !== undefined && { alphaMode: 'MASK', alphaCutoff: cutoff }),
     ...(surface === 'shining' && { emissiveFactor: color }),
     ...(surface === 'unlit' && { extensions: { KHR_materials_unlit: {} } }),
   };
