@@ -211,3 +211,12 @@ test('a page that is busy for 30 ms in every frame is no slow GPU', async (conte
   const page = new Page(context);
   assert.equal(await turn(page, 0.6, 0, () => page.block(30)), 'whole');
 });
+
+test('errors of what is timed are thrown at once, not kept by the promise of the time', (context) => {
+  const page = new Page(context);
+  const fail = (): never => {
+    throw new Error('no buffer');
+  };
+  assert.throws(() => QueueClock.of(page.device).time(fail), /no buffer/);
+  assert.throws(() => new GlClock(page.gl).time(fail), /no buffer/);
+});

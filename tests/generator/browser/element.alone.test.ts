@@ -123,6 +123,10 @@ describe('a generator in the element', () => {
     const grown = await imageOf(element);
     assert(grown.count > 1.05 * still.count, `${still.count} pixels, then ${grown.count}`);
     assertEqual([element.currentTime, element.seeking], [1.5707, false]);
+    const again = nextEvent(element, 'seeked');
+    element.currentTime = 1.5707;
+    await again;
+    assertEqual(element.seeking, false, 'seeking, to the time that is shown');
   });
 
   it('plays, pauses, ends, loops and keeps the words of media elements', async () => {

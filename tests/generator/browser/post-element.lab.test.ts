@@ -307,6 +307,13 @@ describe('an image as a control', () => {
     element.inputValues = { image: '/net/status/404' };
     assertEqual((await event).detail.reason, 'network/status');
     assert(element.loaded && (await count(1)) > 100, 'the last image stays');
+    // The header of a GIF of 65,535 x 65,535 pixels, which would take 16 GB after decoding.
+    const gif = new File([Uint8Array.of(0x47, 0x49, 0x46, 0x38, 0x39, 0x61, 255, 255, 255, 255, 0, 0, 0)], 'a.gif');
+    const refusal = nextEvent<CustomEvent<ElementError>>(element, 'generator-error');
+    element.inputValues = { image: gif };
+    const { detail } = await refusal;
+    assertEqual(detail.reason, 'decode/unknown-format');
+    assert(/PNG, JPEG, WebP or AVIF/.test(detail.message), detail.message);
     const bytes = await (await fetch(await photo('blue', 'blue'))).blob();
     element.inputValues = { image: await createImageBitmap(bytes) };
     await untilCounts(([, green, blue]) => blue > 200 && green < 20, 'blue');
