@@ -34,6 +34,8 @@ const FOLDERS = ['packages', 'tests', 'scripts', 'demo', 'benchmarks', 'shaders'
 const EXEMPT = /^(scripts\/words\/|tests\/site\/words\.test\.ts$)/;
 const COMMENTED_ENDINGS = ['.ts', '.tsx', '.mjs', '.js', '.wgsl', '.py'];
 const COMMENT_LIMITS = { where: 3, 'what-clauses': 3, 'of which': 0.7 };
+/** As in packages/exporter/pyproject.toml. */
+const MAX_PYTHON_COLUMNS = 120;
 const FRAGMENT = /^(What|Of|Where|With|By|That|Those)\b/;
 const NOT_OURS = /(^|\/)(node_modules|dist|cdn|generated|\.[^/]+)$/;
 
@@ -90,9 +92,28 @@ for (const [name, limit] of Object.entries(LIMITS)) faults += measure(name, limi
 faults += measureRates('documents', documentsAndPages, RATE_LIMITS);
 faults += holdComments();
 faults += holdShaderNames();
+faults += holdPythonLines();
 if (values.inside) countInside();
 if (faults > 0) console.error(`\n${faults} to fix. The words: scripts/words/terms.mjs.`);
 process.exit(faults > 0 ? 1 : 0);
+
+/** Lines of Python that ruff refuses, which only `npm run test:exporter` runs. @returns {number} of them */
+function holdPythonLines() {
+  // Ruff does not count comments for tools.
+  const columnsOf = (text) => [...text.replace(/\s*# (type|noqa).*$/, '')].length;
+  const long = code
+    .filter((path) => path.startsWith('packages/exporter/') && path.endsWith('.py'))
+    .flatMap((path) =>
+      placed(
+        path,
+        [...read(path).split('\n').entries()].map(([i, text]) => ({ line: i + 1, text })),
+      ),
+    )
+    .filter(({ text }) => columnsOf(text) > MAX_PYTHON_COLUMNS);
+  for (const { file, line, text } of long)
+    console.error(`${file}:${line}: expected at most ${MAX_PYTHON_COLUMNS} columns, found ${columnsOf(text)}`);
+  return long.length;
+}
 
 /** Holds the sentences of some documents against their limits. @returns {number} of limits that are not kept */
 function measure(name, { files, min, average, longest = Infinity, many = 30, fraction = 1, short }) {

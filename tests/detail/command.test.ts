@@ -104,6 +104,8 @@ test('invalid arguments are reported in a line, without a stack trace, and at on
     [/--spacing: expected a length/, scene, '--out', out, '--tile', '20x2', '--spacing', '1e38'],
     [/--min-psnr: expected 30 to 60/, scene, '--out', out, '--min-psnr', '70'],
     [/--score-views: expected a whole number from 24 to 2000/, scene, '--out', out, '--score-views', '5'],
+    [/--min-psnr: expected without --quantized/, scene, '--out', out, '--quantized', '--min-psnr', '40'],
+    [/--spacing: expected with --tile/, scene, '--out', out, '--spacing', '2'],
     [/--degree/, scene, '--out', out, '--degree', '4'],
     [/found no list "views"/, scene, '--out', out, '--views', 'package.json'],
   ];

@@ -83,7 +83,7 @@ function filesOfPage(scene: string): string[] {
 test('gaussian-splat page brings the files that a scene or a model names, and no others', () => {
   for (const name of ['link.onnx', 'link.contract.json', 'external.onnx', 'external.weights'])
     copyFileSync(fixturePath(name), inFolder(name));
-  assert.deepEqual(filesOfPage('gltf/scene.gltf'), ['parts/a b.bin', 'scene.gltf']);
+  assert.deepEqual(filesOfPage('gltf/scene.gltf'), ['gltf/parts/a b.bin', 'gltf/scene.gltf']);
   assert.deepEqual(filesOfPage('link.onnx'), ['link.contract.json', 'link.onnx']);
   assert.deepEqual(filesOfPage('external.onnx'), ['external.onnx', 'external.weights']);
 });
@@ -107,6 +107,10 @@ test('gaussian-splat page brings what descriptions in JSON name, and what these 
   write('film.json', { gaussianSplatSequence: 1, framesPerSecond: 2, frames: 'frame-{09}.spz', count: 2 });
   for (const part of ['ball.sog', 'move-7.bin', 'move-8.bin', 'move-9.bin']) write(part, 'splats');
   const moving = { gaussianSplatSequence: 2, framesPerSecond: 2, first: 'ball.sog', framesPerFile: 5, count: 11 };
+  const tile = (uri: string, more: object = {}): object => ({ content: { uri }, ...more });
+  write('tileset.json', { root: tile('tiles/a%20b.glb?v=1', { children: [tile('sub/tileset.json')] }) });
+  write('sub/tileset.json', { root: { contents: [{ uri: '../tiles/c.glb' }] } });
+  for (const glb of ['tiles/a b.glb', 'tiles/c.glb']) write(glb, 'splats');
   write('moving.json', { ...moving, motion: 'move-{7}.bin' });
   const within = (folder: string): string[] => ['meta.json', ...images].map((name) => folder + name).sort();
   const expected: [string, string[]][] = [
@@ -114,6 +118,7 @@ test('gaussian-splat page brings what descriptions in JSON name, and what these 
     ['lod-meta.json', [...within('a/'), 'b.sog', 'lod-meta.json', ...within('sky/')].sort()],
     ['detail.json', ['detail.json', 'pages/0.bin', 'pages/1.bin']],
     ['film.json', ['film.json', 'frame-09.spz', 'frame-10.spz']],
+    ['tileset.json', ['sub/tileset.json', 'tiles/a b.glb', 'tiles/c.glb', 'tileset.json']],
     ['moving.json', ['ball.sog', 'move-7.bin', 'move-8.bin', 'moving.json']],
   ];
   for (const [scene, files] of someOf(expected, 3)) {
@@ -134,7 +139,7 @@ test('gaussian-splat page copies files, not links to them, none from outside of 
   writeFileSync(inFolder('links', 'scene', 'a.gltf'), JSON.stringify({ asset: { version: '2.0' }, buffers, images }));
   writeFileSync(inFolder('links', 'scene', 'b.ply'), 'ply');
   symlinkSync('b.ply', inFolder('links', 'scene', 'c.ply'));
-  assert.deepEqual(filesOfPage('links/scene/a.gltf'), ['a.gltf', 'c.ply']);
+  assert.deepEqual(filesOfPage('links/scene/a.gltf'), ['scene/a.gltf', 'scene/c.ply']);
   const { text } = command('page', 'links/scene/a.gltf', 'page', '--no-serve');
   assert.match(
     text,
@@ -157,7 +162,7 @@ test('gaussian-splat page copies no page and no script that a scene names', () =
     assert.match(text, new RegExp(`${name.replaceAll('.', '\\.')} \\(a page or a script\\)`));
   }
   rmSync(inFolder('page'), { recursive: true });
-  assert.deepEqual(filesOfPage('evil/a.gltf'), ['a.bin', 'a.gltf']);
+  assert.deepEqual(filesOfPage('evil/a.gltf'), ['evil/CDN/x.bin', 'evil/a.bin', 'evil/a.gltf']);
 });
 
 test('gaussian-splat page takes a scene of several files from the folder of the page itself', () => {
@@ -206,6 +211,8 @@ test('what cannot be written, or would replace what is read, is said before the 
     [/--out: the folder .*nowhere does not exist/, 'sequence', 'camera.json', '--out', 'nowhere/a.gsv'],
     [/--out: .*camera\.json is not a folder/, 'sequence', 'camera.json', '--out', 'camera.json/a'],
     [/camera\.json is not a folder/, 'page', 'gltf/scene.gltf', 'camera.json/a', '--no-serve'],
+    [/--images: expected with --gate/, 'economise', 'a.ply', '--min-psnr', '40', '--images', '.', '--out', 'a.spz'],
+    [/--out: .*found \.xyz/, 'economise', 'a.ply', '--min-psnr', '40', '--out', 'a.xyz'],
     [/--out: .*camera\.json is not a folder/, 'video', 'gltf/scene.gltf', '--turntable', '--out', 'camera.json/a'],
   ];
   for (const [sentence, ...args] of someOf(cases, 2)) refused(2, sentence, ...args);

@@ -41,9 +41,9 @@ function parseOptions(args) {
     degree: text,
     tile: text,
     spacing: text,
-    'min-psnr': { ...text, default: '50' },
+    'min-psnr': text,
     views: text,
-    'score-views': { ...text, default: '216' },
+    'score-views': text,
     quantized: { type: 'boolean' },
     exact: { type: 'boolean' },
   });
@@ -67,10 +67,14 @@ function parseOptions(args) {
   if (!/^[0-3]$/.test(values.degree ?? '3'))
     throw new UsageError(`--degree: expected 0 to 3, found "${values.degree}"`);
   const degree = Number(values.degree ?? 3);
-  const minPsnr = Number(values['min-psnr']);
+  for (const name of ['min-psnr', 'views', 'score-views'])
+    if (values[name] !== undefined && (values.exact || values.quantized))
+      throw new UsageError(`--${name}: expected without --quantized and --exact, whose accuracy is fixed`);
+  if (spacing !== undefined && values.tile === undefined) throw new UsageError('--spacing: expected with --tile');
+  const minPsnr = Number(values['min-psnr'] ?? 50);
   if (!(minPsnr >= 30 && minPsnr <= 60))
     throw new UsageError(`--min-psnr: expected 30 to 60, found "${values['min-psnr']}"`);
-  const scored = Number(values['score-views']);
+  const scored = Number(values['score-views'] ?? 216);
   if (!(Number.isInteger(scored) && scored >= 24 && scored <= 2000))
     throw new UsageError(`--score-views: expected a whole number from 24 to 2000, found "${values['score-views']}"`);
   const views = values.views === undefined ? undefined : resolve(values.views);

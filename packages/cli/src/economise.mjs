@@ -1,5 +1,5 @@
 /** Implementation of `gaussian-splat economise`: reads a scene, compresses it, writes it, and reports the result. */
-import { existsSync, mkdirSync, readdirSync, statSync } from 'node:fs';
+import { existsSync, readdirSync, statSync } from 'node:fs';
 import { basename, dirname, join, resolve } from 'node:path';
 import { boundsOf } from '@gaussian-splat/core';
 import {
@@ -24,7 +24,7 @@ import { holdOut, readPhotographs } from './lib/gate/photographs.mjs';
 import { dealViews, parseViews } from './lib/given-views.mjs';
 import { deviceDescriptor } from '@gaussian-splat/renderer';
 import { requestNodeAdapter } from './lib/node-gpu.mjs';
-import { checkOutput, isSameFile, obstacleTo, obstacleToFolder, writeWhole } from './lib/output-file.mjs';
+import { checkOutput, isSameFile, obstacleTo, obstacleToFolder, writeAll, writeWhole } from './lib/output-file.mjs';
 import { startReading } from './lib/scene-in-parts.mjs';
 import { ThreadPool, usualThreads } from './lib/thread-pool.mjs';
 
@@ -56,7 +56,7 @@ function parseOptions(args) {
     'max-mb': text,
     gate: text,
     images: text,
-    python: { ...text, default: 'python3' },
+    python: text,
     out: text,
     views: text,
     report: text,
@@ -71,6 +71,9 @@ function parseOptions(args) {
   if (maxBytes !== undefined && !(maxBytes > 0)) throw new UsageError('--max-mb: expected megabytes, above 0');
   if (['min-psnr', 'max-mb', 'gate'].filter((name) => values[name] !== undefined).length !== 1)
     throw new UsageError('expected one of --min-psnr, --max-mb and --gate');
+  for (const name of ['images', 'python'])
+    if (values[name] !== undefined && values.gate === undefined)
+      throw new UsageError(`--${name}: expected with --gate`);
   if (values.gate !== undefined && values.views !== undefined)
     throw new UsageError('--gate: expected no --views, because the other cameras of its file take their place');
   const minPsnr = Number(values['min-psnr'] ?? FIRST_PSNR);
@@ -88,13 +91,17 @@ function parseOptions(args) {
   const threads = Number(values.threads);
   if (!(Number.isInteger(threads) && threads >= 1 && threads <= 64))
     throw new UsageError(`--threads: expected a whole number from 1 to 64, found "${values.threads}"`);
-  const gating = gate && { cameras: gate, images, python: values.python };
+  const gating = gate && { cameras: gate, images, python: values.python ?? 'python3' };
   return { scene, out, minPsnr, maxBytes, gating, views, report, scored, threads, merge, refine };
 }
 
 /** Checks before the work that outputs can be written, and that they differ from inputs and each other. */
 function checkFiles({ scene, out, views, gate, report }) {
-  encodingsFor(out);
+  try {
+    encodingsFor(out);
+  } catch (error) {
+    throw new UsageError(`--out: ${error.message}`);
+  }
   for (const [option, path] of Object.entries({ out, report })) {
     if (path === undefined) continue;
     const inputs = { SCENE: scene, 'that of --views': views, 'that of --gate': gate };
@@ -114,11 +121,7 @@ function obstacleBeside(index) {
 /** Writes the result: a file, or the files of a streamed scene with its index last. */
 function writeOut(out, bytes) {
   if (!isLodIndex(out)) return writeWhole(out, bytes);
-  for (const [path, file] of filesOfZip(bytes)) {
-    const target = isLodIndex(path) ? out : join(dirname(out), path);
-    mkdirSync(dirname(target), { recursive: true });
-    writeWhole(target, file);
-  }
+  writeAll([...filesOfZip(bytes)].map(([path, file]) => [isLodIndex(path) ? out : join(dirname(out), path), file]));
 }
 
 /** Every n-th photograph judges files. Training usually holds out the same fraction. */

@@ -3,13 +3,13 @@
  * scene to FOLDER, writes an index.html unless one exists, and serves the folder. Any static host can serve the result.
  * With `--single`, the index.html contains the element and the scene, and can be opened from a disk.
  */
-import { cpSync, existsSync, mkdirSync, readFileSync, statSync, writeFileSync } from 'node:fs';
+import { cpSync, existsSync, mkdirSync, readFileSync, statSync } from 'node:fs';
 import { createRequire } from 'node:module';
 import { basename, dirname, extname, join, relative, resolve } from 'node:path';
 import { fileURLToPath } from 'node:url';
 import { CommandError, parseCommandLine, runCommand, UsageError } from './lib/command.mjs';
 import { filesBeside } from './lib/files-beside.mjs';
-import { obstacleToFolder } from './lib/output-file.mjs';
+import { obstacleToFolder, writeWhole } from './lib/output-file.mjs';
 import { serve } from './lib/server.mjs';
 
 const USAGE = `usage: gaussian-splat page SCENE FOLDER [options]
@@ -38,7 +38,7 @@ async function writeFolder(scene, folder, page) {
   await copyElement(scene, join(folder, 'cdn'));
   const tag = tagOf(await copyScene(scene, folder), titleOf(scene));
   if (existsSync(page)) console.log(`\n${page} exists and was not changed. Paste into it:\n\n${SCRIPT}\n${tag}`);
-  else writeFileSync(page, htmlOf(SCRIPT, tag, titleOf(scene)));
+  else writeWhole(page, htmlOf(SCRIPT, tag, titleOf(scene)));
 }
 
 /** Maximum bytes of a scene in a page of one file: its text must fit into a string of JavaScript. */
@@ -70,7 +70,7 @@ async function writeSingle(scene, page) {
     const data = await fetch('data:application/octet-stream;base64,' + document.getElementById('scene').textContent);
     document.querySelector('gaussian-splat').src = new File([await data.blob()], ${name});
   </script>`;
-  writeFileSync(page, htmlOf(script, `<gaussian-splat alt="${title}" camera-controls></gaussian-splat>`, title));
+  writeWhole(page, htmlOf(script, `<gaussian-splat alt="${title}" camera-controls></gaussian-splat>`, title));
 }
 
 function parseOptions(args) {
@@ -111,13 +111,14 @@ async function copyElement(scene, target) {
 }
 
 /**
- * Copies the scene and the files that it refers to, and returns its path relative to the page. A scene described by a JSON
- * file is copied with its folder, because different scenes use the same file names.
+ * Copies the scene and the files that it refers to, and returns its path relative to the page. A scene of several files is
+ * copied with its folder, because different scenes use the same file names.
  */
 async function copyScene(scene, folder) {
   const [name, from] = [basename(scene), dirname(scene)];
   const { found, missing } = await filesBeside(scene);
-  const own = isJson(scene) && from !== folder ? basename(from) : '';
+  const isOfParts = isJson(scene) || (found.length > 0 && !isModel(scene));
+  const own = isOfParts && from !== folder ? basename(from) : '';
   const to = join(folder, own);
   const isRefused = (file) => isCode(relative(folder, join(to, file)));
   missing.push(...found.filter(isRefused).map((file) => `${file} (a page or a script)`));

@@ -2,7 +2,7 @@
  * Implementation of `gaussian-splat sequence`: converts a sequence of scene files with corresponding splats to a scene
  * and its motion.
  */
-import { existsSync, mkdirSync, readdirSync, writeFileSync } from 'node:fs';
+import { existsSync, readdirSync } from 'node:fs';
 import { basename, dirname, join, resolve } from 'node:path';
 import { framePath, parseSequence, readScene } from '@gaussian-splat/formats';
 import { deviceDescriptor, pickInitialVariants } from '@gaussian-splat/renderer';
@@ -10,7 +10,7 @@ import { parseSceneOptions, runCommand, UsageError } from './lib/command.mjs';
 import { codeClip, codeSequence } from '@gaussian-splat/economise';
 import { deflate, deflateQuickly, encodeWebp } from './lib/encoders.mjs';
 import { requestNodeAdapter } from './lib/node-gpu.mjs';
-import { checkOutput, obstacleTo, obstacleToFolder, writeWhole } from './lib/output-file.mjs';
+import { checkOutput, obstacleTo, obstacleToFolder, writeAll, writeWhole } from './lib/output-file.mjs';
 import { readWhole } from './lib/input-file.mjs';
 
 const USAGE = `usage: gaussian-splat sequence MANIFEST --out CLIP.gsv|FOLDER [options]
@@ -93,15 +93,14 @@ async function writeClip(options, out, sourceBytes) {
 async function writeFolder(options, out) {
   const { frameCount, framesPerSecond, framesPerFile } = options;
   const { first, files, psnr, worstPsnr } = await codeSequence(options);
-  mkdirSync(out, { recursive: true });
-  writeFileSync(join(out, 'first.sog'), first);
   const digits = String(Math.max(0, files.length - 1)).length;
-  files.forEach((file, k) => writeFileSync(join(out, `motion-${String(k).padStart(digits, '0')}.bin`), file));
+  const motion = files.map((file, k) => [join(out, `motion-${String(k).padStart(digits, '0')}.bin`), file]);
   const described = {
     ...{ gaussianSplatSequence: 2, framesPerSecond, count: frameCount, first: 'first.sog' },
     ...{ motion: `motion-{${'0'.repeat(digits)}}.bin`, framesPerFile },
   };
-  writeWhole(join(out, 'sequence.json'), `${JSON.stringify(described)}\n`);
+  const manifest = [join(out, 'sequence.json'), `${JSON.stringify(described)}\n`];
+  writeAll([[join(out, 'first.sog'), first], ...motion, manifest]);
   const bytes = files.reduce((sum, { length }) => sum + length, first.length);
   console.log(
     `${frameCount} frames in ${(bytes / 1e6).toFixed(2)} MB, ${(first.length / 1e3).toFixed(0)} kB before the first one; ` +

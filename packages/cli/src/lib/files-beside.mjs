@@ -3,10 +3,12 @@ import { basename, dirname, extname, join, posix, sep } from 'node:path';
 
 /** Keys whose values are file names in the JSON of SOG, streamed SOG, LOD pages and sequences. */
 const KEYS = new Set(['files', 'filenames', 'environment', 'file', 'frames']);
+/** Keys whose values are relative references (RFC 3986) in the JSON of 3D Tiles. */
+const URI_KEYS = new Set(['uri', 'url']);
 
 /**
  * Finds the files that a scene or a model refers to: buffers and images of a glTF, weights and contract of a model, and
- * files in JSON and in nested JSON. A damaged file refers to none; the page reports its fault. Requires built packages.
+ * files in JSON, in tilesets and in RAD, and those that these files refer to. A damaged file refers to none; the page reports its fault. Requires built packages.
  * @returns `found`: paths relative to the folder of the scene. `missing`: paths of files that do not exist or are outside
  * the folder, with the reason.
  */
@@ -22,7 +24,7 @@ export async function filesBeside(scene) {
       else if (leadsOut(scene, file)) missing.set(file, 'a link out of its folder');
       else if (!found.has(file)) {
         found.add(file);
-        if (isJson(file)) await visit(file);
+        await visit(file);
       }
     }
   };
@@ -38,8 +40,6 @@ const leadsOut = (scene, file) => {
   return !realpathSync(join(folder, file)).startsWith(folder.endsWith(sep) ? folder : folder + sep);
 };
 
-const isJson = (path) => extname(path).toLowerCase() === '.json';
-
 /** Returns the name of a model's contract; undefined for other files. A model may have none. */
 const sidecarOf = (scene, { sidecarPath }) =>
   extname(scene).toLowerCase() === '.onnx' ? sidecarPath(basename(scene)) : undefined;
@@ -51,6 +51,7 @@ async function namedBy(file) {
     '.json': partsOf,
     '.lcc': partsOfLcc,
     '.lcc2': partsOfLcc2,
+    '.rad': chunksOfRad,
   };
   const read = readers[extname(file).toLowerCase()];
   return read === undefined ? [] : read(file);
@@ -68,12 +69,20 @@ function partsOfLcc2(file) {
   return root.splatFiles ?? earlier ?? [];
 }
 
+/** The header of a RAD file: 4 bytes of signature, the length of its JSON, and the JSON. */
+function chunksOfRad(file) {
+  const bytes = readFileSync(file);
+  const { chunks = [] } = JSON.parse(bytes.subarray(8, 8 + bytes.readUInt32LE(4)).toString('utf8'));
+  return chunks.flatMap(({ filename }) => filename ?? []);
+}
+
+/** Returns the path of a relative reference, without its query; none for other references. */
+const pathOf = (uri) =>
+  typeof uri !== 'string' || /^[a-z]+:/i.test(uri) ? [] : [decodeURIComponent(uri.replace(/[?#].*$/, ''))];
+
 async function buffersOf(file) {
   const { buffers = [], images = [] } = JSON.parse(readFileSync(file, 'utf8'));
-  return [...buffers, ...images].flatMap(({ uri }) =>
-    // The path of a file does not include the query of its URI.
-    uri === undefined || /^[a-z]+:/i.test(uri) ? [] : [decodeURIComponent(uri.replace(/[?#].*$/, ''))],
-  );
+  return [...buffers, ...images].flatMap(({ uri }) => pathOf(uri));
 }
 
 async function weightsOf(file) {
@@ -95,6 +104,7 @@ async function partsOf(file) {
     for (const [key, value] of Object.entries(open.pop())) {
       if (KEYS.has(key))
         for (const name of [value].flat()) if (typeof name === 'string' && name !== '') names.push(name);
+      if (URI_KEYS.has(key)) names.push(...pathOf(value));
       if (typeof value === 'object' && value !== null) open.push(value);
     }
   }

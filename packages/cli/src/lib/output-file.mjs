@@ -1,5 +1,15 @@
 /** Writer of the output files of commands, which are never partial and never replace an input file. */
-import { accessSync, constants, existsSync, realpathSync, renameSync, rmSync, statSync, writeFileSync } from 'node:fs';
+import {
+  accessSync,
+  constants,
+  existsSync,
+  mkdirSync,
+  realpathSync,
+  renameSync,
+  rmSync,
+  statSync,
+  writeFileSync,
+} from 'node:fs';
 import { dirname, resolve } from 'node:path';
 import { UsageError } from './command.mjs';
 
@@ -61,6 +71,23 @@ export function writeWhole(path, content) {
     renameSync(part, target);
   } catch (error) {
     rmSync(part, { force: true });
+    throw error;
+  }
+}
+
+/**
+ * Writes files and the folders that they need, or nothing: after a failure, what was written is removed.
+ * @param files {Iterable<readonly [path: string, content: string | Uint8Array]>} In this order.
+ */
+export function writeAll(files) {
+  const made = [];
+  try {
+    for (const [path, content] of files) {
+      made.push(mkdirSync(dirname(path), { recursive: true }) ?? path);
+      writeWhole(path, content);
+    }
+  } catch (error) {
+    for (const path of made) rmSync(path, { recursive: true, force: true });
     throw error;
   }
 }
