@@ -69,6 +69,14 @@ test('coarse before fine, and the next group before a fine image of this one', a
   assert.ok(!asked.some((each) => each.startsWith('12.')), 'nothing far ahead');
 });
 
+test('played backward, the group before is the next one', async () => {
+  const { cache, asked, settle } = bench(clip(20));
+  cache.want(3, false, -1);
+  await settle();
+  assert.deepEqual(asked.slice(0, 4), ['3.0', '2.0', '3.1', '2.1']);
+  assert.ok(!asked.some((each) => each.startsWith('4.')), 'nothing behind');
+});
+
 test('at the end of a loop the beginning is fetched', async () => {
   for (const loops of [true, false]) {
     const { cache, asked, settle } = bench(clip(20));

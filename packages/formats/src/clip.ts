@@ -180,7 +180,11 @@ class IndexReader {
   }
 
   #vector(path: string, value: unknown): Vector3 {
-    if (Array.isArray(value) && value.length === 3 && value.every((each) => Math.abs(each as number) <= 1e18))
+    if (
+      Array.isArray(value) &&
+      value.length === 3 &&
+      value.every((each) => typeof each === 'number' && Math.abs(each) <= 1e18)
+    )
       return value as unknown as Vector3;
     return this.#fail(path, 'three numbers', value);
   }

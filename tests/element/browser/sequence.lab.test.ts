@@ -147,6 +147,19 @@ describe('a sequence of files', () => {
     );
   });
 
+  itInLab('played backward with late frames, frames follow the clock, too', async () => {
+    const element = await showLoaded({ src: `${MOVIE}?count=72&fps=24&ms=350` });
+    await seek(element, 2.9);
+    element.playbackRate = -1;
+    const seen = new Set<number>();
+    await element.play();
+    await until(() => {
+      seen.add(element.stats?.splats ?? 0);
+      return element.paused;
+    }, 'the beginning');
+    assert(seen.size >= 3, `frames on the way: ${[...seen].join(' ')}`);
+  });
+
   itInLab('a late frame leaves the last one visible, and is shown when it arrives', async () => {
     const element = await showLoaded({ src: `${MOVIE}?ms=1200` });
     element.currentTime = 0.15;

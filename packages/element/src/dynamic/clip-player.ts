@@ -8,6 +8,7 @@ import type { ClipAnswer, ClipRequest, ProgressListener, SceneRequest } from '..
 import type { SceneWorker, SceneLoader } from '../loading/scene-loader.js';
 import { GroupCache } from './group-cache.js';
 import { GroupSlots } from './group-slots.js';
+import { PlayDirection } from './play-direction.js';
 import type { DynamicListeners, DynamicState, Timeline } from './dynamic-model.js';
 
 export interface ClipOptions {
@@ -36,6 +37,7 @@ export class ClipPlayer implements Timeline {
   readonly #options: ClipOptions;
   readonly #cache: GroupCache;
   readonly #slots: GroupSlots;
+  readonly #direction: PlayDirection;
   #isClosed = false;
 
   private constructor(options: ClipOptions, index: ClipIndex, gaussians: AnimatedGaussians, cache: GroupCache) {
@@ -46,6 +48,7 @@ export class ClipPlayer implements Timeline {
     this.duration = index.durationSeconds;
     this.#cache = cache;
     this.#slots = new GroupSlots(gaussians, index);
+    this.#direction = new PlayDirection(index.frameCount, index.framesPerSecond);
   }
 
   /**
@@ -122,7 +125,8 @@ export class ClipPlayer implements Timeline {
   request({ timeSeconds }: Pick<DynamicState, 'timeSeconds'>): void {
     const frame = frameAt(this.#index, timeSeconds);
     const group = clipGroupAt(this.#index, frame);
-    this.#cache.want(group, this.#options.loops());
+    const loops = this.#options.loops();
+    this.#cache.want(group, loops, this.#direction.at(frame, loops));
     if (this.#slots.show(frame, group, this.#cache)) this.#options.listeners.onInput();
     if (this.#slots.shownFrame === frame || this.#cache.isMissing(group, 0))
       queueMicrotask(() => this.#isClosed || this.#options.listeners.onShown(timeSeconds));

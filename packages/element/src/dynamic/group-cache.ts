@@ -1,6 +1,7 @@
 import { BackOff } from '@gaussian-splat/core/fetch';
 import { clipPartBytes, type ClipIndex } from '@gaussian-splat/formats';
 import type { PackedAnimation } from '@gaussian-splat/renderer/tools';
+import { indicesFrom } from './play-direction.js';
 
 export interface GroupSource {
   fetchPart(group: number, part: number, signal: AbortSignal): Promise<PackedAnimation>;
@@ -83,12 +84,13 @@ export class GroupCache {
 
   /**
    * Sets the current group, and fetches the groups that follow it. `loops`: whether the first group follows the last.
+   * `direction`: -1 if playback goes backward.
    */
-  want(group: number, loops: boolean): void {
-    const key = `${group} ${loops}`;
+  want(group: number, loops: boolean, direction: 1 | -1 = 1): void {
+    const key = `${group} ${loops} ${direction}`;
     if (key !== this.#wantedFor) {
       this.#wantedFor = key;
-      this.#wanted = this.#wantedFrom(group, loops);
+      this.#wanted = this.#wantedFrom(group, loops, direction);
       // A seek to a group that is not loaded does not wait for a part that is needed later.
       const isUrgent = !this.get(group, 0) && !this.isMissing(group, 0);
       const needed = isUrgent ? this.#wanted.slice(0, 1) : this.#wanted;
@@ -111,16 +113,15 @@ export class GroupCache {
    * Returns the needed parts, the most urgent first. The coarse part of the next group has priority over the fine parts
    * of the current group.
    */
-  #wantedFrom(group: number, loops: boolean): (readonly [number, number])[] {
+  #wantedFrom(group: number, loops: boolean, direction: 1 | -1): (readonly [number, number])[] {
     const { groups, framesPerSecond } = this.#index;
     const ahead: number[] = [];
     let seconds = 0;
-    const end = Math.min(groups.length, 1 + MAX_AHEAD);
-    for (let k = 1; k < end && (seconds < AHEAD_SECONDS || ahead.length === 0); k++) {
-      const next = group + k;
-      if (next >= groups.length && !loops) break;
-      ahead.push(next % groups.length);
-      seconds += groups[next % groups.length].frames / framesPerSecond;
+    const count = Math.min(groups.length, 1 + MAX_AHEAD);
+    for (const next of indicesFrom(group, count, direction, groups.length, loops).slice(1)) {
+      if (seconds >= AHEAD_SECONDS && ahead.length > 0) break;
+      ahead.push(next);
+      seconds += groups[next].frames / framesPerSecond;
     }
     const fine = (own: number): (readonly [number, number])[] =>
       groups[own].parts.slice(1).map((_, k) => [own, k + 1] as const);

@@ -7,6 +7,7 @@ import type { LoadedGaussians } from '../gpu/loaded-gaussians.js';
 import type { FileRequest, LoadedScene, LoadedSequence, ProgressListener, SceneRequest } from '../loading/protocol.js';
 import type { SceneLoader } from '../loading/scene-loader.js';
 import { FrameRoom } from './frame-room.js';
+import { indicesFrom, PlayDirection } from './play-direction.js';
 import type { DynamicListeners, DynamicState, Timeline } from './dynamic-model.js';
 
 export interface SequenceOptions {
@@ -55,6 +56,8 @@ export class SequencePlayer implements Timeline {
   readonly #failures = new BackOff<string>({ firstMs: RETRY_MS, factor: 4, maxTries: MAX_TRIES });
   readonly #room: FrameRoom;
   #gaussians: SequenceGaussians;
+  readonly #playDirection: PlayDirection;
+  #direction: 1 | -1 = 1;
   #shown = 0;
   #isGrowing = false;
   #isClosed = false;
@@ -71,6 +74,7 @@ export class SequencePlayer implements Timeline {
     this.duration = sequence.durationSeconds;
     this.bounds = first.bounds;
     this.#room = new FrameRoom(sequence.frameCount, sequence.framesPerSecond);
+    this.#playDirection = new PlayDirection(sequence.frameCount, sequence.framesPerSecond);
     this.#room.note(bytesOf(first.packed));
     this.#slots.set(0, { abort: new AbortController(), packed: first.packed });
   }
@@ -97,6 +101,7 @@ export class SequencePlayer implements Timeline {
   /** Shows the frame at a time, if it is loaded, and fetches the following frames. */
   request({ timeSeconds }: DynamicState): void {
     const frame = this.#frameAt(timeSeconds);
+    this.#direction = this.#playDirection.at(frame, this.#options.loops());
     this.#showLate(frame);
     this.#prefetch(frame);
     const slot = this.#slots.get(frame);
@@ -106,19 +111,18 @@ export class SequencePlayer implements Timeline {
   }
 
   /**
-   * If the current frame is not loaded, shows the newest loaded frame before it. If every frame is late, playback thus
-   * follows the clock with a delay.
+   * If the current frame is not loaded, shows the newest loaded frame that the clock has passed. If every frame is late,
+   * playback thus follows the clock with a delay.
    */
   #showLate(frame: number): void {
     if (this.#slots.get(frame)?.packed) return;
+    const passed = (held: number): number => this.#direction * (frame - held);
     // The shown frame may belong to the previous round.
-    const before = this.#shown < frame ? this.#shown : -1;
+    const min = passed(this.#shown) > 0 ? passed(this.#shown) : Infinity;
     const late = [...this.#slots.keys()].filter(
-      (held) => held > before && held < frame && this.#slots.get(held)!.packed,
+      (held) => passed(held) > 0 && passed(held) < min && this.#slots.get(held)!.packed,
     );
-    if (late.length === 0) return;
-    const newest = Math.max(...late);
-    this.#show(newest);
+    if (late.length > 0) this.#show(late.reduce((a, b) => (passed(a) < passed(b) ? a : b)));
   }
 
   close(): void {
@@ -171,7 +175,8 @@ export class SequencePlayer implements Timeline {
     for (const [held, { abort, packed }] of this.#slots) {
       // Frames that the clock has just passed may still arrive. On a slow connection, the clock passes every frame
       // before it arrives.
-      const isLate = held < frame && frame - held <= this.#room.frames && !packed;
+      const passed = this.#direction * (frame - held);
+      const isLate = passed > 0 && passed <= this.#room.frames && !packed;
       if (wanted.includes(held) || isLate) continue;
       abort.abort();
       this.#slots.delete(held);
@@ -208,9 +213,8 @@ export class SequencePlayer implements Timeline {
   }
 
   #wantedFrom(frame: number): number[] {
-    const { frameCount: length } = this.#sequence;
-    const following = Array.from({ length: this.#room.frames }, (_, k) => frame + k);
-    return this.#options.loops() ? following.map((each) => each % length) : following.filter((each) => each < length);
+    const { frameCount } = this.#sequence;
+    return indicesFrom(frame, this.#room.frames, this.#direction, frameCount, this.#options.loops());
   }
 
   async #fetch(frame: number): Promise<void> {

@@ -154,11 +154,23 @@ export interface Decoding {
 /**
  * Decodes the state of the last chunk of a chain.
  * @param chain Indices that {@link chainOf} returns.
+ * @param known A chunk whose state is known, and that state. If it is in the chain, only the changes after it are decoded.
  */
-export async function stateOf(chunks: readonly Chunk[], chain: readonly number[], decoding: Decoding): Promise<State> {
-  let state = await wholeState(chunks[chain[0]], decoding);
-  for (const k of chain.slice(1)) state = await changedState(state, chunks[k], decoding);
+export async function stateOf(
+  chunks: readonly Chunk[],
+  chain: readonly number[],
+  decoding: Decoding,
+  known?: KnownState,
+): Promise<State> {
+  const after = known ? chain.indexOf(known.chunk) + 1 : 0;
+  let state = after > 0 ? known!.state : await wholeState(chunks[chain[0]], decoding);
+  for (const k of chain.slice(Math.max(1, after))) state = await changedState(state, chunks[k], decoding);
   return state;
+}
+
+export interface KnownState {
+  readonly chunk: number;
+  readonly state: State;
 }
 
 async function wholeState({ content, bands, live }: Chunk, decoding: Decoding): Promise<State> {
@@ -203,7 +215,7 @@ async function changedState(before: State, chunk: Chunk, decoding: Decoding): Pr
   const wrong = FIXED.find((id) => updates.has(id));
   if (wrong !== undefined) throw damaged(name, 'changes that leave grids alone', `attribute ${wrong}`, 'decode/header');
   const rowOf = rowsById(before.bins, name);
-  const [changed, dead, born] = [idsOf(updates, counts[0]), idsOf(deaths, counts[2]), idsOf(births, counts[1])];
+  const [changed, born, dead] = [updates, births, deaths].map((group, k) => idsOf(group, counts[k], name));
   const touched = new Set([...changed, ...dead, ...born]);
   const isKnown = (id: number): boolean => rowOf.has(id);
   if (touched.size !== counts[0] + counts[1] + counts[2] || ![...changed, ...dead].every(isKnown) || born.some(isKnown))
@@ -251,7 +263,12 @@ function joined(
   return own;
 }
 
-const idsOf = (bins: Bins, count: number): number[] => Array.from(bins.get(ATTRIBUTE.id) ?? new Int32Array(count));
+function idsOf(bins: Bins, count: number, name: string): number[] {
+  const ids = bins.get(ATTRIBUTE.id);
+  // Without a stream, nothing has been charged for this count.
+  if (!ids && count > 0) throw damaged(name, 'indices of splats', 'none', 'decode/header');
+  return Array.from(ids ?? []);
+}
 
 /** Returns the row of each splat by its id. Throws `decode/header` without ids, `decode/corrupt` if one occurs twice. */
 export function rowsById(bins: Bins, name: string): Map<number, number> {

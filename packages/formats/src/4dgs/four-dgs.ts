@@ -4,7 +4,7 @@ import { concatenated } from '@gaussian-splat/core/fetch';
 import { LoadBudget, type LoadLimits } from '../budget.js';
 import { damaged } from '../faults.js';
 import { ATTRIBUTE, type AttributeId } from './streams.js';
-import { chainOf, chunksOf, rowsById, stateOf, type Chunk, type State } from './chunks.js';
+import { chainOf, chunksOf, rowsById, stateOf, type Chunk, type KnownState, type State } from './chunks.js';
 import { presence, splatsFrom, type ChangingSplats, type Scene } from './splats.js';
 import { poseAt, product, readTrack, turnedPoint, type ObjectTrack } from './tracks.js';
 import { Cursor, OPCODE, readGrids, readHeader, readUp, readWindows, recordsOf } from './wire.js';
@@ -31,6 +31,8 @@ export class FourDgs {
   readonly byteLength: number;
   readonly #limits: LoadLimits;
   readonly #states = new Map<string, Promise<Population>>();
+  /** The last state that {@link keyedPopulation} decoded. */
+  #latest: KnownState | undefined;
 
   /**
    * Reads the header records of a file, and the heads of its chunks.
@@ -87,7 +89,9 @@ export class FourDgs {
   /** Decodes the splats of a chunk, by its index, after all deltas that lead to its state. */
   keyedPopulation(chunk: number): Promise<Population> {
     return this.#kept(`to ${chunk}`, async (decoding) => {
-      const state = await stateOf(this.chunks, chainOf(this.chunks, chunk), decoding);
+      // During playback, each state is one delta after the last one.
+      const state = await stateOf(this.chunks, chainOf(this.chunks, chunk), decoding, this.#latest);
+      this.#latest = { chunk, state };
       const { name } = this.scene;
       const ids = Int32Array.from(rowsById(state.bins, name).keys());
       return { splats: splatsFrom(...parts(state), this.scene), ids };
