@@ -1,4 +1,4 @@
-/** The direction in which frames are fetched ahead, from the frames that are requested. */
+/** The direction of playback, from the frames that are requested. */
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { indicesFrom, PlayDirection } from '../../packages/element/dist/dynamic/play-direction.js';
@@ -14,7 +14,7 @@ test('frames are requested forward or backward, also around the ends of a loop',
   assert.deepEqual(directionsOf([2, 1, 0, 47, 46], true), [1, -1, -1, -1, -1]);
 });
 
-test('a seek goes on forward', () => {
+test('after a seek, the direction is forward', () => {
   assert.deepEqual(directionsOf([30, 29, 5, 6], false), [1, -1, 1, 1]);
   assert.deepEqual(directionsOf([30, 29, 40], false), [1, -1, 1]);
 });

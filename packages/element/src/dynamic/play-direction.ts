@@ -1,7 +1,7 @@
-/** Duration of a step above which it is a seek, s. Playback then goes on forward. */
+/** Duration of a step above which it is a seek, s. Playback then continues forward. */
 const SEEK_SECONDS = 0.5;
 
-/** The direction in which the frames of a scene are requested, which are fetched ahead in this direction. */
+/** The direction of playback, from the frames that are requested. Frames are fetched ahead in this direction. */
 export class PlayDirection {
   readonly #frameCount: number;
   readonly #maxStep: number;

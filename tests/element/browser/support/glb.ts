@@ -34,7 +34,7 @@ export interface BoxOptions {
   readonly surface?: 'shining' | 'unlit' | 'rough';
   /** Whether it is transparent. */
   readonly alpha?: number;
-  /** Alpha up to which nothing is drawn: `alphaMode` MASK. */
+  /** Greatest alpha that is not drawn: `alphaMode` MASK. */
   readonly cutoff?: number;
   /** Its movement along x within a second. */
   readonly moves?: number;
