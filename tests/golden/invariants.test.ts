@@ -8,7 +8,7 @@ import { renderOracle } from '../oracle/oracle.js';
 import { cloudOf, repeat } from '../support/clouds.js';
 import { closeness, renderCloud } from '../support/compare.js';
 import { psnr } from '../support/metrics.js';
-import { onlyInFull } from '../support/extent.js';
+import { isLab, onlyInFull } from '../support/extent.js';
 import { endNodeDevice, anyDevice } from '../support/node-device.js';
 import { randomSource } from '../support/gpu.js';
 import { cameraAt, equalDepthPlane, movedBy, offCenter, resized, room, withHostileSplats } from '../support/scenes.js';
@@ -56,8 +56,8 @@ function part(cloud: GaussianCloud, first: number, end: number): GaussianCloud {
 
 for (const { make, frames } of [
   // Two hundred of them, and turns between, are a row of `npm run lab:stability`.
-  { make: equalDepthPlane, frames: 5 },
-  { make: room, frames: 8 },
+  { make: equalDepthPlane, frames: isLab ? 5 : 3 },
+  { make: room, frames: isLab ? 8 : 3 },
 ]) {
   test(`${frames} frames of one view of ${make.name} are the same bytes`, async () => {
     const device = await anyDevice();
