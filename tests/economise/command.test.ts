@@ -71,7 +71,7 @@ test('what cannot be written or read is said before the work, for people', () =>
   const cases = [
     [['none.ply', '--out', 'nowhere/a.glb'], 2, /--out: the folder .*nowhere does not exist/],
     [['none.ply', '--out', 'a.glb', '--report', '.'], 2, /--report: .* is a folder/],
-    [['none.ply', '--out', 'a.obj'], 1, /expected a name that ends in .*\[argument\/value\]/],
+    [['none.ply', '--out', 'a.obj'], 2, /expected a name that ends in .*\[argument\/value\]/],
     [['none.ply', '--out', 'a.glb'], 1, /^ENOENT: no such file.*none\.ply'$/m],
     [['scene.ply', '--out', 'a.glb', '--views', 'cameras.json'], 2, /found no list "views"/],
     [['scene.ply', '--out', 'a.glb', '--views', 'prose.json'], 2, /prose\.json is not JSON/],
