@@ -8,7 +8,8 @@ const URI_KEYS = new Set(['uri', 'url']);
 
 /**
  * Finds the files that a scene or a model refers to: buffers and images of a glTF, weights and contract of a model, and
- * files in JSON, in tilesets and in RAD, and those that these files refer to. A damaged file refers to none; the page reports its fault. Requires built packages.
+ * files in JSON, in tilesets and in RAD, and those that these files refer to. A damaged file refers to none; the page
+ * reports its fault. Requires built packages.
  * @returns `found`: paths relative to the folder of the scene. `missing`: paths of files that do not exist or are outside
  * the folder, with the reason.
  */

@@ -13,6 +13,11 @@ export class PlayDirection {
     this.#maxStep = Math.max(1, SEEK_SECONDS * framesPerSecond);
   }
 
+  /** The direction after the last request. */
+  get direction(): 1 | -1 {
+    return this.#direction;
+  }
+
   /**
    * Returns the direction after the request of a frame: 1 for forward, -1 for backward. `loops`: whether the first frame
    * follows the last.

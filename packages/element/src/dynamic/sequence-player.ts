@@ -56,8 +56,7 @@ export class SequencePlayer implements Timeline {
   readonly #failures = new BackOff<string>({ firstMs: RETRY_MS, factor: 4, maxTries: MAX_TRIES });
   readonly #room: FrameRoom;
   #gaussians: SequenceGaussians;
-  readonly #playDirection: PlayDirection;
-  #direction: 1 | -1 = 1;
+  readonly #playing: PlayDirection;
   #shown = 0;
   #isGrowing = false;
   #isClosed = false;
@@ -74,7 +73,7 @@ export class SequencePlayer implements Timeline {
     this.duration = sequence.durationSeconds;
     this.bounds = first.bounds;
     this.#room = new FrameRoom(sequence.frameCount, sequence.framesPerSecond);
-    this.#playDirection = new PlayDirection(sequence.frameCount, sequence.framesPerSecond);
+    this.#playing = new PlayDirection(sequence.frameCount, sequence.framesPerSecond);
     this.#room.note(bytesOf(first.packed));
     this.#slots.set(0, { abort: new AbortController(), packed: first.packed });
   }
@@ -101,7 +100,7 @@ export class SequencePlayer implements Timeline {
   /** Shows the frame at a time, if it is loaded, and fetches the following frames. */
   request({ timeSeconds }: DynamicState): void {
     const frame = this.#frameAt(timeSeconds);
-    this.#direction = this.#playDirection.at(frame, this.#options.loops());
+    this.#playing.at(frame, this.#options.loops());
     this.#showLate(frame);
     this.#prefetch(frame);
     const slot = this.#slots.get(frame);
@@ -116,7 +115,7 @@ export class SequencePlayer implements Timeline {
    */
   #showLate(frame: number): void {
     if (this.#slots.get(frame)?.packed) return;
-    const passed = (held: number): number => this.#direction * (frame - held);
+    const passed = (held: number): number => this.#playing.direction * (frame - held);
     // The shown frame may belong to the previous round.
     const min = passed(this.#shown) > 0 ? passed(this.#shown) : Infinity;
     const late = [...this.#slots.keys()].filter(
@@ -175,7 +174,7 @@ export class SequencePlayer implements Timeline {
     for (const [held, { abort, packed }] of this.#slots) {
       // Frames that the clock has just passed may still arrive. On a slow connection, the clock passes every frame
       // before it arrives.
-      const passed = this.#direction * (frame - held);
+      const passed = this.#playing.direction * (frame - held);
       const isLate = passed > 0 && passed <= this.#room.frames && !packed;
       if (wanted.includes(held) || isLate) continue;
       abort.abort();
@@ -214,7 +213,7 @@ export class SequencePlayer implements Timeline {
 
   #wantedFrom(frame: number): number[] {
     const { frameCount } = this.#sequence;
-    return indicesFrom(frame, this.#room.frames, this.#direction, frameCount, this.#options.loops());
+    return indicesFrom(frame, this.#room.frames, this.#playing.direction, frameCount, this.#options.loops());
   }
 
   async #fetch(frame: number): Promise<void> {
