@@ -18,7 +18,6 @@ const IN_NODE = {
   'detail-chart': ['scripts/charts/detail.mjs'],
   bytes: ['scripts/bytes/run-bytes.mjs'],
   gate: ['scripts/gate/run-gate.mjs'],
-  sequence: ['scripts/bytes/run-sequence.mjs'],
   clip: ['--import', 'tsx', 'tests/support/clip-report.ts'],
 };
 

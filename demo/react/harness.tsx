@@ -5,7 +5,7 @@ import { useEffect, useRef, useState } from 'react';
 
 const query = new URLSearchParams(location.search);
 /** The scenes that the app goes to and fro between. */
-const SCENES = [query.get('first') ?? '../scenes/skull.spz', query.get('second') ?? '../scenes/knot/knot.json'];
+const SCENES = [query.get('first') ?? '../scenes/skull.spz', query.get('second') ?? '../scenes/knot/knot.gsv'];
 /** Sliders of a generator: an object that must arrive as it is. */
 const CONTROLS = { smile: 0.4 };
 

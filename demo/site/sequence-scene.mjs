@@ -1,5 +1,5 @@
 /**
- * The sequence of the examples, written when the site is built: a knot along which waves run, as its first frame and the later motion. It demonstrates sequences without a file in the repository.
+ * The moving scene of the examples, written when the site is built: a knot along which waves run, as a clip. All of its splats live all the time.
  */
 import { mkdirSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
@@ -16,23 +16,16 @@ const SH_CONSTANT = 0.28209479177387814;
 /** Step sizes of rounding that the eye cannot see. */
 const STEPS = { position: 0.004, rotation: 0.02, scale: 0.05, opacity: 0.02, color: 0.03 };
 
-/** Writes `knot.json`, its first frame and its motion into a folder. */
+/** Writes `knot.gsv` into a folder. */
 export async function writeSequence(folder) {
-  const { encodingsFor, writeMotion } = await import('../../packages/economise/dist/index.js');
-  const { readScene } = await import('../../packages/formats/dist/index.js');
+  const { codeClip, encodingsFor } = await import('../../packages/economise/dist/index.js');
   mkdirSync(folder, { recursive: true });
-  const knots = Array.from({ length: FRAMES }, (_, frame) => knotAt(frame / FRAMES));
-  const first = await encodingsFor('first.spz')
-    .at(-1)
-    .write({ cloud: knots[0], degrees: new Uint8Array(SPLATS) });
-  writeFileSync(join(folder, 'first.spz'), first);
-  const cloud = await readScene(first, { name: 'first.spz' });
-  writeFileSync(join(folder, 'motion-0.bin'), writeMotion(cloud, knots.slice(1), { steps: STEPS, deflate }));
-  const manifest = {
-    ...{ gaussianSplatSequence: 2, framesPerSecond: FRAMES_PER_SECOND, count: FRAMES },
-    ...{ first: 'first.spz', motion: 'motion-{0}.bin', framesPerFile: FRAMES - 1 },
-  };
-  writeFileSync(join(folder, 'knot.json'), `${JSON.stringify(manifest)}\n`);
+  const { bytes } = await codeClip({
+    ...{ frameCount: FRAMES, framesPerSecond: FRAMES_PER_SECOND, framesPerGroup: FRAMES, minPsnr: 45 },
+    openFrame: async (frame) => knotAt(frame / FRAMES),
+    ...{ deflate, rounding: { encoding: encodingsFor('knot.spz').at(-1), steps: STEPS } },
+  });
+  writeFileSync(join(folder, 'knot.gsv'), bytes);
 }
 
 /** The knot at a fraction of its period, as a `GaussianCloud`. */

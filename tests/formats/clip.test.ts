@@ -85,7 +85,7 @@ test('splats fade in and out by their lives, not by curves', async () => {
   for (const [group, { first, frames }] of index.groups.entries()) {
     const parts = await partsOf(group);
     for (const { motion } of parts) {
-      assert.ok(motion.lives?.fades, 'a part has fades');
+      assert.ok(motion.lives.fades, 'a part has fades');
       assert.ok(motion.parts.opacity.rank <= 1, `${motion.parts.opacity.rank} curves of opacities`);
     }
     for (let frame = 0; frame < frames; frame++) {

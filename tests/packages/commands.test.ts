@@ -105,13 +105,10 @@ test('gaussian-splat page brings what descriptions in JSON name, and what these 
   write('lod-meta.json', { lodLevels: 2, filenames: ['a/meta.json', 'b.sog'], environment: './sky/meta.json' });
   write('detail.json', { trees: [{ pages: [{ file: 'pages/0.bin' }, { file: 'pages/1.bin' }] }] });
   write('film.json', { gaussianSplatSequence: 1, framesPerSecond: 2, frames: 'frame-{09}.spz', count: 2 });
-  for (const part of ['ball.sog', 'move-7.bin', 'move-8.bin', 'move-9.bin']) write(part, 'splats');
-  const moving = { gaussianSplatSequence: 2, framesPerSecond: 2, first: 'ball.sog', framesPerFile: 5, count: 11 };
   const tile = (uri: string, more: object = {}): object => ({ content: { uri }, ...more });
   write('tileset.json', { root: tile('tiles/a%20b.glb?v=1', { children: [tile('sub/tileset.json')] }) });
   write('sub/tileset.json', { root: { contents: [{ uri: '../tiles/c.glb' }] } });
   for (const glb of ['tiles/a b.glb', 'tiles/c.glb']) write(glb, 'splats');
-  write('moving.json', { ...moving, motion: 'move-{7}.bin' });
   const within = (folder: string): string[] => ['meta.json', ...images].map((name) => folder + name).sort();
   const expected: [string, string[]][] = [
     ['meta.json', within('')],
@@ -119,7 +116,6 @@ test('gaussian-splat page brings what descriptions in JSON name, and what these 
     ['detail.json', ['detail.json', 'pages/0.bin', 'pages/1.bin']],
     ['film.json', ['film.json', 'frame-09.spz', 'frame-10.spz']],
     ['tileset.json', ['sub/tileset.json', 'tiles/a b.glb', 'tiles/c.glb', 'tileset.json']],
-    ['moving.json', ['ball.sog', 'move-7.bin', 'move-8.bin', 'moving.json']],
   ];
   for (const [scene, files] of someOf(expected, 3)) {
     assert.deepEqual(
@@ -209,7 +205,9 @@ test('what cannot be written, or would replace what is read, is said before the 
     [/--out: the folder .*nowhere does not exist/, 'floor', 'gltf/scene.gltf', '--out', 'nowhere/a.floor'],
     [/--up: expected x, .* found "toString"/, 'floor', 'gltf/scene.gltf', '--out', 'a.floor', '--up', 'toString'],
     [/--out: the folder .*nowhere does not exist/, 'sequence', 'camera.json', '--out', 'nowhere/a.gsv'],
-    [/--out: .*camera\.json is not a folder/, 'sequence', 'camera.json', '--out', 'camera.json/a'],
+    [/--out: expected a file \.gsv/, 'sequence', 'camera.json', '--out', 'camera.json/a'],
+    [/--min-psnr: expected 30 to 60/, 'sequence', 'camera.json', '--out', 'a.gsv', '--min-psnr', '90'],
+    [/--per-file/, 'sequence', 'camera.json', '--out', 'a.gsv', '--per-file', '1'],
     [/camera\.json is not a folder/, 'page', 'gltf/scene.gltf', 'camera.json/a', '--no-serve'],
     [/--images: expected with --gate/, 'economise', 'a.ply', '--min-psnr', '40', '--images', '.', '--out', 'a.spz'],
     [/--out: .*found \.xyz/, 'economise', 'a.ply', '--min-psnr', '40', '--out', 'a.xyz'],

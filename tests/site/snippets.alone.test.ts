@@ -232,8 +232,6 @@ const fixture = (path: string): Buffer => readFileSync(join(root, 'tests', path)
 
 /** A small scene of the right kind is served at every address in a snippet. */
 async function serveScenes(tab: Page, origin: string): Promise<void> {
-  const knot = join(root, 'demo/dist/scenes/knot');
-  const bodies = new Map(readdirSync(knot).map((name) => [name, readFileSync(join(knot, name))]));
   const headers = { 'access-control-allow-origin': '*' };
   await tab.route(/\/(skull|scene|garden|room|mine%20%26%20yours)\.(ply|spz|glb)$/, (route) =>
     route.fulfill({ headers, body: fixture('element/browser/fixtures/compass.ply') }),
@@ -246,11 +244,6 @@ async function serveScenes(tab: Page, origin: string): Promise<void> {
   await tab.route(/\/skull\.(webp|jpg)$/, (route) =>
     route.fulfill({ path: join(root, 'demo/scenes/skull-poster.webp') }),
   );
-  await tab.route('**/dancer.json', (route) => route.fulfill({ body: bodies.get('knot.json') }));
-  await tab.route(/\/(first\.spz|motion-0\.bin)$/, (route) =>
-    route.fulfill({ body: bodies.get(new URL(route.request().url()).pathname.split('/').pop()!) }),
-  );
-  await tab.route('**/sequence.json', (route) => route.fulfill({ body: bodies.get('knot.json') }));
   const clip = await clipOf(fountain({ splats: 300, frames: 8, framesPerSecond: 10 }), {
     frames: 8,
     framesPerGroup: 4,

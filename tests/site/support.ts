@@ -50,7 +50,7 @@ export const withCompass = (tab: Page): Promise<unknown> =>
 
 /** Scenes and models that never arrive, until the function that this returns is called: the page is as it is while they load. */
 export async function withScenesToCome(tab: Page): Promise<() => Promise<void>> {
-  const scenes = /\.(spz|onnx)$|knot\.json$/;
+  const scenes = /\.(spz|onnx)$|knot\.gsv$/;
   await tab.route(scenes, () => undefined);
   return () => tab.unroute(scenes);
 }

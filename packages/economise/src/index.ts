@@ -24,7 +24,5 @@ export { findSteps, type FindStepsOptions, type Steps } from './steps.js';
 export { writeSog, type EncodeWebp, type SogOptions, type SogSteps } from './write/sog.js';
 export { isLodIndex, writeStreamedSog } from './write/streamed-sog.js';
 export { filesOfZip } from './write/zip.js';
-export { codeSequence, type CodedSequence, type CodeSequenceOptions } from './motion/code-sequence.js';
-export { alignAxes } from './motion/near-axes.js';
-export { writeMotion, type MotionOptions, type MotionSteps } from './motion/write-motion.js';
+export type { MotionSteps } from './clip/write-motion.js';
 export { codeClip, type CodeClipOptions, type CodedClip } from './clip/code-clip.js';

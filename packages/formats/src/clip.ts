@@ -292,10 +292,7 @@ export async function readClipPart({
     throw damaged(name, `${grouped(splats)} splats, as the index says`, grouped(cloud.count), 'decode/header');
   if (cloud.shDegree > shDegree)
     throw damaged(name, `degree ${shDegree} at most, as the index says`, `degree ${cloud.shDegree}`, 'decode/header');
-  const motion = await readMotion({
-    ...{ bytes: bytes.subarray(sceneBytes), name, splats, frames, budget },
-    hasLives: true,
-  });
+  const motion = await readMotion({ bytes: bytes.subarray(sceneBytes), name, splats, frames, budget });
   const found = ANIMATED_ATTRIBUTE_NAMES.reduce(
     (sum, each) => sum + ANIMATED_ATTRIBUTES[each] * motion.parts[each].rank,
     0,

@@ -16,17 +16,7 @@ export type { ImageFile } from './triangles/images.js';
 export type { MeshoptView } from './triangles/views.js';
 export { isSequence, MAX_HEADER_BYTES as HEADER_BYTES } from './signatures.js';
 export type { FileBytes } from './bytes.js';
-export {
-  frameAt,
-  framePath,
-  motionFrame,
-  parseSequence,
-  sequencePaths,
-  type FramePattern,
-  type MovedFrame,
-  type SceneSequence,
-  type SequenceMotion,
-} from './sequence.js';
+export { frameAt, framePath, parseSequence, sequencePaths, type FramePattern, type SceneSequence } from './sequence.js';
 export {
   FADE_NAMES,
   MOTION_MODES,

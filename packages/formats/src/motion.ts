@@ -11,8 +11,8 @@ export const ANIMATED_ATTRIBUTES = { position: 3, rotation: 3, scale: 3, opacity
 export type AnimatedAttributeName = keyof typeof ANIMATED_ATTRIBUTES;
 export const ANIMATED_ATTRIBUTE_NAMES = Object.keys(ANIMATED_ATTRIBUTES) as readonly AnimatedAttributeName[];
 
-/** Versions of files. `everywhere`: all splats exist in every frame. `lives`: splats have lifetimes. `fades`: they fade. */
-export const MOTION_VERSION = { everywhere: 1, lives: 2, fades: 3 } as const;
+/** Versions of files. `lives`: splats have lifetimes. `fades`: they fade, too. */
+export const MOTION_VERSION = { lives: 2, fades: 3 } as const;
 /** Size of the header: version, splats, frames, and a rank and a step for each of {@link ANIMATED_ATTRIBUTES}. */
 const HEAD_BYTES = 4 * (3 + 2 * ANIMATED_ATTRIBUTE_NAMES.length);
 /** Coding of a plane of codes: plain codes, or differences from the code of the previous splat. */
@@ -65,8 +65,7 @@ export interface Motion {
   readonly splats: number;
   readonly frames: number;
   readonly parts: Readonly<Record<AnimatedAttributeName, AnimatedAttribute>>;
-  /** Lifetimes of the splats. Undefined if every splat exists in all frames. */
-  readonly lives?: Lives;
+  readonly lives: Lives;
 }
 
 /** A motion file, and the counts of splats and frames that its header must have. */
@@ -76,8 +75,6 @@ export interface MotionFile {
   readonly splats: number;
   readonly frames: number;
   readonly budget: LoadBudget;
-  /** Whether the file must have lifetimes of splats; default false. */
-  readonly hasLives?: boolean;
 }
 
 /**
@@ -88,7 +85,7 @@ export async function readMotion({ bytes, name, ...asked }: MotionFile): Promise
   return new MotionReader(await inflate(await checkedPart(bytes, name), name, asked), name, asked).read();
 }
 
-type Asked = Pick<MotionFile, 'splats' | 'frames' | 'budget' | 'hasLives'>;
+type Asked = Pick<MotionFile, 'splats' | 'frames' | 'budget'>;
 
 /** Inflates a file. Throws if the inflated size differs from the size that its header implies. */
 async function inflate(bytes: Uint8Array, name: string, asked: Asked): Promise<Uint8Array> {
@@ -122,13 +119,12 @@ const wrongLength = (name: string, expected: number, found: string): GaussianSpl
 const rankAt = (view: DataView, k: number): number => view.getUint32(12 + 8 * k, true);
 
 /** Returns the inflated size of a file in bytes, from its header, and checks the header. */
-function lengthFrom(head: Uint8Array, name: string, { splats, frames, hasLives = false }: Asked): number {
+function lengthFrom(head: Uint8Array, name: string, { splats, frames }: Asked): number {
   const view = viewOf(head);
   const [version, ownSplats, ownFrames] = [0, 4, 8].map((at) => view.getUint32(at, true));
-  const { everywhere, lives, fades } = MOTION_VERSION;
-  const versions: readonly number[] = hasLives ? [lives, fades] : [everywhere];
-  if (!versions.includes(version))
-    throw damaged(name, `motion of version ${versions.join(' or ')}`, `version ${version}`, 'decode/unsupported');
+  const { lives, fades } = MOTION_VERSION;
+  if (version !== lives && version !== fades)
+    throw damaged(name, `motion of version ${lives} or ${fades}`, `version ${version}`, 'decode/unsupported');
   if (ownSplats !== splats || ownFrames !== frames) {
     throw damaged(
       name,
@@ -143,7 +139,7 @@ function lengthFrom(head: Uint8Array, name: string, { splats, frames, hasLives =
       if (rank > frames) throw damaged(name, `at most ${frames} curves`, `${rank} for ${part}`, 'decode/header');
       return sum + 4 * frames * rank + ANIMATED_ATTRIBUTES[part] * rank * (1 + 2 * splats);
     },
-    HEAD_BYTES + (hasLives ? 4 * splats : 0) + (version === fades ? FADE_NAMES.length * splats : 0),
+    HEAD_BYTES + 4 * splats + (version === fades ? FADE_NAMES.length * splats : 0),
   );
 }
 
@@ -167,7 +163,7 @@ class MotionReader {
       ANIMATED_ATTRIBUTE_NAMES.reduce((sum, part, k) => sum + ANIMATED_ATTRIBUTES[part] * rankAt(view, k), 0),
     );
     budget.take(2 * splats * modes.length, this.#name);
-    const lives = this.#asked.hasLives ? this.#lives(view.getUint32(0, true) === MOTION_VERSION.fades) : undefined;
+    const lives = this.#lives(view.getUint32(0, true) === MOTION_VERSION.fades);
     let plane = 0;
     const parts = ANIMATED_ATTRIBUTE_NAMES.map((part, k): [AnimatedAttributeName, AnimatedAttribute] => {
       const rank = rankAt(view, k);
@@ -176,7 +172,7 @@ class MotionReader {
       const codes = Array.from({ length: ANIMATED_ATTRIBUTES[part] * rank }, () => this.#codes(modes[plane++]));
       return [part, { rank, step, curves: curves[k], codes }];
     });
-    return { splats, frames, parts: Object.fromEntries(parts) as Motion['parts'], ...(lives && { lives }) };
+    return { splats, frames, parts: Object.fromEntries(parts) as Motion['parts'], lives };
   }
 
   #lives(hasFades: boolean): Lives {
@@ -265,7 +261,7 @@ export function applyMotion(
   eachNumber('scale', (number) => {
     for (let i = 0; i < change.length; i++) cloud.scales[3 * i + number] *= Math.exp(change[i]);
   });
-  if (lives?.fades) for (let i = 0; i < first.count; i++) cloud.opacities[i] *= fadeAt(lives.fades, lives, i, frame);
+  if (lives.fades) for (let i = 0; i < first.count; i++) cloud.opacities[i] *= fadeAt(lives.fades, lives, i, frame);
   eachNumber('opacity', add(cloud.opacities, 1));
   eachNumber('color', add(cloud.sh, 3 * shCoefficientCount(first.shDegree)));
   if (parts.rotation.rank > 0) {
@@ -273,7 +269,7 @@ export function applyMotion(
     eachNumber('rotation', add(turns, 3));
     turnBy(cloud.rotations, turns);
   }
-  if (lives) for (let i = 0; i < first.count; i++) if (!isAlive(lives, i, frame)) hide(cloud, first, i);
+  for (let i = 0; i < first.count; i++) if (!isAlive(lives, i, frame)) hide(cloud, first, i);
   const usable = keepUsable(cloud);
   if (usable.count > 0) return usable;
   throw noSplats(name, usable);

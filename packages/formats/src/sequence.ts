@@ -1,44 +1,18 @@
 import { LoadBudget } from './budget.js';
 import { grouped } from './bytes.js';
 import { damaged } from './faults.js';
-import { parseJson, show, type Json } from './json.js';
+import { parseJson, show } from './json.js';
 import { MAX_PATH } from './lod/meta.js';
 import { MAX_MANIFEST_BYTES } from './signatures.js';
 
 /** A sequence of scene files over time. */
 export interface SceneSequence {
-  /**
-   * Paths of scene files of any format, relative to the manifest, or the pattern of these paths. Each frame has a scene
-   * file; with {@link motion}, only the first frame has one. See {@link framePath}.
-   */
+  /** Paths of scene files of any format, relative to the manifest, or the pattern of these paths: see {@link framePath}. */
   readonly frames: readonly string[] | FramePattern;
-  /**
-   * Motion files, which contain the differences of later frames from the first. Undefined if each frame has a scene file.
-   * See {@link motionFrame}.
-   */
-  readonly motion?: SequenceMotion;
   readonly frameCount: number;
   readonly framesPerSecond: number;
   /** Seconds from the first frame to the end of the last. */
   readonly durationSeconds: number;
-}
-
-/** Motion files of the frames after the first. */
-export interface SequenceMotion {
-  /** Paths of the motion files, relative to the manifest, or the pattern of these paths. */
-  readonly frames: readonly string[] | FramePattern;
-  /** Number of frames in each motion file. The last file may have fewer. */
-  readonly framesPerFile: number;
-}
-
-/** Location of a frame in a motion file. */
-export interface MovedFrame {
-  /** Path of the motion file, relative to the manifest. */
-  readonly path: string;
-  /** Index of the frame in the motion file, from 0. */
-  readonly frame: number;
-  /** Number of frames in the motion file. */
-  readonly frames: number;
 }
 
 /** Numbered paths: `before`, the number of the path, and `behind`. */
@@ -52,8 +26,6 @@ export interface FramePattern {
 }
 
 const MAX_FRAMES = 1_000_000;
-/** Maximum number of frames in a motion file, so that its curves are small compared with its codes. */
-const MAX_PER_FILE = 4096;
 /** Maximum number of digits, so that all numbers are exact integers. */
 const MAX_DIGITS = 15;
 /** Matches a pattern such as `frame-{0001}.spz`. The digits are the first number, with the minimum number of digits. */
@@ -67,7 +39,6 @@ type Fail = (path: string, expected: string, found: unknown) => never;
  * ```json
  * { "gaussianSplatSequence": 1, "framesPerSecond": 24, "frames": ["a.spz", "b.spz"] }
  * { "gaussianSplatSequence": 1, "framesPerSecond": 24, "frames": "frame-{0001}.spz", "count": 240 }
- * { "gaussianSplatSequence": 2, "framesPerSecond": 24, "count": 240, "first": "first.sog", "motion": "motion-{00}.bin", "framesPerFile": 48 }
  * ```
  *
  * @throws GaussianSplatError `decode/corrupt`, `decode/truncated`, `decode/header` or `decode/unsupported`.
@@ -78,9 +49,7 @@ export function parseSequence(bytes: Uint8Array, name: string): SceneSequence {
     throw damaged(`${name}, ${path}`, expected, show(found), 'decode/header');
   };
   const { gaussianSplatSequence: version, framesPerSecond, frames, count } = json;
-  if (version !== 1 && version !== 2) {
-    throw damaged(`${name}, gaussianSplatSequence`, 'version 1 or 2', show(version), 'decode/unsupported');
-  }
+  if (version !== 1) throw damaged(`${name}, gaussianSplatSequence`, 'version 1', show(version), 'decode/unsupported');
   if (!(Number.isFinite(framesPerSecond) && (framesPerSecond as number) > 0 && (framesPerSecond as number) <= 1000)) {
     fail('framesPerSecond', 'a number above 0, 1000 at most', framesPerSecond);
   }
@@ -90,46 +59,14 @@ export function parseSequence(bytes: Uint8Array, name: string): SceneSequence {
     framesPerSecond: framesPerSecond as number,
     durationSeconds: frameCount / (framesPerSecond as number),
   });
-  if (version === 2) return { ...sequence([firstOf(json, fail)], countOf(count, fail)), motion: motionOf(json, fail) };
   if (typeof frames === 'string') return sequence(patternOf(frames, 'frames', fail), countOf(count, fail));
   const paths = pathsOf(frames, 'frames', fail);
   return sequence(paths, paths.length);
 }
 
-function firstOf({ first }: Json, fail: Fail): string {
-  if (typeof first !== 'string' || first === '') return fail('first', 'the path of a scene file', first);
-  requireShort([first], 'first', fail);
-  return first;
-}
-
-/** Reads the properties of a manifest that describe the motion files. */
-function motionOf({ motion, framesPerFile, count }: Json, fail: Fail): SequenceMotion {
-  if (!Number.isInteger(framesPerFile) || (framesPerFile as number) < 1 || (framesPerFile as number) > MAX_PER_FILE) {
-    fail('framesPerFile', `1 to ${grouped(MAX_PER_FILE)}`, framesPerFile);
-  }
-  const max = Math.ceil(((count as number) - 1) / (framesPerFile as number));
-  const isPattern = typeof motion === 'string';
-  const files = isPattern ? patternOf(motion, 'motion', fail) : pathsOf(motion, 'motion', fail, max);
-  if (Array.isArray(files) && files.length !== max) fail('motion', `${grouped(max)} paths`, files.length);
-  return { frames: files, framesPerFile: framesPerFile as number };
-}
-
-/** Returns the location of a frame in a motion file; undefined if the frame has a scene file. */
-export function motionFrame({ motion, frameCount }: SceneSequence, frame: number): MovedFrame | undefined {
-  if (motion === undefined || frame === 0) return undefined;
-  const { framesPerFile } = motion;
-  const file = Math.floor((frame - 1) / framesPerFile);
-  const begins = 1 + framesPerFile * file;
-  const frames = Math.min(framesPerFile, frameCount - begins);
-  return { path: framePath(motion, file), frame: frame - begins, frames };
-}
-
-/** Iterates over the paths of all files, in the order of the frames that need them. */
+/** Iterates over the paths of all frames. */
 export function* sequencePaths(sequence: SceneSequence): Generator<string> {
-  const { motion, frameCount } = sequence;
-  const own = motion ? 1 : frameCount;
-  for (let frame = 0; frame < own; frame++) yield framePath(sequence, frame);
-  for (let file = 0; motion && file * motion.framesPerFile < frameCount - 1; file++) yield framePath(motion, file);
+  for (let frame = 0; frame < sequence.frameCount; frame++) yield framePath(sequence, frame);
 }
 
 /**
@@ -167,8 +104,8 @@ function patternOf(pattern: string, path: string, fail: Fail): FramePattern {
   return { before, behind, first: Number(digits), digits: digits.length };
 }
 
-function pathsOf(paths: unknown, path: string, fail: Fail, min = 1): readonly string[] {
-  const isList = Array.isArray(paths) && paths.length >= Math.min(1, min) && paths.length <= MAX_FRAMES;
+function pathsOf(paths: unknown, path: string, fail: Fail): readonly string[] {
+  const isList = Array.isArray(paths) && paths.length >= 1 && paths.length <= MAX_FRAMES;
   if (!isList || !paths.every((each) => typeof each === 'string' && each !== ''))
     return fail(path, `1 to ${grouped(MAX_FRAMES)} paths, or one with {0001} in it`, paths);
   requireShort(paths as string[], path, fail);

@@ -55,47 +55,6 @@ describe('a sequence of files', () => {
     }
   });
 
-  it('frames that say what they differ by from the first: shown for their times, over and over', async () => {
-    const element = await showLoaded({ src: '/net/moving/movie.json', loop: '' });
-    assertEqual([element.duration, element.stats?.splats], [1.2, 200], 'duration, splats');
-    assert(await shows(element, isRed), 'the first frame');
-    for (const [seconds, isColor] of [
-      [0.15, isGreen],
-      [0.25, isBlue],
-      [1.15, isBlue],
-      [0.35, isRed],
-      [0.75, isGreen],
-      [0, isRed],
-    ] as const) {
-      await seek(element, seconds);
-      assert(await shows(element, isColor), `the frame at ${seconds} s`);
-      for (const other of [isRed, isGreen, isBlue]) {
-        if (other !== isColor) assert(!(await shows(element, other)), `nothing of other frames at ${seconds} s`);
-      }
-    }
-    let wraps = 0;
-    let last = element.currentTime;
-    await element.play();
-    await until(() => {
-      if (element.currentTime < last) wraps++;
-      last = element.currentTime;
-      return wraps >= 1;
-    }, 'a round');
-    element.pause();
-  });
-
-  it('a missing motion file is reported once, and the frames of the others are shown', async () => {
-    const element = await showLoaded({ src: '/net/moving/movie.json?lost=0&count=12' });
-    let errors = 0;
-    element.addEventListener('error', () => errors++);
-    await seek(element, 0.15);
-    await seek(element, 0.25);
-    assert(await shows(element, isRed), 'the first frame still');
-    await seek(element, 0.85);
-    assert(await shows(element, isBlue), 'a frame of the next file');
-    assert(errors <= 1, `${errors} errors`);
-  });
-
   it('asks for frames with the query of its manifest, and leaves alone what urlModifier makes of them', async () => {
     const src = '/net/signed/movie.json?token=a';
     assert(await shows(await showLoaded({ src }), isRed), 'a frame with the token');

@@ -10,14 +10,7 @@ import {
   type AnimatedAttributeName,
 } from '@gaussian-splat/formats';
 import { packedOrder } from '@gaussian-splat/renderer/tools';
-import {
-  minCurve,
-  motionFile,
-  roundedPart,
-  UNCHANGED,
-  type Followed,
-  type MotionSteps,
-} from '../motion/write-motion.js';
+import { minCurve, motionFile, roundedPart, UNCHANGED, type Followed, type MotionSteps } from './write-motion.js';
 import type { Deflate } from '../pages/page-planes.js';
 import { splatsOf } from '../reduce.js';
 import type { Encoding } from '../write/index.js';

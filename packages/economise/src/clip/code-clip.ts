@@ -13,23 +13,33 @@ import {
   type ClipPartContent,
   type AnimatedAttributeName,
 } from '@gaussian-splat/formats';
-import type { GpuEvaluator } from '../gpu/gpu-evaluator.js';
+import { GpuEvaluator } from '../gpu/gpu-evaluator.js';
 import { decibels, mean, meanSquareOf } from '../measure.js';
-import { judgeOf, typicalSize, type CodeSequenceOptions } from '../motion/code-sequence.js';
-import type { MotionSteps } from '../motion/write-motion.js';
+import type { Deflate } from '../pages/page-planes.js';
+import type { MotionSteps } from './write-motion.js';
 import { findSteps, scaledSteps, type Steps } from '../steps.js';
+import { viewsAround } from '../views.js';
 import type { Encoding } from '../write/index.js';
+import type { EncodeWebp } from '../write/sog.js';
 import { tuneSog } from '../write/tune-sog.js';
 import { TrackedPart, type WrittenClipPart } from './clip-part.js';
 import { coarseAndRest } from './coarse-part.js';
 import { cutTracks } from './cut-tracks.js';
 import { cloudOfTracks, followSplats, type Tracks } from './tracks.js';
 
-export interface CodeClipOptions extends Omit<CodeSequenceOptions, 'openFrame' | 'framesPerFile'> {
+export interface CodeClipOptions {
+  readonly frameCount: number;
   /** Reads a frame by its index. Frames may have different splats. */
   readonly openFrame: (frame: number) => Promise<GaussianCloud>;
   readonly framesPerSecond: number;
   readonly framesPerGroup: number;
+  /** Target PSNR of frames against their sources in dB, over covered pixels. */
+  readonly minPsnr: number;
+  readonly device: GPUDevice;
+  readonly encodeWebp: EncodeWebp;
+  readonly deflate: Deflate;
+  /** Called with a sentence about each step. */
+  readonly onStep?: (step: string) => void;
   /**
    * Maximum bit rate of each group in megabits per second; default no limit. It takes precedence over `minPsnr`, and
    * `worstPsnr` of the result shows its effect.
@@ -307,4 +317,16 @@ async function growthIn({ judge, frame }: FrameJudge, [coarse]: readonly ClipPar
     if (error < min) [best, min] = [grow, error];
   }
   return best;
+}
+
+/** Returns an evaluator that compares clouds with `cloud` in `count` views; `heldOut` and `searched` views are the same. */
+function judgeOf(device: GPUDevice, cloud: GaussianCloud, count: number, seed: number): Promise<GpuEvaluator> {
+  const views = viewsAround(boundsOf(cloud), count, { seed });
+  return GpuEvaluator.create(device, cloud, { scored: views.slice(0, 1), searched: views, heldOut: views });
+}
+
+/** Returns the median, over all splats, of their middle standard deviation. */
+function typicalSize({ scales, count }: GaussianCloud): number {
+  const middle = (i: number): number => [...scales.subarray(3 * i, 3 * i + 3)].sort((a, b) => a - b)[1];
+  return Float64Array.from({ length: count }, (_, i) => middle(i)).sort()[count >> 1];
 }

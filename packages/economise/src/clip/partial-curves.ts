@@ -1,5 +1,5 @@
-import { mainCurves } from '../motion/main-curves.js';
-import { followed, type Followed } from '../motion/write-motion.js';
+import { mainCurves } from './main-curves.js';
+import { followed, type Followed } from './write-motion.js';
 
 /** Returns the range of valid frames of a row: from `first` to `end`, excluding `end`. */
 export type Span = (row: number) => readonly [first: number, end: number];

@@ -1,6 +1,6 @@
 import { shCoefficientCount, type GaussianCloud } from '@gaussian-splat/core';
 import { ANIMATED_ATTRIBUTES, type AnimatedAttributeName } from '@gaussian-splat/formats';
-import { turnBetween } from '../motion/write-motion.js';
+import { turnBetween } from './write-motion.js';
 import type { Tracks } from './tracks.js';
 
 /** Splats of some tracks. */

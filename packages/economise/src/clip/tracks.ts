@@ -1,6 +1,6 @@
 import { shCoefficientCount, type GaussianCloud } from '@gaussian-splat/core';
 import type { Lives } from '@gaussian-splat/formats';
-import { alignAxes } from '../motion/near-axes.js';
+import { alignAxes } from './near-axes.js';
 import { featuresOf, matchFrames, type Features } from './match-frames.js';
 
 /** Tracks of a group of frames. A track is a splat that is identified in consecutive frames. */

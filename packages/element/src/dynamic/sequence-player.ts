@@ -1,10 +1,10 @@
 /** Plays sequences of scene files. The module is loaded only for sequences. */
 import { type Bounds } from '@gaussian-splat/core';
 import { BackOff, fileRequest } from '@gaussian-splat/core/fetch';
-import { frameAt, framePath, motionFrame, type SceneSequence } from '@gaussian-splat/formats';
+import { frameAt, framePath, type SceneSequence } from '@gaussian-splat/formats';
 import { SequenceGaussians, type PackedGaussians } from '@gaussian-splat/renderer';
 import type { LoadedGaussians } from '../gpu/loaded-gaussians.js';
-import type { FileRequest, LoadedScene, LoadedSequence, ProgressListener, SceneRequest } from '../loading/protocol.js';
+import type { LoadedScene, LoadedSequence, ProgressListener, SceneRequest } from '../loading/protocol.js';
 import type { SceneLoader } from '../loading/scene-loader.js';
 import { FrameRoom } from './frame-room.js';
 import { indicesFrom, PlayDirection } from './play-direction.js';
@@ -52,8 +52,8 @@ export class SequencePlayer implements Timeline {
   readonly #sequence: SceneSequence;
   readonly #options: SequenceOptions;
   readonly #slots = new Map<number, FetchedFrame>();
-  /** Failures of downloads, by the path of the file. */
-  readonly #failures = new BackOff<string>({ firstMs: RETRY_MS, factor: 4, maxTries: MAX_TRIES });
+  /** Failures of downloads, by frame. */
+  readonly #failures = new BackOff<number>({ firstMs: RETRY_MS, factor: 4, maxTries: MAX_TRIES });
   readonly #room: FrameRoom;
   #gaussians: SequenceGaussians;
   readonly #playing: PlayDirection;
@@ -192,23 +192,16 @@ export class SequencePlayer implements Timeline {
 
   /** Returns whether a frame has failed and is not requested again yet. */
   #isMissing(frame: number): boolean {
-    return this.#failures.isPaused(this.#fileOf(frame));
-  }
-
-  /** Returns the path of the file of a frame. All frames in one file of differences arrive, or fail, together. */
-  #fileOf(frame: number): string {
-    return motionFrame(this.#sequence, frame)?.path ?? framePath(this.#sequence, frame);
+    return this.#failures.isPaused(frame);
   }
 
   /**
-   * Records the failure of a frame. Only the first failure of its file is reported. The frame is requested again at
-   * increasing intervals, up to {@link MAX_TRIES} times.
+   * Records the failure of a frame. Only its first failure is reported. The frame is requested again at increasing
+   * intervals, up to {@link MAX_TRIES} times.
    */
   #fail(frame: number, error: unknown): void {
     this.#slots.delete(frame);
-    // Another frame in the same file has already reported the failure.
-    if (this.#isMissing(frame)) return;
-    if (this.#failures.fail(this.#fileOf(frame)) === 1 && !this.#isClosed) this.#options.listeners.onError(error);
+    if (this.#failures.fail(frame) === 1 && !this.#isClosed) this.#options.listeners.onError(error);
   }
 
   #wantedFrom(frame: number): number[] {
@@ -224,13 +217,12 @@ export class SequencePlayer implements Timeline {
     try {
       const loading = load(this.#sequence, frame, this.#options, shPrecision, slot.abort.signal, () => undefined);
       slot.packed = (await loading).packed;
-      this.#failures.succeed(this.#fileOf(frame));
+      this.#failures.succeed(frame);
       this.#room.note(bytesOf(slot.packed));
     } catch (error) {
       if (slot.abort.signal.aborted) return;
       this.#fail(frame, error);
     }
-    // Other frames that need this file request it in the next image.
     if (!slot.abort.signal.aborted) listeners.onInput();
   }
 }
@@ -245,24 +237,12 @@ async function load(
 ): Promise<LoadedScene> {
   const { limits } = request;
   const sh = request.sh === 'auto' ? precision : request.sh;
-  const asked = (path: string): FileRequest => {
-    const own = fileRequest(path, request, limits?.origins);
-    // If the page rewrites the address, its result is used unchanged.
-    const { href } = new URL(path, request.url);
-    const url = frameUrl(href);
-    return { ...own, ...(url !== href && { url }), limits };
-  };
-  if (sequence.motion === undefined)
-    return loader.load({ ...asked(framePath(sequence, frame)), sh }, signal, onProgress);
-  const moved = motionFrame(sequence, frame);
-  const motion = moved && { ...asked(moved.path), frame: moved.frame, frames: moved.frames };
-  const wanted = { first: asked(framePath(sequence, 0)), motion, sh, limits };
-  return loader.ask(
-    { type: 'frame', request: wanted },
-    signal,
-    ({ readMovedFrame }) => readMovedFrame(wanted, signal, onProgress),
-    { onProgress },
-  );
+  const path = framePath(sequence, frame);
+  const own = fileRequest(path, request, limits?.origins);
+  // If the page rewrites the address, its result is used unchanged.
+  const { href } = new URL(path, request.url);
+  const url = frameUrl(href);
+  return loader.load({ ...own, ...(url !== href && { url }), limits, sh }, signal, onProgress);
 }
 
 const bytesOf = ({ geometry, sh, chunks }: PackedGaussians): number =>

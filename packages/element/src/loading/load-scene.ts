@@ -12,7 +12,6 @@ import {
 import { packGaussians } from '@gaussian-splat/renderer';
 import { fileName, named, throttled } from './load-helpers.js';
 import type { LargePly } from './large-ply.js';
-import type * as sequences from './sequence-of.js';
 import { ProgressSum } from './progress-sum.js';
 import type {
   LoadedScene,
@@ -100,7 +99,7 @@ export async function loadScene(
     const joined = await (await shared?.ply)?.finish(bytes);
     if (joined) return joined;
     if (isSequence(bytes)) {
-      const { parseSequence } = await loadSequenceCode();
+      const { parseSequence } = await loadModule('the code that reads sequences', () => import('./sequence-of.js'));
       return parseSequence(bytes, name);
     }
     // Files beside a `blob:` or `data:` URL do not exist.
@@ -126,9 +125,6 @@ export async function loadScene(
     throw named(error, fileName(request.url));
   }
 }
-
-export const loadSequenceCode = (): Promise<typeof sequences> =>
-  loadModule('the code that reads sequences', () => import('./sequence-of.js'));
 
 /**
  * Starts the time limit of a load. Returns a function that returns the limits, with the seconds that remain at each

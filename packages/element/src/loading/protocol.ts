@@ -117,21 +117,6 @@ export interface LoadedMesh extends Omit<TriangleFile, 'images'> {
 export type LoadedSequence = SceneSequence;
 
 /**
- * A frame of a sequence that stores differences from its first frame. The request contains all data that the worker
- * needs, because the worker may have been restarted since the previous request.
- */
-export interface MovedFrameRequest {
-  readonly first: FileRequest;
-  /**
-   * The file with the differences of this frame, the frame's index in the file, and the number of frames in the file.
-   * Absent for the first frame.
-   */
-  readonly motion?: (FileRequest & { readonly frame: number; readonly frames: number }) | undefined;
-  readonly sh: SceneRequest['sh'];
-  readonly limits?: SceneLimits | undefined;
-}
-
-/**
  * A request for the index of a clip, or for a part of one of its groups. It is sent as type `boxes`, whose code also
  * reads by byte ranges.
  */
@@ -217,7 +202,6 @@ export type WorkerRequest =
   | { readonly type: 'mesh'; readonly request: FileRequest }
   | { readonly type: 'boxes'; readonly request: SceneRequest | ClipRequest }
   | { readonly type: 'box'; readonly request: BoxRequest }
-  | { readonly type: 'frame'; readonly request: MovedFrameRequest }
   | { readonly type: 'floor'; readonly request: FloorRequest }
   | { readonly type: 'model'; readonly request: ModelRequest };
 

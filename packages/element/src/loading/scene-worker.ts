@@ -15,16 +15,14 @@ import {
   type FloorRequest,
   type LoadedBoxes,
   type LoadedMesh,
-  type LoadedScene,
   type ModelRequest,
-  type MovedFrameRequest,
   type PageMessage,
   type ProgressListener,
   type SceneRequest,
   type WorkerMessage,
   type WorkerRequest,
 } from './protocol.js';
-import { loadScene, loadSequenceCode, named } from './load-scene.js';
+import { loadScene, named } from './load-scene.js';
 import type * as boxes from './lod-boxes.js';
 import type { WalkMap } from '@gaussian-splat/formats/walk';
 
@@ -57,12 +55,6 @@ export const openBoxes = async (
 
 export const readBox = async (request: BoxRequest, signal: AbortSignal): Promise<ArrayBuffer> =>
   (await loadBoxCode()).readBox(request, signal);
-
-export const readMovedFrame = async (
-  request: MovedFrameRequest,
-  signal: AbortSignal,
-  onProgress?: ProgressListener,
-): Promise<LoadedScene> => (await loadSequenceCode()).readMovedFrame(request, signal, onProgress);
 
 export const openManifest = async (
   request: FileRequest,
@@ -168,10 +160,6 @@ function serve(scope: WorkerScope): void {
     if (message.type === 'floor') {
       const map = await makeFloor(message.request, signal);
       return [map, buffersOf(map.layers)];
-    }
-    if (message.type === 'frame') {
-      const scene = await readMovedFrame(message.request, signal, progressOf(id));
-      return [scene, buffersOf(scene.packed)];
     }
     if (message.type === 'mesh') {
       const mesh = await openMeshFile(message.request, signal, progressOf(id));

@@ -22,17 +22,15 @@ export interface Motions {
       }
     >
   >;
-  /** Range of frames that contain each splat; undefined if all frames contain all splats. */
-  readonly lives?:
-    | {
-        /** [splats] index of the first frame */
-        readonly first: Uint16Array;
-        /** [splats] index of the first frame after the last */
-        readonly end: Uint16Array;
-        /** Fades of the opacity at both ends; undefined if all splats appear and disappear abruptly. */
-        readonly fades?: Readonly<Record<'begin' | 'rise' | 'last' | 'fall', Uint8Array>> | undefined;
-      }
-    | undefined;
+  /** Range of frames that contain each splat. */
+  readonly lives: {
+    /** [splats] index of the first frame */
+    readonly first: Uint16Array;
+    /** [splats] index of the first frame after the last */
+    readonly end: Uint16Array;
+    /** Fades of the opacity at both ends; undefined if all splats appear and disappear abruptly. */
+    readonly fades?: Readonly<Record<'begin' | 'rise' | 'last' | 'fall', Uint8Array>> | undefined;
+  };
 }
 
 /**
@@ -73,7 +71,7 @@ export function packAnimation(cloud: GaussianCloud, motions: Motions, origin: Ve
   const planes = ATTRIBUTES.flatMap((name) => parts[name].codes);
   const codes = new Uint32Array((planeCodes(rows) / 2) * (planes.length + FADE_PLANES));
   const halves = new Int16Array(codes.buffer);
-  [...planes, ...fadePlanes(rows, motions.lives?.fades)].forEach((plane, k) => halves.set(plane, k * planeCodes(rows)));
+  [...planes, ...fadePlanes(rows, motions.lives.fades)].forEach((plane, k) => halves.set(plane, k * planeCodes(rows)));
   const curveCount = ranks.reduce((sum, rank) => sum + rank, 0);
   const curves = new Float32Array(frames * curveCount);
   let at = 0;
@@ -90,21 +88,21 @@ export function packAnimation(cloud: GaussianCloud, motions: Motions, origin: Ve
   };
 }
 
-function fadePlanes(rows: number, fades: NonNullable<Motions['lives']>['fades']): readonly Int16Array[] {
+function fadePlanes(rows: number, fades: Motions['lives']['fades']): readonly Int16Array[] {
   if (!fades) return Array.from({ length: FADE_PLANES }, () => new Int16Array(rows).fill(NO_FADE));
   const plane = (ends: Uint8Array, slopes: Uint8Array): Int16Array =>
     Int16Array.from(ends, (end, i) => end | (slopes[i] << 8));
   return [plane(fades.begin, fades.rise), plane(fades.last, fades.fall)];
 }
 
-function packBases(cloud: GaussianCloud, { lives, frames }: Motions, origin: Vector3): Uint32Array {
+function packBases(cloud: GaussianCloud, { lives }: Motions, origin: Vector3): Uint32Array {
   const { count, positions, scales, rotations, opacities } = cloud;
   const words = new Uint32Array(BASE_WORDS * count);
   const floats = new Float32Array(words.buffer);
   for (let i = 0; i < count; i++) {
     const at = BASE_WORDS * i;
     for (let k = 0; k < 3; k++) floats[at + k] = positions[3 * i + k] + (cloud.origin[k] - origin[k]);
-    words[at + 3] = (lives ? lives.first[i] : 0) | ((lives ? lives.end[i] : frames) << 16);
+    words[at + 3] = lives.first[i] | (lives.end[i] << 16);
     for (let k = 0; k < 3; k++) floats[at + 4 + k] = scales[3 * i + k];
     floats[at + 7] = opacities[i];
     for (let k = 0; k < 3; k++) floats[at + 8 + k] = rotations[4 * i + 1 + k];

@@ -224,24 +224,6 @@ const ANSWERS = {
     context.body = ball(200 + 20 * (frame % 12), COLORS[frame % 3]);
   },
 
-  /** A sequence of one ball that changes its color and place: its first frame, and files of motion of four frames each. `lost` is one that is not there. */
-  async moving(context, name) {
-    const { count = '12', lost } = context.query;
-    const manifest = { gaussianSplatSequence: 2, framesPerSecond: 10, count: Number(count), framesPerFile: 4 };
-    if (name.endsWith('.json')) {
-      context.body = JSON.stringify({
-        ...manifest,
-        first: 'ball.splat',
-        motion: `{0}.bin?count=${count}&lost=${lost}`,
-      });
-      return;
-    }
-    if (name === 'ball.splat') return void (context.body = ball(200, COLORS[0]));
-    const file = Number.parseInt(name, 10);
-    if (String(file) === lost) return void (context.status = 404);
-    context.body = Buffer.from(await motionOf(1 + 4 * file, Math.min(4, Number(count) - 1 - 4 * file)));
-  },
-
   /**
    * A clip of one ball that changes its color and place, with a splat that is in every other frame alone; groups of four frames, ten a second. `whole`: without byte ranges; `slow`: each answer is delayed by a number of milliseconds, and as late as `mbps` and at least `padded` bytes make it;
    * `gate`: data after the first group comes once it is opened; `lost`: a missing group.
@@ -559,22 +541,6 @@ function ball(count, color, size = Math.max(0.05, 2 / Math.sqrt(count))) {
     bytes.set([...color, 220, 255, 128, 128, 128], at + 24);
   }
   return bytes;
-}
-
-/** Frames of the sequence `moving`, as a file of motion. */
-async function motionOf(begin, count) {
-  const { writeMotion } = await import('@gaussian-splat/economise');
-  const { readScene } = await import('@gaussian-splat/formats');
-  const first = await readScene(ball(200, COLORS[0]), { name: 'ball.splat' });
-  const frames = Array.from({ length: count }, (_, k) => {
-    const frame = begin + k;
-    const color = COLORS[frame % 3].map((value) => (value / 255 - 0.5) / 0.28209479177387814);
-    const positions = first.positions.map((value, i) => value + (i % 3 === 0 ? 0.02 * frame : 0));
-    return { ...first, positions, sh: first.sh.map((_, i) => color[i % 3]) };
-  });
-  const deflate = (bytes) => deflateRawSync(bytes, { finishFlush: constants.Z_SYNC_FLUSH });
-  const steps = { position: 1e-3, rotation: 1e-2, scale: 1e-2, opacity: 1e-2, color: 1e-2 };
-  return writeMotion(first, frames, { steps, deflate });
 }
 
 const clips = new Map();

@@ -1,11 +1,8 @@
-import { GaussianSplatError, shCoefficientCount, type GaussianCloud } from '@gaussian-splat/core';
 import { concatenated } from '@gaussian-splat/core/fetch';
 import {
   FADE_NAMES,
   MOTION_MODES,
   MOTION_VERSION,
-  ANIMATED_ATTRIBUTES,
-  ANIMATED_ATTRIBUTE_NAMES,
   type Lives,
   type AnimatedAttributeName,
   type AnimatedAttribute,
@@ -19,11 +16,6 @@ import { mainCurves } from './main-curves.js';
  * `opacity` and `color` (constant coefficients) have the units of these attributes.
  */
 export type MotionSteps = Steps<AnimatedAttributeName>;
-
-export interface MotionOptions {
-  readonly steps: MotionSteps;
-  readonly deflate: Deflate;
-}
 
 /** Fraction of a step below which weights become 0, because zeros need almost no bits. */
 const DEAD_ZONE = 0.6;
@@ -47,29 +39,7 @@ export interface Followed {
   readonly shares: readonly Float32Array[];
 }
 
-/**
- * Writes a motion file: the differences of frames from the first frame of a sequence with corresponding splats. The file
- * has the principal curves of each attribute over its frames, and the weights of the curves for each splat.
- * @param first First frame, as read from its file.
- * @param frames Frames of the file, with the order of axes of the first frame: see `alignAxes`.
- * @throws GaussianSplatError `argument/value` for frames with a different number of splats.
- */
-export function writeMotion(
-  first: GaussianCloud,
-  frames: readonly GaussianCloud[],
-  { steps, deflate }: MotionOptions,
-): Uint8Array<ArrayBuffer> {
-  const other = frames.find(({ count }) => count !== first.count);
-  if (other) throw notCorresponding(first.count, other.count);
-  const parts = ANIMATED_ATTRIBUTE_NAMES.map((name): WrittenPart => {
-    const changes = changesOf(first, frames, name);
-    if (changes === undefined) return UNCHANGED;
-    return roundedPart(followed(changes, frames.length, minCurve(steps[name])), steps[name], first.count);
-  });
-  return motionFile({ splats: first.count, frames: frames.length, parts, deflate });
-}
-
-/** Returns the bytes of a motion file. `parts` has the motion of each of {@link ANIMATED_ATTRIBUTE_NAMES}, in order. */
+/** Returns the bytes of a motion file. `parts` has the motion of each of `ANIMATED_ATTRIBUTE_NAMES`, in order. */
 export function motionFile({
   splats,
   frames,
@@ -80,10 +50,10 @@ export function motionFile({
   splats: number;
   frames: number;
   parts: readonly WrittenPart[];
-  lives?: Lives;
+  lives: Lives;
   deflate: Deflate;
 }): Uint8Array<ArrayBuffer> {
-  const version = lives ? MOTION_VERSION[lives.fades ? 'fades' : 'lives'] : MOTION_VERSION.everywhere;
+  const version = MOTION_VERSION[lives.fades ? 'fades' : 'lives'];
   const head = new DataView(new ArrayBuffer(12 + 8 * parts.length));
   [version, splats, frames].forEach((number, k) => head.setUint32(4 * k, number, true));
   parts.forEach(({ rank, step }, k) => {
@@ -95,8 +65,8 @@ export function motionFile({
   const planes = parts.flatMap(({ codes }) => codes.map((own) => smaller(own, deflate)));
   const modes = Uint8Array.from(planes, ({ mode }) => mode);
   const begin = concatenated(Uint8Array, [bytesOf(head), bytesOf(curves), modes]);
-  const lifetimes = lives ? [lives.first, lives.end].flatMap((words) => halvesOf(words).map(deflate)) : [];
-  const { fades } = lives ?? {};
+  const lifetimes = [lives.first, lives.end].flatMap((words) => halvesOf(words).map(deflate));
+  const { fades } = lives;
   if (fades) lifetimes.push(...FADE_NAMES.map((name) => deflate(fades[name])));
   return concatenated(Uint8Array, [deflate(begin), ...lifetimes, ...planes.map(({ bytes }) => bytes), END]);
 }
@@ -106,72 +76,6 @@ const halvesOf = (words: Uint16Array): readonly Uint8Array[] => [
   Uint8Array.from(words, (word) => word & 255),
   Uint8Array.from(words, (word) => word >> 8),
 ];
-
-/**
- * Returns the difference of each number of an attribute from the first frame, [numbers · splats, frames]. Undefined if no
- * number changes.
- */
-function changesOf(
-  first: GaussianCloud,
-  frames: readonly GaussianCloud[],
-  name: AnimatedAttributeName,
-): Float32Array | undefined {
-  const { count } = first;
-  const changes = new Float32Array(ANIMATED_ATTRIBUTES[name] * count * frames.length);
-  let hasChanged = false;
-  const put = (number: number, i: number, frame: number, value: number): void => {
-    changes[(number * count + i) * frames.length + frame] = value;
-    if (value !== 0) hasChanged = true;
-  };
-  if (name === 'rotation') putTurns(first, frames, put);
-  else {
-    const of = numbersOf(name, first);
-    frames.forEach((cloud, frame) => {
-      for (let i = 0; i < count; i++) {
-        for (let number = 0; number < ANIMATED_ATTRIBUTES[name]; number++)
-          put(number, i, frame, of(cloud, i, number) - of(first, i, number));
-      }
-    });
-  }
-  return hasChanged ? changes : undefined;
-}
-
-function numbersOf(
-  name: Exclude<AnimatedAttributeName, 'rotation'>,
-  { origin }: GaussianCloud,
-): (cloud: GaussianCloud, i: number, number: number) => number {
-  const min = 1e-12;
-  return {
-    position: (cloud: GaussianCloud, i: number, k: number) =>
-      cloud.positions[3 * i + k] + (cloud.origin[k] - origin[k]),
-    scale: ({ scales }: GaussianCloud, i: number, k: number) => Math.log(Math.max(min, scales[3 * i + k])),
-    opacity: ({ opacities }: GaussianCloud, i: number) => opacities[i],
-    color: ({ sh, shDegree }: GaussianCloud, i: number, k: number) => sh[3 * shCoefficientCount(shDegree) * i + k],
-  }[name];
-}
-
-/** Writes rotation vectors from the first frame. Of the vectors of a rotation, selects that nearest to the previous frame. */
-function putTurns(
-  first: GaussianCloud,
-  frames: readonly GaussianCloud[],
-  put: (number: number, i: number, frame: number, value: number) => void,
-): void {
-  const turn = new Float64Array(4);
-  for (let i = 0; i < first.count; i++) {
-    const last = [1, 0, 0, 0];
-    frames.forEach(({ rotations }, frame) => {
-      turnBetween(first.rotations, rotations, 4 * i, turn);
-      if (last.reduce((sum, value, k) => sum + value * turn[k], 0) < 0) for (let k = 0; k < 4; k++) turn[k] = -turn[k];
-      for (let k = 0; k < 4; k++) last[k] = turn[k];
-      const [w, x, y, z] = turn;
-      const length = Math.hypot(x, y, z);
-      const factor = length > 1e-12 ? (2 * Math.atan2(length, w)) / length : 2;
-      put(0, i, frame, factor * x);
-      put(1, i, frame, factor * y);
-      put(2, i, frame, factor * z);
-    });
-  }
-}
 
 /**
  * Writes to `turn` the quaternion that rotates one orientation to another, to · from⁻¹.
@@ -239,7 +143,7 @@ export function roundedPart(
 }
 
 /** Returns the compressed low and high bytes of codes, plain or as differences, whichever is smaller. */
-function smaller(codes: Int16Array, deflate: MotionOptions['deflate']): { mode: number; bytes: Uint8Array } {
+function smaller(codes: Int16Array, deflate: Deflate): { mode: number; bytes: Uint8Array } {
   const differences = codes.map((code, i) => code - (i > 0 ? codes[i - 1] : 0));
   const [plain, changed] = [codes, differences].map((own) => {
     const planes = new Uint8Array(2 * own.length);
@@ -256,11 +160,3 @@ function smaller(codes: Int16Array, deflate: MotionOptions['deflate']): { mode: 
 }
 
 const bytesOf = ({ buffer }: DataView): Uint8Array => new Uint8Array(buffer);
-
-const notCorresponding = (expected: number, found: number): GaussianSplatError =>
-  new GaussianSplatError('argument/value', {
-    where: 'frames of a sequence',
-    expected: `${expected} splats in each, the same ones in the same order`,
-    found: `one of ${found}`,
-    remedy: 'keep scene files for such frames: {"gaussianSplatSequence": 1, ...}',
-  });
