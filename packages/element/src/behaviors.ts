@@ -1,22 +1,24 @@
-import { Lazy, type Vector3 } from '@gaussian-splat/core';
+import type { Lazy, Vector3 } from '@gaussian-splat/core';
 import type { ReactiveControllerHost } from 'lit';
 import type { Attributes } from './attributes.js';
 import type { CameraAction } from './camera/gestures.js';
 import { viewName, type ViewName } from './camera/spoken.js';
 import type { AnnouncerController, AnnouncerHost } from './controllers/announcer-controller.js';
-import type { AutoRotateHost } from './controllers/auto-rotate-controller.js';
+import type { AutoRotateController, AutoRotateHost } from './controllers/auto-rotate-controller.js';
 import type { CameraController } from './controllers/camera-controller.js';
 import type { FlyHost } from './controllers/fly-controller.js';
 import type { InputOptions } from './controllers/input-controller.js';
 import type { MotionController, MotionCore, MotionHost } from './controllers/motion-controller.js';
-import { prefersReducedMotion, reducedMotion, type Mover } from './controllers/motion.js';
+import { prefersReducedMotion, reducedMotion } from './controllers/motion.js';
 import type { PromptController, PromptHost } from './controllers/prompt-controller.js';
+import type { Features } from './features.js';
 
 /** The part of the element that {@link Behaviors} uses. */
 export interface BehaviorHost extends MotionCore {
   readonly attributes: Attributes;
   readonly camera: CameraController;
   readonly input: InputOptions;
+  readonly features: Features;
   /** Whether automatic motion is allowed. */
   readonly mayMove: boolean;
   readonly surface: HTMLElement | null;
@@ -36,8 +38,6 @@ export class Behaviors implements AutoRotateHost, PromptHost, FlyHost, Announcer
   readonly camera: CameraController;
   readonly core: BehaviorHost;
   readonly #element: ReactiveControllerHost;
-  /** Automatic motions of the camera, which {@link advance} advances in each frame. */
-  readonly movers: Mover[] = [];
 
   // The following code is loaded on demand, because few pages need it.
 
@@ -45,40 +45,38 @@ export class Behaviors implements AutoRotateHost, PromptHost, FlyHost, Announcer
   readonly announcer: Lazy<AnnouncerController>;
   /** The button with which a visitor pauses automatic motion. */
   readonly motion: Lazy<MotionController>;
-  readonly autoRotate = new Lazy('the code that turns the camera', async () => {
-    const { AutoRotateController } = await import('./controllers/auto-rotate-controller.js');
-    return this.#added(new AutoRotateController(this.#element, this));
-  });
-  readonly #fly = new Lazy('the code that flies by keyboard', async () => {
-    const { FlyController } = await import('./controllers/fly-controller.js');
-    return this.#added(new FlyController(this.#element, this));
-  });
+  readonly autoRotate: Lazy<AutoRotateController>;
 
   constructor(element: ReactiveControllerHost & HTMLElement, host: BehaviorHost) {
     this.core = host;
     this.camera = host.camera;
     this.#element = element;
-    this.motion = new Lazy(
-      'the code of the switch for motion',
-      async () => {
-        const { MotionController } = await import('./controllers/motion-controller.js');
-        return new MotionController(element, this);
-      },
-      () => element.requestUpdate(),
+    const { features } = host;
+    this.autoRotate = features.add(
+      'the code that turns the camera',
+      { by: ({ autoRotate }) => autoRotate },
+      async () => new (await import('./controllers/auto-rotate-controller.js')).AutoRotateController(element, this),
     );
-    this.announcer = new Lazy('the code that speaks of the view', async () => {
-      const { AnnouncerController } = await import('./controllers/input-controller.js');
-      return new AnnouncerController(element, this);
-    });
+    features.add(
+      'the code that flies by keyboard',
+      { by: () => this.mayFly },
+      async () => new (await import('./controllers/fly-controller.js')).FlyController(element, this),
+    );
+    this.motion = features.add(
+      'the code of the switch for motion',
+      { by: ({ autoRotate }) => autoRotate || host.player },
+      async () => new (await import('./controllers/motion-controller.js')).MotionController(element, this),
+    );
+    this.announcer = features.add(
+      'the code that speaks of the view',
+      {},
+      async () => new (await import('./controllers/input-controller.js')).AnnouncerController(element, this),
+    );
     let motion: MediaQueryList | undefined;
     const onMotion = (): void => element.requestUpdate();
     element.addController({
       hostUpdated: () => {
         this.camera.pivot = this.#flies ? 'eye' : 'target';
-        if (this.mayFly) this.#fly.want(this.#warnOf);
-        const { attributes, player } = host;
-        if (attributes.autoRotate) this.autoRotate.want(this.#warnOf);
-        if (attributes.autoRotate || player) this.motion.want(this.#warnOf);
       },
       hostConnected: () => {
         // `focusout` is fired also when the focus moves from the frame to a button in the shadow tree.
@@ -144,16 +142,9 @@ export class Behaviors implements AutoRotateHost, PromptHost, FlyHost, Announcer
   }
 
   promptBy(prompt: PromptController): void {
-    this.prompt = this.#added(prompt);
-  }
-
-  #added<T extends Mover>(mover: T): T {
-    this.movers.push(mover);
+    this.prompt = this.core.features.use(prompt);
     this.#element.requestUpdate();
-    return mover;
   }
-
-  readonly #warnOf = ({ message }: Error): void => this.core.warn(message);
 
   /** Restarts the delay after which auto-rotation begins. */
   rest(): void {
@@ -162,7 +153,7 @@ export class Behaviors implements AutoRotateHost, PromptHost, FlyHost, Announcer
 
   /** Advances all automatic motions to the time of a frame, `now` in milliseconds. */
   advance(now: number): void {
-    for (const mover of this.movers) if (mover.advance(now)) this.core.requestFrame();
+    if (this.core.features.call('advance', now).includes(true)) this.core.requestFrame();
   }
 
   /** Applies a visitor's gesture or key. @returns Whether it has an effect; false only for a zoom beyond its limit. */

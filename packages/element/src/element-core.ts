@@ -34,6 +34,7 @@ import { SourceList } from './source-list.js';
 import type { Services, ElementHost } from './element-host.js';
 import { statsOf, type SceneStats } from './stats.js';
 import type { TemplateModel } from './template.js';
+import { Features } from './features.js';
 import type { TourHost } from './views/tour.js';
 import type { A11yStrings } from './strings.js';
 
@@ -74,77 +75,72 @@ export class ElementCore
   #counts: ReadCounts | undefined;
   #children: MutationObserver | undefined;
 
-  /** Renders the shadow tree again after a change of state that it shows. */
-  readonly #update = (): void => this.element.requestUpdate();
-
-  // The following code is loaded on demand, because few pages need it.
-
+  /** Capabilities whose code is loaded when a page uses them. */
+  readonly features = new Features(() => this.element.requestUpdate());
   /** Shows the element's children. */
-  readonly #composition = new Lazy('the code that shows several scenes', async () => {
-    const { compose } = await import('./composition/compose.js');
-    compose(this);
-    return true;
-  });
+  readonly #composition = this.features.add(
+    'the code that shows several scenes',
+    { children: ':scope>splat-scene,:scope>splat-mesh' },
+    async () => {
+      const { compose } = await import('./composition/compose.js');
+      compose(this);
+      return {};
+    },
+  );
   /** Flies between views. */
-  readonly tour = new Lazy(
+  readonly tour = this.features.add(
     'the code for views',
+    { by: ({ views }) => views, children: ':scope>[data-orbit]' },
     async () => {
       const [{ Tour }] = await Promise.all([import('./views/tour.js'), this.behaviors.announcer.get()]);
       return new Tour(this.element, this);
     },
-    this.#update,
   );
-  /** Moves the camera on the floor for `navigation="walk"`. */
-  readonly walk = new Lazy(
+  /** Moves the camera on the floor. */
+  readonly walk = this.features.add(
     'the code for walking',
-    async () => {
-      const { WalkController } = await import('./walk/walk-controller.js');
-      const walk = new WalkController(this.element, this);
-      this.behaviors.movers.push(walk);
-      return walk;
-    },
-    this.#update,
+    { by: ({ navigation }) => navigation === 'walk' },
+    async () => new (await import('./walk/walk-controller.js')).WalkController(this.element, this),
   );
   /** VR, AR, the ruler, the shadow and the sky. */
-  readonly extras = new Lazy(
+  readonly extras = this.features.add(
     'the code for VR, AR and measuring',
+    {
+      by: ({ vr, ar, measure, shadowIntensity, skyboxImage }) => vr || ar || measure || shadowIntensity || skyboxImage,
+    },
     async () => new (await import('./xr/extras.js')).Extras(this.element, this),
-    this.#update,
   );
   /** An `<audio>` or `<video>` element of the page that plays along with a moving scene. */
-  readonly #sound = new Lazy('the code for sound', async () => {
+  readonly sound = this.features.add('the code for sound', { children: ':scope>[slot=sound]' }, async () => {
     const { Sound } = await import('./dynamic/sound.js');
     const sound = new Sound(this.element as unknown as SoundHost);
-    sound.update();
+    sound.childrenChanged();
     return sound;
   });
   /** Cuts, the reveal effect, and the page's own shader. */
-  readonly effects = new Lazy(
+  readonly effects = this.features.add(
     'the code of effects',
+    { by: ({ revealEffect }) => revealEffect || this.source.splatShader, children: 'splat-cut' },
     async () => new (await import('./effects/effects.js')).Effects(this as unknown as EffectsHost),
-    this.#update,
   );
   /** Whether a VR or AR session shows the scene. The page does not draw meanwhile. */
   isImmersed = false;
   /** Draws an image before the page is printed; its code is loaded with the first frame. */
-  readonly #print = new Lazy('the code for printing', async () => {
+  readonly #print = this.features.add('the code for printing', {}, async () => {
     const { PrintController } = await import('./controllers/print-controller.js');
     return new PrintController(this.element, () => this.drawNow());
   });
   /** Positions the hotspots: children in slots named `hotspot-…`. */
-  readonly labels = new Lazy(
-    'the code of labels',
-    async () => {
-      const { HotspotController } = await import('./controllers/hotspot-controller.js');
-      const labels = new HotspotController(this.element, this);
-      if (this.drawnFrom) labels.frameDrawn(this.drawnFrom);
-      return labels;
-    },
-    this.#update,
-  );
+  readonly labels = this.features.add('the code of labels', { children: ':scope>[slot^=hotspot-]' }, async () => {
+    const { HotspotController } = await import('./controllers/hotspot-controller.js');
+    const labels = new HotspotController(this.element, this);
+    if (this.drawnFrom) labels.frameDrawn(this.drawnFrom);
+    return labels;
+  });
   /** Listens to mouse, touch and keyboard. */
-  readonly #hands = new Lazy(
+  readonly #hands = this.features.add(
     'the code for mouse, touch and keys',
+    { by: () => this.input.enabled },
     async () => {
       const { handsView, InputController, PromptController } = await import('./controllers/input-controller.js');
       await this.behaviors.announcer.get();
@@ -152,7 +148,6 @@ export class ElementCore
       this.handsView = handsView;
       return new InputController(this.element, this);
     },
-    this.#update,
   );
   /** Template of the prompt, reset button and keyboard help; undefined until the code for input is loaded. */
   handsView: TemplateModel['handsView'];
@@ -359,14 +354,14 @@ export class ElementCore
 
   prepareFrame(): string {
     this.sources.place();
-    this.effects.value?.prepareFrame();
+    this.features.call('prepareFrame');
     const { layout, changes, placements } = this.sources.world;
     const versions = placements.map(({ scene }) => scene.version).join();
     return `${layout} ${changes} ${versions} ${this.sources.meshes.value?.version ?? ''}`;
   }
 
   drawBeneath(frame: Frame): Partial<FrameTarget> {
-    return { ...this.extras.value?.sky.value?.draw(frame), ...this.sources.meshes.value?.draw(frame) };
+    return Object.assign({}, ...this.features.call('drawBeneath', frame), this.sources.meshes.value?.draw(frame));
   }
 
   /** Reads surface positions of the last frame. Rejects if the frame is gone. */
@@ -384,7 +379,7 @@ export class ElementCore
 
   afterFrame(camera: Camera): void {
     this.drawnFrom = camera;
-    this.labels.value?.frameDrawn(camera);
+    this.features.call('frameDrawn', camera);
     this.onFrame?.();
   }
 
@@ -403,7 +398,7 @@ export class ElementCore
   /** Prepares effects and settings of a scene before its first frame. */
   async prepareFor(scene: LoadedGaussians): Promise<void> {
     await this.effects.settled;
-    await this.effects.value?.prepareFor(scene);
+    await Promise.all(this.features.call('prepareFor', scene));
   }
 
   /** Starts to draw the world with the renderer of a scene. Fulfills with the first frame. */
@@ -419,7 +414,7 @@ export class ElementCore
     this.live.attachPost(null);
     if (!clear) return this.view.pause();
     this.drawnFrom = undefined;
-    this.labels.value?.forget();
+    this.features.call('cleared');
     this.view.clear();
   }
 
@@ -456,28 +451,16 @@ export class ElementCore
 
   readonly #warnOf = (error: Error): void => this.warn(error.message);
 
-  /** Loads the code for the children that the element has; few pages have any. */
   #lookAtChildren(): void {
-    const has = (selector: string): boolean => this.element.querySelector(`:scope>:is(${selector})`) !== null;
-    if (has('splat-scene,splat-mesh')) this.#composition.want(this.#warnOf);
-    if (this.element.querySelector('splat-cut')) this.effects.want(this.#warnOf);
-    if (has('[slot^=hotspot-]')) this.labels.want(this.#warnOf);
-    if (has('[slot=sound]')) this.#sound.want(this.#warnOf);
-    this.#sound.value?.update();
-    if (has('[data-orbit]')) this.tour.want(this.#warnOf);
+    this.features.readChildren(this.element, this.#warnOf);
     if (this.tour.value) this.element.requestUpdate();
   }
 
   #updated(): void {
     this.sources.ownEntry.update();
     this.live.wantPost(this.sources.ownEntry.postprocess);
-    if (this.attributes.views) this.tour.want(this.#warnOf);
-    if (this.attributes.navigation === 'walk') this.walk.want(this.#warnOf);
-    const { vr, ar, measure, shadowIntensity, skyboxImage, revealEffect } = this.attributes;
-    if (revealEffect || this.source.splatShader) this.effects.want(this.#warnOf);
-    if (vr) wantHeadset();
-    if (vr || ar || measure || shadowIntensity || skyboxImage) this.extras.want(this.#warnOf);
-    if (this.input.enabled) this.#hands.want(this.#warnOf);
+    if (this.attributes.vr) wantHeadset();
+    this.features.readAttributes(this.attributes, this.#warnOf);
     this.reveal.settle();
     this.sources.request();
   }

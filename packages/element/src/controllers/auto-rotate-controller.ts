@@ -1,7 +1,8 @@
 import type { ReactiveController, ReactiveControllerHost } from 'lit';
 import type { Attributes } from '../attributes.js';
 import type { CameraController } from './camera-controller.js';
-import { MAX_MOVER_STEP_MS, type Mover } from './motion.js';
+import { MAX_MOVER_STEP_MS } from './motion.js';
+import type { Feature } from '../features.js';
 
 export interface AutoRotateHost {
   readonly core: {
@@ -17,7 +18,7 @@ export interface AutoRotateHost {
 }
 
 /** Rotates the camera around the scene while no visitor interacts, as on a turntable. */
-export class AutoRotateController implements ReactiveController, Mover {
+export class AutoRotateController implements ReactiveController, Feature {
   readonly #of: AutoRotateHost;
   #timer: ReturnType<typeof setTimeout> | undefined;
   #isTurning = false;

@@ -1,6 +1,7 @@
 import type { ReactiveController, ReactiveControllerHost } from 'lit';
 import type { CameraController } from './camera-controller.js';
-import { MAX_MOVER_STEP_MS, type Mover } from './motion.js';
+import { MAX_MOVER_STEP_MS } from './motion.js';
+import type { Feature } from '../features.js';
 
 export interface FlyHost {
   /** The radius of its bounds scales the speed. */
@@ -35,7 +36,7 @@ const FIRST_STEP_MS = 50;
  * Flies while keys are held: W and S along the view, A and D to the sides, E and Q up and down. Shift makes the flight
  * `FAST` times faster.
  */
-export class FlyController implements ReactiveController, Mover {
+export class FlyController implements ReactiveController, Feature {
   readonly #of: FlyHost;
   readonly #held = new Map<string, Direction>();
   #isFast = false;

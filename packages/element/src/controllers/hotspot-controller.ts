@@ -169,7 +169,7 @@ export class HotspotController implements ReactiveController {
   }
 
   /** Hides all labels until the next frame, because the scene is gone. */
-  forget(): void {
+  cleared(): void {
     this.#camera = undefined;
     this.hostUpdated();
   }

@@ -1,13 +1,3 @@
-/** An automatic motion of the camera that advances in each frame. */
-export interface Mover {
-  /**
-   * Advances to the time of a frame.
-   * @param now requestAnimationFrame's clock, ms.
-   * @returns Whether another frame is needed.
-   */
-  advance(now: number): boolean;
-}
-
 /** Longest step of an automatic motion, ms. After a pause the motion therefore continues near its last state. */
 export const MAX_MOVER_STEP_MS = 100;
 

@@ -1,7 +1,7 @@
 import type { ReactiveController, ReactiveControllerHost } from 'lit';
 import type { Attributes } from '../attributes.js';
 import type { CameraController } from './camera-controller.js';
-import type { Mover } from './motion.js';
+import type { Feature } from '../features.js';
 
 export interface PromptHost {
   readonly core: {
@@ -33,7 +33,7 @@ export function wiggleAt(elapsedMs: number): number {
 }
 
 /** Shows a prompt to visitors who have not moved the camera yet: that they can move it. */
-export class PromptController implements ReactiveController, Mover {
+export class PromptController implements ReactiveController, Feature {
   readonly #host: ReactiveControllerHost;
   readonly #of: PromptHost;
   #state: 'idle' | 'waiting' | 'shown' | 'done' = 'idle';

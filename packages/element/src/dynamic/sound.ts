@@ -72,7 +72,7 @@ export class Sound {
   }
 
   /** Call when the child with `slot="sound"` may have been added, replaced or removed. */
-  update(): void {
+  childrenChanged(): void {
     const child = this.#element.querySelector<HTMLMediaElement>(':scope > :is(audio, video)[slot=sound]') ?? undefined;
     if (child === this.#track) return;
     this.#listening?.abort();

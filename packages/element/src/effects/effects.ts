@@ -14,7 +14,8 @@ import type { SceneBounds } from '../camera/settings.js';
 import { SplatChild } from '../composition/child.js';
 import { matrixOfFrame, transposed } from '../composition/placing.js';
 import type { MotionCore } from '../controllers/motion-controller.js';
-import { MAX_MOVER_STEP_MS, prefersReducedMotion, type Mover } from '../controllers/motion.js';
+import { MAX_MOVER_STEP_MS, prefersReducedMotion } from '../controllers/motion.js';
+import type { Feature } from '../features.js';
 import type { LoadedGaussians } from '../gpu/loaded-gaussians.js';
 import type { WorldEntry } from '../world-entry.js';
 import type { SourceEntry } from '../source-entry.js';
@@ -36,7 +37,6 @@ export interface EffectsHost {
     readonly isPreview: boolean;
     readonly progress: number | null;
   };
-  readonly behaviors: { readonly movers: Mover[] };
   requestFrame(): void;
   warn(sentence: string): void;
 }
@@ -44,7 +44,7 @@ export interface EffectsHost {
 type Player = NonNullable<MotionCore['player']>;
 
 /** Applies the cuts of children, the reveal effect, and the page's shader to the splats of all scenes. */
-export class Effects implements Mover {
+export class Effects implements Feature {
   readonly #host: EffectsHost;
   /** Compiled program of the current shader by device. */
   #programs = new WeakMap<GPUDevice, SplatProgram>();
@@ -67,7 +67,6 @@ export class Effects implements Mover {
     this.#host = host;
     showers.set(host.element, this);
     defineCuts();
-    host.behaviors.movers.push(this);
     host.element.addController({ hostUpdated: () => this.#update() });
     // Without a scene no frame is drawn.
     host.element.addEventListener('emptied', () => this.#freeRemoved());

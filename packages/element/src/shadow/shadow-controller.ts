@@ -7,7 +7,7 @@ import { numberGrammar, readAttribute } from '../camera/grammar.js';
 import { toViewer, type ViewerFrame } from '../camera/orbit.js';
 import type { SceneBounds } from '../camera/settings.js';
 import { matrixOfFrame, transposed } from '../composition/placing.js';
-import type { Mover } from '../controllers/motion.js';
+import type { Feature } from '../features.js';
 import type { Backend, DeviceOwner } from '../gpu/backend.js';
 import type { WebGpuBackend } from '../gpu/webgpu-backend.js';
 import type { Frame } from '../dynamic/frame-filter.js';
@@ -23,7 +23,6 @@ export interface ShadowHost {
   readonly services: { readonly sceneLoader: SceneLoader };
   readonly frame: ViewerFrame;
   readonly camera: { view(width: number, height: number): Camera };
-  readonly behaviors: { readonly movers: Mover[] };
   readonly isImmersed: boolean;
   readonly view: { readonly backend: Backend | null };
   readonly sources: {
@@ -80,7 +79,7 @@ const isGl = ({ place }: Backend): boolean => place.context instanceof WebGL2Ren
  * Captures images of the scene when it has changed, converts them to flat splats, and draws these splats under the
  * scene.
  */
-export class ShadowController implements ReactiveController, Mover {
+export class ShadowController implements ReactiveController, Feature {
   readonly #core: ShadowHost;
   /** Key of the content that the current shadow was made for. */
   #key = '';
@@ -102,7 +101,6 @@ export class ShadowController implements ReactiveController, Mover {
   constructor(core: ShadowHost) {
     this.#core = core;
     core.element.addController(this);
-    core.behaviors.movers.push(this);
     // Without a scene no frame is drawn that would remove the shadow.
     core.element.addEventListener('emptied', () => core.view.backend === null && this.#remove());
   }

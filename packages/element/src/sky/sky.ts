@@ -5,7 +5,7 @@ import type { FrameTarget } from '@gaussian-splat/renderer';
 import type { ReactiveController, ReactiveControllerHost } from 'lit';
 import { credentialsOf, type Attributes } from '../attributes.js';
 import type { ViewerFrame } from '../camera/orbit.js';
-import type { Mover } from '../controllers/motion.js';
+import type { Feature } from '../features.js';
 import type { Backend } from '../gpu/backend.js';
 import { LatestTask } from '../latest-task.js';
 import type { Frame } from '../dynamic/frame-filter.js';
@@ -22,13 +22,12 @@ export interface SkyHost {
   readonly attributes: Pick<Attributes, 'skyboxImage' | 'crossorigin'>;
   readonly frame: ViewerFrame;
   readonly view: { readonly backend: Backend | null };
-  readonly behaviors: { readonly movers: Mover[] };
   requestFrame(): void;
   warn(sentence: string): void;
 }
 
 /** Fetches the image, and draws it beneath the splats with the API that draws the splats. */
-export class Sky implements ReactiveController, Mover {
+export class Sky implements ReactiveController, Feature {
   readonly #host: SkyHost;
   readonly #loading = new LatestTask();
   #url: string | null = null;
@@ -39,7 +38,6 @@ export class Sky implements ReactiveController, Mover {
   constructor(host: SkyHost) {
     this.#host = host;
     host.element.addController(this);
-    host.behaviors.movers.push(this);
     // Without a scene nothing is drawn, so that the sky must not wait for a frame to be freed.
     host.element.addEventListener('emptied', () => host.view.backend === null && this.#free());
     this.hostUpdated();
@@ -54,24 +52,20 @@ export class Sky implements ReactiveController, Mover {
     this.#show(undefined);
   }
 
-  /**
-   * Attaches the sky to splats that WebGL draws. Called before each frame.
-   * @returns false, because the sky does not move
-   */
-  advance(): boolean {
+  /** Attaches the sky to splats that WebGL draws. */
+  prepareFrame(): void {
     const { backend } = this.#host.view;
-    if (!backend || backend.place.isLost || !(backend.place.context instanceof WebGL2RenderingContext)) return false;
+    if (!backend || backend.place.isLost || !(backend.place.context instanceof WebGL2RenderingContext)) return;
     const { beneath } = backend as WebGlBackend;
     const sky = this.#image && this.#glOn(backend.place.context, this.#image);
     beneath.sky = sky && ((camera) => sky.draw(camera, this.#host.frame));
-    return false;
   }
 
   /**
    * Draws the sky into the target of a WebGPU frame.
    * @returns properties of the target that let the splats blend over the sky; none without a sky
    */
-  draw(frame: Frame): Partial<FrameTarget> {
+  drawBeneath(frame: Frame): Partial<FrameTarget> {
     const { backend } = this.#host.view;
     if (!this.#image || !backend || !hasTarget(frame)) return {};
     const { device } = backend;

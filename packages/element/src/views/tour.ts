@@ -6,7 +6,8 @@ import type { Behaviors } from '../behaviors.js';
 import type { CameraPose } from '../camera/orbit.js';
 import { poseOf } from '../camera/settings.js';
 import type { CameraController } from '../controllers/camera-controller.js';
-import { prefersReducedMotion, type Mover } from '../controllers/motion.js';
+import { prefersReducedMotion } from '../controllers/motion.js';
+import type { Feature } from '../features.js';
 import { languageOf, type A11yStrings, type ViewString } from '../strings.js';
 import { fail, poseOfView, type CameraView, type ViewContext } from './camera-view.js';
 import { Flight } from './flight.js';
@@ -92,7 +93,7 @@ const STYLES = css`
 `;
 
 /** Views of an element: the list, flights between views, and the bar, keys and texts to select a view. */
-export class Tour implements ReactiveController, Mover {
+export class Tour implements ReactiveController, Feature {
   readonly #element: ReactiveControllerHost & HTMLElement;
   readonly #of: TourHost;
   #flight: Flight | undefined;
@@ -107,7 +108,6 @@ export class Tour implements ReactiveController, Mover {
   constructor(element: ReactiveControllerHost & HTMLElement, of: TourHost) {
     this.#element = element;
     this.#of = of;
-    of.behaviors.movers.push(this);
     element.addController(this);
     element.addEventListener('click', this.#onClick);
     this.hostUpdated();

@@ -8,7 +8,8 @@ import { eyeOfPose, type ViewerFrame } from '../camera/orbit.js';
 import type { ScenePoint } from '../camera/values.js';
 import type { AnnouncerController } from '../controllers/announcer-controller.js';
 import type { CameraController } from '../controllers/camera-controller.js';
-import { MAX_MOVER_STEP_MS, prefersReducedMotion, type Mover } from '../controllers/motion.js';
+import { MAX_MOVER_STEP_MS, prefersReducedMotion } from '../controllers/motion.js';
+import type { Feature } from '../features.js';
 import { LatestTask } from '../latest-task.js';
 import type { SceneRequest } from '../loading/protocol.js';
 import type { SceneLoader } from '../loading/scene-loader.js';
@@ -62,7 +63,7 @@ const KEYS: Readonly<Record<string, readonly [right: number, forward: number, tu
 };
 
 /** Moves the camera on the floor of the scene: by keys, clicks and taps on the floor, a joystick, and gamepads. */
-export class WalkController implements ReactiveController, Mover {
+export class WalkController implements ReactiveController, Feature {
   readonly #host: ReactiveControllerHost & HTMLElement;
   readonly #of: WalkHost;
   readonly #held = new Map<string, readonly [number, number, number]>();

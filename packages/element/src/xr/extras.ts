@@ -1,10 +1,11 @@
 /**
  * Code for the attributes `vr`, `ar`, `measure`, `shadow-intensity` and `skybox-image`. Loaded if one of these is set.
  */
-import { Lazy } from '@gaussian-splat/core';
+import type { Lazy } from '@gaussian-splat/core';
 import { css, type ReactiveControllerHost } from 'lit';
+import type { Features } from '../features.js';
 import type { ShadowHost } from '../shadow/shadow-controller.js';
-import type { Sky, SkyHost } from '../sky/sky.js';
+import type { SkyHost } from '../sky/sky.js';
 import type { XrHost } from './xr-host.js';
 import { adoptStyles } from '../styles.js';
 import type { XrOffer } from './xr-offer.js';
@@ -45,53 +46,38 @@ const STYLES = css`
 export class Extras {
   readonly vr: Lazy<XrOffer>;
   readonly ar: Lazy<XrOffer>;
-  readonly measure: Lazy<unknown>;
-  readonly shadow: Lazy<unknown>;
-  readonly sky: Lazy<Sky>;
 
-  constructor(element: ReactiveControllerHost & HTMLElement, core: XrHost & ShadowHost & SkyHost) {
+  constructor(
+    element: ReactiveControllerHost & HTMLElement,
+    core: XrHost & ShadowHost & SkyHost & { readonly features: Features },
+  ) {
     adoptStyles(element.shadowRoot!, STYLES);
     const place = element.ownerDocument.createElement('div');
     place.className = 'extras';
     core.surface?.after(place);
-    const update = (): void => element.requestUpdate();
-    this.vr = new Lazy(
-      'the code for VR',
-      async () => {
-        const [{ XrOffer }, { vrKind }] = await Promise.all([import('./xr-offer.js'), import('./vr.js')]);
-        return new XrOffer(element, core, place, vrKind(core));
-      },
-      update,
-    );
-    this.ar = new Lazy(
-      'the code for AR',
-      async () => {
-        const { offerAr } = await import('./ar.js');
-        return offerAr(element, core, place);
-      },
-      update,
-    );
-    this.measure = new Lazy(
-      'the code for measuring',
-      async () => {
-        const [{ Measure }] = await Promise.all([import('./measure.js'), core.behaviors.announcer.get()]);
-        return new Measure(element, core, place);
-      },
-      update,
-    );
-    this.shadow = new Lazy('the code for shadows', async () => {
-      const { ShadowController } = await import('../shadow/shadow-controller.js');
-      return new ShadowController(core);
+    const { features } = core;
+    this.vr = features.add('the code for VR', { by: ({ vr }) => vr }, async () => {
+      const [{ XrOffer }, { vrKind }] = await Promise.all([import('./xr-offer.js'), import('./vr.js')]);
+      return new XrOffer(element, core, place, vrKind(core));
     });
-    this.sky = new Lazy('the code for skies', async () => new (await import('../sky/sky.js')).Sky(core), update);
-    const warn = ({ message }: Error): void => core.warn(message);
-    const find = ({ attributes }: XrHost): void => {
-      if (attributes.shadowIntensity) this.shadow.want(warn);
-      if (attributes.skyboxImage) this.sky.want(warn);
-      if (attributes.vr) this.vr.want(warn);
-      if (attributes.ar) this.ar.want(warn);
-      if (attributes.measure) this.measure.want(warn);
-    };
+    this.ar = features.add('the code for AR', { by: ({ ar }) => ar }, async () => {
+      const { offerAr } = await import('./ar.js');
+      return offerAr(element, core, place);
+    });
+    features.add('the code for measuring', { by: ({ measure }) => measure }, async () => {
+      const [{ Measure }] = await Promise.all([import('./measure.js'), core.behaviors.announcer.get()]);
+      return new Measure(element, core, place);
+    });
+    features.add(
+      'the code for shadows',
+      { by: ({ shadowIntensity }) => shadowIntensity },
+      async () => new (await import('../shadow/shadow-controller.js')).ShadowController(core),
+    );
+    features.add(
+      'the code for skies',
+      { by: ({ skyboxImage }) => skyboxImage },
+      async () => new (await import('../sky/sky.js')).Sky(core),
+    );
     const offerOf = (name: 'vr' | 'ar'): XrOffer => {
       const { value } = this[name];
       if (!value) throw new TypeError(`the attribute ${name} is not set, or its code is not loaded yet`);
@@ -109,6 +95,5 @@ export class Extras {
       canActivateVR: { get: () => this.vr.value?.canActivate ?? false },
       canActivateAR: { get: () => this.ar.value?.canActivate ?? false },
     });
-    element.addController({ hostUpdated: () => find(core) });
   }
 }
