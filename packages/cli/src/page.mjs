@@ -120,8 +120,13 @@ async function copyScene(scene, folder) {
   const isOfParts = isJson(scene) || (found.length > 0 && !isModel(scene));
   const own = isOfParts && from !== folder ? basename(from) : '';
   const to = join(folder, own);
-  const isRefused = (file) => isCode(relative(folder, join(to, file)));
-  missing.push(...found.filter(isRefused).map((file) => `${file} (a page or a script)`));
+  /** Why a file is not copied; undefined for one that is. */
+  const refusal = (file) => {
+    if (isCode(relative(folder, join(to, file)))) return 'a page or a script';
+    return isModel(scene) || isPart(file) ? undefined : 'not a file of a scene';
+  };
+  const isRefused = (file) => refusal(file) !== undefined;
+  missing.push(...found.filter(isRefused).map((file) => `${file} (${refusal(file)})`));
   if (missing.length > 0) console.warn(`${name} names files that were not copied: ${missing.join(', ')}`);
   const files = [name, ...found.filter((file) => !isRefused(file))];
   // Links are dereferenced, because their targets may be outside the folder.
@@ -134,7 +139,16 @@ async function copyScene(scene, folder) {
  * may bring or replace such a file.
  */
 function isCode(path) {
-  return /\.(x?html?|svg|xml|[cm]?js|php\d?)$|^cdn[\\/]/i.test(path);
+  return /(^|[\\/])[._][^\\/]*$|\.(s?x?html?|svgz?|xml|xslt?|[cm]?js|ph\w*|aspx?|jsp|cgi|pl|py|sh|config|htaccess|ini)[. ]*$|^cdn[\\/]/i.test(
+    path,
+  );
+}
+
+/** Whether a file may be a part of a scene. A list of what is allowed, because servers give meanings to many other names. */
+function isPart(path) {
+  return /\.(ply|spz|splat|ksplat|sog|json|bin|webp|png|jpe?g|ktx2|gltf|glb|rad|radc|lcc2?|subtree|motion|page|pages|gz)$/i.test(
+    path,
+  );
 }
 
 function isJson(path) {

@@ -24,7 +24,9 @@ export const CLIP_HEAD_BYTES = 12;
 export const MAX_CLIP_INDEX_BYTES = 1 << 24;
 const MAX_GROUP_FRAMES = 4096;
 const MAX_PARTS = 8;
-const MAX_GROUPS = 1_000_000;
+/** Maximum numbers of groups, and of their parts together, because the page gets each as an object. */
+const MAX_GROUPS = 32_768;
+const MAX_ALL_PARTS = 65_536;
 /** Maximum number of code planes for each frame of a group: one for each animated number of a splat. */
 const PLANES_PER_FRAME = ANIMATED_ATTRIBUTE_NAMES.reduce((sum, name) => sum + ANIMATED_ATTRIBUTES[name], 0);
 
@@ -123,10 +125,12 @@ class IndexReader {
     if (!Array.isArray(groups) || groups.length < 1 || groups.length > MAX_GROUPS)
       this.#fail('groups', `1 to ${grouped(MAX_GROUPS)} groups`, groups);
     const found: ClipGroup[] = [];
-    let [first, at] = [0, start];
+    let [first, at, count] = [0, start, 0];
     for (const [k, group] of (groups as unknown[]).entries()) {
       const own = this.#group(`groups[${k}]`, group, first, at);
       found.push(own);
+      count += own.parts.length;
+      if (count > MAX_ALL_PARTS) this.#fail('groups', `at most ${grouped(MAX_ALL_PARTS)} parts`, count);
       first += own.frames;
       const { start: begin, sceneBytes, motionBytes } = own.parts[own.parts.length - 1];
       at = begin + sceneBytes + motionBytes;
@@ -210,6 +214,11 @@ class IndexReader {
  */
 export function writeClipHead({ groups, ...facts }: ClipHead): Uint8Array<ArrayBuffer> {
   requireAtMost(groups.length, MAX_GROUPS, 'groups');
+  requireAtMost(
+    groups.reduce((sum, { parts }) => sum + parts.length, 0),
+    MAX_ALL_PARTS,
+    'parts of groups',
+  );
   const rows = groups.map(({ frames, parts }) => [
     frames,
     ...parts.map(({ splats, planes, sceneBytes, motionBytes }) => [splats, planes, sceneBytes, motionBytes]),

@@ -41,7 +41,8 @@ export async function contentsAt(
     countTile(path);
     if (depth > MAX_DEPTH) fail(path, `tiles at most ${MAX_DEPTH} deep`, 'deeper ones');
     const toTileset = multiply(parent, transformOf(json, `${source.name}, ${path}`));
-    const isAdded = json.refine === undefined ? isParentAdded : String(json.refine).toUpperCase() === 'ADD';
+    const isAdded =
+      json.refine === undefined ? isParentAdded : /^add$/i.test(typeof json.refine === 'string' ? json.refine : '');
     const tiling = json.implicitTiling ?? extensionOf(json, '3DTILES_implicit_tiling');
     if (tiling !== undefined) {
       const tile: Tile = { contents: [], children: [], isAdded };

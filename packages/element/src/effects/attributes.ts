@@ -16,13 +16,19 @@ const colorGrammar: AttributeGrammar<Vector3> = {
   parse: parseColor,
 };
 
+let paper: CanvasRenderingContext2D | null | undefined;
+
 /** Parses a CSS color. Returns red, green and blue, 0..1, sRGB-encoded; null if it is no color. */
 function parseColor(text: string): Vector3 | null {
-  const context = document.createElement('canvas').getContext('2d');
-  if (!context || !CSS.supports('color', text)) return null;
-  context.fillStyle = text;
-  context.fillRect(0, 0, 1, 1);
-  const [red, green, blue] = context.getImageData(0, 0, 1, 1).data;
+  // A canvas in CPU memory, because reading one on the GPU waits for the GPU at every change of a cut.
+  paper ??= Object.assign(document.createElement('canvas'), { width: 1, height: 1 }).getContext('2d', {
+    willReadFrequently: true,
+  });
+  if (!paper || !CSS.supports('color', text)) return null;
+  paper.clearRect(0, 0, 1, 1);
+  paper.fillStyle = text;
+  paper.fillRect(0, 0, 1, 1);
+  const [red, green, blue] = paper.getImageData(0, 0, 1, 1).data;
   return [red / 255, green / 255, blue / 255];
 }
 

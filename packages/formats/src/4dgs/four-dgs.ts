@@ -1,5 +1,5 @@
 /** Reader of `.4dgs` files, whose splats appear, move and fade: https://github.com/avala-ai/4dgs. */
-import type { GaussianCloud, Vector3 } from '@gaussian-splat/core';
+import type { GaussianCloud, ShDegree, Vector3 } from '@gaussian-splat/core';
 import { concatenated } from '@gaussian-splat/core/fetch';
 import { LoadBudget, type LoadLimits } from '../budget.js';
 import { damaged } from '../faults.js';
@@ -31,6 +31,8 @@ export class FourDgs {
   readonly byteLength: number;
   readonly #limits: LoadLimits;
   readonly #states = new Map<string, Promise<Population>>();
+  /** For each chunk of a file with deltas, the index of the next keyframe after it; -1 if there is none. */
+  #nextKeyframes: Int32Array | undefined;
   /** The last state that {@link keyedPopulation} decoded. */
   #latest: KnownState | undefined;
 
@@ -69,12 +71,47 @@ export class FourDgs {
 
   /** Returns the index of the first chunk that ends after a time in seconds; the last chunk if none does. */
   stateAt(seconds: number): number {
+    if (this.isKeyed) return Math.min(this.chunks.length - 1, this.#firstEndingAfter(seconds));
     const next = this.chunks.findIndex(({ until }) => seconds < until);
     return next < 0 ? this.chunks.length - 1 : next;
   }
 
+  /** Binary search, because the chunks of a file with deltas follow each other without gaps. */
+  #firstEndingAfter(seconds: number): number {
+    let [low, high] = [0, this.chunks.length];
+    while (low < high) {
+      const middle = (low + high) >> 1;
+      if (seconds < this.chunks[middle].until) high = middle;
+      else low = middle + 1;
+    }
+    return low;
+  }
+
+  /** Returns the index of the first keyframe after a chunk; -1 if there is none. */
+  keyframeAfter(chunk: number): number {
+    if (this.#nextKeyframes === undefined) {
+      this.#nextKeyframes = new Int32Array(this.chunks.length);
+      for (let k = this.chunks.length - 1, next = -1; k >= 0; k--) {
+        this.#nextKeyframes[k] = next;
+        if (this.chunks[k].reference === undefined) next = k;
+      }
+    }
+    return this.#nextKeyframes[chunk] ?? -1;
+  }
+
+  /** Returns a new account for decoding one group of frames. */
+  budget(): LoadBudget {
+    return new LoadBudget(this.byteLength, this.#limits);
+  }
+
   /** Returns the indices of the chunks whose splats may be visible within a range of seconds. */
   chunksWithin(from: number, until: number): number[] {
+    if (this.isKeyed) {
+      const found: number[] = [];
+      for (let k = this.#firstEndingAfter(from); k < this.chunks.length && this.chunks[k].from <= until; k++)
+        found.push(k);
+      return found;
+    }
     return [...this.chunks.keys()].filter((k) => this.chunks[k].from <= until && from < this.chunks[k].until);
   }
 
@@ -82,7 +119,9 @@ export class FourDgs {
   population(chunks: readonly number[]): Promise<Population> {
     return this.#kept(`${chunks}`, async (decoding) => {
       const states = await Promise.all(chunks.map((k) => stateOf(this.chunks, [k], decoding)));
-      return { splats: splatsFrom(...parts(mergedStates(states, decoding.shDegree)), this.scene) };
+      const state = mergedStates(states, decoding.shDegree);
+      takeSplats(state, decoding);
+      return { splats: splatsFrom(...parts(state), this.scene) };
     });
   }
 
@@ -93,6 +132,7 @@ export class FourDgs {
       const state = await stateOf(this.chunks, chainOf(this.chunks, chunk), decoding, this.#latest);
       this.#latest = { chunk, state };
       const { name } = this.scene;
+      takeSplats(state, decoding);
       const ids = Int32Array.from(rowsById(state.bins, name).keys());
       return { splats: splatsFrom(...parts(state), this.scene), ids };
     });
@@ -154,7 +194,7 @@ export class FourDgs {
 
   #kept(
     key: string,
-    decode: (decoding: { name: string; budget: LoadBudget; shDegree: number }) => Promise<Population>,
+    decode: (decoding: { name: string; budget: LoadBudget; shDegree: ShDegree }) => Promise<Population>,
   ): Promise<Population> {
     const { name, header } = this.scene;
     const found = this.#states.get(key);
@@ -165,6 +205,16 @@ export class FourDgs {
     for (const [oldest] of this.#states) if (this.#states.size > MAX_STATES) this.#states.delete(oldest);
     return asked;
   }
+}
+
+/** Bytes of the changes over time and the id of a splat, besides those of a cloud. */
+const CHANGES_BYTES = 64;
+
+/** Charges the splats that a state is converted to. */
+function takeSplats({ bins }: State, decoding: { name: string; budget: LoadBudget; shDegree: ShDegree }): void {
+  const count = bins.get(ATTRIBUTE.flags)?.length ?? 0;
+  decoding.budget.takeSplats(count, decoding.shDegree, decoding.name);
+  decoding.budget.take(CHANGES_BYTES * count, decoding.name);
 }
 
 const parts = ({ bins, bands }: State): [State['bins'], State['bands']] => [bins, bands];
@@ -186,7 +236,10 @@ function mergedStates(states: readonly State[], shDegree: number): State {
   const count = (state: State): number => state.bins.get(ATTRIBUTE.flags)?.length ?? 0;
   const bins = new Map<AttributeId, Int32Array>();
   for (const id of ids) {
-    const width = Math.max(...states.map((s) => (count(s) > 0 ? (s.bins.get(id)?.length ?? 0) / count(s) : 0)), 1);
+    const width = states.reduce(
+      (max, s) => Math.max(max, count(s) > 0 ? (s.bins.get(id)?.length ?? 0) / count(s) : 0),
+      1,
+    );
     const own = states.map((state) => state.bins.get(id) ?? new Int32Array(width * count(state)));
     bins.set(id, concatenated(Int32Array, own));
   }

@@ -1,5 +1,5 @@
 /** Conversion of `.4dgs` files to clips: https://github.com/avala-ai/4dgs. */
-import { boundsOf, type GaussianCloud } from '@gaussian-splat/core';
+import { boundsOf, shCoefficientCount, type GaussianCloud, type ShDegree } from '@gaussian-splat/core';
 import { LoadBudget, type LoadLimits } from '../budget.js';
 import { clipPartBytes, type ClipGroup, type ClipIndex, type ClipPartContent } from '../clip.js';
 import { damaged } from '../faults.js';
@@ -17,7 +17,11 @@ const [USUAL_RATE, MIN_RATE, MAX_RATE] = [30, 24, 120];
 const GROUP_FRAMES = [15, 8, 4, 2, 1];
 const MAX_GROUP_BYTES = 64 << 20;
 /** Bytes charged for each frame, whose group may contain only this frame. The search for its chunks is charged, too. */
-const FRAME_BYTES = 256;
+const FRAME_BYTES = 4096;
+/** Bytes charged for each chunk and frame of a file without deltas, whose chunks are searched for each group. */
+const SEARCH_BYTES = 16;
+/** Bytes of the changes of a splat in a frame, while a group is converted, besides those of a cloud. */
+const MOMENT_BYTES = 96;
 const ALL_PLANES = ANIMATED_ATTRIBUTE_NAMES.reduce((sum, name) => sum + ANIMATED_ATTRIBUTES[name], 0);
 
 /** A `.4dgs` file with the interface of a clip. Its groups are decoded on demand. */
@@ -41,7 +45,8 @@ export class FourDgsClip {
     if (header.splats === 0 || file.chunks.length === 0) throw damaged(name, 'splats', 'none', 'decode/header');
     const framesPerSecond = rateOf(file);
     const frameCount = Math.max(1, Math.ceil(header.durationSeconds * framesPerSecond - 1e-6));
-    new LoadBudget(bytes.length, limits).take(frameCount * (FRAME_BYTES + file.chunks.length), name);
+    const searched = file.isKeyed ? 0 : SEARCH_BYTES * file.chunks.length;
+    new LoadBudget(bytes.length, limits).take(frameCount * (FRAME_BYTES + searched), name);
     const groups = groupsOf(file, framesPerSecond, frameCount);
     const first = await firstSplats(file);
     const bounds = { ...boundsOf(first), ...(file.up && { up: file.up }) };
@@ -99,7 +104,9 @@ export class FourDgsClip {
     times: readonly number[],
     states: readonly { readonly splats: ChangingSplats; readonly rows: readonly number[] }[],
   ): Moments {
-    const { cutoff } = this.#file.scene.header;
+    const { header, name } = this.#file.scene;
+    const { cutoff } = header;
+    this.#file.budget().take(times.length * states[0].rows.length * momentBytes(header.shDegree), name);
     const isThere = states.map(({ splats, rows }, f) =>
       Uint8Array.from(rows, (row) => (row >= 0 && presence(splats, row, times[f], cutoff) > 0 ? 1 : 0)),
     );
@@ -153,6 +160,9 @@ function rateOf(file: FourDgs): number {
   return whole * Math.ceil(MIN_RATE / whole);
 }
 
+/** Bytes of a splat in a frame while a group is converted. */
+const momentBytes = (degree: ShDegree): number => 4 * (11 + 3 * shCoefficientCount(degree)) + MOMENT_BYTES;
+
 /** Divides the frames into groups of the greatest length that memory allows. A keyframe begins a new group. */
 function groupsOf(file: FourDgs, rate: number, frameCount: number): ClipGroup[] {
   let groups: ClipGroup[] = [];
@@ -163,7 +173,12 @@ function groupsOf(file: FourDgs, rate: number, frameCount: number): ClipGroup[] 
       groups.push({ first, frames, parts: [partOf(file, first, frames, rate)] });
       first += frames;
     }
-    if (groups.every(({ parts: [part] }) => clipPartBytes(part) <= MAX_GROUP_BYTES)) break;
+    // Converting a group takes more memory than its result.
+    const allowed = file.budget().allowed / 2;
+    const bytes = momentBytes(file.scene.header.shDegree);
+    const fits = ({ frames, parts: [part] }: ClipGroup): boolean =>
+      clipPartBytes(part) <= MAX_GROUP_BYTES && frames * part.splats * bytes <= allowed;
+    if (groups.every(fits)) break;
   }
   return groups;
 }
@@ -172,7 +187,7 @@ function groupsOf(file: FourDgs, rate: number, frameCount: number): ClipGroup[] 
 function endOfGroup(file: FourDgs, first: number, rate: number, frameCount: number): number {
   if (!file.isKeyed) return frameCount;
   const own = file.stateAt((first + 0.5) / rate);
-  const next = file.chunks.findIndex((chunk, k) => k > own && chunk.reference === undefined);
+  const next = file.keyframeAfter(own);
   return next < 0 ? frameCount : Math.max(first + 1, Math.round(file.chunks[next].from * rate - 1e-6));
 }
 

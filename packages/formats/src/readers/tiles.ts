@@ -19,6 +19,10 @@ import { noParts } from './sog.js';
 const TO_CLOUD: Affine = [-1, 0, 0, 0, 0, 0, -1, 0, 0, -1, 0, 0];
 /** Maximum nesting of tilesets. */
 const MAX_NESTED = 16;
+/** Bytes charged for each reference to a file, besides its address. */
+const CONTENT_BYTES = 256;
+/** Bytes charged for each request, to bound their number: those of a file of 64 bytes, and 4,096 without any. */
+const REQUEST_BYTES = 2 ** 14;
 /** Minimum distance from the Earth's center, in meters, of a georeferenced tileset. */
 const ON_EARTH = 1e6;
 
@@ -80,6 +84,7 @@ async function* filesOf(source: SceneSource, level: number): AsyncGenerator<Tile
       // The folder of a nested tileset is part of the address of each of its contents.
       if (content.uri.length > MAX_PATH)
         throw damaged(name, `addresses of at most ${grouped(MAX_PATH)} characters`, 'longer ones', 'decode/header');
+      budget.take(CONTENT_BYTES + 2 * content.uri.length, name);
       left.push({ ...content, depth });
       uses.set(content.uri, (uses.get(content.uri) ?? 0) + 1);
     }
@@ -118,8 +123,10 @@ async function* filesOf(source: SceneSource, level: number): AsyncGenerator<Tile
   }
 }
 
-const opened = ({ openFile, name }: SceneSource, path: string, query?: string): Promise<Uint8Array> =>
-  (openFile ?? noParts(name, 'scene.zip'))(path, query);
+const opened = ({ openFile, name, budget }: SceneSource, path: string, query?: string): Promise<Uint8Array> => {
+  budget.take(REQUEST_BYTES, name);
+  return (openFile ?? noParts(name, 'scene.zip'))(path, query);
+};
 
 /** Whether a tile is of a kind of 3D Tiles 1.0, which cannot have splats. */
 const isOtherTile = (bytes: Uint8Array): boolean => /^(b3dm|i3dm|pnts|cmpt)$/.test(asciiOf(bytes, 0, 4));

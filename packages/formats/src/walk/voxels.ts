@@ -77,7 +77,7 @@ function readHead({ head, name, limits }: VoxelFiles): VoxelHead {
     { bytes: head, name, budget },
     MAX_HEAD_BYTES,
   );
-  const found = /^(\d+)\.(\d+)$/.exec(String(version));
+  const found = /^(\d+)\.(\d+)$/.exec(typeof version === 'object' ? '' : String(version));
   if (found?.[1] !== '1') throw damaged(name, 'version 1.0 or 1.1', show(version), 'decode/unsupported');
   const number = (path: string, value: unknown, lowest: number, highest: number): number => {
     if (typeof value === 'number' && value >= lowest && value <= highest) return value;

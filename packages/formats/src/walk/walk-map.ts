@@ -169,6 +169,10 @@ const MAX_BYTES = 2 ** 26;
 const MAX_HEAD_BYTES = 1024;
 /** Maximum number of layers of a file. Layers of few cells would take much more memory than their bytes. */
 const MAX_LAYERS = 1024;
+/** Minimum edge of a cell, and maximum of the edge and of a step, in meters: a body visits every cell on its way. */
+const [MIN_CELL, MAX_CELL] = [1e-3, 1e3];
+/** Maximum number of heights that a search for a path compares for one neighbor of every height. */
+const MAX_SEARCH = 2 ** 25;
 
 /**
  * Returns the bytes of a `.floor` file: gzip of one line of JSON, followed by the heights of all layers. Heights are int16
@@ -248,13 +252,15 @@ export function decodeWalkMap(file: Uint8Array, name = 'walk map'): WalkMap {
   }
   const { format, version, cell, corner, width, depth, layers, step, start, area, heightUnit } = head ?? {};
   if (format !== FORMAT || version !== VERSION)
-    fail(`format ${FORMAT}, version ${VERSION}`, `format ${format}, version ${version}`);
+    fail(`format ${FORMAT}, version ${VERSION}`, JSON.stringify({ format, version }).slice(0, 200));
   const numbers = [cell, step, area, heightUnit, ...numbersOf(corner, 2), ...numbersOf(start, 3)];
   const counts = [width, depth, layers];
   const isWhole =
     numbers.every((value) => Number.isFinite(value)) &&
-    cell! > 0 &&
+    cell! >= MIN_CELL &&
+    cell! <= MAX_CELL &&
     step! > 0 &&
+    step! <= MAX_CELL &&
     counts.every((value) => Number.isSafeInteger(value) && value! >= 0) &&
     layers! <= MAX_LAYERS;
   if (!isWhole)
@@ -267,6 +273,8 @@ export function decodeWalkMap(file: Uint8Array, name = 'walk map'): WalkMap {
   // Layers without cells take no bytes, so that their number would be unlimited.
   if (bytes.length - end - 1 !== expected || layers! > expected)
     fail(`${expected} bytes of heights`, String(bytes.length - end - 1));
+  if (layers! ** 2 * cells > MAX_SEARCH)
+    fail(`at most ${MAX_SEARCH} heights, multiplied by the number of layers`, String(layers! ** 2 * cells));
   const view = new DataView(bytes.buffer, bytes.byteOffset + end + 1);
   const read = (layer: number): Float32Array => {
     let before = 0;

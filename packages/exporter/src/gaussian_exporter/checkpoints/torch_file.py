@@ -7,10 +7,11 @@ files can be read, and exporting needs no PyTorch, which takes gigabytes.
 
 from __future__ import annotations
 
+import math
 import pickle
 import zipfile
 from collections import OrderedDict
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -35,6 +36,13 @@ _STORAGES = {
     "ByteStorage": "u1",
     "BoolStorage": "?",
 }
+
+
+# Numbers of a tensor that repeats those of its storage, at most.
+_REPEATED = 1 << 20
+# Items of all nested dicts and lists of a file, at most, and their depth.
+_ITEMS = 1_000_000
+_DEPTH = 64
 
 
 class Record:
@@ -63,6 +71,9 @@ def _rebuild_tensor(storage: AnyArray, offset: int, size: Sequence[int], stride:
     last = offset + sum((n - 1) * step for n, step in zip(size, stride, strict=True))
     if 0 in size:
         return np.zeros(tuple(size), storage.dtype)
+    # Strides of 0 repeat numbers. A copy of them could take any memory.
+    if math.prod(size) > max(storage.size, _REPEATED):
+        raise ValueError(f"a tensor {tuple(size)} of {storage.size} numbers, repeated")
     if min(stride, default=0) < 0 or offset < 0 or last >= storage.size:
         raise ValueError(f"a tensor {tuple(size)} that reaches beyond its {storage.size} numbers")
     steps = tuple(step * storage.itemsize for step in stride)
@@ -94,7 +105,11 @@ class _Reader(pickle.Unpickler):
 
     def persistent_load(self, pid: Any) -> AnyArray:
         _, kind, key, *_rest = pid
-        data = self._archive.read(f"{self._prefix}data/{key}")
+        entry = self._archive.getinfo(f"{self._prefix}data/{key}")
+        # torch.save does not compress.
+        if entry.file_size > entry.compress_size + (1 << 26):
+            raise ValueError(f"a compressed storage of {entry.file_size} bytes")
+        data = self._archive.read(entry)
         if kind == "bf16":
             return (np.frombuffer(data, "<u2").astype(np.uint32) << 16).view(np.float32)
         if not isinstance(kind, str):
@@ -110,34 +125,52 @@ def read_torch(path: Path) -> object:
             if prefix is None:
                 raise ValueError(f"a zip archive of {listed(archive.namelist())}")
             return _Reader(archive, prefix).load()
-    except (zipfile.BadZipFile, pickle.UnpicklingError, ValueError, KeyError, EOFError, TypeError, IndexError) as error:
-        raise ExportError(
-            "checkpoint/unreadable",
-            where=str(path),
-            expected="a zip archive of PyTorch 1.6 or later with tensors in it",
-            found=str(error) or type(error).__name__,
-            remedy="if the file is older, load it in PyTorch and torch.save its state_dict again",
-        ) from error
+    except (
+        *(zipfile.BadZipFile, pickle.UnpicklingError, ValueError, KeyError, EOFError, TypeError, IndexError),
+        *(RecursionError, MemoryError, OverflowError, AttributeError),
+    ) as error:
+        raise _unreadable(path, str(error) or type(error).__name__) from error
 
 
 def read_tensors(path: Path) -> dict[str, AnyArray]:
     """All tensors of a file by their dotted names, as in a state_dict."""
-    return dict(_flattened(read_torch(path), ""))
+    content = read_torch(path)
+    found: dict[str, AnyArray] = {}
+    # A stack instead of recursion, because a pickle may be nested to any depth, and contain itself.
+    left: list[tuple[object, str, int]] = [(content, "", 0)]
+    visited = 0
+    while left:
+        value, name, depth = left.pop()
+        visited += 1
+        if visited > _ITEMS or depth > _DEPTH:
+            raise _unreadable(path, f"more than {_ITEMS} items, or lists deeper than {_DEPTH}")
+        if isinstance(value, np.ndarray):
+            found[name] = value
+            continue
+        dot = f"{name}." if name else ""
+        children = [(child, f"{dot}{key}", depth + 1) for key, child in _children(value)]
+        if len(left) + len(children) > _ITEMS:
+            raise _unreadable(path, f"more than {_ITEMS} items")
+        left.extend(reversed(children))
+    return found
 
 
-def _flattened(value: object, name: str) -> list[tuple[str, AnyArray]]:
-    if isinstance(value, np.ndarray):
-        return [(name, value)]
+def _children(value: object) -> Iterable[tuple[object, object]]:
     if isinstance(value, Record):
-        children: Mapping[Any, object] = value.state
-    elif isinstance(value, Mapping):
-        children = value
-    elif isinstance(value, (list, tuple)):
-        children = dict(enumerate(value))
-    else:
-        return []
-    dot = f"{name}." if name else ""
-    return [item for key, child in children.items() for item in _flattened(child, f"{dot}{key}")]
+        return value.state.items()
+    if isinstance(value, Mapping):
+        return value.items()
+    return enumerate(value) if isinstance(value, (list, tuple)) else ()
+
+
+def _unreadable(path: Path, found: str) -> ExportError:
+    return ExportError(
+        "checkpoint/unreadable",
+        where=str(path),
+        expected="a zip archive of PyTorch 1.6 or later with tensors in it",
+        found=found,
+        remedy="if the file is older, load it in PyTorch and torch.save its state_dict again",
+    )
 
 
 class Weights:
