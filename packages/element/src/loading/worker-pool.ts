@@ -14,10 +14,12 @@ const TICK_MS = 100;
 /** Number of missed pings after which a worker gets no new requests. */
 const BUSY = 2;
 /**
- * Number of missed pings after which the requests of a worker restart in other workers, except the one that it reads. A
- * worker that reads none, or a canceled one, is terminated.
+ * Number of missed pings after which the requests of a worker may restart in other workers, except the one that it
+ * reads. A worker that reads a canceled request is terminated.
  */
 const SILENT = 5;
+/** Silence after which a request restarts, however long its worker had worked for it before, ms. */
+const MAX_WAIT_MS = 10_000;
 /**
  * Number of missed pings after which a worker counts as dead, even while it reads, because browsers do not report dead
  * workers.
@@ -111,7 +113,8 @@ export class WorkerPool {
     let job!: Job;
     const answer = new Promise<T>((resolve, reject) => {
       const id = this.#nextId++;
-      job = { ...listeners, id, request, signal, transfer, here, resolve: resolve as Job['resolve'], reject, moves: 0 };
+      const settle = { resolve: resolve as Job['resolve'], reject };
+      job = { ...listeners, ...settle, id, request, signal, transfer, here, moves: 0, sentAt: Infinity };
       cancel = () => reject(signal.reason);
     });
     signal.addEventListener('abort', cancel, { once: true });
@@ -289,9 +292,13 @@ export class WorkerPool {
   #reassignJobs(slot: WorkerSlot): void {
     const isDead = slot.missed >= DEAD;
     const reader = isDead ? undefined : slot.reader;
-    const jobs = [...slot.jobs.values()].filter((job) => job !== reader);
+    const silentMs = slot.missed * TICK_MS;
+    const isLeft = isDead || (slot.reading !== undefined && !reader);
+    const mayMove = (job: Job): boolean => isLeft || hasWaited(job, silentMs);
+    const jobs = [...slot.jobs.values()].filter((job) => job !== reader && mayMove(job));
+    const isEmpty = jobs.length === slot.jobs.size;
     const stuckWorker = slot.reader;
-    if (!reader) this.#end(slot);
+    if (!reader && isEmpty) this.#end(slot);
     for (const job of jobs) this.#move(slot, job, job === stuckWorker ? AFTER_DEATH : 1);
     this.#placeQueued();
   }
@@ -325,6 +332,17 @@ export class WorkerPool {
     slot.end();
     this.#slots.delete(slot);
   }
+}
+
+/**
+ * Returns whether a job may leave a silent worker that is perhaps only late, because the machine is busy. It loses what
+ * it has downloaded, so the silence must have lasted as long as the job before it. The time quadruples with each
+ * restart. A job that cannot restart waits until its worker counts as dead.
+ */
+function hasWaited({ sentAt, moves, transfer }: Job, silentMs: number): boolean {
+  const workedMs = performance.now() - sentAt - silentMs;
+  const minMs = TICK_MS * SILENT * 4 ** moves;
+  return !transfer && silentMs >= Math.max(minMs, Math.min(MAX_WAIT_MS, workedMs));
 }
 
 function stopped(found: string): GaussianSplatError {

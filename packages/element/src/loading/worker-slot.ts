@@ -20,6 +20,8 @@ export interface Job {
    * counts more than 1.
    */
   moves: number;
+  /** Time when the request was sent to its worker, in milliseconds of `performance.now()`. */
+  sentAt: number;
   slot?: WorkerSlot | undefined;
 }
 
@@ -101,7 +103,9 @@ export class WorkerSlot {
     for (const stop of this.helpers.values()) stop();
   }
 
-  #send({ id, request, transfer }: Job): void {
+  #send(job: Job): void {
+    const { id, request, transfer } = job;
+    job.sentAt = performance.now();
     this.post({ ...request, id }, transfer);
   }
 }
