@@ -16,6 +16,10 @@ const STYLES = css`
     left: 0;
   }
   /* Apart from the box that moves: style of what has transitions takes three times as long to recalculate. */
+  /* The label in use lies over the others. A z-index of the page cannot reach out of its own box. */
+  .hotspot:is(:hover, :focus-within, .with-panel) {
+    z-index: 1;
+  }
   .hotspot > div {
     /* Isolated, so that a fading label does not cause a layout. */
     isolation: isolate;
