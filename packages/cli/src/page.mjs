@@ -180,6 +180,12 @@ function htmlOf(script, tag, title) {
   </style>
   ${tag}
   ${script}
+  <script>
+    // Browsers load modules by http only.
+    const element = document.querySelector('gaussian-splat');
+    if (location.protocol === 'file:' && element.hasAttribute('src'))
+      element.textContent = 'This page needs a web server: run "npx http-server" in its folder, and open the address that it prints.';
+  </script>
 </html>
 `;
 }
