@@ -1,8 +1,7 @@
 import { GaussianSplatError } from '@gaussian-splat/core';
 import { turn } from '../gpu/page-thread.js';
 import type { PackedGaussians } from '../pack/pack.js';
-import { makeTexture, requireMemory } from './gl.js';
-import { DATA_WIDTH } from './shaders.js';
+import { dataWidth, makeTexture, requireMemory } from './gl.js';
 
 /** Number of words uploaded in one step: 4 MB, a few milliseconds. */
 const WORDS_AT_ONCE = 1 << 20;
@@ -33,8 +32,11 @@ export function positionsIn(geometry: Uint32Array): Float32Array {
 /** Runs a function with WebGL calls synchronously, and returns its result. */
 export type RunGl = <T>(work: () => T) => T;
 
-/** Returns the number of texture rows for a number of texels, at least 1. */
-export const rowsOf = (texels: number): number => Math.max(1, Math.ceil(texels / DATA_WIDTH));
+/** Returns the width and the number of rows of a texture for a number of texels; at least one row. */
+export function sizeOf(gl: WebGL2RenderingContext, texels: number): readonly [width: number, rows: number] {
+  const width = dataWidth(gl);
+  return [width, Math.max(1, Math.ceil(texels / width))];
+}
 
 /** Packed Gaussians of a scene in textures. */
 export class GlGaussians {
@@ -48,8 +50,8 @@ export class GlGaussians {
     const { count, droppedCount, shDegree, shPrecision, antialiased, filterVariance, origin } = packed;
     this.facts = { count, droppedCount, shDegree, shPrecision, antialiased, filterVariance, origin };
     requireRoom(gl, packed);
-    this.geometry = makeTexture(gl, gl.RGBA32UI, [DATA_WIDTH, rowsOf(packed.geometry.length / 4)]);
-    this.sh = makeTexture(gl, gl.RG32UI, [DATA_WIDTH, rowsOf(packed.sh.length / 2)]);
+    this.geometry = makeTexture(gl, gl.RGBA32UI, sizeOf(gl, packed.geometry.length / 4));
+    this.sh = makeTexture(gl, gl.RG32UI, sizeOf(gl, packed.sh.length / 2));
   }
 
   /**
@@ -89,14 +91,15 @@ interface Content {
 
 async function write(gl: WebGL2RenderingContext, texture: WebGLTexture, content: Content, run: RunGl): Promise<void> {
   const { format, texelWords, words } = content;
-  const rowWords = DATA_WIDTH * texelWords;
+  const rowTexels = dataWidth(gl);
+  const rowWords = rowTexels * texelWords;
   const rowsAtOnce = Math.floor(WORDS_AT_ONCE / rowWords);
   for (let first = 0; first < words.length;) {
     if (first > 0) await turn();
     const left = words.length - first;
     // An incomplete row is uploaded separately.
     const [width, rows] =
-      left < rowWords ? [left / texelWords, 1] : [DATA_WIDTH, Math.min(rowsAtOnce, Math.floor(left / rowWords))];
+      left < rowWords ? [left / texelWords, 1] : [rowTexels, Math.min(rowsAtOnce, Math.floor(left / rowWords))];
     const row = first / rowWords;
     const from = first;
     run(() => {
@@ -111,7 +114,7 @@ async function write(gl: WebGL2RenderingContext, texture: WebGLTexture, content:
 function requireRoom(gl: WebGL2RenderingContext, { count, shDegree, geometry, sh }: PackedGaussians): void {
   const side = gl.getParameter(gl.MAX_TEXTURE_SIZE) as number;
   const texels = Math.max(geometry.length / 4, sh.length / 2);
-  const max = side < DATA_WIDTH ? 0 : Math.floor((side * DATA_WIDTH * count) / texels);
+  const max = Math.floor((side * dataWidth(gl) * count) / texels);
   if (!(count > max) || gl.isContextLost()) return;
   throw new GaussianSplatError('out-of-memory/buffer-limit', {
     where: `scene of ${count} splats, drawn with WebGL 2`,

@@ -3,7 +3,7 @@ import { deviceReading, type DepthPlanes } from '../depth-reading.js';
 import { cameraValues } from '../view.js';
 import { GlProgram, makeTarget, makeTexture, requireMemory } from './gl.js';
 import type { PackedGaussians } from '../pack/pack.js';
-import { GlGaussians, positionsIn, rowsOf, type RunGl } from './gl-gaussians.js';
+import { GlGaussians, positionsIn, type RunGl } from './gl-gaussians.js';
 import { GlRenderer, type GlFrameRequest, type GlFrameTarget, type GlQuads, type GlQuadsFrame } from './gl-renderer.js';
 import { borrowState } from './gl-state.js';
 import { DATA_WIDTH, hostedQuadsFragment, hostedQuadsVertex, HostedView } from './shaders.js';
@@ -195,7 +195,7 @@ export class HostedSplats {
     this.#renderer = renderer;
     this.#gaussians = gaussians;
     this.#sorter = sorter;
-    this.#order = new Uint32Array(DATA_WIDTH * rowsOf(gaussians.facts.count));
+    this.#order = new Uint32Array(DATA_WIDTH * Math.max(1, Math.ceil(gaussians.facts.count / DATA_WIDTH)));
   }
 
   /**

@@ -13,10 +13,9 @@ import type { Rgba } from '../frame-target.js';
 import type { AccumulationFormat } from '../rasterizers/rasterizer.js';
 import { cameraValues, MAX_FLOAT32, scaled } from '../view.js';
 import { makeTarget, makeTexture, requireMemory } from './gl.js';
-import { rowsOf, type GlGaussians } from './gl-gaussians.js';
+import { sizeOf, type GlGaussians } from './gl-gaussians.js';
 import { probeSplats } from './gl-probe.js';
 import { GlPrograms } from './gl-programs.js';
-import { DATA_WIDTH } from './shaders.js';
 import { SH_PRECISION } from '../pack/words.js';
 
 const { QUAD_BATCH } = constants;
@@ -138,7 +137,7 @@ export class GlRenderer {
     this.#gaussians = gaussians;
     this.#programs = GlPrograms.of(gl).check();
     [this.#corners, this.#indices] = makeCorners(gl);
-    const size = [DATA_WIDTH, rowsOf(gaussians.facts.count)] as const;
+    const size = sizeOf(gl, gaussians.facts.count);
     this.#shapes = makeTexture(gl, gl.RGBA32UI, size);
     this.#paints = makeTexture(gl, gl.RGBA32UI, size);
     this.#order = makeTexture(gl, gl.R32UI, size);
@@ -162,8 +161,8 @@ export class GlRenderer {
     this.#count = count;
     gl.activeTexture(gl.TEXTURE0);
     gl.bindTexture(gl.TEXTURE_2D, this.#order);
-    const rows = rowsOf(count);
-    gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, DATA_WIDTH, rows, gl.RED_INTEGER, gl.UNSIGNED_INT, order);
+    const [width, rows] = sizeOf(gl, count);
+    gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, width, rows, gl.RED_INTEGER, gl.UNSIGNED_INT, order);
   }
 
   /**
@@ -232,11 +231,11 @@ export class GlRenderer {
    */
   countDrawn(): number {
     const gl = this.#gl;
-    const rows = rowsOf(this.#gaussians.facts.count);
-    const words = new Uint32Array(4 * DATA_WIDTH * rows);
+    const [width, rows] = sizeOf(gl, this.#gaussians.facts.count);
+    const words = new Uint32Array(4 * width * rows);
     gl.bindFramebuffer(gl.FRAMEBUFFER, this.#splats);
     gl.readBuffer(gl.COLOR_ATTACHMENT1);
-    gl.readPixels(0, 0, DATA_WIDTH, rows, gl.RGBA_INTEGER, gl.UNSIGNED_INT, words);
+    gl.readPixels(0, 0, width, rows, gl.RGBA_INTEGER, gl.UNSIGNED_INT, words);
     let count = 0;
     // The last word of a splat is its opacity.
     for (let at = 3; at < words.length; at += 4) if (words[at] !== 0) count++;
@@ -275,7 +274,7 @@ export class GlRenderer {
       ...{ opacity: 1, crop_low: EVERYWHERE.map((side) => -side), crop_high: EVERYWHERE },
     };
     gl.bindFramebuffer(gl.FRAMEBUFFER, this.#splats);
-    gl.viewport(0, 0, DATA_WIDTH, rowsOf(facts.count));
+    gl.viewport(0, 0, ...sizeOf(gl, facts.count));
     gl.disable(gl.BLEND);
     this.#view = values;
     this.#programs.project.use(values, [geometry, sh]);

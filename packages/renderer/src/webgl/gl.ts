@@ -1,6 +1,14 @@
 /** Helpers to create WebGL 2 objects. */
 import { GaussianSplatError } from '@gaussian-splat/core';
 import { writeStruct, type StructLayout, type StructValues } from '../gpu/struct.js';
+import { DATA_WIDTH } from './shaders.js';
+
+/**
+ * Texels in a row of the textures that hold arrays. Browsers that hide the device, and some old GPUs, allow only 2048,
+ * the least that WebGL 2 guarantees. Whole rows of `DATA_WIDTH` are whole rows of this width, too.
+ */
+export const dataWidth = (gl: WebGL2RenderingContext): number =>
+  Math.min(DATA_WIDTH, gl.getParameter(gl.MAX_TEXTURE_SIZE) as number);
 
 /** A shader program, the names of its textures, and a uniform buffer that contains one struct. */
 export class GlProgram<L extends StructLayout> {
@@ -81,7 +89,7 @@ function link(
   const program = gl.createProgram();
   const shaders = [gl.VERTEX_SHADER, gl.FRAGMENT_SHADER].map((type, i) => {
     const shader = gl.createShader(type)!;
-    gl.shaderSource(shader, texts[i]);
+    gl.shaderSource(shader, texts[i]!.replace(`DATA_WIDTH = ${DATA_WIDTH}u`, `DATA_WIDTH = ${dataWidth(gl)}u`));
     gl.compileShader(shader);
     gl.attachShader(program, shader);
     return shader;
