@@ -8,12 +8,14 @@ ensureBuilt();
 
 const wanted = Number(process.env.PORT ?? 8080);
 const mounts = { '/': `${root}demo/dist` };
+// The home page offers HTML that loads script and scene from this server.
+const headers = { 'access-control-allow-origin': '*' };
 let server;
 try {
-  server = await serve(mounts, { port: wanted });
+  server = await serve(mounts, { port: wanted, headers });
 } catch (error) {
   if (error.code !== 'EADDRINUSE') throw error;
   console.log(`Port ${wanted} is taken; using a free one.`);
-  server = await serve(mounts);
+  server = await serve(mounts, { headers });
 }
 console.log(`\nThe demo is at http://localhost:${server.address().port}/ (Ctrl+C ends it)\n`);
