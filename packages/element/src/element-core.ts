@@ -419,6 +419,8 @@ export class ElementCore
   }
 
   posterDismissed(): void {
+    // WebKit leaves a canvas that becomes visible blank until it is drawn again.
+    this.requestFrame();
     this.element.dispatchEvent(new Event('poster-dismissed'));
     this.sources.startPlaying();
   }
