@@ -35,8 +35,11 @@ export interface GridOptions {
 export const MAX_VOXELS = 2 ** 24;
 /** Maximum number of splats that are added to a grid. Of more splats, an evenly spaced sample represents all. */
 const MAX_SPLATS = 500_000;
-/** Fraction of the splats that may be outside the grid on each side, so that distant outliers do not enlarge it. */
-const OUTLIERS = 0.003;
+/**
+ * Fractions of the splats that may be outside the grid on each side, so that distant outliers do not enlarge it. The first
+ * one with which the grid has at most {@link MAX_VOXELS} is used.
+ */
+const OUTLIERS = [0.003, 0.006, 0.01, 0.015, 0.025, 0.04, 0.06, 0.1, 0.15] as const;
 /** Number of voxels around the scene on each side of the grid. */
 const MARGIN = 4;
 const MIN_ALPHA = 1 / 255;
@@ -86,14 +89,22 @@ function centersOf(cloud: GaussianCloud, frame: UpFrame, metersPerUnit: number, 
 
 function emptyGrid(centers: Float32Array, wanted: number): ExtinctionGrid {
   const count = centers.length / 3;
-  const ranges = [0, 1, 2].map((axis) => {
-    const sorted = Float32Array.from({ length: count }, (_, i) => centers[3 * i + axis]).sort();
-    return [sorted[Math.floor(OUTLIERS * count)], sorted[Math.min(count - 1, Math.floor((1 - OUTLIERS) * count))]];
-  });
-  const sizeAt = (voxel: number): number[] => ranges.map(([low, high]) => Math.ceil((high - low) / voxel) + 2 * MARGIN);
+  const sorted = [0, 1, 2].map((axis) => Float32Array.from({ length: count }, (_, i) => centers[3 * i + axis]).sort());
+  const rangesAt = (outliers: number): number[][] =>
+    sorted.map((each) => [
+      each[Math.floor(outliers * count)],
+      each[Math.min(count - 1, Math.floor((1 - outliers) * count))],
+    ]);
+  const sizeAt = (ranges: readonly number[][], voxel: number): number[] =>
+    ranges.map(([low, high]) => Math.ceil((high - low) / voxel) + 2 * MARGIN);
+  const isTooLarge = (ranges: readonly number[][], voxel: number): boolean =>
+    sizeAt(ranges, voxel).reduce((product, length) => product * length) > MAX_VOXELS;
   let voxel = wanted;
-  while (sizeAt(voxel).reduce((product, length) => product * length) > MAX_VOXELS) voxel *= 1.25;
-  const [nx, ny, nz] = sizeAt(voxel);
+  let ranges = rangesAt(OUTLIERS[0]);
+  // Distant splats, such as a background, are left out before voxels become larger.
+  for (const outliers of OUTLIERS) if (isTooLarge(ranges, voxel)) ranges = rangesAt(outliers);
+  while (isTooLarge(ranges, voxel)) voxel *= 1.25;
+  const [nx, ny, nz] = sizeAt(ranges, voxel);
   const [x, y, z] = ranges.map(([low]) => low - MARGIN * voxel);
   return { values: new Float32Array(nx * ny * nz), corner: [x, y, z], size: [nx, ny, nz], voxel };
 }
@@ -122,6 +133,10 @@ function addSplat(
   if (!(determinant > 0)) return 0;
   const inverse = [a, d, f, xx * zz - xz * xz, xy * xz - xx * yz, xx * yy - xy * xy].map((v) => v / determinant);
   const reach = Math.sqrt(2 * Math.log(alpha / MIN_ALPHA));
+  // A splat that is thicker than a voxel in all directions has only a part of its optical depth in each voxel.
+  const { scales } = cloud;
+  const thinnest = metersPerUnit * Math.min(scales[3 * i], scales[3 * i + 1], scales[3 * i + 2]);
+  const part = share * Math.min(1, voxel / (Math.sqrt(2 * Math.PI) * thinnest));
   const center = [centers[3 * k], centers[3 * k + 1], centers[3 * k + 2]];
   const extent = [xx, yy, zz].map((variance) => reach * Math.sqrt(variance));
   const first = (axis: number): number =>
@@ -140,7 +155,7 @@ function addSplat(
       for (let x = x0; x <= x1; x++, at++) {
         const dx = offset(0, x);
         const value = alpha * Math.exp(-0.5 * (rest + dx * (slope + inverse[0] * dx)));
-        if (value > MIN_ALPHA) values[at] -= share * Math.log(1 - value);
+        if (value > MIN_ALPHA) values[at] -= part * Math.log(1 - value);
       }
     }
   }

@@ -20,8 +20,10 @@ export interface FloorOptions extends GridOptions {
 const BRIDGE = 0.3;
 /** Maximum number of cells along the radius of a body. With smaller voxels, only some cells under it are examined. */
 const MAX_RADIUS = 8;
-/** Maximum horizontal distance in meters of the floor from the point `near`. */
-const REACH = 3;
+/** Horizontal distances in meters of the floor from the point `near`, of which the first with a large floor is used. */
+const REACHES = [0.3, 1, 3] as const;
+/** Minimum area in m² of a floor that is preferred to farther ones. */
+const LARGE = 4;
 /** Maximum number of columns of a grid, of their floors, and of the cells of all regions: 10,000 m² at 5 cm. */
 const MAX_FLOORS = 2 ** 22;
 /** Maximum number of heights of a map over all layers, 128 MB of float32. */
@@ -29,8 +31,8 @@ const MAX_HEIGHTS = 2 ** 25;
 
 /**
  * Finds the walkable floor of a scene from its splats. Surfaces are solid voxels with free height above, which a flood
- * fill joins if a body fits between them. The result is the largest floor below `near` within 3 m of it, or else the
- * lowest of the large floors.
+ * fill joins if a body fits between them. The result is the floor below `near`: the largest within 0.3 m of it, or else
+ * within 1 or 3 m, or else the lowest of the large floors.
  * @throws GaussianSplatError `argument/value` for lengths that are not positive and finite; `out-of-memory/budget` for
  * a scene that takes too much work or memory.
  */
@@ -136,7 +138,14 @@ class FloorFinder {
         regions.push(this.#fill(c, height, near));
       }
     });
-    const reached = regions.filter(({ distance, bottom }) => distance <= REACH && bottom <= near[1]);
+    const below = regions.filter(({ bottom }) => bottom <= near[1]);
+    const isLarge = ({ cells }: Region): boolean => cells.length * this.#grid.voxel ** 2 >= LARGE;
+    // The floor under the point, even if a larger one is behind a wall. A point at infinity is above the roof, too.
+    const [reach] = REACHES.slice(-1);
+    const reached =
+      (near[1] === Infinity ? [] : REACHES)
+        .map((each) => below.filter((region) => region.distance <= each && isLarge(region)))
+        .find((found) => found.length > 0) ?? below.filter(({ distance }) => distance <= reach);
     return this.#mapOf(largestOf(reached) ?? lowestOf(regions));
   }
 
