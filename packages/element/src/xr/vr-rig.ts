@@ -80,10 +80,14 @@ export class VrRig {
   set map(map: WalkMap) {
     this.#map = map;
     if (!this.#pose) return;
-    // Visitors may have moved before the map is loaded.
+    // Visitors may have moved before the map is loaded. Over no floor, such as outside a house, they would walk through walls.
     const walker = this.#walkerUnder(this.#headAt(this.#pose));
+    if (!walker) {
+      this.#jump(map.start, this.#pose);
+      return;
+    }
     const [x, , z] = this.#origin!;
-    this.#origin = [x, this.#floorY((walker?.at ?? map.start)[1]), z];
+    this.#origin = [x, this.#floorY(walker.at[1]), z];
   }
 
   /** Starts to aim with an input that has no trigger button, at its event `selectstart`. */
