@@ -17,7 +17,7 @@ const USAGE = `usage: gaussian-splat floor SCENE|VOXELS.voxel.json --out FILE.fl
 
   --out FILE      the map, for the attribute walk-map
   --unit LENGTH   length of one unit of the scene, such as 1m or 37cm; default 1m
-  --up AXIS       what points up in the scene: x, -x, y, -y, z or -z; default: what the file says, else -y
+  --up DIRECTION  what points up in the scene: x, -x, y, -y, z, -z or a vector such as "0.1 -1 0.2"; default: what the file says, else -y
   --near X,Y,Z    point, meters and y up, below which the walk starts; default: the middle of the scene
   --eyes LENGTH   height of a walker's eyes; default 1.6m
   --cell LENGTH   edge of a cell of the map; default 5cm
@@ -26,39 +26,28 @@ const USAGE = `usage: gaussian-splat floor SCENE|VOXELS.voxel.json --out FILE.fl
 const METERS = { m: 1, cm: 0.01, mm: 0.001 };
 /** Free height in meters above the eyes of a body, the same as in the element. */
 const ABOVE_EYES = 0.1;
-/** Rows of the rotation to coordinates with y up, for each value of the option --up. */
-const FRAMES = {
-  x: [
-    [0, -1, 0],
-    [1, 0, 0],
-    [0, 0, 1],
-  ],
-  '-x': [
-    [0, 1, 0],
-    [-1, 0, 0],
-    [0, 0, 1],
-  ],
-  y: [
-    [1, 0, 0],
-    [0, 1, 0],
-    [0, 0, 1],
-  ],
-  '-y': [
-    [1, 0, 0],
-    [0, -1, 0],
-    [0, 0, -1],
-  ],
-  z: [
-    [1, 0, 0],
-    [0, 0, 1],
-    [0, -1, 0],
-  ],
-  '-z': [
-    [1, 0, 0],
-    [0, 0, -1],
-    [0, 1, 0],
-  ],
-};
+/** Directions of the names that the option --up takes besides vectors. */
+const AXES = { x: [1, 0, 0], '-x': [-1, 0, 0], y: [0, 1, 0], '-y': [0, -1, 0], z: [0, 0, 1], '-z': [0, 0, -1] };
+
+/** Returns the unit vector of an axis name or of three numbers; undefined for any other text. */
+function directionOf(text) {
+  const vector = Object.hasOwn(AXES, text) ? AXES[text] : text.trim().split(/[\s,]+/).map(Number);
+  const length = Math.hypot(...vector);
+  if (vector.length !== 3 || !(length > 0 && length < Infinity)) return undefined;
+  return vector.map((value) => value / length);
+}
+
+/** Returns the rows of the rotation of a unit vector to +y, the same as in the element. */
+function frameOf([x, y, z]) {
+  const side = y < 0 ? -1 : 1;
+  const share = 1 / (1 + side * y);
+  const both = share * x * z;
+  return [
+    [1 - share * x * x, -side * x, -both],
+    [x, y, z],
+    [-side * both, -z, side * (1 - share * z * z)],
+  ];
+}
 
 function parseOptions(args) {
   const text = { type: 'string' };
@@ -70,8 +59,9 @@ function parseOptions(args) {
   const { values, scene } = parsed;
   if (values.out === undefined) throw new UsageError('--out is missing');
   checkOutput('out', values.out, { [scene]: scene });
-  if (values.up !== undefined && !Object.hasOwn(FRAMES, values.up))
-    throw new UsageError(`--up: expected x, -x, y, -y, z or -z, found "${values.up}"`);
+  const up = values.up === undefined ? undefined : directionOf(values.up);
+  if (values.up !== undefined && up === undefined)
+    throw new UsageError(`--up: expected x, -x, y, -y, z, -z or three numbers, found "${values.up}"`);
   const near = values.near?.split(',').map(Number);
   if (near && (near.length !== 3 || !near.every(Number.isFinite)))
     throw new UsageError(`--near: expected X,Y,Z, found "${values.near}"`);
@@ -84,21 +74,15 @@ function parseOptions(args) {
   return {
     scene: resolve(scene),
     out: resolve(values.out),
-    up: values.up,
+    up,
     options: { near, metersPerUnit: length('unit'), voxel: length('cell'), height: length('eyes') + ABOVE_EYES },
   };
-}
-
-/** Returns the name of the axis that is nearest to a direction. */
-function axisOf([x, y, z]) {
-  const axes = { x, '-x': -x, y, '-y': -y, z, '-z': -z };
-  return Object.entries(axes).reduce((best, axis) => (axis[1] > best[1] ? axis : best))[0];
 }
 
 /** Finds the floor of a scene from the voxels that splat-transform has written. */
 async function floorOfVoxels(scene, up, options) {
   const files = { head: await readWhole(scene), tree: await readWhole(voxelTreePath(scene)), name: basename(scene) };
-  const { grid, solid } = readVoxels(files, FRAMES[up ?? '-y'], options.metersPerUnit);
+  const { grid, solid } = readVoxels(files, frameOf(up ?? AXES['-y']), options.metersPerUnit);
   return floorOf(grid, solid, options);
 }
 
@@ -106,7 +90,7 @@ async function floorOfScene(scene, up, options) {
   const openFile = (part) => readWhole(join(dirname(scene), part));
   const cloud = await readScene(await readWhole(scene), { name: basename(scene), openFile });
   sayWarnings(basename(scene), cloud);
-  return makeWalkMap(cloud, { ...options, frame: FRAMES[up ?? axisOf(cloud.hints?.up ?? [0, -1, 0])] });
+  return makeWalkMap(cloud, { ...options, frame: frameOf(up ?? cloud.hints?.up ?? AXES['-y']) });
 }
 
 async function main({ scene, out, up, options }) {
