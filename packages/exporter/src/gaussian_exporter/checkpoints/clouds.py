@@ -45,13 +45,14 @@ def read_cloud(path: Path, ignored: Sequence[str] = ()) -> Cloud:
     path = newest_in(existing(path, "a PLY file, a checkpoint, or the folder of a training"))
     with path.open("rb") as file:
         is_archive = file.read(2) == b"PK"
-    refuse_neighbors(path)
+    refuse_neighbors(path, ignored)
     kernel = refused_settings(path, ignored)
     if is_archive:
         if kernel is not None:
             remedy = "give its point_cloud.ply, which has the 3D filter of each Gaussian (filter_3D)"
             raise other_family(path, "Mip-Splatting", "kernel_size in cfg_args, and no 3D filter", remedy)
-        return cloud_of_checkpoint(path, ignored)
+        cloud = cloud_of_checkpoint(path, ignored)
+        return replace(cloud, filter="antialiased") if is_antialiased(path) else cloud
     vertices = read_ply(path)
     refuse_other_properties(vertices.names, path, ignored)
     cloud = cloud_of_vertices(vertices)
@@ -72,6 +73,17 @@ def refused_settings(path: Path, ignored: Sequence[str]) -> float | None:
         remedy = "train with kernel_size 0.1, or give --filter and --ignore kernel_size"
         raise other_family(beside or path, "Mip-Splatting", f"kernel_size={kernel}", remedy)
     return None if "kernel_size" in ignored else kernel  # type: ignore[return-value]
+
+
+# Settings of gsplat (cfg.yml) and nerfstudio (config.yml) of a training with opacity compensation.
+_ANTIALIASED = re.compile(r"^\s*(antialiased: true|rasterize_mode: antialiased)\s*$", re.MULTILINE)
+
+
+def is_antialiased(checkpoint: Path) -> bool:
+    """Whether the settings around a checkpoint of gsplat or nerfstudio say that it was trained with compensation."""
+    # OUT/ckpts/ckpt_N_rank0.pt and OUT/nerfstudio_models/step-N.ckpt; a copy may lie beside the file.
+    around = (folder / name for folder in checkpoint.resolve().parents[:2] for name in ("cfg.yml", "config.yml"))
+    return any(_ANTIALIASED.search(each.read_text(errors="replace")) for each in around if each.is_file())
 
 
 def newest_in(path: Path) -> Path:

@@ -34,6 +34,8 @@ _BY_NEIGHBOR = {
     "deform": ("Deformable-3D-Gaussians", "run gaussian-export deformable"),
     "mlp_ckpt": ("GauHuman", "its network moves SMPL: export a module of it (gaussian_exporter.export_module)"),
     "flame_param.npz": _BY_PROPERTY["binding_0"],
+    "skin.glb": ("LAM", "its places are offsets from vertices of FLAME, its colors are no harmonics: export its module"),
+    "embedding.json": ("SplattingAvatar", "it is one pose of an avatar; --ignore embedding.json exports it as a statue"),
     "opacity_mlp.pt": ("Scaffold-GS or Octree-GS", "run gaussian-export scaffold"),
     "checkpoints.pth": ("Scaffold-GS or Octree-GS", "run gaussian-export scaffold"),
 }
@@ -57,13 +59,13 @@ def unfiltered(cloud: Cloud, where: Path) -> Cloud:
     return cloud
 
 
-def refuse_neighbors(point_cloud: Path) -> None:
+def refuse_neighbors(point_cloud: Path, ignored: Sequence[str] = ()) -> None:
     """Raises checkpoint/other-family if files beside a point cloud show that it is only a part of a model."""
     # OUT/point_cloud/iteration_N/point_cloud.ply: beside the file, or beside the folder point_cloud.
     for folder in (point_cloud.parent, point_cloud.parent.parent.parent):
         is_training = folder == point_cloud.parent or (folder / "point_cloud").is_dir()
         for name, (family, remedy) in _BY_NEIGHBOR.items():
-            if is_training and (folder / name).exists():
+            if is_training and name not in ignored and (folder / name).exists():
                 raise other_family(point_cloud, family, f"{name} in {folder}", remedy)
 
 

@@ -25,10 +25,22 @@ from .capture import OPSETS, captured, cause, keeping_modes, widened
 from .finish import finish_graph
 from .layouts import Layout, split, with_state
 from .roles import Role
-from .trial import describe_difference, difference, in_torch, said, tried, weights_of, wrapped_module
+from .trial import (
+    describe_difference,
+    difference,
+    in_torch,
+    said,
+    sensitivity,
+    tried,
+    weights_of,
+    wrapped_module,
+)
 
 # Largest allowed difference to PyTorch, as a fraction of the largest number of an output.
 _ALLOWED = 1e-3
+# The same for a module that is sensitive to its inputs: a multiple of its own change, up to a limit beyond which a set of
+# inputs proves nothing.
+_SENSITIVE, _MOST = 4.0, 2e-2
 
 
 @dataclass(frozen=True)
@@ -108,8 +120,13 @@ def export_module(
     module = module if isinstance(module, torch.nn.Module) else _module_of(module, torch)
     module, narrow = widened(module.eval(), torch)
     refuse_other_arguments(module, inputs)
+    _refuse_repeated(inputs)
     tries, expected = tried(module, inputs, layout, batched, n_max, torch)
     wrapped = wrapped_module(module, inputs, layout, batched, torch)
+    allowed = [
+        [max(_ALLOWED, _SENSITIVE * each) for each in row] for row in sensitivity(wrapped, tries, expected, torch)
+    ]
+    _refuse_sensitive(allowed, layout, tries)
     bounds = _bounds(wrapped, inputs, layout, torch)
     given = {"version": 1, "name": name or path.stem}
     facts = _facts(inputs, n_max, fps, antialiased, filter)
@@ -123,11 +140,11 @@ def export_module(
             contract["inputs"] = _bindings(model, inputs, layout)
             complete = contract | bounds | _rows(model, layout, n_max, expected)
             onnx.helper.set_model_props(model, metadata(complete))
-            errors, worst = _errors(model, tries, expected, layout)
+            errors, worst = _errors(model, tries, expected, layout, allowed)
         except Exception as error:  # an exporter may fail in any way of its own
             refusals.append(f"{exporter}: {cause(error)}")
             continue
-        if not max(errors.values(), default=0.0) <= _ALLOWED:
+        if worst:
             refusals.append(f"{exporter}: computes other numbers than PyTorch: {worst}")
             continue
         findings = gpu_findings(model)
@@ -145,6 +162,9 @@ def export_module(
         doubles = [name for _, name, each in weights_of(module) if each.dtype == torch.float64]
         narrowed = [f"weights of 16 bits became float32: {listed(narrow)}"] if narrow else []
         narrowed += [f"float64, which pages do not cast, became float32: {listed(doubles)}"] if doubles else []
+        vague = sum(max(row) > _MOST for row in allowed)
+        if vague:
+            narrowed.append(f"{vague} of {len(tries)} sets of inputs prove nothing: the module itself jumps at them")
         notes = [*(f"not taken: {refusal}" for refusal in refusals), *unused, *narrowed]
         report = ExportReport(path, exporter, model.opset_import[0].version, complete, errors, findings, notes)
         if not quiet:
@@ -186,6 +206,28 @@ def refuse_other_arguments(module: Any, inputs: Mapping[str, Role]) -> None:
             found=f"{', '.join(inputs) or 'none'} ({error})",
             remedy="name them in inputs={...}",
         ) from error
+
+
+# Roles that a contract may give to several inputs.
+_REPEATED = {"control", "view", "camera_to_world", "intrinsics", "projection", "view_projection", "state", "image"}
+
+
+def _refuse_repeated(inputs: Mapping[str, Role]) -> None:
+    """Raises contract/conflict, before the work, for a role that two inputs have and a contract allows once."""
+    first: dict[str, str] = {}
+    for name, role in inputs.items():
+        kind = str(role.binding["role"])
+        if kind in first and kind not in _REPEATED:
+            what = "joints of both in one input, and slices of it in forward" if kind == "pose" else "one input for both"
+            extra = "; or control(low, high, shape=[n]) for one of them" if kind == "shape" else ""
+            raise ExportError(
+                "contract/conflict",
+                where=f"inputs {first[kind]} and {name}",
+                expected=f"one input with the role {kind}",
+                found="two",
+                remedy=f"give {what}{extra}",
+            )
+        first.setdefault(kind, name)
 
 
 def _module_of(function: Callable[..., Any], torch: Any) -> Any:
@@ -260,21 +302,40 @@ def _errors(
     tries: Sequence[Mapping[str, AnyArray]],
     expected: Sequence[Sequence[AnyArray]],
     layout: Layout,
+    allowed: Sequence[Sequence[float]],
 ) -> tuple[dict[str, float], str]:
     """Largest difference of each output to PyTorch's, as a fraction of the largest number in it, and a sentence on the
-    output with the largest one."""
+    output that exceeds what is allowed the most; sets at which the module itself jumps are left out."""
     import onnxruntime as ort
 
     options = ort.SessionOptions()
     options.log_severity_level = 4
     session = ort.InferenceSession(model.SerializeToString(), options, providers=["CPUExecutionProvider"])
     there = {value.name for value in session.get_inputs()}
-    errors, worst = dict.fromkeys(layout.outputs, 0.0), ""
-    for values, wanted in zip(tries, expected, strict=True):
+    errors, worst, excess = dict.fromkeys(layout.outputs, 0.0), "", 1.0
+    for values, wanted, limits in zip(tries, expected, allowed, strict=True):
         feeds = {name: value for name, value in values.items() if name in there}
-        for name, mine, theirs in zip(layout.outputs, session.run(list(layout.outputs), feeds), wanted, strict=True):
+        written = session.run(list(layout.outputs), feeds)
+        if max(limits, default=0.0) > _MOST:
+            continue
+        for name, mine, theirs, limit in zip(layout.outputs, written, wanted, limits, strict=True):
             error = difference(mine, theirs)
-            if error > max(errors.values()):
-                worst = f"{name} {describe_difference(mine, theirs)}, {said(values, tries)}"
+            if not error <= excess * limit:
+                excess, worst = error / limit, f"{name} {describe_difference(mine, theirs)}, {said(values, tries)}"
             errors[name] = max(errors[name], error)
     return errors, worst
+
+
+def _refuse_sensitive(allowed: Sequence[Sequence[float]], layout: Layout, tries: Sequence[Mapping[str, AnyArray]]) -> None:
+    """Raises argument/value if no set of inputs is one at which a file can be compared."""
+    if min(max(row, default=0.0) for row in allowed) <= _MOST:
+        return
+    worst = max(range(len(layout.outputs)), key=lambda i: allowed[0][i])
+    raise ExportError(
+        "argument/value",
+        where=f"output {layout.outputs[worst]} of the module",
+        expected="inputs at which a file can be compared with PyTorch",
+        found=f"a change by {allowed[0][worst] / _SENSITIVE:.1e} of its largest number when they change by a millionth,"
+        f" {said(tries[0], tries)}",
+        remedy="noise means nothing to some networks: give true images, image(..., examples=[photo])",
+    )

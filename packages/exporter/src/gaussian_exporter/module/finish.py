@@ -11,7 +11,7 @@ from onnx import TensorProto, helper, numpy_helper
 from ..arrays import AnyArray
 from ..graph import ALIASES
 from ..placement import RULES, gpu_findings
-from .kernels import use_kernels
+from .kernels import pad_channels, use_kernels
 from .layouts import Layout
 from .roles import Role
 
@@ -33,6 +33,7 @@ def finish_graph(
     for index, value in enumerate(graph.output):
         _declare(value, [tensors[index] for tensors in expected], layout)
     use_kernels(model)
+    pad_channels(model)
     _turn_vectors(model)
     _write_by_kernels(model, inputs)
     onnx.checker.check_model(model)

@@ -12,19 +12,55 @@ _COMPARED = {"Max": "Greater", "Min": "Less"}
 
 
 def use_kernels(model: onnx.ModelProto) -> None:
-    """Rewrites Max and Min of two floats, and Sign, in place: Clip if one is a constant number, else Where."""
+    """Rewrites Max and Min of two floats, Sign and PRelu, in place: Clip if one is a constant number, else Where."""
     left = {found.tensor for found in gpu_findings(model) if found.kind == "fallback"}
     graph, floats, nodes = model.graph, _floats(model), []
     for node in graph.node:
         is_pair = node.op_type in _COMPARED and len(node.input) == 2
-        if node.output[0] not in left & floats or not (is_pair or node.op_type == "Sign"):
+        if node.output[0] not in left & floats or not (is_pair or node.op_type in ("Sign", "PRelu")):
             nodes.append(node)
         elif is_pair:
             nodes += _pair(graph, node)
+        elif node.op_type == "PRelu":
+            nodes += _prelu(graph, node)
         else:
             nodes += _sign(graph, node)
     del graph.node[:]
     graph.node.extend(nodes)
+
+
+def pad_channels(model: onnx.ModelProto) -> None:
+    """Adds channels of zeros to what goes into a convolution that WebGPU would compute wrongly, and to its weights."""
+    wrong = {found.tensor for found in gpu_findings(model) if found.kind == "wrong" and found.operator == "Conv"}
+    graph, nodes = model.graph, []
+    weights = {tensor.name: tensor for tensor in graph.initializer}
+    for node in graph.node:
+        if node.output[0] in wrong and node.input[1] in weights:
+            table = numpy_helper.to_array(weights[node.input[1]])
+            more, name = -table.shape[1] % 4, node.output[0]
+            sides = [0, 0] * table.ndim
+            sides[table.ndim + 1] = more
+            wide = np.pad(table, [(0, more if axis == 1 else 0) for axis in range(table.ndim)])
+            graph.initializer.append(numpy_helper.from_array(np.array(sides, np.int64), f"{name}_sides"))
+            graph.initializer.append(numpy_helper.from_array(wide, f"{name}_weight"))
+            nodes.append(helper.make_node("Pad", [node.input[0], f"{name}_sides"], [f"{name}_padded"]))
+            node.input[0], node.input[1] = f"{name}_padded", f"{name}_weight"
+        nodes.append(node)
+    if wrong:
+        del graph.node[:]
+        graph.node.extend(nodes)
+        used = _used(graph) | {value.name for value in graph.output}
+        kept = [tensor for tensor in graph.initializer if tensor.name in used]
+        del graph.initializer[:]
+        graph.initializer.extend(kept)
+
+
+def _used(graph: onnx.GraphProto) -> set[str]:
+    """Names of all inputs of nodes, those of subgraphs included."""
+    names = {name for node in graph.node for name in node.input}
+    inner = [each for node in graph.node for each in node.attribute]
+    parts = [graph for each in inner for graph in ([each.g] if each.HasField("g") else []) + list(each.graphs)]
+    return names.union(*(_used(part) for part in parts))
 
 
 def _floats(model: onnx.ModelProto) -> set[str]:
@@ -45,6 +81,16 @@ def _pair(graph: onnx.GraphProto, node: onnx.NodeProto) -> list[onnx.NodeProto]:
     return [
         helper.make_node(_COMPARED[node.op_type], [a, b], [chosen]),
         helper.make_node("Where", [chosen, a, b], [name]),
+    ]
+
+
+def _prelu(graph: onnx.GraphProto, node: onnx.NodeProto) -> list[onnx.NodeProto]:
+    (x, slope), name = node.input, node.output[0]
+    zero = _constant(graph, f"{name}_0", 0)
+    return [
+        helper.make_node("Less", [x, zero], [f"{name}_below"]),
+        helper.make_node("Mul", [x, slope], [f"{name}_sloped"]),
+        helper.make_node("Where", [f"{name}_below", f"{name}_sloped", x], [name]),
     ]
 
 

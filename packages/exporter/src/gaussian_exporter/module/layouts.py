@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
@@ -74,10 +74,21 @@ def split(
 
 
 def packed(
-    color: Literal["rgb", "sh"] = "rgb", opacities: Literal["linear", "logit"] = "linear", count: bool = False
+    color: Literal["rgb", "sh"] = "rgb",
+    opacities: Literal["linear", "logit"] = "linear",
+    count: bool = False,
+    columns: Sequence[str] | None = None,
+    scales: Literal["linear", "log"] = "linear",
+    rotations: Literal["wxyz", "xyzw"] = "wxyz",
 ) -> Layout:
-    """One tensor [N,D]: position 3, covariance 6, color 3 or harmonics, opacity 1."""
+    """One tensor [N,D]: position 3, covariance 6, color 3 or harmonics, opacity 1. `columns`: another order, that of LGM:
+    ["positions", "opacities", "scales", "rotations", "colors"].
+    """
     words: Json = {"color": color, "opacityActivation": opacities}
+    if columns is not None:
+        words["columns"] = list(columns)
+        if "scales" in columns:
+            words |= {"scaleActivation": scales, "rotationOrder": rotations}
     if color == "sh":
         words["shOrder"] = "coefficient-major"
     if count:

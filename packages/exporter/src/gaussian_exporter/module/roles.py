@@ -182,9 +182,13 @@ def viewport() -> Role:
     return Role({"role": "viewport"}, (2,), _floats((2,), [640, 480], [1920, 1080]))
 
 
-def image(width: int, height: int, views: int = 1) -> Role:
-    """[1,3,H,W], or [V,3,H,W] of several views: red, green and blue planes in 0..1, top row first."""
+def image(width: int, height: int, views: int = 1, examples: Sequence[object] | None = None) -> Role:
+    """[1,3,H,W], or [V,3,H,W] of several views: red, green and blue planes in 0..1, top row first. `examples`: images
+    of that shape to compare the file at, in place of noise, which means nothing to a detector.
+    """
     rng, sizes = np.random.default_rng(0), (views, 3, height, width)
+    if examples is not None:
+        return Role({"role": "image"}, sizes, [np.asarray(x, np.float32).reshape(sizes) for x in examples])
     images = [rng.random(sizes).astype(np.float32) for _ in range(2)]
     return Role({"role": "image"}, sizes, images, np.zeros(sizes, np.float32))
 

@@ -123,6 +123,19 @@ def tried(
     return tries, expected
 
 
+def sensitivity(
+    wrapped: Any, tries: Sequence[Values], expected: Sequence[Sequence[AnyArray]], torch: Any
+) -> list[list[float]]:
+    """How far each output of the module itself moves, for each set, when its inputs change by a millionth: what float32
+    cannot hold, so that no file can be compared more closely.
+    """
+    found = []
+    for values, wanted in zip(tries, expected, strict=True):
+        near = {n: x * np.float32(1 + 1e-6) if x.dtype == np.float32 else x for n, x in values.items()}
+        found.append([difference(a, b) for a, b in zip(in_torch(wrapped, near, torch), wanted, strict=True)])
+    return found
+
+
 def difference(mine: AnyArray, theirs: AnyArray) -> float:
     """The largest difference, as a fraction of the largest finite number in `theirs`; inf if shapes differ."""
     mine, theirs = np.asarray(mine, np.float64), np.asarray(theirs, np.float64)
