@@ -81,7 +81,11 @@ async function readBody(
   let loaded = 0;
   for await (const chunk of chunksOf(response)) {
     const end = loaded + chunk.length;
-    if (end > bytes.length) bytes = grown(bytes, Math.max(end, 2 * bytes.length));
+    if (end > bytes.length) {
+      // A declared length is trusted further with each part that has arrived, so that a large file is copied once.
+      const next = total !== undefined && total >= end ? Math.min(4 * bytes.length, total) : 2 * bytes.length;
+      bytes = grown(bytes, Math.max(end, next));
+    }
     bytes.set(chunk, loaded);
     loaded = end;
     // If the file is longer than declared, the total grows with the received bytes.
