@@ -40,6 +40,16 @@ export type FixedOutputs = Record<string, FixedOutput>;
 /** Suppresses log messages, because the runtime's errors contain them, too. */
 const QUIET = { logSeverityLevel: 4 } as const;
 
+/**
+ * Defines `adapterInfo` of a device that lacks it, as in Safari 26.0. ONNX Runtime reads its fields for each device that
+ * it is given, and a device without them aborts its WebAssembly ("unreachable").
+ */
+function provideAdapterInfo(device: GPUDevice): void {
+  if ((device as Partial<GPUDevice>).adapterInfo) return;
+  const value = { vendor: '', architecture: '', device: '', description: '', subgroupMinSize: 0, subgroupMaxSize: 0 };
+  Object.defineProperty(device, 'adapterInfo', { value, configurable: true });
+}
+
 /** A session of ONNX Runtime with inputs and outputs on the GPU. It must not be used again after a failed run. */
 export class OrtSession {
   readonly kind: SessionKind;
@@ -90,6 +100,7 @@ export class OrtSession {
     device: GPUDevice,
     fixed: Readonly<FixedOutputs> = {},
   ): Promise<OrtSession> {
+    provideAdapterInfo(device);
     const options: InferenceSession.SessionOptions = {
       ...QUIET,
       freeDimensionOverrides: fixedDimensions(model),
