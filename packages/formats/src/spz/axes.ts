@@ -106,7 +106,9 @@ function frameOfSystem(system: number, name: string): SpzFrame | undefined {
   const down = bits & 2 ? -1 : 1;
   if (system <= 8) return { axes: [right, down, bits & 4 ? 1 : -1] };
   if (system <= 16) {
-    return { axes: [1, 1, 1], turn: [right, 0, 0, 0, 0, 0, down, 0, 0, bits & 4 ? -1 : 1, 0, 0] };
+    // As the only library that writes these systems does it: it mirrors the axes before it turns them, so that in systems
+    // 9, 10, 15 and 16 the second and the third axis point the other way than their names say.
+    return { axes: [1, 1, 1], turn: [right, 0, 0, 0, 0, 0, bits & 4 ? 1 : -1, 0, 0, bits & 2 ? 1 : -1, 0, 0] };
   }
   throw new GaussianSplatError('decode/unsupported', {
     where: `${name}, SPZ extension 0xADBE0003 (coordinate system)`,
