@@ -21,10 +21,15 @@ export function isSplats(primitive: unknown): primitive is Json {
   return isObject(primitive) && isObject(primitive.extensions) && isObject(primitive.extensions[EXTENSION]);
 }
 
-/** Whether the splats of a primitive are in uncompressed accessors. */
+/**
+ * Whether the splats of a primitive are in uncompressed accessors. An extension of the extension may also define a kernel
+ * or a projection; `noteUnknown` reports those.
+ */
 export function isUncompressed(primitive: Json): boolean {
   const { extensions } = splatsOf(primitive);
-  return !isObject(extensions) || Object.keys(extensions).length === 0;
+  if (!isObject(extensions) || Object.keys(extensions).length === 0) return true;
+  const isSpz = SPZ_EXTENSIONS.some((name) => isObject(extensions[name]));
+  return !isSpz && isObject(primitive.attributes) && attributeIn(primitive.attributes, 'ROTATION') !== undefined;
 }
 
 const splatsOf = ({ extensions }: Json): Json => (extensions as Json)[EXTENSION] as Json;
@@ -90,7 +95,7 @@ async function readNumbers(
   const compression = isObject(splats.extensions) ? splats.extensions : {};
   const spz = SPZ_EXTENSIONS.map((name) => compression[name]).find(isObject);
   if (spz) return readCompressed(document, spz, path, source);
-  if (Object.keys(compression).length > 0) {
+  if (!isUncompressed(primitive)) {
     throw unsupported(
       document,
       path,
