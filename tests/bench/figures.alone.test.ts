@@ -237,7 +237,11 @@ test('the chart names every configuration that worked and no other', () => {
     scene: { scene: 'a/skull.spz', splats: 5, width: 4, height: 3, views: 2, path: 'orbit', antialiased: false },
     reference: { kind: 'oracle' },
     run: { rounds: 1, frames: 1 },
-    results: [result('one', 1, 'tier'), result('two', 10, 'setting'), { configuration: { name: 'broken' }, error: 'no' }],
+    results: [
+      result('one', 1, 'tier'),
+      result('two', 10, 'setting'),
+      { configuration: { name: 'broken' }, error: 'no' },
+    ],
   };
   const svg: string = drawChart(report);
   assert.match(svg, /^<svg xmlns="http:\/\/www.w3.org\/2000\/svg"/);

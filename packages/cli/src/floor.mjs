@@ -31,7 +31,12 @@ const AXES = { x: [1, 0, 0], '-x': [-1, 0, 0], y: [0, 1, 0], '-y': [0, -1, 0], z
 
 /** Returns the unit vector of an axis name or of three numbers; undefined for any other text. */
 function directionOf(text) {
-  const vector = Object.hasOwn(AXES, text) ? AXES[text] : text.trim().split(/[\s,]+/).map(Number);
+  const vector = Object.hasOwn(AXES, text)
+    ? AXES[text]
+    : text
+        .trim()
+        .split(/[\s,]+/)
+        .map(Number);
   const length = Math.hypot(...vector);
   if (vector.length !== 3 || !(length > 0 && length < Infinity)) return undefined;
   return vector.map((value) => value / length);

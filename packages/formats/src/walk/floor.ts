@@ -20,7 +20,7 @@ export interface FloorOptions extends GridOptions {
 const BRIDGE = 0.3;
 /** Maximum number of cells along the radius of a body. With smaller voxels, only some cells under it are examined. */
 const MAX_RADIUS = 8;
-/** Horizontal distances in meters of the floor from the point `near`, of which the first with a large floor is used. */
+/** Horizontal distances in meters of the floor from the point `near`: the first with a large floor is used. */
 const REACHES = [0.3, 1, 3] as const;
 /** Minimum area in m² of a floor that is preferred to farther ones. */
 const LARGE = 4;

@@ -32,10 +32,10 @@ _BY_PROPERTY = {
 _BY_NEIGHBOR = {
     "deformation.pth": ("4DGaussians", "run gaussian-export hexplane"),
     "deform": ("Deformable-3D-Gaussians", "run gaussian-export deformable"),
-    "mlp_ckpt": ("GauHuman", "its network moves SMPL: export a module of it (gaussian_exporter.export_module)"),
+    "mlp_ckpt": ("GauHuman", "its network moves SMPL: export a module of it (export_module)"),
     "flame_param.npz": _BY_PROPERTY["binding_0"],
-    "skin.glb": ("LAM", "its places are offsets from vertices of FLAME, its colors are no harmonics: export its module"),
-    "embedding.json": ("SplattingAvatar", "it is one pose of an avatar; --ignore embedding.json exports it as a statue"),
+    "skin.glb": ("LAM", "its positions are offsets from vertices of FLAME: export its module"),
+    "embedding.json": ("SplattingAvatar", "it is one pose of an avatar; --ignore embedding.json exports the pose"),
     "opacity_mlp.pt": ("Scaffold-GS or Octree-GS", "run gaussian-export scaffold"),
     "checkpoints.pth": ("Scaffold-GS or Octree-GS", "run gaussian-export scaffold"),
 }

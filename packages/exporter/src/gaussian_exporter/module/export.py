@@ -38,7 +38,7 @@ from .trial import (
 
 # Largest allowed difference to PyTorch, as a fraction of the largest number of an output.
 _ALLOWED = 1e-3
-# The same for a module that is sensitive to its inputs: a multiple of its own change, up to a limit beyond which a set of
+# For a module that is sensitive to its inputs: a multiple of its own change, up to a limit beyond which a set of
 # inputs proves nothing.
 _SENSITIVE, _MOST = 4.0, 2e-2
 
@@ -218,7 +218,8 @@ def _refuse_repeated(inputs: Mapping[str, Role]) -> None:
     for name, role in inputs.items():
         kind = str(role.binding["role"])
         if kind in first and kind not in _REPEATED:
-            what = "joints of both in one input, and slices of it in forward" if kind == "pose" else "one input for both"
+            both = "joints of both in one input, and slices of it in forward"
+            what = both if kind == "pose" else "one input for both"
             extra = "; or control(low, high, shape=[n]) for one of them" if kind == "shape" else ""
             raise ExportError(
                 "contract/conflict",
@@ -326,7 +327,9 @@ def _errors(
     return errors, worst
 
 
-def _refuse_sensitive(allowed: Sequence[Sequence[float]], layout: Layout, tries: Sequence[Mapping[str, AnyArray]]) -> None:
+def _refuse_sensitive(
+    allowed: Sequence[Sequence[float]], layout: Layout, tries: Sequence[Mapping[str, AnyArray]]
+) -> None:
     """Raises argument/value if no set of inputs is one at which a file can be compared."""
     if min(max(row, default=0.0) for row in allowed) <= _MOST:
         return
@@ -337,5 +340,5 @@ def _refuse_sensitive(allowed: Sequence[Sequence[float]], layout: Layout, tries:
         expected="inputs at which a file can be compared with PyTorch",
         found=f"a change by {allowed[0][worst] / _SENSITIVE:.1e} of its largest number when they change by a millionth,"
         f" {said(tries[0], tries)}",
-        remedy="noise means nothing to some networks: give true images, image(..., examples=[photo])",
+        remedy="noise means nothing to some networks: give photographs, image(..., examples=[photo])",
     )

@@ -81,7 +81,7 @@ def packed(
     scales: Literal["linear", "log"] = "linear",
     rotations: Literal["wxyz", "xyzw"] = "wxyz",
 ) -> Layout:
-    """One tensor [N,D]: position 3, covariance 6, color 3 or harmonics, opacity 1. `columns`: another order, that of LGM:
+    """One tensor [N,D]: position 3, covariance 6, color 3 or harmonics, opacity 1. `columns`: another order, as LGM's:
     ["positions", "opacities", "scales", "rotations", "colors"].
     """
     words: Json = {"color": color, "opacityActivation": opacities}
