@@ -303,7 +303,7 @@ const tooManyCuts = (found: number): string =>
   new GaussianSplatError('argument/splat-cut', {
     where: '<splat-cut>',
     expected: `at most ${MAX_CUTS} cuts of one scene, a reveal by sweep included`,
-    found: `${found}, of which the last are left out`,
+    found: `${found}; the last are left out`,
     remedy: 'put cuts of one scene into its <splat-scene>, and hide those that are not needed',
   }).message;
 

@@ -81,7 +81,7 @@ function jpegHeader(bytes: Uint8Array): ImageHeader | undefined {
 }
 
 /**
- * Reads the size of an AVIF image. A grid of tiles has several sizes, of which the largest is that of the image.
+ * Reads the size of an AVIF image. A grid of tiles has several sizes; the largest is that of the image.
  * Undefined for sequences of images, whose size is elsewhere.
  */
 function avifHeader(bytes: Uint8Array): ImageHeader | undefined {
