@@ -37,7 +37,7 @@ const directions = Object.entries(MAY_IMPORT).map(([name, allowed]) => ({
               group: [`@gaussian-splat/${other}`, `@gaussian-splat/${other}/*`],
               message: `${name} must not know ${other}: see docs/architecture.md.`,
             })),
-          { group: ['../../*'], message: 'Import another package by its name.' },
+          { group: [name === 'element' ? '../../../*' : '../../*'], message: 'Import another package by its name.' },
           ...(name === 'check' ? [] : [{ group: ['node:*', 'fs', 'path'], message: 'Packages run in browsers.' }]),
           ...(RUN_MODELS.includes(name)
             ? []

@@ -1,6 +1,6 @@
 /** The element's errors about a value, beside its field. */
-import { ATTRIBUTES } from '../../packages/element/dist/attributes.js';
-import { SCENE_ATTRIBUTES } from '../../packages/element/dist/composition/attributes.js';
+import { ATTRIBUTES } from '../../packages/element/dist/viewer/attributes.js';
+import { SCENE_ATTRIBUTES } from '../../packages/element/dist/features/children/attributes.js';
 
 const ALL = { ...SCENE_ATTRIBUTES, ...ATTRIBUTES };
 

@@ -1,6 +1,6 @@
 /** A capture that is tilted, set upright by three points of its floor: the value of the attribute `up`. */
-import { parseUp } from '../../packages/element/dist/camera/grammar.js';
-import { eyeOfPose, toScene, viewerFrame } from '../../packages/element/dist/camera/orbit.js';
+import { parseUp } from '../../packages/element/dist/viewer/camera/grammar.js';
+import { eyeOfPose, toScene, viewerFrame } from '../../packages/element/dist/viewer/camera/orbit.js';
 import { pickPoint } from './pick.js';
 
 /** The default up direction of a scene. */

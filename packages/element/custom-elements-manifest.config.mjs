@@ -62,11 +62,11 @@ const publicOnly = {
 
 const ENTRIES = [
   'src/index.ts',
-  'src/element.ts',
+  'src/viewer/element.ts',
   'src/scenes.ts',
-  'src/composition/splat-scene.ts',
-  'src/composition/splat-mesh.ts',
-  'src/effects/splat-cut.ts',
+  'src/features/children/splat-scene.ts',
+  'src/features/children/splat-mesh.ts',
+  'src/features/effects/splat-cut.ts',
 ];
 /** Members of the life cycle of Lit and of the platform are inherited, but are no part of the documented interface. */
 const LIFE_CYCLE = [
@@ -89,13 +89,13 @@ const files = { outdir: '.', packageJson: false };
 export default {
   globs: [
     ...ENTRIES,
-    'src/viewing.ts',
-    'src/media.ts',
-    'src/properties.ts',
-    'src/attributes.ts',
-    'src/composition/child.ts',
-    'src/composition/attributes.ts',
-    'src/effects/attributes.ts',
+    'src/viewer/viewing.ts',
+    'src/viewer/media.ts',
+    'src/viewer/properties.ts',
+    'src/viewer/attributes.ts',
+    'src/features/children/child.ts',
+    'src/features/children/attributes.ts',
+    'src/features/effects/attributes.ts',
   ],
   outdir: '.',
   litelement: true,

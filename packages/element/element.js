@@ -1,2 +1,2 @@
 /** For bundlers that do not read `exports` (Parcel). */
-export * from './dist/element.js';
+export * from './dist/viewer/element.js';

@@ -20,7 +20,7 @@ import { workerAsText } from './scripts/worker-text.mjs';
  * These modules of the package stay separate: they find files by their own address, belong to the worker, or are
  * generated here.
  */
-const KEPT = /\/element\/dist\/(loading\/(worker-sources|spawn-worker|scene-worker)|meshes\/three)\.js$/;
+const KEPT = /\/element\/dist\/(loading\/(worker-sources|spawn-worker|scene-worker)|sources\/mesh\/three)\.js$/;
 
 const path = (name) => fileURLToPath(new URL(name, import.meta.url));
 
@@ -47,15 +47,15 @@ const threeOfPackage = {
   name: 'three-of-package',
   writeBundle(_, bundle) {
     threeFile = Object.values(bundle).find(({ isEntry }) => isEntry).fileName;
-    mkdirSync(path('./dist/meshes'), { recursive: true });
-    writeFileSync(path('./dist/meshes/three.js'), `export * from '../../cdn/${threeFile}';\n`);
-    cpSync(path('./src/meshes/three.d.ts'), path('./dist/meshes/three.d.ts'));
+    mkdirSync(path('./dist/sources/mesh'), { recursive: true });
+    writeFileSync(path('./dist/sources/mesh/three.js'), `export * from '../../../cdn/${threeFile}';\n`);
+    cpSync(path('./src/sources/mesh/three.d.ts'), path('./dist/sources/mesh/three.d.ts'));
   },
 };
 const threeBeside = {
   name: 'three-beside',
   resolveId: (id, importer) =>
-    id === './three.js' && importer?.startsWith(path('./dist/meshes/')) ? { id: THREE, external: true } : null,
+    id === './three.js' && importer?.startsWith(path('./dist/sources/mesh/')) ? { id: THREE, external: true } : null,
 };
 
 /** All arguments of the element's viewpoints are its own: its bundles need no checks. */
@@ -71,14 +71,14 @@ const sources = [
   shortShaders(),
   minifyTemplateLiterals({
     include: [
-      'styles',
-      'template',
-      'hands-view',
-      'corner-button',
-      'views/tour',
-      'dynamic/controls-panel',
-      'controllers/hotspot-controller',
-      'controllers/motion-controller',
+      'viewer/styles',
+      'viewer/template',
+      'viewer/corner-button',
+      'features/input/hands-view',
+      'features/views/tour',
+      'features/labels/hotspot-controller',
+      'features/auto-rotate/motion-controller',
+      'sources/generator/controls-panel',
     ].map((name) => path(`./dist/${name}.js`)),
   }),
 ];
@@ -174,7 +174,11 @@ export default [
     output: [output, { dir: path('./dist/loading'), format: 'cjs', plugins: [workerAsText] }],
   },
   {
-    input: { index: path('./dist/index.js'), element: path('./dist/element.js'), scenes: path('./dist/scenes.js') },
+    input: {
+      index: path('./dist/index.js'),
+      element: path('./dist/viewer/element.js'),
+      scenes: path('./dist/scenes.js'),
+    },
     // Imports for nothing but their effects, which these do not have, would make bundlers warn.
     treeshake: { moduleSideEffects: (_, isExternal) => !isExternal },
     // Lit and the errors' class may be the app's own, too.

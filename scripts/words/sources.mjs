@@ -103,7 +103,7 @@ function commentOf(file, doc) {
 
 /** The tables of attributes: their comments are the reference. */
 export function attributeComments() {
-  return ['attributes.ts', 'composition/attributes.ts'].flatMap((name) => {
+  return ['viewer/attributes.ts', 'features/children/attributes.ts'].flatMap((name) => {
     const path = join(PACKAGES, 'element/src', name);
     const file = parse(path);
     const found = [];

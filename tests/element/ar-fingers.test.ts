@@ -1,7 +1,7 @@
 /** Fingers on a phone's screen, as points of a floor or a wall. */
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { fingersOn, type Plane } from '../../packages/element/dist/xr/fingers.js';
+import { fingersOn, type Plane } from '../../packages/element/dist/features/xr/fingers.js';
 
 const EYE = [0, 1.5, 0];
 

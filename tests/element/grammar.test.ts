@@ -6,8 +6,8 @@ import {
   credentialsOf,
   readAttributes,
   type RawAttributes,
-} from '../../packages/element/src/attributes.js';
-import { MESH_ATTRIBUTES, SCENE_ATTRIBUTES } from '../../packages/element/src/composition/attributes.js';
+} from '../../packages/element/src/viewer/attributes.js';
+import { MESH_ATTRIBUTES, SCENE_ATTRIBUTES } from '../../packages/element/src/features/children/attributes.js';
 import {
   fieldOfViewGrammar,
   numberGrammar,
@@ -16,9 +16,9 @@ import {
   targetGrammar,
   upGrammar,
   type AttributeGrammar,
-} from '../../packages/element/src/camera/grammar.js';
-import { lengthGrammar, optionalLengthGrammar } from '../../packages/element/src/camera/lengths.js';
-import { CameraOrbit, CameraTarget, FieldOfView } from '../../packages/element/src/camera/values.js';
+} from '../../packages/element/src/viewer/camera/grammar.js';
+import { lengthGrammar, optionalLengthGrammar } from '../../packages/element/src/viewer/camera/lengths.js';
+import { CameraOrbit, CameraTarget, FieldOfView } from '../../packages/element/src/viewer/camera/values.js';
 
 const orbit = orbitGrammar('0deg 75deg auto');
 const DEGREE = Math.PI / 180;

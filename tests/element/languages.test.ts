@@ -1,7 +1,7 @@
 /** The words of the element in nine languages. */
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { wordsIn } from '../../packages/element/dist/languages.js';
+import { wordsIn } from '../../packages/element/dist/viewer/languages.js';
 
 const LANGUAGES = ['de', 'es', 'fr', 'ja', 'ko', 'pt', 'ru', 'zh'];
 

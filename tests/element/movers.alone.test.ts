@@ -3,10 +3,10 @@ import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import type { Bounds } from '@gaussian-splat/core';
 import type { ReactiveControllerHost } from 'lit';
-import type { RawAttributes } from '../../packages/element/src/attributes.js';
-import { AutoRotateController } from '../../packages/element/src/controllers/auto-rotate-controller.js';
-import { CameraController } from '../../packages/element/src/controllers/camera-controller.js';
-import { PromptController } from '../../packages/element/src/controllers/prompt-controller.js';
+import type { RawAttributes } from '../../packages/element/src/viewer/attributes.js';
+import { AutoRotateController } from '../../packages/element/src/features/auto-rotate/auto-rotate-controller.js';
+import { CameraController } from '../../packages/element/src/viewer/camera-controller.js';
+import { PromptController } from '../../packages/element/src/features/prompt/prompt-controller.js';
 import { settings } from '../support/camera-settings.js';
 
 const BOUNDS: Bounds = { min: [-1, -1, -1], max: [1, 1, 1], center: [0, 0, 0], radius: 2 };

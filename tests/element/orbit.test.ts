@@ -2,7 +2,7 @@ import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { cross, dot, eyeOf, lookAt, type Bounds, type Matrix4, type Vector3 } from '@gaussian-splat/core';
 import fc from 'fast-check';
-import { keyOf, orbitOf, panOf, pinchOf, wheelOf } from '../../packages/element/src/camera/gestures.js';
+import { keyOf, orbitOf, panOf, pinchOf, wheelOf } from '../../packages/element/src/viewer/camera/gestures.js';
 import {
   cameraOfPose,
   eyeOfPose,
@@ -13,13 +13,13 @@ import {
   toViewer,
   viewerFrame,
   type CameraPose,
-} from '../../packages/element/src/camera/orbit.js';
-import { OrbitCamera } from '../../packages/element/src/camera/orbit-camera.js';
-import { limitsOf, poseOf } from '../../packages/element/src/camera/settings.js';
-import { project } from '../../packages/element/src/camera/projection.js';
-import { CameraController } from '../../packages/element/src/controllers/camera-controller.js';
-import { boxOf } from '../../packages/element/src/scene-queries.js';
-import { LabelView, type Located } from '../../packages/element/src/controllers/label-box.js';
+} from '../../packages/element/src/viewer/camera/orbit.js';
+import { OrbitCamera } from '../../packages/element/src/viewer/camera/orbit-camera.js';
+import { limitsOf, poseOf } from '../../packages/element/src/viewer/camera/settings.js';
+import { project } from '../../packages/element/src/viewer/camera/projection.js';
+import { CameraController } from '../../packages/element/src/viewer/camera-controller.js';
+import { boxOf } from '../../packages/element/src/viewer/scene-queries.js';
+import { LabelView, type Located } from '../../packages/element/src/features/labels/label-box.js';
 import { settings } from '../support/camera-settings.js';
 
 /** Rows of the frame of each up axis, as they stand in no formula. */

@@ -3,7 +3,7 @@ import assert from 'node:assert/strict';
 import { test, type TestContext } from 'node:test';
 import { QueueClock, type WorkTime } from '@gaussian-splat/renderer/tools';
 import { GlClock } from '@gaussian-splat/renderer/webgl';
-import { DynamicQualityController } from '../../packages/element/src/controllers/dynamic-quality-controller.js';
+import { DynamicQualityController } from '../../packages/element/src/dynamic-quality/dynamic-quality-controller.js';
 import type { FrameScheduler } from '../../packages/element/src/gpu/frame-scheduler.js';
 import { LEVELS } from '../support/pace-gpu.js';
 

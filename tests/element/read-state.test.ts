@@ -4,8 +4,8 @@ import { test } from 'node:test';
 import type { Camera, GaussianSplatError } from '@gaussian-splat/core';
 import type { Contract } from '@gaussian-splat/core/contract';
 import type { GeneratorModel, GeneratorState } from '@gaussian-splat/generator';
-import type { DynamicState } from '../../packages/element/src/dynamic/dynamic-model.js';
-import { StateReader } from '../../packages/element/src/dynamic/read-state.js';
+import type { DynamicState } from '../../packages/element/src/sources/generator/dynamic-model.js';
+import { StateReader } from '../../packages/element/src/sources/generator/read-state.js';
 
 const CAMERA = {} as Camera;
 const STATE: DynamicState = { timeSeconds: 0, pose: undefined, controls: {}, images: {} };

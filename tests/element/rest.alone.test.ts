@@ -1,12 +1,12 @@
 /** The time of the full frame once the camera rests: the real controller, with the test's clock and a simulated GPU. */
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { DetailController } from '../../packages/element/src/controllers/detail-controller.js';
+import { DetailController } from '../../packages/element/src/sources/stream/detail-controller.js';
 import {
   DynamicQualityController,
   type FramePlan,
   type DynamicQualityOptions,
-} from '../../packages/element/src/controllers/dynamic-quality-controller.js';
+} from '../../packages/element/src/dynamic-quality/dynamic-quality-controller.js';
 import { FrameScheduler } from '../../packages/element/src/gpu/frame-scheduler.js';
 import type { LoadedGaussians } from '../../packages/element/src/gpu/loaded-gaussians.js';
 import type { SceneLoader } from '../../packages/element/src/loading/scene-loader.js';
@@ -338,7 +338,7 @@ test('levels of detail are built once frames have moved slowly for 1.5 s, rests 
       detail.reportMotionFrame(isWhole);
     }
     // They are built by a module of their own.
-    await import('../../packages/element/src/detail/build-levels.js');
+    await import('../../packages/element/src/sources/stream/build-levels.js');
     await new Promise(setImmediate);
     return builds;
   };

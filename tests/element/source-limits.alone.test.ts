@@ -7,7 +7,7 @@ import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { writePly } from '../formats/support/ply-writer.js';
 import { inriaColumns, rawSplats } from '../formats/support/splats.js';
-import { SourceController, type SourceHost } from '../../packages/element/src/controllers/source-controller.js';
+import { SourceController, type SourceHost } from '../../packages/element/src/viewer/source-controller.js';
 import { PreviewSchedule } from '../../packages/element/src/loading/preview-schedule.js';
 import type { SceneLimits, SceneRequest } from '../../packages/element/src/loading/protocol.js';
 

@@ -32,7 +32,7 @@ interface OrbitCameraModule {
 }
 
 const load = <T>(name: string): Promise<T> =>
-  import(`../../packages/element/dist/camera/${name}.js`) as unknown as Promise<T>;
+  import(`../../packages/element/dist/viewer/camera/${name}.js`) as unknown as Promise<T>;
 const degrees = (value: number): number => (value * Math.PI) / 180;
 const finite = (limit: number): fc.Arbitrary<number> => fc.double({ min: -limit, max: limit, noNaN: true });
 const pose = fc.record({

@@ -14,15 +14,19 @@ import {
   toViewer,
   viewerFrame,
   type CameraPose,
-} from '../../packages/element/src/camera/orbit.js';
-import { ATTRIBUTES } from '../../packages/element/src/attributes.js';
-import { fieldOfViewGrammar, orbitGrammar, targetGrammar } from '../../packages/element/src/camera/grammar.js';
-import { poseOf } from '../../packages/element/src/camera/settings.js';
-import { CameraController } from '../../packages/element/src/controllers/camera-controller.js';
-import { poseOfView, type CameraView, type ViewContext } from '../../packages/element/src/views/camera-view.js';
-import { Flight } from '../../packages/element/src/views/flight.js';
-import { easingOf, pathThrough, unwound } from '../../packages/element/src/views/path.js';
-import { readViews } from '../../packages/element/src/views/read-views.js';
+} from '../../packages/element/src/viewer/camera/orbit.js';
+import { ATTRIBUTES } from '../../packages/element/src/viewer/attributes.js';
+import { fieldOfViewGrammar, orbitGrammar, targetGrammar } from '../../packages/element/src/viewer/camera/grammar.js';
+import { poseOf } from '../../packages/element/src/viewer/camera/settings.js';
+import { CameraController } from '../../packages/element/src/viewer/camera-controller.js';
+import {
+  poseOfView,
+  type CameraView,
+  type ViewContext,
+} from '../../packages/element/src/features/views/camera-view.js';
+import { Flight } from '../../packages/element/src/features/views/flight.js';
+import { easingOf, pathThrough, unwound } from '../../packages/element/src/features/views/path.js';
+import { readViews } from '../../packages/element/src/features/views/read-views.js';
 import { settings } from '../support/camera-settings.js';
 import { needsSharedData, sharedFile } from '../support/data.js';
 

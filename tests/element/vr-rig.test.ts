@@ -1,7 +1,7 @@
 /** The position of a person in a headset: turns, steps and jumps on the floor alone. */
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { VrRig } from '../../packages/element/dist/xr/vr-rig.js';
+import { VrRig } from '../../packages/element/dist/features/xr/vr-rig.js';
 
 /** A floor of 4 x 4 m around the origin, at 1 m. */
 const side = 80;

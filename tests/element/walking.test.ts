@@ -1,8 +1,8 @@
 /** The parts of walking that need no page: a body that is put down, and the sticks of gamepads. */
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { Gamepads } from '../../packages/element/src/walk/gamepads.js';
-import { Walker } from '../../packages/element/src/walk/walker.js';
+import { Gamepads } from '../../packages/element/src/features/walk/gamepads.js';
+import { Walker } from '../../packages/element/src/features/walk/walker.js';
 
 /** Two floors of 4 x 4 m around the origin, at 0 m and, in its half with positive x, at 2 m. */
 const side = 80;

@@ -7,7 +7,7 @@ import { DEFAULT_STEPS } from '@gaussian-splat/economise/pages';
 import { deflateQuickly } from '../../packages/cli/src/lib/encoders.mjs';
 import { loadScene } from '../../packages/element/src/loading/load-scene.js';
 import type { SceneRequest } from '../../packages/element/src/loading/protocol.js';
-import { openXrScene, type XrSceneSource } from '../../packages/element/src/xr/xr-scene.js';
+import { openXrScene, type XrSceneSource } from '../../packages/element/src/features/xr/xr-scene.js';
 import { smallCloud } from '../formats/support/small-cloud.js';
 import { detailFolder } from '../support/detail-folder.js';
 

@@ -1,8 +1,8 @@
 /** Time limits of a session's frame by the headset's rate, and the resulting size of the image. */
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { ViewOrder } from '../../packages/element/dist/xr/view-order.js';
-import { XrLoop } from '../../packages/element/dist/xr/xr-session.js';
+import { ViewOrder } from '../../packages/element/dist/features/xr/view-order.js';
+import { XrLoop } from '../../packages/element/dist/features/xr/xr-session.js';
 
 function loopAt(frameRate: number | undefined): XrLoop {
   const session = { frameRate, updateRenderState: () => undefined, requestAnimationFrame: () => 0 };

@@ -1,6 +1,6 @@
 /**
- * Generates the attributes of the manifest and rows of documents from the tables in src/attributes.ts,
- * src/composition/attributes.ts and src/effects/attributes.ts.
+ * Generates the attributes of the manifest and rows of documents from the tables in src/viewer/attributes.ts,
+ * src/features/children/attributes.ts and src/features/effects/attributes.ts.
  */
 import { readFileSync, writeFileSync } from 'node:fs';
 import { fileURLToPath } from 'node:url';

@@ -1,4 +1,4 @@
-/** Exports of three.js that the element uses, for src/meshes/three.d.ts. */
+/** Exports of three.js that the element uses, for src/sources/mesh/three.d.ts. */
 export {
   AnimationMixer,
   Box3,

@@ -3,14 +3,14 @@
  * attributes.
  */
 import type { Camera } from '@gaussian-splat/core';
-import { readAttributes, type RawAttributes } from './attributes.js';
-import type { SceneBounds } from './camera/settings.js';
-import { CameraController } from './controllers/camera-controller.js';
-import { frameCount, frameShares, pathOfList, turntable, type CameraPath } from './views/camera-path.js';
-import { fail } from './views/camera-view.js';
-import { readViews } from './views/read-views.js';
+import { readAttributes, type RawAttributes } from './viewer/attributes.js';
+import type { SceneBounds } from './viewer/camera/settings.js';
+import { CameraController } from './viewer/camera-controller.js';
+import { frameCount, frameShares, pathOfList, turntable, type CameraPath } from './features/views/camera-path.js';
+import { fail } from './features/views/camera-view.js';
+import { readViews } from './features/views/read-views.js';
 
-export type { SceneBounds } from './camera/settings.js';
+export type { SceneBounds } from './viewer/camera/settings.js';
 
 /** Path of the camera, and number and size of the frames along it. */
 export interface PathRequest {

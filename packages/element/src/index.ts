@@ -1,9 +1,9 @@
 /**
  * Registers `<gaussian-splat>`. For the class alone, without registration, import `@gaussian-splat/element/element.js`.
  */
-import { GaussianSplatElement } from './element.js';
+import { GaussianSplatElement } from './viewer/element.js';
 
-export type { ElementError, ElementErrorCode } from './errors.js';
+export type { ElementError, ElementErrorCode } from './viewer/errors.js';
 export type {
   CameraChangeDetail,
   CameraChangeSource,
@@ -18,18 +18,18 @@ export type {
   ViewChangeDetail,
   VisibilityDetail,
   WalkReadyDetail,
-} from './events.js';
-export { GaussianSplatElement } from './element.js';
-export type { SceneStats } from './stats.js';
-export type { DynamicQualityReport } from './controllers/dynamic-quality-controller.js';
-export type { SettableProperties } from './media.js';
-export type { FrameOptions, RecordOptions } from './recording.js';
-export type { ImageOptions } from './viewing.js';
-export type { CameraView, LookView, MatrixView, OrbitView, TrainerView } from './views/camera-view.js';
-export type { Easing } from './views/path.js';
+} from './viewer/events.js';
+export { GaussianSplatElement } from './viewer/element.js';
+export type { SceneStats } from './viewer/stats.js';
+export type { DynamicQualityReport } from './dynamic-quality/dynamic-quality-controller.js';
+export type { SettableProperties } from './viewer/media.js';
+export type { FrameOptions, RecordOptions } from './features/recording/recording.js';
+export type { ImageOptions } from './viewer/viewing.js';
+export type { CameraView, LookView, MatrixView, OrbitView, TrainerView } from './features/views/camera-view.js';
+export type { Easing } from './features/views/path.js';
 export type { SplatShader, SplatUniform } from '@gaussian-splat/renderer/modifiers';
-export type { NamedView } from './views/read-views.js';
-export type { FlightOptions, PathOptions } from './views/tour.js';
+export type { NamedView } from './features/views/read-views.js';
+export type { FlightOptions, PathOptions } from './features/views/tour.js';
 export type {
   InteractionPrompt,
   InteractionPromptStyle,
@@ -38,15 +38,15 @@ export type {
   Reveal,
   TouchAction,
   WheelZoom,
-} from './attributes.js';
-export type { ViewName } from './camera/spoken.js';
-export type { A11yStrings } from './strings.js';
-export { CameraOrbit, CameraTarget, FieldOfView, ScenePoint, type PickedPoint } from './camera/values.js';
-export type { HotspotPlace } from './controllers/hotspot-controller.js';
-export type { SceneBox } from './scene-queries.js';
-export { SceneTimeRanges } from './time-ranges.js';
-export type { GeneratorInput } from './dynamic/inputs.js';
-export type { ControlValues, Numbers, ImageSource, ImageSources } from './dynamic/values.js';
+} from './viewer/attributes.js';
+export type { ViewName } from './viewer/camera/spoken.js';
+export type { A11yStrings } from './viewer/strings.js';
+export { CameraOrbit, CameraTarget, FieldOfView, ScenePoint, type PickedPoint } from './viewer/camera/values.js';
+export type { HotspotPlace } from './features/labels/hotspot-controller.js';
+export type { SceneBox } from './viewer/scene-queries.js';
+export { SceneTimeRanges } from './viewer/time-ranges.js';
+export type { GeneratorInput } from './sources/generator/inputs.js';
+export type { ControlValues, Numbers, ImageSource, ImageSources } from './sources/generator/values.js';
 export type { SceneLimits } from './loading/protocol.js';
 export { SharedDevice, type DeviceLease } from './gpu/shared-device.js';
 

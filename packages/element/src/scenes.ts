@@ -4,20 +4,20 @@
  * child.
  */
 import { GaussianSplatElement } from './index.js';
-import { define } from './composition/compose.js';
-import { defineCuts } from './effects/define.js';
-import type { SplatCutElement } from './effects/splat-cut.js';
+import { define } from './features/children/compose.js';
+import { defineCuts } from './features/effects/define.js';
+import type { SplatCutElement } from './features/effects/splat-cut.js';
 
-import type { CUT_ATTRIBUTES } from './effects/attributes.js';
-import type { MESH_ATTRIBUTES, PropertiesOf, SCENE_ATTRIBUTES } from './composition/attributes.js';
-import type { SettableOf } from './composition/child.js';
-import type { SplatSceneElement } from './composition/splat-scene.js';
+import type { CUT_ATTRIBUTES } from './features/effects/attributes.js';
+import type { MESH_ATTRIBUTES, PropertiesOf, SCENE_ATTRIBUTES } from './features/children/attributes.js';
+import type { SettableOf } from './features/children/child.js';
+import type { SplatSceneElement } from './features/children/splat-scene.js';
 
-export type { ChildEventMap } from './composition/child.js';
-export { SplatCutElement } from './effects/splat-cut.js';
-export type { ScenePointerEvent } from './composition/interaction.js';
-export { SplatMeshElement } from './composition/splat-mesh.js';
-export { SplatSceneElement } from './composition/splat-scene.js';
+export type { ChildEventMap } from './features/children/child.js';
+export { SplatCutElement } from './features/effects/splat-cut.js';
+export type { ScenePointerEvent } from './features/children/interaction.js';
+export { SplatMeshElement } from './features/children/splat-mesh.js';
+export { SplatSceneElement } from './features/children/splat-scene.js';
 
 /** The properties of `<splat-scene>` that a page may set. */
 export type SettableSceneProperties = SettableOf<typeof SCENE_ATTRIBUTES> &

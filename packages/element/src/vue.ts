@@ -4,9 +4,9 @@
  * (tag) => /^(gaussian-splat|splat-)/.test(tag)`.
  */
 import type { HTMLAttributes, PublicProps } from 'vue';
-import type { GaussianSplatElement } from './element.js';
-import type { GaussianSplatEventMap } from './events.js';
-import type { SettableProperties } from './media.js';
+import type { GaussianSplatElement } from './viewer/element.js';
+import type { GaussianSplatEventMap } from './viewer/events.js';
+import type { SettableProperties } from './viewer/media.js';
 import type {
   ChildEventMap,
   SettableCutProperties,

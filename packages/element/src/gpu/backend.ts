@@ -10,7 +10,7 @@ import type {
   World,
 } from '@gaussian-splat/renderer';
 import type { ProbeAnswer, ProbePoint, WorkTime } from '@gaussian-splat/renderer/tools';
-import type { Frame, FrameFilter } from '../dynamic/frame-filter.js';
+import type { Frame, FrameFilter } from '../sources/generator/frame-filter.js';
 
 /** Settings of all frames of an element. */
 export interface Rendering {

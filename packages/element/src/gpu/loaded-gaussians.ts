@@ -1,7 +1,7 @@
 import type { GaussianScene, StreamProgress } from '@gaussian-splat/renderer';
 import { QueueClock } from '@gaussian-splat/renderer/tools';
-import type { SceneBounds } from '../camera/settings.js';
-import type { Timeline } from '../dynamic/dynamic-model.js';
+import type { SceneBounds } from '../viewer/camera/settings.js';
+import type { Timeline } from '../sources/generator/dynamic-model.js';
 import type { FrameSource, LodSettings, Backend, BackendEvents, Drawable } from './backend.js';
 import type { DeviceLease } from './shared-device.js';
 import { WebGpuBackend } from './webgpu-backend.js';

@@ -1,6 +1,6 @@
 /** Errors of missing GPU devices and of insufficient memory, and other rare errors. The module is loaded on demand. */
 import { GaussianSplatError } from '@gaussian-splat/core';
-import { visitorMessages } from '../errors.js';
+import { visitorMessages } from '../viewer/errors.js';
 
 const NO_ADAPTER =
   'This 3D scene needs WebGPU, and this browser found no graphics adapter for it: switch on hardware acceleration or update the graphics driver.';

@@ -1,7 +1,7 @@
 import { loadModule, type GaussianSplatError } from '@gaussian-splat/core';
 import { pickInitialVariants } from '@gaussian-splat/renderer';
 import { sceneBytes } from '@gaussian-splat/renderer/tools';
-import type { DynamicRequest } from '../dynamic/dynamic-model.js';
+import type { DynamicRequest } from '../sources/generator/dynamic-model.js';
 import type {
   FileRequest,
   LoadedScene,
@@ -172,7 +172,7 @@ async function openSequence(
 ): Promise<LoadedGaussians> {
   const { SequencePlayer } = await loadModule(
     'the code that plays sequences',
-    () => import('../dynamic/sequence-player.js'),
+    () => import('../sources/players/sequence-player.js'),
   );
   const { listeners, loops } = options.live();
   const player = await SequencePlayer.open(sequence, { ...options, request, device: lease.device, listeners, loops });
@@ -184,7 +184,10 @@ async function openSequence(
 
 /** Opens a generator. Requests the device and the code concurrently. */
 const openDynamicScene: typeof openLoadedScene = async (request, options, lease) => {
-  const late = await loadModule('the code that runs generators', () => import('../dynamic/open-dynamic-model.js'));
+  const late = await loadModule(
+    'the code that runs generators',
+    () => import('../sources/generator/open-dynamic-model.js'),
+  );
   return late.openDynamicScene(request, options, await lease);
 };
 
@@ -198,7 +201,7 @@ export function isStreamed({ url, isWhole }: SceneRequest): boolean {
 }
 
 const openStreamedScene: typeof openLoadedScene = async (request, options, lease) => {
-  const late = await loadModule('the code that streams scenes', () => import('./open-streamed.js'));
+  const late = await loadModule('the code that streams scenes', () => import('../sources/stream/open-streamed.js'));
   return late.openStreamedScene(request, options, await lease);
 };
 

@@ -1,7 +1,7 @@
 import { loadModule, type Camera } from '@gaussian-splat/core';
 import { Viewpoint, type FrameSettings, type PerFrameSettings } from '@gaussian-splat/renderer';
 import { QueueClock, type ProbeAnswer, type ProbePoint, type WorkTime } from '@gaussian-splat/renderer/tools';
-import type { Frame, FrameFilter } from '../dynamic/frame-filter.js';
+import type { Frame, FrameFilter } from '../sources/generator/frame-filter.js';
 import type {
   CanvasFrame,
   FrameSource,

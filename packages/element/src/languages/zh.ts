@@ -1,5 +1,5 @@
 /** Texts of the element in Chinese. */
-import type { Words } from '../strings.js';
+import type { Words } from '../viewer/strings.js';
 
 export const words: Words = {
   front: '前视图',

@@ -2,8 +2,8 @@
 import type { ErrorData, ShDegree, Vector3 } from '@gaussian-splat/core';
 import type { ModelPlace } from '@gaussian-splat/core/onnx';
 import type { CpuCheckMessage } from '@gaussian-splat/generator';
-import type { RendererChoice } from '../attributes.js';
-import type { SceneBounds } from '../camera/settings.js';
+import type { RendererChoice } from '../viewer/attributes.js';
+import type { SceneBounds } from '../viewer/camera/settings.js';
 import type { FloorOptions } from '@gaussian-splat/formats/walk';
 import type { ClipPart, LoadLimits, SceneSequence, TriangleFile } from '@gaussian-splat/formats';
 import type { PackedGaussians, StreamedScene } from '@gaussian-splat/renderer';

@@ -3,7 +3,7 @@ import { faultsOf } from '@gaussian-splat/renderer/tools';
 import { glBytes } from '@gaussian-splat/renderer/webgl';
 import type { LoadedGaussians } from '../gpu/loaded-gaussians.js';
 import { isGenerator, isStreamed, type OpenOptions } from '../gpu/open-scene.js';
-import { streamCaps } from '../gpu/stream-caps.js';
+import { streamCaps } from '../sources/stream/stream-caps.js';
 import type { LoadedScene, SceneRequest } from '../loading/protocol.js';
 import { GlLoaded } from './gl-loaded.js';
 import { acquireGl, cannotShow, noWebGl, type GlLease } from './gl-session.js';

@@ -1,0 +1,258 @@
+import { css, type ReactiveController, type ReactiveControllerHost } from 'lit';
+import { project } from '../../viewer/camera/projection.js';
+import { toScene } from '../../viewer/camera/orbit.js';
+import type { ScenePoint } from '../../viewer/camera/values.js';
+import type { MeasureDetail } from '../../viewer/events.js';
+import type { XrHost } from '../xr/xr-host.js';
+import { adoptStyles } from '../../viewer/styles.js';
+import { languageOf, type ExtraWord } from '../../viewer/strings.js';
+import { unitOf } from '../xr/vr.js';
+import { WORDS } from '../xr/xr-offer.js';
+
+const STYLES = css`
+  .ruler {
+    position: absolute;
+    inset: 0;
+    width: 100%;
+    height: 100%;
+    pointer-events: none;
+    overflow: hidden;
+    color: var(--measure-color, rgb(255 255 255));
+  }
+  .ruler line {
+    stroke: currentcolor;
+    stroke-width: 2.5;
+    paint-order: stroke;
+    filter: drop-shadow(0 0 1px rgb(0 0 0));
+  }
+  .ruler circle {
+    fill: none;
+    stroke: currentcolor;
+    stroke-width: 2;
+    filter: drop-shadow(0 0 1px rgb(0 0 0));
+  }
+  .ruler-label {
+    position: absolute;
+    padding: 2px 8px;
+    border-radius: 6px;
+    pointer-events: none;
+    font:
+      600 14px / 1.4 system-ui,
+      sans-serif;
+    font-variant-numeric: tabular-nums;
+    white-space: nowrap;
+    /* The numbers and their unit keep their order on pages from right to left. */
+    direction: ltr;
+    color: var(--measure-color, rgb(255 255 255));
+    background: var(--measure-background, rgb(0 0 0 / 0.75));
+    transform: translate(-50%, -50%);
+  }
+`;
+const SVG = 'http://www.w3.org/2000/svg';
+/** Distance between press and release, CSS pixels, from which a movement is a drag and no click. */
+const DRAG = 5;
+/** Number of significant digits of a length. */
+const DIGITS = 3;
+
+/** A ruler: two ends on surfaces of the scene, a line, and its length with its uncertainty. */
+export class Measure implements ReactiveController {
+  readonly #element: ReactiveControllerHost & HTMLElement;
+  readonly #core: XrHost;
+  readonly #place: HTMLElement;
+  readonly #button: HTMLButtonElement;
+  readonly #drawing: SVGSVGElement;
+  readonly #label: HTMLElement;
+  #ends: readonly ScenePoint[] = [];
+  /** URL of the scene that the ends belong to. */
+  #url = '';
+  #listening: AbortController | undefined;
+  #pressed: readonly [number, number] | undefined;
+  #hasKeyboard = false;
+
+  constructor(element: ReactiveControllerHost & HTMLElement, core: XrHost, place: HTMLElement) {
+    this.#element = element;
+    this.#core = core;
+    this.#place = place;
+    adoptStyles(element.shadowRoot!, STYLES);
+    const page = element.ownerDocument;
+    this.#button = Object.assign(page.createElement('button'), { type: 'button' });
+    this.#button.setAttribute('part', 'measure-button');
+    this.#button.addEventListener('click', () => this.#toggle());
+    this.#drawing = page.createElementNS(SVG, 'svg');
+    this.#drawing.setAttribute('class', 'ruler');
+    this.#drawing.setAttribute('aria-hidden', 'true');
+    this.#label = page.createElement('div');
+    this.#label.className = 'ruler-label';
+    this.#label.setAttribute('part', 'measure-label');
+    this.#label.setAttribute('aria-hidden', 'true');
+    element.addController(this);
+  }
+
+  hostUpdated(): void {
+    const { attributes, isOnShow, strings, sources } = this.#core;
+    if (!attributes.measure || !isOnShow) return this.hostDisconnected();
+    const { url } = sources.ownEntry.scene;
+    if (url !== this.#url) this.#ends = [];
+    this.#url = url;
+    if (this.#listening) this.#draw();
+    this.#button.textContent = this.#word('measure');
+    this.#button.lang = languageOf(strings) ?? '';
+    this.#button.setAttribute('aria-pressed', String(this.#listening !== undefined));
+    if (!this.#button.isConnected) this.#place.append(this.#button);
+  }
+
+  #word(key: ExtraWord): string {
+    return this.#core.strings[key] ?? WORDS[key];
+  }
+
+  #say(text: string): void {
+    const { value } = this.#core.behaviors.announcer;
+    // Screen readers announce changes only. A space makes a repeated text another one.
+    value?.say(text !== '' && text === value.text ? `${text}\u00A0` : text);
+  }
+
+  #toggle(): void {
+    if (this.#listening) this.#put();
+    else this.#take();
+    this.#element.requestUpdate();
+  }
+
+  #take(): void {
+    const { surface } = this.#core;
+    if (!surface) return;
+    this.#listening = new AbortController();
+    const { signal } = this.#listening;
+    const on = { signal, capture: true };
+    surface.addEventListener('pointerdown', ({ clientX, clientY }) => (this.#pressed = [clientX, clientY]), on);
+    surface.addEventListener('click', this.#onClick, on);
+    surface.addEventListener('keydown', this.#onKey, on);
+    surface.addEventListener('focus', () => this.#draw(), { signal });
+    surface.addEventListener('blur', () => this.#draw(), { signal });
+    this.#element.addEventListener('camera-change', this.#draw, { signal });
+    const observer = new ResizeObserver(() => requestAnimationFrame(this.#draw));
+    observer.observe(surface);
+    signal.addEventListener('abort', () => observer.disconnect());
+    surface.after(this.#drawing, this.#label);
+    // Keyboard users set the ends in the center of the image, so the image gets the focus.
+    this.#hasKeyboard = this.#button.matches(':focus-visible');
+    if (surface.tabIndex < 0) {
+      surface.tabIndex = 0;
+      signal.addEventListener('abort', () => surface.removeAttribute('tabindex'));
+    }
+    if (this.#hasKeyboard) surface.focus();
+    this.#say(this.#word('measure-keys'));
+    this.#draw();
+  }
+
+  #put(): void {
+    this.#listening?.abort();
+    this.#listening = undefined;
+    this.#ends = [];
+    this.#drawing.remove();
+    this.#label.remove();
+    this.#say('');
+  }
+
+  hostDisconnected(): void {
+    this.#button.remove();
+    if (this.#listening) this.#put();
+  }
+
+  readonly #onClick = (event: MouseEvent): void => {
+    const { clientX, clientY } = event;
+    const from = this.#pressed ?? [clientX, clientY];
+    if (Math.hypot(clientX - from[0], clientY - from[1]) > DRAG) return;
+    event.stopImmediatePropagation();
+    this.#hasKeyboard = false;
+    void this.#setEnd(clientX, clientY);
+  };
+
+  readonly #onKey = (event: KeyboardEvent): void => {
+    if (event.key === 'Escape') {
+      // Otherwise a dialog around the scene would close, too.
+      event.preventDefault();
+      event.stopImmediatePropagation();
+      this.#put();
+      this.#element.requestUpdate();
+      this.#button.focus();
+      return;
+    }
+    if (!this.#hasKeyboard) {
+      this.#hasKeyboard = true;
+      this.#draw();
+    }
+    if (event.key !== 'Enter') return;
+    event.preventDefault();
+    event.stopImmediatePropagation();
+    if (event.repeat) return;
+    const { left, top, width, height } = this.#core.surface!.getBoundingClientRect();
+    void this.#setEnd(left + width / 2, top + height / 2);
+  };
+
+  async #setEnd(clientX: number, clientY: number): Promise<void> {
+    const signal = this.#listening?.signal;
+    const point = await this.#core.positionFromPoint(clientX, clientY);
+    if (!signal || signal.aborted) return;
+    if (point === null) return this.#say(this.#word('measure-none'));
+    // A third point starts a new measurement.
+    this.#ends = this.#ends.length === 1 ? [this.#ends[0], point] : [point];
+    this.#draw();
+    const measured = this.#measured();
+    if (!measured) return this.#say(this.#word('measure-first'));
+    this.#say(textOf(measured));
+    this.#element.dispatchEvent(new CustomEvent('measure', { detail: measured }));
+  }
+
+  #measured(): MeasureDetail | undefined {
+    const [from, to] = this.#ends;
+    if (!to) return undefined;
+    const length = Math.hypot(to.x - from.x, to.y - from.y, to.z - from.z);
+    const uncertainty = Math.hypot(from.uncertainty, to.uncertainty);
+    const unit = unitOf(this.#core);
+    return { from, to, length, uncertainty, meters: unit === undefined ? null : length * unit, unit: unit ?? null };
+  }
+
+  /** Draws the ruler at the projections of its ends in the last frame. */
+  readonly #draw = (): void => {
+    const { drawnFrom: camera, surface, frame } = this.#core;
+    this.#drawing.replaceChildren();
+    this.#label.hidden = true;
+    if (!camera || !surface) return;
+    const [width, height] = [surface.clientWidth, surface.clientHeight];
+    if (this.#hasKeyboard && surface.matches(':focus')) this.#add('circle', { cx: width / 2, cy: height / 2, r: 10 });
+    const ends = this.#ends.map(({ x, y, z }) => {
+      const at = project(camera, toScene(frame, [x, y, z]));
+      return { x: (at.x * width) / camera.width, y: (at.y * height) / camera.height, isAhead: at.depth > 0 };
+    });
+    if (ends.some(({ isAhead }) => !isAhead)) return;
+    const [a, b] = ends;
+    if (b) this.#add('line', { x1: a.x, y1: a.y, x2: b.x, y2: b.y });
+    for (const { x, y } of ends) this.#add('circle', { cx: x, cy: y, r: 4 });
+    const measured = this.#measured();
+    if (!measured) return;
+    this.#label.hidden = false;
+    this.#label.textContent = textOf(measured);
+    this.#label.style.left = `${(a.x + b.x) / 2}px`;
+    this.#label.style.top = `${(a.y + b.y) / 2 - 18}px`;
+  };
+
+  #add(name: string, attributes: Readonly<Record<string, number>>): void {
+    const shape = this.#element.ownerDocument.createElementNS(SVG, name);
+    for (const [key, value] of Object.entries(attributes)) shape.setAttribute(key, value.toFixed(1));
+    this.#drawing.append(shape);
+  }
+}
+
+/**
+ * Returns a text such as `1.24 m ± 0.01 m`, both numbers with the same decimals. If `unit` is null, the numbers are in
+ * units of the scene and have no suffix.
+ */
+function textOf({ length, uncertainty, unit }: MeasureDetail): string {
+  const factor = unit ?? 1;
+  const suffix = unit === null ? '' : ' m';
+  const value = length * factor;
+  const decimals = Math.max(0, DIGITS - 1 - Math.floor(Math.log10(Math.max(value, 1e-3))));
+  const number = (each: number): string => `${each.toFixed(decimals)}${suffix}`;
+  const off = Number.isFinite(uncertainty) ? number(Math.max(uncertainty * factor, 10 ** -decimals)) : '?';
+  return `${number(value)} ± ${off}`;
+}

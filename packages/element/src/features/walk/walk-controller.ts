@@ -1,0 +1,334 @@
+import { subtract, type Vector3 } from '@gaussian-splat/core';
+import type { WalkMap } from '@gaussian-splat/formats/walk';
+import type { ReactiveController, ReactiveControllerHost } from 'lit';
+import type { Attributes } from '../../viewer/attributes.js';
+import { readAttribute } from '../../viewer/camera/grammar.js';
+import { lengthGrammar, optionalLengthGrammar } from '../../viewer/camera/lengths.js';
+import { eyeOfPose, type ViewerFrame } from '../../viewer/camera/orbit.js';
+import type { ScenePoint } from '../../viewer/camera/values.js';
+import type { AnnouncerController } from '../input/announcer-controller.js';
+import type { CameraController } from '../../viewer/camera-controller.js';
+import { MAX_MOVER_STEP_MS, prefersReducedMotion } from '../../viewer/motion.js';
+import type { Feature } from '../../viewer/features.js';
+import { LatestTask } from '../../viewer/latest-task.js';
+import type { SceneRequest } from '../../loading/protocol.js';
+import type { SceneLoader } from '../../loading/scene-loader.js';
+import type { A11yStrings, WalkWord } from '../../viewer/strings.js';
+import { openFloor } from './floor-source.js';
+import { Gamepads } from './gamepads.js';
+import { Joystick } from './joystick.js';
+import { Walker } from './walker.js';
+
+export interface WalkHost {
+  readonly element: HTMLElement;
+  readonly attributes: Pick<Attributes, 'navigation' | 'walkMap' | 'eyeHeight' | 'unit' | 'cameraControls'>;
+  readonly camera: CameraController;
+  readonly behaviors: { readonly announcer: { readonly value: Pick<AnnouncerController, 'say'> | undefined } };
+  readonly surface: HTMLElement | null;
+  readonly frame: ViewerFrame;
+  readonly strings: A11yStrings;
+  readonly services: { readonly sceneLoader: SceneLoader };
+  /** Request of the displayed scene; null while no scene is shown, and for one that moves. */
+  readonly walkable: SceneRequest | null;
+  requestFrame(): void;
+  positionFromPoint(clientX: number, clientY: number): Promise<ScenePoint | null>;
+  warn(sentence: string): void;
+}
+
+const WORDS: Readonly<Record<WalkWord, string>> = {
+  'keys-walk':
+    'The up and down arrow keys walk, left and right turn, W, A, S and D walk to all sides, with Shift faster. ' +
+    'A click on the floor walks there. Home brings the view back.',
+  blocked: 'Blocked',
+};
+/** Minimum area of a floor, m². */
+const MIN_AREA = 4;
+/** Duration of motion that a short key press causes at least, milliseconds. */
+const FIRST_STEP_MS = 50;
+/** Speed of rotation by the arrow keys, radians per second. */
+const TURN = 1.5;
+/** Distance of the camera from the walker's eyes, meters, above which something else has moved the camera. */
+const STRAYED = 0.01;
+
+/** Motion of each key, by KeyboardEvent.code: to the right, forward, and rotation to the left, -1..1. */
+const KEYS: Readonly<Record<string, readonly [right: number, forward: number, turn: number]>> = {
+  KeyW: [0, 1, 0],
+  KeyS: [0, -1, 0],
+  KeyA: [-1, 0, 0],
+  KeyD: [1, 0, 0],
+  ArrowUp: [0, 1, 0],
+  ArrowDown: [0, -1, 0],
+  ArrowLeft: [0, 0, 1],
+  ArrowRight: [0, 0, -1],
+};
+
+/** Moves the camera on the floor of the scene: by keys, clicks and taps on the floor, a joystick, and gamepads. */
+export class WalkController implements ReactiveController, Feature {
+  readonly #host: ReactiveControllerHost & HTMLElement;
+  readonly #of: WalkHost;
+  readonly #held = new Map<string, readonly [number, number, number]>();
+  readonly #joystick: Joystick;
+  readonly #gamepads: Gamepads;
+  #walker: Walker | undefined;
+  /** Point near the start of the walk, viewer space in meters. */
+  #start: Vector3 = [0, 0, 0];
+  /** Position of the camera's eye after the last motion of the walker, viewer space in scene units. */
+  #eye: Vector3 = [0, 0, 0];
+  #isFast = false;
+  #lastStep: number | undefined;
+  #listening: AbortController | undefined;
+  /** Key of the scene and settings that the floor was requested for; undefined before a request. */
+  #askedFor: string | undefined;
+  readonly #opening = new LatestTask();
+  /** Whether the scene has no floor, so that the camera flies. */
+  #isRefused = false;
+  #isSaid = false;
+
+  constructor(host: ReactiveControllerHost & HTMLElement, of: WalkHost) {
+    this.#host = host;
+    this.#of = of;
+    this.#joystick = new Joystick(host.ownerDocument, () => of.requestFrame());
+    this.#gamepads = new Gamepads(host.ownerDocument.defaultView, () => of.requestFrame());
+    host.addController(this);
+  }
+
+  get isRefused(): boolean {
+    return this.#isRefused;
+  }
+
+  /** Help text for the keys; undefined if the camera does not walk. */
+  get keys(): string | undefined {
+    return this.#of.attributes.navigation === 'walk' && !this.#isRefused ? this.#word('keys-walk') : undefined;
+  }
+
+  hostUpdated(): void {
+    const { attributes, surface } = this.#of;
+    if (attributes.navigation !== 'walk' || surface === null || !surface.isConnected) return this.hostDisconnected();
+    this.#ask();
+    this.#joystick.isShown = attributes.cameraControls && this.#walker !== undefined && isTouchScreen();
+    if (!attributes.cameraControls || this.#isRefused) return this.#deafen();
+    if (this.#listening !== undefined) return;
+    this.#listening = new AbortController();
+    const { signal } = this.#listening;
+    // Capturing listeners are called before the listener for the keys that orbit.
+    surface.addEventListener('keydown', this.#onDown, { signal, capture: true });
+    surface.addEventListener('keyup', this.#onUp, { signal });
+    surface.addEventListener('blur', this.#release, { signal });
+    surface.addEventListener('click', this.#onClick, { signal });
+    this.#host.addEventListener('click', this.#onSceneClick, { signal });
+    this.#gamepads.listen(signal);
+    surface.after(this.#joystick.element);
+  }
+
+  advance(now: number): boolean {
+    if (this.#walker === undefined) return false;
+    // A reset of the camera also returns the walker to the start. A new scene has its own start.
+    if (!this.#of.camera.isTouched && this.#of.walkable !== null) this.#begin(this.#walker.map);
+    const stick = this.#stick();
+    const [right, forward, turn] = [...this.#held.values(), stick].reduce(
+      (sum, held) => [sum[0] + held[0], sum[1] + held[1], sum[2] + held[2]] as const,
+      [0, 0, 0] as const,
+    );
+    if (right === 0 && forward === 0 && turn === 0 && !this.#walker.isMoving) {
+      this.#lastStep = undefined;
+      return false;
+    }
+    const stepMs = this.#lastStep === undefined ? 0 : Math.min(MAX_MOVER_STEP_MS, now - this.#lastStep);
+    this.#lastStep = now;
+    this.#move(right, forward, turn, stepMs);
+    return true;
+  }
+
+  /** Walks forward, or backward if negative, by a distance in meters. For the wheel and pinch gestures. */
+  ahead(meters: number): void {
+    const walker = this.#walker;
+    if (walker === undefined) return;
+    this.#land();
+    const { theta } = this.#of.camera.goal;
+    walker.step(Math.abs(meters) / 1.4, -Math.sin(theta) * Math.sign(meters), -Math.cos(theta) * Math.sign(meters));
+    this.#follow();
+  }
+
+  #move(right: number, forward: number, turn: number, stepMs: number): void {
+    const { camera } = this.#of;
+    if (stepMs === 0) return;
+    const seconds = stepMs / 1000;
+    this.#land();
+    if (turn !== 0) camera.lookBy(turn * TURN * seconds, 0);
+    const { theta } = camera.goal;
+    const [sin, cos] = [Math.sin(theta), Math.cos(theta)];
+    this.#walker!.step(seconds, right * cos - forward * sin, -right * sin - forward * cos, this.#isFast);
+    this.#notifyBlocked(right !== 0 || forward !== 0);
+    this.#follow();
+  }
+
+  /** Moves the walker to its start at once, and levels the view. */
+  #begin(map: WalkMap): void {
+    const { camera } = this.#of;
+    this.#walker = new Walker(map, this.#start);
+    camera.lookBy(0, Math.PI / 2 - camera.goal.phi);
+    this.#follow();
+    camera.jumpToGoal();
+  }
+
+  /** Moves the camera's eye to its height above the feet. */
+  #follow(): void {
+    const { camera } = this.#of;
+    const { at, eyeFloor } = this.#walker!;
+    const { unit = 1, eyeHeight } = this.#settings();
+    camera.walkTo([at[0] / unit, (eyeFloor + eyeHeight) / unit, at[2] / unit]);
+    this.#eye = eyeOfPose(camera.goal);
+    this.#of.requestFrame();
+  }
+
+  /** Moves the walker to the floor below the camera if a view, a flight or an attribute has moved the camera. */
+  #land(): void {
+    const { unit = 1 } = this.#settings();
+    const eye = eyeOfPose(this.#of.camera.goal);
+    const [x, y, z] = subtract(eye, this.#eye);
+    if (Math.hypot(x, y, z) * unit > STRAYED) this.#walker!.land(inMeters(eye, unit));
+  }
+
+  /** Announces to screen readers, once, that a wall blocks the way. */
+  #notifyBlocked(isWalking: boolean): void {
+    const isBlocked = isWalking && this.#walker!.isBlocked;
+    if (isBlocked && !this.#isSaid) this.#of.behaviors.announcer.value?.say(this.#word('blocked'));
+    if (!isBlocked && this.#isSaid && isWalking) this.#of.behaviors.announcer.value?.say('');
+    this.#isSaid = isBlocked || (this.#isSaid && !isWalking);
+  }
+
+  /** Computes or fetches the floor, once for each scene and settings. */
+  #ask(): void {
+    const { walkable: request, camera, frame, services } = this.#of;
+    if (request === null) return;
+    const { walkMap, eyeHeight, unit } = this.#settings();
+    const key = JSON.stringify([request.url, walkMap, eyeHeight, unit, frame]);
+    if (key === this.#askedFor) return;
+    this.#forget();
+    this.#askedFor = key;
+    const metersPerUnit = unit ?? 1;
+    const near = (this.#start = inMeters(eyeOfPose(camera.goal), metersPerUnit));
+    const options = { loader: services.sceneLoader, request, frame, metersPerUnit, eyeHeight, near };
+    this.#opening.run(
+      async (signal) => {
+        const mapUrl = walkMap === 'auto' ? null : new URL(walkMap, this.#of.element.baseURI).href;
+        const map = await openFloor({ ...options, mapUrl }, signal);
+        if (signal.aborted) return;
+        if (map.area < MIN_AREA) return this.#refuse(`its floor has ${map.area.toFixed(1)} m², ${MIN_AREA} are needed`);
+        this.#begin(map);
+        this.#host.requestUpdate();
+        this.#of.element.dispatchEvent(new CustomEvent('walk-ready', { detail: { area: map.area } }));
+      },
+      (error) => this.#refuse((error as Error).message),
+    );
+  }
+
+  #refuse(why: string): void {
+    this.#isRefused = true;
+    this.#of.warn(
+      `<gaussian-splat> navigation="walk": ${why}. Visitors fly instead. ` +
+        'Check the attributes up and unit, or name a file of gaussian-splat floor in walk-map.',
+    );
+    this.#host.requestUpdate();
+  }
+
+  readonly #onDown = (event: KeyboardEvent): void => {
+    const keys = event.code in KEYS ? event.code : event.key;
+    const direction = KEYS[keys];
+    if (!direction || event.ctrlKey || event.altKey || event.metaKey || !this.#walker) return;
+    // Shift with the arrow keys rotates the view up and down, as in flight.
+    if (event.shiftKey && keys.startsWith('Arrow')) return;
+    event.preventDefault();
+    event.stopImmediatePropagation();
+    this.#isFast = event.shiftKey;
+    // A short key press may end before the next frame, so it moves the camera at once.
+    if (!event.repeat && !this.#held.has(event.code)) this.#move(...direction, FIRST_STEP_MS);
+    this.#held.set(event.code, direction);
+    this.#of.requestFrame();
+  };
+
+  readonly #onUp = (event: KeyboardEvent): void => {
+    this.#isFast = event.shiftKey;
+    this.#held.delete(event.code);
+    // macOS reports no release of keys while the command key is held.
+    if (event.key === 'Meta') this.#held.clear();
+  };
+
+  readonly #release = (): void => this.#held.clear();
+
+  /** Walks to a click on the frame. If it may belong to an interactive child, {@link #onSceneClick} follows. */
+  readonly #onClick = (event: MouseEvent): void => {
+    const children = [...this.#host.children] as (HTMLElement & { readonly interactive?: boolean })[];
+    if (!children.some(({ interactive, hidden }) => interactive && !hidden)) this.#walkTo(event);
+  };
+
+  /** Walks to a click that was dispatched to the element itself, because it hits no interactive child. */
+  readonly #onSceneClick = (event: MouseEvent): void => {
+    if (event.target === this.#host && 'hit' in event) this.#walkTo(event);
+  };
+
+  /** Walks to the point of a click or tap on the floor. Visitors who prefer reduced motion jump there at once. */
+  #walkTo({ clientX, clientY }: MouseEvent): void {
+    const walker = this.#walker;
+    if (walker === undefined) return;
+    const { unit = 1 } = this.#settings();
+    this.#of.positionFromPoint(clientX, clientY).then(
+      (point) => {
+        if (point === null || this.#walker !== walker) return;
+        this.#land();
+        if (!walker.goTo(inMeters([point.x, point.y, point.z], unit))) return;
+        if (prefersReducedMotion()) {
+          walker.jump();
+          this.#follow();
+        }
+        this.#of.requestFrame();
+      },
+      (error: Error) => this.#of.warn(error.message),
+    );
+  }
+
+  /** Sum of the inputs of the joystick and the gamepads. Each input is -1..1. */
+  #stick(): readonly [right: number, forward: number, turn: number] {
+    const [right, forward, turn] = this.#gamepads.deflection;
+    return [right + this.#joystick.right, forward + this.#joystick.forward, turn];
+  }
+
+  /** Returns the settings of the attributes. Lengths are in meters; `unit` is undefined if the page does not set it. */
+  #settings(): { walkMap: string; eyeHeight: number; unit: number | undefined } {
+    const { walkMap, eyeHeight, unit } = this.#of.attributes;
+    const warn = (sentence: string): void => this.#of.warn(sentence);
+    return {
+      walkMap: walkMap?.trim() || 'auto',
+      eyeHeight: readAttribute('eye-height', eyeHeight, lengthGrammar('1.6m'), warn),
+      unit: readAttribute('unit', unit, optionalLengthGrammar, warn),
+    };
+  }
+
+  #word(key: WalkWord): string {
+    return this.#of.strings[key] ?? WORDS[key];
+  }
+
+  #forget(): void {
+    this.#opening.renew();
+    this.#askedFor = undefined;
+    this.#walker = undefined;
+    this.#isRefused = this.#isSaid = false;
+  }
+
+  #deafen(): void {
+    this.#listening?.abort();
+    this.#listening = undefined;
+    this.#held.clear();
+    this.#joystick.remove();
+  }
+
+  hostDisconnected(): void {
+    this.#deafen();
+    this.#forget();
+  }
+}
+
+const inMeters = ([x, y, z]: Vector3, unit: number): Vector3 => [x * unit, y * unit, z * unit];
+
+/** Whether the primary pointer is coarse, such as a finger. */
+const isTouchScreen = (): boolean => globalThis.matchMedia?.('(pointer: coarse)').matches ?? false;

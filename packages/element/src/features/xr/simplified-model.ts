@@ -1,0 +1,58 @@
+import type { ReactiveController } from 'lit';
+import type { XrHost } from './xr-host.js';
+import { languageOf } from '../../viewer/strings.js';
+import { WORDS, type XrOffer } from './xr-offer.js';
+
+/**
+ * Whether the browser opens models in Quick Look. Such browsers declare the link type `ar`, and provide no WebXR to
+ * scripts.
+ */
+const opensModels = (page: Document): boolean =>
+  page.createElement('a').relList.supports('ar') || /iPhone|iPad/.test(page.defaultView?.navigator.userAgent ?? '');
+
+/**
+ * Replacements of AR on devices without WebXR: a link to the author's own mesh for iPhones, if the page names one;
+ * otherwise the author's content in the slot `ar-fallback`.
+ */
+export class SimplifiedModel implements ReactiveController {
+  readonly #core: XrHost;
+  readonly #place: HTMLElement;
+  readonly #offer: XrOffer;
+  readonly #link: HTMLAnchorElement;
+  readonly #element: HTMLElement;
+  readonly #fallback: HTMLSlotElement;
+
+  constructor(element: HTMLElement, core: XrHost, place: HTMLElement, offer: XrOffer) {
+    this.#core = core;
+    this.#place = place;
+    this.#offer = offer;
+    this.#element = element;
+    this.#link = Object.assign(element.ownerDocument.createElement('a'), { rel: 'ar' });
+    this.#link.setAttribute('part', 'ar-link');
+    // Quick Look opens links whose only child is an image.
+    this.#link.append(element.ownerDocument.createElement('img'));
+    this.#fallback = Object.assign(element.ownerDocument.createElement('slot'), { name: 'ar-fallback' });
+  }
+
+  hostUpdated(): void {
+    const { attributes, strings } = this.#core;
+    const modes = attributes.arModes?.trim() || 'webxr quick-look';
+    const isOffered =
+      attributes.ar &&
+      attributes.iosSrc &&
+      !this.#offer.canActivate &&
+      /(^|\s)quick-look(\s|$)/.test(modes) &&
+      opensModels(this.#element.ownerDocument);
+    const isReplaced =
+      !isOffered && attributes.ar && this.#offer.isUnsupported && this.#element.querySelector('[slot=ar-fallback]');
+    if (!isReplaced) this.#fallback.remove();
+    else if (!this.#fallback.isConnected) this.#place.append(this.#fallback);
+    if (!isOffered) return this.#link.remove();
+    const text = strings['ar-simplified'] ?? WORDS['ar-simplified'];
+    const image = this.#link.querySelector('img')!;
+    image.alt = text;
+    this.#link.lang = languageOf(strings) ?? '';
+    this.#link.href = attributes.iosSrc!;
+    if (!this.#link.isConnected) this.#place.append(this.#link);
+  }
+}

@@ -1,0 +1,158 @@
+/** Plays clips of moving splats. The module is loaded only for clips. */
+import { clipGroupAt, frameAt, type ClipIndex } from '@gaussian-splat/formats';
+import { AnimatedGaussians } from '@gaussian-splat/renderer';
+import type { PackedAnimation } from '@gaussian-splat/renderer/tools';
+import type { SceneBounds } from '../../viewer/camera/settings.js';
+import type { OpenedClip } from '../../loading/clip-of.js';
+import type { ClipAnswer, ClipRequest, ProgressListener, SceneRequest } from '../../loading/protocol.js';
+import type { SceneWorker, SceneLoader } from '../../loading/scene-loader.js';
+import { GroupCache } from './group-cache.js';
+import { GroupSlots } from './group-slots.js';
+import { PlayDirection } from './play-direction.js';
+import type { DynamicListeners, DynamicState, Timeline } from '../generator/dynamic-model.js';
+
+export interface ClipOptions {
+  readonly request: SceneRequest;
+  readonly device: GPUDevice;
+  readonly loader: SceneLoader;
+  readonly signal: AbortSignal;
+  /** Called with the loaded bytes when parts of the clip have arrived, as a video fires `progress`. */
+  readonly onProgress: ProgressListener;
+  readonly listeners: DynamicListeners;
+  readonly loops: () => boolean;
+  /** Start position of playback, seconds. */
+  readonly startSeconds: number;
+  readonly memoryBudget: number | undefined;
+}
+
+/**
+ * Plays a clip. Groups of frames are fetched ahead by byte ranges and uploaded once each; the GPU computes their
+ * frames.
+ */
+export class ClipPlayer implements Timeline {
+  readonly gaussians: AnimatedGaussians;
+  readonly bounds: SceneBounds;
+  readonly duration: number;
+  readonly #index: ClipIndex;
+  readonly #options: ClipOptions;
+  readonly #cache: GroupCache;
+  readonly #slots: GroupSlots;
+  readonly #direction: PlayDirection;
+  #isClosed = false;
+
+  private constructor(options: ClipOptions, index: ClipIndex, gaussians: AnimatedGaussians, cache: GroupCache) {
+    this.#options = options;
+    this.#index = index;
+    this.gaussians = gaussians;
+    this.bounds = index.bounds;
+    this.duration = index.durationSeconds;
+    this.#cache = cache;
+    this.#slots = new GroupSlots(gaussians, index);
+    this.#direction = new PlayDirection(index.frameCount, index.framesPerSecond);
+  }
+
+  /**
+   * Opens a clip. Resolves when the coarse part of the group at the start position is loaded. Rejects with
+   * GaussianSplatError, or the signal's reason.
+   */
+  static async open(options: ClipOptions): Promise<ClipPlayer> {
+    const { device, loader, request, signal, onProgress, memoryBudget, startSeconds, listeners } = options;
+    const ask = async <T>(own: Pick<ClipRequest, 'whole' | 'part'>, aborted: AbortSignal): Promise<T> => {
+      const { url, credentials, limits } = request;
+      const asked: ClipRequest = { isClip: true, url, credentials, limits, ...own };
+      const here = ({ openBoxes }: SceneWorker): Promise<ClipAnswer<T>> =>
+        openBoxes(asked, aborted, () => undefined) as Promise<ClipAnswer<T>>;
+      return (await loader.ask({ type: 'boxes', request: asked }, aborted, here)).clip;
+    };
+    const whole = await localFile(request.url);
+    const opened = await ask<OpenedClip>({ whole }, signal);
+    const { index } = opened;
+    const file = opened.file ?? (opened.isPartial ? whole : new Blob([await loader.fetchFile(request, signal)]));
+    const cache = new GroupCache(index, {
+      fetchPart: (group, part, aborted) => {
+        const { groups, shDegree, origin } = index;
+        const { frames, parts } = groups[group];
+        return ask<PackedAnimation>(
+          { whole: file, part: { part: parts[part], group, frames, shDegree, origin } },
+          aborted,
+        );
+      },
+      onArrival: () => {
+        onProgress(file ? index.byteLength : cache.loadedBytes, index.byteLength);
+        listeners.onInput();
+      },
+      onError: (error) => listeners.onError(error),
+    });
+    const first = clipGroupAt(index, frameAt(index, startSeconds));
+    let gaussians: AnimatedGaussians | undefined;
+    try {
+      const arriving = cache.first(first, signal);
+      arriving.catch(() => undefined);
+      gaussians = await AnimatedGaussians.create(device, { ...index, parts: roomOf(index), memoryBudget });
+      await arriving;
+      signal.throwIfAborted();
+      const player = new ClipPlayer(options, index, gaussians, cache);
+      player.request({ timeSeconds: startSeconds });
+      return player;
+    } catch (error) {
+      cache.close();
+      gaussians?.destroy();
+      throw error;
+    }
+  }
+
+  get buffered(): readonly (readonly [number, number])[] {
+    const { framesPerSecond, groups } = this.#index;
+    const spans: [number, number][] = [];
+    for (const [k, { first, frames }] of groups.entries()) {
+      if (!this.#cache.get(k, 0)) continue;
+      const [start, end] = [first / framesPerSecond, (first + frames) / framesPerSecond];
+      const last = spans.at(-1);
+      if (last && last[1] === start) last[1] = end;
+      else spans.push([start, end]);
+    }
+    return spans;
+  }
+
+  loadedUntil(timeSeconds: number): number {
+    const { groups, framesPerSecond } = this.#index;
+    let group = clipGroupAt(this.#index, frameAt(this.#index, timeSeconds));
+    while (group < groups.length && (this.#cache.get(group, 0) || this.#cache.isMissing(group, 0))) group++;
+    return group < groups.length ? Math.max(timeSeconds, groups[group].first / framesPerSecond) : Infinity;
+  }
+
+  /** Shows the frame at a time, if its group is loaded, and fetches the following groups. */
+  request({ timeSeconds }: Pick<DynamicState, 'timeSeconds'>): void {
+    const frame = frameAt(this.#index, timeSeconds);
+    const group = clipGroupAt(this.#index, frame);
+    const loops = this.#options.loops();
+    this.#cache.want(group, loops, this.#direction.at(frame, loops));
+    if (this.#slots.show(frame, group, this.#cache)) this.#options.listeners.onInput();
+    if (this.#slots.shownFrame === frame || this.#cache.isMissing(group, 0))
+      queueMicrotask(() => this.#isClosed || this.#options.listeners.onShown(timeSeconds));
+  }
+
+  close(): void {
+    this.#isClosed = true;
+    this.#cache.close();
+  }
+}
+
+/** Returns the largest sizes of each part over all groups, for which GPU buffers are allocated. */
+function roomOf({ groups }: ClipIndex): { rows: number; planes: number; frames: number }[] {
+  const room: { rows: number; planes: number; frames: number }[] = [];
+  for (const { frames, parts } of groups) {
+    parts.forEach(({ splats, planes }, k) => {
+      const own = (room[k] ??= { rows: 0, planes: 0, frames: 0 });
+      own.rows = Math.max(own.rows, splats);
+      own.planes = Math.max(own.planes, planes);
+      own.frames = Math.max(own.frames, frames);
+    });
+  }
+  return room;
+}
+
+/** Returns the content of a `blob:` address; undefined for other addresses. */
+async function localFile(url: string): Promise<Blob | undefined> {
+  return url.startsWith('blob:') ? (await fetch(url)).blob() : undefined;
+}

@@ -1,0 +1,184 @@
+/** Opens streamed scenes: manifests of pages (docs/lod-format.md), streamed SOG by boxes, and clips. */
+import { fileRequest } from '@gaussian-splat/core/fetch';
+import { loadModule } from '@gaussian-splat/core';
+import { MemoryLedger, pickInitialVariants, StreamedGaussians, type PoolOptions } from '@gaussian-splat/renderer';
+import { levelSource } from '@gaussian-splat/renderer/tools';
+import type { LoadedBoxes, ProgressListener, SceneLimits, SceneRequest } from '../../loading/protocol.js';
+import type { SceneWorker, SceneLoader } from '../../loading/scene-loader.js';
+import type { ClipPlayer } from '../players/clip-player.js';
+import type { DynamicRequest } from '../generator/dynamic-model.js';
+import type { SceneBounds } from '../../viewer/camera/settings.js';
+import { LoadedGaussians, type OwnedGaussians } from '../../gpu/loaded-gaussians.js';
+import { limitScenes } from '../../gpu/memory-budget.js';
+import { images, unlessWrong } from '../../gpu/initial-frames.js';
+import type { DeviceLease } from '../../gpu/shared-device.js';
+import type { LodSettings } from '../../gpu/backend.js';
+import { streamCaps } from './stream-caps.js';
+
+export interface StreamedOptions {
+  readonly loader: SceneLoader;
+  readonly signal: AbortSignal;
+  readonly onProgress: ProgressListener;
+  /** Maximum GPU memory of the scene, in bytes; undefined for the default of the device. */
+  readonly memoryBudget: number | undefined;
+  /** Called when a part has arrived, so that another frame is needed. */
+  readonly onChange: () => void;
+  /** Returns additional parameters for opening a clip. */
+  readonly live: () => Pick<DynamicRequest, 'listeners' | 'loops' | 'state'>;
+}
+
+/** A scene that is loaded in parts, after its coarsest part has arrived. */
+export interface OpenedStream {
+  readonly gaussians: OwnedGaussians;
+  readonly bounds: SceneBounds;
+  readonly order?: 'pixel' | undefined;
+  readonly detail?: LodSettings;
+  readonly live?: ClipPlayer;
+  readonly warnings?: readonly string[];
+}
+
+/** Fraction of the remaining memory budget that a streamed scene may use, because other scenes may follow. */
+const SHARE_OF_REST = 0.5;
+/** Maximum number of failures of parts that are reported. */
+const MAX_WARNINGS = 16;
+/** Allowed error in pixels. If the limit of splats does not allow it, the error is larger. */
+const DETAIL = 1;
+
+/**
+ * Opens a streamed scene: fetches its manifest or index, and its coarsest level. Failures of parts are added to
+ * `warnings` later.
+ * @throws GaussianSplatError `network/*`, `decode/*`, `out-of-memory/*`, or the signal's reason.
+ */
+async function openStreamed(request: SceneRequest, device: GPUDevice, options: StreamedOptions): Promise<OpenedStream> {
+  if (!new URL(request.url).pathname.endsWith('.json')) return openClip(request, device, options);
+  const { signal, memoryBudget = Infinity, onChange } = options;
+  const caps = streamCaps();
+  const warnings: string[] = [];
+  const pool: PoolOptions = {
+    // Computed when the pool is allocated. Beside many other scenes this scene is coarser, but it always has a slot.
+    get memoryBudget() {
+      const { budgetBytes, bytes } = MemoryLedger.of(device);
+      return Math.min(memoryBudget, caps.bytes, SHARE_OF_REST * Math.max(0, budgetBytes - bytes));
+    },
+    signal,
+    onChange,
+    // The parent of a missing page stays visible. The page is requested repeatedly, but its failure is reported once.
+    onError: (error) => {
+      const sentence = error instanceof Error ? error.message : String(error);
+      if (warnings.includes(sentence) || warnings.length === MAX_WARNINGS) return;
+      warnings.push(sentence);
+      console.warn(sentence);
+    },
+  };
+  const isSog = new URL(request.url).pathname.endsWith('lod-meta.json');
+  const gaussians = await (isSog ? openBoxes : openPages)(request, device, options, pool);
+  const { bounds, order } = gaussians;
+  if (!signal.aborted)
+    return { ...{ gaussians, bounds, order, warnings }, detail: { detail: DETAIL, splatBudget: caps.splats } };
+  gaussians.destroy();
+  throw signal.reason;
+}
+
+async function openClip(request: SceneRequest, device: GPUDevice, options: StreamedOptions): Promise<OpenedStream> {
+  const { ClipPlayer } = await loadModule('the code that plays clips', () => import('../players/clip-player.js'));
+  const { listeners, loops, state } = options.live();
+  const startSeconds = state().timeSeconds;
+  const player = await ClipPlayer.open({ ...options, request, device, listeners, loops, startSeconds });
+  const { gaussians, bounds } = player;
+  return { gaussians, bounds, live: player };
+}
+
+/**
+ * Limits of the downloads of one scene. They apply to the sum of all of its parts; a part that is fetched again counts
+ * once.
+ */
+class Allowance {
+  readonly #limits: SceneLimits;
+  readonly #bytes = new Map<string, number>();
+  #sum = 0;
+
+  constructor(limits: SceneLimits = {}) {
+    this.#limits = limits;
+  }
+
+  /** Returns the limits for a part: the bytes that the other parts leave. */
+  of(part: string): SceneLimits {
+    const { maxBytes = Infinity } = this.#limits;
+    const others = this.#sum - (this.#bytes.get(part) ?? 0);
+    return { ...this.#limits, maxBytes: Math.max(0, maxBytes - others) };
+  }
+
+  async note(part: string, coming: Promise<ArrayBuffer>): Promise<ArrayBuffer> {
+    const bytes = await coming;
+    this.#sum += bytes.byteLength - (this.#bytes.get(part) ?? 0);
+    this.#bytes.set(part, bytes.byteLength);
+    return bytes;
+  }
+}
+
+type Open = (
+  request: SceneRequest,
+  device: GPUDevice,
+  options: StreamedOptions,
+  pool: PoolOptions,
+) => Promise<StreamedGaussians>;
+
+const openPages: Open = async (request, device, { loader, signal, onProgress }, pool) => {
+  const { limits = {} } = request;
+  const allowance = new Allowance(limits);
+  const manifest = await loader.ask(
+    { type: 'manifest', request },
+    signal,
+    ({ openManifest }) => openManifest(request, signal, onProgress),
+    { onProgress },
+  );
+  return StreamedGaussians.open(device, manifest, {
+    ...pool,
+    isDecoded: true,
+    fetchPage: async (page, aborted, coded) => {
+      const part = fileRequest(page, request, limits.origins);
+      return allowance.note(part.url, loader.fetchFile({ ...part, limits: allowance.of(part.url), coded }, aborted));
+    },
+  });
+};
+
+const openBoxes: Open = async (request, device, { loader, signal, onProgress }, pool) => {
+  const { levels, files, runs, firstRuns } = await loader.ask(
+    { type: 'boxes', request },
+    signal,
+    ({ openBoxes }) => openBoxes(request, signal, onProgress) as Promise<LoadedBoxes>,
+    { onProgress },
+  );
+  const { url, credentials } = request;
+  const allowance = new Allowance(request.limits);
+  const source = levelSource(levels, async (page, aborted) => {
+    const [file, first, count] = runs.subarray(3 * (firstRuns[page.box] + page.level));
+    const part = `${page.box} ${page.level}`;
+    const place = { url, path: files[file], first, count };
+    const box = { ...place, page, scene: levels.scene, credentials, limits: allowance.of(part) };
+    const here = ({ readBox }: SceneWorker): Promise<ArrayBuffer> => readBox(box, aborted);
+    return new Uint32Array(await allowance.note(part, loader.ask({ type: 'box', request: box }, aborted, here)));
+  });
+  return StreamedGaussians.openSource(device, source, pool);
+};
+
+/** Opens a streamed scene, which then owns the lease. If the promise rejects, the caller releases the lease. */
+export async function openStreamedScene(
+  request: SceneRequest,
+  options: Omit<StreamedOptions, 'onChange'> & { beforeUpload(byteLength: number): void; readonly submissions: number },
+  lease: DeviceLease,
+): Promise<LoadedGaussians> {
+  const { loader, signal, onProgress, beforeUpload, memoryBudget, submissions, live } = options;
+  const opened: { scene?: LoadedGaussians } = {};
+  await pickInitialVariants(lease.device, images()).catch(unlessWrong);
+  limitScenes(lease.device, memoryBudget);
+  signal.throwIfAborted();
+  const onChange = (): void => opened.scene?.onChange();
+  // The size of the scene is unknown until the manifest is loaded, so its limit is reported.
+  beforeUpload(memoryBudget ?? 0);
+  const { gaussians, bounds, ...rest } = await openStreamed(request, lease.device, {
+    ...{ loader, signal, onProgress, memoryBudget, onChange, live },
+  });
+  opened.scene = new LoadedGaussians(lease, gaussians, bounds, submissions, rest);
+  return opened.scene;
+}

@@ -1,0 +1,94 @@
+import { subtract, type Camera, type Vector3 } from '@gaussian-splat/core';
+import type { ProbeAnswer, ProbePoint } from '@gaussian-splat/renderer/tools';
+import { boxPoints } from './camera/box-points.js';
+import { toViewer } from './camera/orbit.js';
+import { unproject } from './camera/projection.js';
+import { ScenePoint, type PickedPoint } from './camera/values.js';
+import type { SplatChild } from '../features/children/child.js';
+import type { CameraController } from './camera-controller.js';
+import type { ViewController } from './view-controller.js';
+import { isGone } from '../gpu/device-failures.js';
+import type { WorldEntry } from './world-entry.js';
+import type { Meshes } from '../sources/mesh/meshes.js';
+
+export interface QueryHost {
+  readonly element: Element;
+  readonly sources: {
+    readonly members: readonly WorldEntry[];
+    readonly meshes: { readonly value: Pick<Meshes, 'hit'> | undefined };
+  };
+  readonly camera: Pick<CameraController, 'viewerFrame'>;
+  /** Reads the surface positions of the last frame at points of the image. Rejects if the frame is released. */
+  probe(points: readonly ProbePoint[]): Promise<readonly ProbeAnswer[]>;
+  readonly view: Pick<ViewController, 'backend'>;
+  /** The camera of the last frame, with the size of the frame in pixels; undefined before the first frame. */
+  readonly drawnFrom: Camera | undefined;
+  /** Element of the shadow tree that the image fills; null before the first rendering. */
+  readonly surface: HTMLElement | null;
+}
+
+/**
+ * Returns the visible surface under a point of the page and the element that contains the surface. Reads back from the
+ * GPU asynchronously.
+ * @param clientX CSS pixels, same as in a MouseEvent
+ * @returns null outside the scene, on parts less than half opaque, and if the frame is released meanwhile
+ */
+export async function positionFromPoint(
+  host: QueryHost,
+  clientX: number,
+  clientY: number,
+): Promise<PickedPoint | null> {
+  const { camera, view, drawnFrom: drawn, surface } = host;
+  const { backend } = view;
+  if (drawn === undefined || backend === null || surface === null) return null;
+  const share = boxPoints(surface)(clientX, clientY);
+  const [x, y] = [share.x * drawn.width, share.y * drawn.height];
+  if (!(x >= 0 && y >= 0 && x < drawn.width && y < drawn.height)) return null;
+  try {
+    const [answer] = await host.probe([{ x, y }]);
+    if (!answer || answer.depth === null) return null;
+    // The splats of the shadow belong to no element.
+    const placement = answer.splat?.placement;
+    if (placement && !host.sources.members.some((member) => member.placement === placement)) return null;
+    const { near, depth, far } = answer;
+    const at = (z: number): Vector3 => unproject(drawn, { x, y, depth: z });
+    const uncertainty = far === null ? Infinity : distance(at(near ?? depth), at(far)) / 2;
+    const [eye, place] = [at(0), at(depth)];
+    const point = new ScenePoint(...toViewer(camera.viewerFrame, place), uncertainty);
+    return Object.assign(point, { distance: distance(eye, place), ...whose(host, answer, eye, place) });
+  } catch (error) {
+    // The loss of a device is reported by its scene.
+    if (await isGone(backend)) return null;
+    throw error;
+  }
+}
+
+/**
+ * Returns the element that contains a surface, and the splat or the mesh and material that was hit. `eye` and `place`
+ * are in world coordinates.
+ */
+function whose(
+  { element, sources, camera }: QueryHost,
+  { splat }: ProbeAnswer,
+  eye: Vector3,
+  place: Vector3,
+): Pick<PickedPoint, 'element' | 'splat' | 'mesh' | 'material'> {
+  const childOf = (isIt: (member: WorldEntry) => boolean): Element =>
+    [...element.children].find((child) => {
+      const member = (child as Partial<SplatChild>).entry?.member;
+      return member !== undefined && isIt(member);
+    }) ?? element;
+  if (splat) {
+    const { placement, index } = splat;
+    return { element: childOf((member) => member.placement === placement), splat: index, mesh: null, material: null };
+  }
+  const [origin, direction] = [eye, subtract(place, eye)].map((v) => toViewer(camera.viewerFrame, v));
+  const length = Math.hypot(...direction);
+  const ahead: Vector3 = [direction[0] / length, direction[1] / length, direction[2] / length];
+  const hit = sources.meshes.value?.hit(origin, ahead);
+  if (!hit) return { element, splat: null, mesh: null, material: null };
+  const { member: owner, mesh, material } = hit;
+  return { element: childOf((member) => member === owner), splat: null, mesh, material };
+}
+
+const distance = (a: Vector3, b: Vector3): number => Math.hypot(...subtract(a, b));
