@@ -32,6 +32,7 @@ const extent = ['element', 'packages'].find((name) => process.argv.includes(`--$
 const noteBuilt = beginBuild(extent);
 ensureDependencies();
 must(process.execPath, ['scripts/build-shaders.mjs']);
+must(process.execPath, ['scripts/build-languages.mjs']);
 must(process.execPath, [TSC, '--build', ...projects()]);
 for (const project of projects()) removeStaleOutputs(project);
 writeLicenses();

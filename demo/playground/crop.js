@@ -1,6 +1,6 @@
 /** Six sliders for the sides of a box, in the directions that visitors see, and the text of `crop`, which is in the axes of the file. */
 import { toScene, viewerFrame } from '../../packages/element/dist/viewer/camera/orbit.js';
-import { boxGrammar } from '../../packages/element/dist/features/children/grammar.js';
+import { boxGrammar } from '../../packages/element/dist/viewer/camera/placing-grammar.js';
 import { upNow } from './level.js';
 
 /** Each slider: an axis of viewer space, and which of its two ends. */

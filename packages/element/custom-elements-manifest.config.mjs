@@ -88,6 +88,7 @@ const files = { outdir: '.', packageJson: false };
 
 export default {
   globs: [
+    'src/features/*/row.ts',
     ...ENTRIES,
     'src/viewer/viewing.ts',
     'src/viewer/media.ts',

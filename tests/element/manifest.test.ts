@@ -1,6 +1,6 @@
 /** The manifest that editors, wrappers and the docs are made from, held against the element itself. */
 import assert from 'node:assert/strict';
-import { existsSync, readFileSync } from 'node:fs';
+import { existsSync, readdirSync, readFileSync } from 'node:fs';
 import { test } from 'node:test';
 import { fileURLToPath } from 'node:url';
 import ts from 'typescript';
@@ -9,6 +9,11 @@ import { SplatMeshElement, SplatSceneElement } from '@gaussian-splat/element/sce
 
 const folder = fileURLToPath(new URL('../../packages/element/', import.meta.url));
 const source = (name: string): string => readFileSync(`${folder}src/${name}`, 'utf8');
+/** Paths of all modules of features. Those of few pages are in separate chunks. */
+const features = readdirSync(`${folder}src/features`, { recursive: true, encoding: 'utf8' })
+  .filter((name) => name.endsWith('.ts'))
+  .map((name) => `features/${name}`);
+const rows = features.filter((name) => name.endsWith('/row.ts'));
 
 interface Named {
   readonly name: string;
@@ -86,57 +91,53 @@ check('names the attributes of the children, and only members that they have, ea
 });
 
 check('names the events of the typed map, with their types, and every one that the sources dispatch', () => {
-  const file = ts.createSourceFile('events.ts', source('events.ts'), ts.ScriptTarget.Latest, true);
-  const map = file.statements.find(
-    (node): node is ts.InterfaceDeclaration =>
-      ts.isInterfaceDeclaration(node) && node.name.text === 'GaussianSplatEventMap',
-  );
   const typed = new Map(
-    map?.members.filter(ts.isPropertySignature).map((m) => {
-      const name = ts.isStringLiteral(m.name) ? m.name.text : m.name.getText();
-      return [name, m.type?.getText() ?? ''] as const;
+    ['viewer/events.ts', ...rows].flatMap((name) => {
+      const found: (readonly [string, string])[] = [];
+      const visit = (node: ts.Node): void => {
+        if (ts.isInterfaceDeclaration(node) && node.name.text === 'GaussianSplatEventMap')
+          for (const m of node.members.filter(ts.isPropertySignature))
+            found.push([ts.isStringLiteral(m.name) ? m.name.text : m.name.getText(), m.type?.getText() ?? '']);
+        ts.forEachChild(node, visit);
+      };
+      visit(ts.createSourceFile(name, source(name), ts.ScriptTarget.Latest, true));
+      return found;
     }),
   );
   assert.deepEqual(namesOf(element?.events), [...typed.keys()].sort());
   for (const { name, type } of element?.events ?? []) assert.equal(type?.text, typed.get(name), name);
-  const sources = ['element-core.ts', 'source-entry.ts', 'source-list.ts', 'dynamic/dynamic-wiring.ts']
+  const sources = [
+    ...['viewer/viewer.ts', 'viewer/source-entry.ts', 'viewer/source-list.ts', 'sources/generator/dynamic-wiring.ts'],
+    ...features,
+  ]
     .map(source)
     .join('\n');
   const dispatched = matches(sources, /new (?:Custom|Progress)?Event\('([a-z-]+)'/g);
   assert.ok(dispatched.length > 5, dispatched.join());
-  for (const name of dispatched) assert.ok(typed.has(name), name);
+  // A label of the page gets an event of its own.
+  for (const name of dispatched) assert.ok(typed.has(name) || name === 'hotspot-visibility', name);
 });
 
 check('names the slots, parts, custom properties and states that there are', () => {
-  // Features of few pages are in separate chunks.
-  const late = [
-    'views/tour',
-    'hands-view',
-    'dynamic/sound',
-    'controllers/motion-controller',
-    'controllers/hotspot-controller',
-    'xr/ar-overlay',
-    'xr/simplified-model',
-    'xr/measure',
-    'walk/joystick',
-    'composition/interaction',
-  ].map((name) => source(`${name}.ts`));
+  const late = features.map(source);
   // The code of VR and of AR forms its names from the kind of session.
   for (const kind of ['vr', 'ar'])
-    late.push(source('xr/xr-offer.ts').replaceAll('`${kind.name}-button`', `'${kind}-button'`));
-  const [template, styles] = ['template.ts', 'styles.ts'].map((name) => [source(name), ...late].join('\n'));
+    late.push(source('features/xr/xr-offer.ts').replaceAll('`${kind.name}-button`', `'${kind}-button'`));
+  const [template, styles] = ['viewer/template.ts', 'viewer/styles.ts'].map((name) =>
+    [source(name), ...late].join('\n'),
+  );
   const slots = [/<slot name="([a-z-]+)"/g, /createElement\('slot'\), \{ name: '([a-z-]+)'/g].flatMap((pattern) =>
     matches(template, pattern),
   );
   assert.deepEqual(namesOf(element?.slots), unique([...slots, 'hotspot-*', 'sound']));
-  const panelParts = matches(source('dynamic/controls-panel.ts'), /part: '([a-z-]+)'/g);
+  const panelParts = matches(source('sources/generator/controls-panel.ts'), /part: '([a-z-]+)'/g);
   assert.ok(panelParts.length > 0);
   const parts = [/part="([a-z-]+)"/g, /'part', '([a-z-]+)'/g, /[bB]utton\(\s*'([a-z-]+)'/g].flatMap((pattern) =>
     matches(template, pattern),
   );
   assert.deepEqual(namesOf(element?.cssParts), unique([...parts, ...panelParts]));
   assert.deepEqual(namesOf(element?.cssProperties), matches(styles, /var\((--[a-z-]+)/g));
-  const [, states] = /const STATES = \[([^\]]+)\]/.exec(source('element.ts')) ?? [];
+  const [, states] = /const STATES = \[([^\]]+)\]/.exec(source('viewer/element.ts')) ?? [];
   assert.deepEqual(namesOf(element?.cssStates), matches(states, /'([a-z]+)'/g));
 });
 
@@ -179,7 +180,7 @@ check('every member has a type and a description, every parameter a name and a t
 });
 
 check('its keywords are those that the attributes take, the default first', async () => {
-  const { readAttributes } = (await import(`${folder}dist/attributes.js`)) as {
+  const { readAttributes } = (await import(`${folder}dist/viewer/attributes.js`)) as {
     readAttributes: (raw: object, warn: (sentence: string) => void) => Record<string, unknown>;
   };
   const enumerated = (element?.attributes ?? [])
@@ -208,7 +209,7 @@ check('the table of the guide is what the build makes of it, with an example tha
   };
   const guide = readFileSync(`${folder}../../docs/guide/attributes.md`, 'utf8');
   assert.ok(guide.includes(`\n\n${attributeRows(element?.attributes)}\n\n`), 'npm run build writes it again');
-  const { readAttributes } = (await import(`${folder}dist/attributes.js`)) as {
+  const { readAttributes } = (await import(`${folder}dist/viewer/attributes.js`)) as {
     readAttributes: (raw: object, warn: (sentence: string) => void) => Record<string, unknown>;
   };
   for (const { name, fieldName, example = '' } of (element?.attributes ?? []) as (Named & Record<string, string>)[]) {

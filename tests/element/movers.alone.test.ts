@@ -2,15 +2,14 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import type { Bounds } from '@gaussian-splat/core';
-import type { ReactiveControllerHost } from 'lit';
 import type { RawAttributes } from '../../packages/element/src/viewer/attributes.js';
 import { AutoRotateController } from '../../packages/element/src/features/auto-rotate/auto-rotate-controller.js';
 import { CameraController } from '../../packages/element/src/viewer/camera-controller.js';
-import { PromptController } from '../../packages/element/src/features/prompt/prompt-controller.js';
+import { PromptController } from '../../packages/element/src/features/input/prompt-controller.js';
 import { settings } from '../support/camera-settings.js';
+import { viewerOf } from '../support/viewer.js';
 
 const BOUNDS: Bounds = { min: [-1, -1, -1], max: [1, 1, 1], center: [0, 0, 0], radius: 2 };
-const host = { addController: () => undefined, requestUpdate: () => undefined } as unknown as ReactiveControllerHost;
 const degrees = Math.PI / 180;
 
 function framed(changes: Partial<RawAttributes> = {}): CameraController {
@@ -21,10 +20,8 @@ function framed(changes: Partial<RawAttributes> = {}): CameraController {
 }
 
 function rotating(camera: CameraController, rotationPerSecond = 100 * degrees): AutoRotateController {
-  const controller = new AutoRotateController(host, {
-    ...{ camera, mayTurn: true },
-    core: { attributes: { autoRotateDelay: 0, rotationPerSecond }, requestFrame: () => undefined },
-  });
+  const attributes = { autoRotate: true, autoRotateDelay: 0, rotationPerSecond };
+  const controller = new AutoRotateController(viewerOf({ camera, attributes }));
   controller.start();
   return controller;
 }
@@ -60,10 +57,12 @@ test('the prompt leaves the camera where it was, at a limit too', (t) => {
   t.mock.timers.enable({ apis: ['setTimeout'] });
   for (const limits of [{}, { maxCameraOrbit: '2deg auto auto' }, { minCameraOrbit: '-1deg auto auto' }]) {
     const camera = framed(limits);
-    const prompt = new PromptController(host, {
-      ...{ camera, mayPrompt: true, promptWiggles: true },
-      core: { attributes: { interactionPromptThreshold: 10 }, requestFrame: () => undefined },
-    });
+    const attributes = {
+      interactionPrompt: 'auto',
+      interactionPromptStyle: 'wiggle',
+      interactionPromptThreshold: 10,
+    };
+    const prompt = new PromptController(viewerOf({ camera, attributes, input: { enabled: true } }));
     prompt.hostUpdated();
     t.mock.timers.tick(20);
     let farthest = 0;

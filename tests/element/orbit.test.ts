@@ -19,7 +19,7 @@ import { limitsOf, poseOf } from '../../packages/element/src/viewer/camera/setti
 import { project } from '../../packages/element/src/viewer/camera/projection.js';
 import { CameraController } from '../../packages/element/src/viewer/camera-controller.js';
 import { boxOf } from '../../packages/element/src/viewer/scene-queries.js';
-import { LabelView, type Located } from '../../packages/element/src/features/labels/label-box.js';
+import { LabelView, type Located } from '../../packages/element/src/shared/label-box.js';
 import { settings } from '../support/camera-settings.js';
 
 /** Rows of the frame of each up axis, as they stand in no formula. */
@@ -307,7 +307,7 @@ test('limits of the target do not hold a walker back, nor do they move it when i
   controller.frame(BOUNDS);
   controller.pivot = 'eye';
   const eye: Vector3 = [7, 1.6, -3];
-  controller.walkTo(eye);
+  controller.moveEyeTo(eye);
   near(eyeOfPose(controller.goal), eye);
   controller.lookBy(2, 0.4);
   near(eyeOfPose(controller.goal), eye);

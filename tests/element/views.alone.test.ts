@@ -19,14 +19,10 @@ import { ATTRIBUTES } from '../../packages/element/src/viewer/attributes.js';
 import { fieldOfViewGrammar, orbitGrammar, targetGrammar } from '../../packages/element/src/viewer/camera/grammar.js';
 import { poseOf } from '../../packages/element/src/viewer/camera/settings.js';
 import { CameraController } from '../../packages/element/src/viewer/camera-controller.js';
-import {
-  poseOfView,
-  type CameraView,
-  type ViewContext,
-} from '../../packages/element/src/features/views/camera-view.js';
+import { poseOfView, type CameraView, type ViewContext } from '../../packages/element/src/viewer/camera/camera-view.js';
 import { Flight } from '../../packages/element/src/features/views/flight.js';
-import { easingOf, pathThrough, unwound } from '../../packages/element/src/features/views/path.js';
-import { readViews } from '../../packages/element/src/features/views/read-views.js';
+import { easingOf, pathThrough, unwound } from '../../packages/element/src/viewer/camera/path.js';
+import { readViews } from '../../packages/element/src/viewer/camera/read-views.js';
 import { settings } from '../support/camera-settings.js';
 import { needsSharedData, sharedFile } from '../support/data.js';
 

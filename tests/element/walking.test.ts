@@ -2,7 +2,7 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { Gamepads } from '../../packages/element/src/features/walk/gamepads.js';
-import { Walker } from '../../packages/element/src/features/walk/walker.js';
+import { FloorBody } from '../../packages/element/src/floor/floor-body.js';
 
 /** Two floors of 4 x 4 m around the origin, at 0 m and, in its half with positive x, at 2 m. */
 const side = 80;
@@ -16,14 +16,14 @@ const map = {
 };
 
 test('a body is put on the highest floor below a point, and stays where there is none', () => {
-  const walker = new Walker(map, [-1, 1.6, -1]);
+  const walker = new FloorBody(map, [-1, 1.6, -1]);
   assert.deepEqual([walker.at, walker.eyeFloor], [[-1, 0, -1], 0]);
   assert.equal(walker.goTo([-1, 0, 1]), true);
   walker.land([1, 3.6, 1]);
   assert.deepEqual([walker.at, walker.eyeFloor, walker.isMoving], [[1, 2, 1], 2, false]);
   walker.land([9, 1.6, 0]);
   assert.deepEqual(walker.at, [1, 2, 1]);
-  assert.deepEqual(new Walker(map, [9, 1.6, 0]).at, map.start);
+  assert.deepEqual(new FloorBody(map, [9, 1.6, 0]).at, map.start);
 });
 
 interface Pad {

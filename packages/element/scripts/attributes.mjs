@@ -1,6 +1,7 @@
 /**
- * Generates the attributes of the manifest and rows of documents from the tables in src/viewer/attributes.ts,
- * src/features/children/attributes.ts and src/features/effects/attributes.ts.
+ * Generates the attributes of the manifest and rows of documents from the tables in src/viewer/attributes.ts, in
+ * src/features/children/attributes.ts and src/features/effects/attributes.ts, and in the rows of features
+ * (src/features/NAME/row.ts). A row also adds slots, parts, custom properties and events: the tags of its comment.
  */
 import { readFileSync, writeFileSync } from 'node:fs';
 import { fileURLToPath } from 'node:url';
@@ -35,18 +36,31 @@ const kebab = (name) => name.replace(/[A-Z]/g, (letter) => `-${letter.toLowerCas
 /** Types of a kind's property where no type argument says it. */
 const TYPES = { flag: 'boolean', number: 'number | string | null' };
 
-function typeOf(ts, { expression, typeArguments, arguments: [words] }) {
+const isRow = (path) => /features\/[^/]+\/row\.ts$/.test(path);
+
+/** @param navigations Kinds of camera motion that features add to the attribute `navigation`. */
+function typeOf(ts, { expression, typeArguments, arguments: [words] }, navigations) {
   const kind = expression.getText();
-  if (/keyword$/i.test(kind)) return `${words.elements.map((word) => word.getText()).join(' | ')} | null`;
+  if (/keyword$/i.test(kind)) {
+    const named = words.elements.flatMap((word) => (ts.isSpreadElement(word) ? navigations : [word.getText()]));
+    return `${named.join(' | ')} | null`;
+  }
   return TYPES[kind] ?? typeArguments?.at(-1).getText() ?? 'string | null';
 }
 
 /** A plugin of the manifest's analyzer: adds each entry of a table to its element, as an attribute and as its property. */
 export function tableOfAttributes() {
   const found = new Map();
+  const navigations = [];
+  /** Attributes and documented additions of all features. */
+  const ofFeatures = { attributes: [], slots: [], cssParts: [], cssProperties: [], events: [] };
   return {
     name: 'table-of-attributes',
-    analyzePhase({ ts, node }) {
+    analyzePhase({ ts, node, moduleDoc }) {
+      const isOfRow = isRow(moduleDoc.path);
+      if (isOfRow && ts.isVariableStatement(node)) readTags(ts, node, ofFeatures);
+      if (isOfRow && ts.isPropertyAssignment(node) && node.name.getText() === 'navigation')
+        navigations.push(node.initializer.getText());
       if (!ts.isVariableDeclaration(node) || !node.initializer || !ts.isObjectLiteralExpression(node.initializer))
         return;
       if (!/^([A-Z_]*ATTRIBUTES|PLACED)$/.test(node.name.getText())) return;
@@ -58,15 +72,21 @@ export function tableOfAttributes() {
         const [description, fallback, example] = [comment, tagged('default'), tagged('example')].map(
           ts.getTextOfJSDocComment,
         );
-        const type = { text: typeOf(ts, entry.initializer) };
+        const type = { text: typeOf(ts, entry.initializer, navigations) };
         return { name: entry.name.getText(), type, description, ...(fallback && { default: fallback }), example };
       });
       found.set(node.name.getText(), entries);
+      if (isOfRow) ofFeatures.attributes.push(...entries);
     },
     packageLinkPhase({ customElementsManifest: { modules } }) {
       for (const element of modules.flatMap(({ declarations = [] }) => declarations)) {
-        const entries = found.get(TABLES[element.tagName]?.table);
-        if (entries === undefined) continue;
+        const own = found.get(TABLES[element.tagName]?.table);
+        if (own === undefined) continue;
+        const isMain = element.tagName === 'gaussian-splat';
+        const entries = isMain ? [...own, ...ofFeatures.attributes] : own;
+        if (isMain)
+          for (const kind of ['slots', 'cssParts', 'cssProperties', 'events'])
+            element[kind] = [...(element[kind] ?? []), ...ofFeatures[kind]];
         const names = new Set(entries.map(({ name }) => name));
         element.members = [
           ...entries.map((entry) => ({ kind: 'field', privacy: 'public', ...entry, attribute: kebab(entry.name) })),
@@ -83,6 +103,25 @@ export function tableOfAttributes() {
       }
     },
   };
+}
+
+/** Reads the tags of a feature's comment, as the analyzer reads those of a class. */
+function readTags(ts, node, into) {
+  const tags = ts
+    .getJSDocCommentsAndTags(node)
+    .filter(ts.isJSDoc)
+    .flatMap(({ tags = [] }) => tags);
+  for (const { tagName, comment } of tags) {
+    const text = ts.getTextOfJSDocComment(comment) ?? '';
+    const [, type, name, fallback, description] =
+      /^(?:\{(.*?)\} )?(?:\[?(\S+?)(?:=(.*?)\])?) - ([^]*)$/.exec(text) ?? [];
+    if (name === undefined) continue;
+    if (tagName.text === 'slot') into.slots.push({ name, description });
+    if (tagName.text === 'csspart') into.cssParts.push({ name, description });
+    if (tagName.text === 'cssproperty')
+      into.cssProperties.push({ name, description, ...(fallback && { default: fallback }) });
+    if (tagName.text === 'fires') into.events.push({ name, type: { text: type }, description });
+  }
 }
 
 /** The table of a document. */

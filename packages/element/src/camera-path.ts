@@ -6,9 +6,9 @@ import type { Camera } from '@gaussian-splat/core';
 import { readAttributes, type RawAttributes } from './viewer/attributes.js';
 import type { SceneBounds } from './viewer/camera/settings.js';
 import { CameraController } from './viewer/camera-controller.js';
-import { frameCount, frameShares, pathOfList, turntable, type CameraPath } from './features/views/camera-path.js';
-import { fail } from './features/views/camera-view.js';
-import { readViews } from './features/views/read-views.js';
+import { frameCount, frameShares, pathOfList, turntable, type CameraPath } from './viewer/camera/camera-path.js';
+import { fail } from './viewer/camera/camera-view.js';
+import { readViews } from './viewer/camera/read-views.js';
 
 export type { SceneBounds } from './viewer/camera/settings.js';
 

@@ -11,38 +11,36 @@ export type {
   GeneratorMemoryDetail,
   GaussianSplatEventMap,
   HotspotVisibilityDetail,
-  ImmersiveStatusDetail,
   LoadDetail,
-  MeasureDetail,
   PreviewDetail,
-  ViewChangeDetail,
   VisibilityDetail,
-  WalkReadyDetail,
 } from './viewer/events.js';
 export { GaussianSplatElement } from './viewer/element.js';
+export type {
+  FlightOptions,
+  FrameOptions,
+  HotspotPlace,
+  ImmersiveStatusDetail,
+  InteractionPrompt,
+  InteractionPromptStyle,
+  MeasureDetail,
+  PathOptions,
+  RecordOptions,
+  ViewChangeDetail,
+  WalkReadyDetail,
+} from './viewer/feature-table.js';
 export type { SceneStats } from './viewer/stats.js';
 export type { DynamicQualityReport } from './dynamic-quality/dynamic-quality-controller.js';
 export type { SettableProperties } from './viewer/media.js';
-export type { FrameOptions, RecordOptions } from './features/recording/recording.js';
 export type { ImageOptions } from './viewer/viewing.js';
-export type { CameraView, LookView, MatrixView, OrbitView, TrainerView } from './features/views/camera-view.js';
-export type { Easing } from './features/views/path.js';
+export type { CameraView, LookView, MatrixView, OrbitView, TrainerView } from './viewer/camera/camera-view.js';
+export type { Easing } from './viewer/camera/path.js';
 export type { SplatShader, SplatUniform } from '@gaussian-splat/renderer/modifiers';
-export type { NamedView } from './features/views/read-views.js';
-export type { FlightOptions, PathOptions } from './features/views/tour.js';
-export type {
-  InteractionPrompt,
-  InteractionPromptStyle,
-  Loading,
-  Navigation,
-  Reveal,
-  TouchAction,
-  WheelZoom,
-} from './viewer/attributes.js';
+export type { NamedView } from './viewer/camera/read-views.js';
+export type { Loading, Navigation, Reveal, TouchAction, WheelZoom } from './viewer/attributes.js';
 export type { ViewName } from './viewer/camera/spoken.js';
 export type { A11yStrings } from './viewer/strings.js';
 export { CameraOrbit, CameraTarget, FieldOfView, ScenePoint, type PickedPoint } from './viewer/camera/values.js';
-export type { HotspotPlace } from './features/labels/hotspot-controller.js';
 export type { SceneBox } from './viewer/scene-queries.js';
 export { SceneTimeRanges } from './viewer/time-ranges.js';
 export type { GeneratorInput } from './sources/generator/inputs.js';

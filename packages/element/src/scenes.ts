@@ -9,7 +9,8 @@ import { defineCuts } from './features/effects/define.js';
 import type { SplatCutElement } from './features/effects/splat-cut.js';
 
 import type { CUT_ATTRIBUTES } from './features/effects/attributes.js';
-import type { MESH_ATTRIBUTES, PropertiesOf, SCENE_ATTRIBUTES } from './features/children/attributes.js';
+import type { MESH_ATTRIBUTES, SCENE_ATTRIBUTES } from './features/children/attributes.js';
+import type { PropertiesOf } from './viewer/attribute.js';
 import type { SettableOf } from './features/children/child.js';
 import type { SplatSceneElement } from './features/children/splat-scene.js';
 

@@ -213,19 +213,19 @@ describe('chunks that are refused once', () => {
     const cut = document.createElement('splat-cut');
     element.append(cut);
     await comes('effects', () => cut.toggleAttribute('data-orbit'));
-    for (const name of ['extras', 'measure', 'xr-offer', 'vr', 'ar', 'shadow-controller', 'take-alpha'])
+    for (const name of ['offers', 'measure', 'xr-offer', 'vr', 'ar', 'shadow-controller', 'take-alpha'])
       await comes(name, update);
     const flat = show({ src: COMPASS, renderer: 'webgl', 'shadow-intensity': '1' }, 'width: 32px; height: 24px');
     await load(flat);
     await comes('gl-shadow', () => flat.requestUpdate());
     flat.remove();
     element.setAttribute('navigation', 'walk');
-    await comes('walker', update);
+    await comes('walk-controller', update);
     element.setAttribute('skybox-image', SKY);
     await comes('sky', update);
     // Another language asks again.
     for (const lang of ['de', 'es', 'fr', 'ja', 'ko', 'pt', 'ru', 'zh'])
-      await comes(lang, () => {
+      await comes(`words-${lang}`, () => {
         element.lang = element.lang === lang ? 'en' : lang;
         update();
       });

@@ -1,6 +1,6 @@
 /** Handles lost devices that cannot be replaced at once. The module is loaded only then. */
 import { GaussianSplatError } from '@gaussian-splat/core';
-import { timerMs } from '../viewer/attributes.js';
+import { timerMs } from '../viewer/attribute.js';
 import { delay, isDeviceFailure } from './device-failures.js';
 import type { DeviceLease, SharedDevice } from './shared-device.js';
 

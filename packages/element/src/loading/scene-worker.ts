@@ -66,7 +66,7 @@ export const openManifest = async (
 };
 
 export const makeFloor = async (request: FloorRequest, signal: AbortSignal): Promise<WalkMap> => {
-  const code = await loadModule('the code that finds the floor', () => import('./make-floor.js'));
+  const code = await loadModule('the code that finds the floor', () => import('../floor/make-floor.js'));
   return code.makeFloor(request, signal);
 };
 

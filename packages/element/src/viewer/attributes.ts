@@ -5,9 +5,21 @@
  */
 import type { ShDegree, SplatFilter } from '@gaussian-splat/core';
 import type { Quality } from '@gaussian-splat/renderer';
-import type { PropertyDeclaration, PropertyDeclarations } from 'lit';
+import type { PropertyDeclarations } from 'lit';
 import {
-  angleGrammar,
+  bareKeyword,
+  flag,
+  keyword,
+  map,
+  milliseconds,
+  number,
+  read,
+  text,
+  type Attribute,
+  type AttributeTable,
+  type PropertiesOf,
+} from './attribute.js';
+import {
   fieldOfViewGrammar,
   keywordGrammar,
   numberGrammar,
@@ -18,11 +30,9 @@ import {
   type AttributeGrammar,
 } from './camera/grammar.js';
 import type { CameraSettings } from './camera/settings.js';
+import { FEATURES } from './feature-table.js';
 import type { Numbers } from '../sources/generator/values.js';
 import type { A11yStrings } from './strings.js';
-
-/** Limits a delay in ms to the maximum of timers, which treat longer ones, even `Infinity`, as 0. */
-export const timerMs = (wait: number): number => Math.min(wait, 2 ** 31 - 1);
 
 /** Start of loading: when the element enters the viewport, or as soon as it is connected. */
 export type Loading = 'lazy' | 'eager';
@@ -51,51 +61,13 @@ export type WheelZoom = 'auto' | 'always' | 'ctrl' | 'none';
 /** Dismissal of the poster: as soon as the scene can be drawn, or by the page. */
 export type Reveal = 'auto' | 'manual';
 
-/** Whether visitors are shown how to move the camera. */
-export type InteractionPrompt = 'auto' | 'none';
+/** Kinds of camera motion that features add. Their rows extend this interface. */
+export interface FeatureNavigations {}
 
-/** `wiggle` swings the camera with the prompt; `basic` keeps it still. */
-export type InteractionPromptStyle = 'wiggle' | 'basic';
+/** Camera motion under a visitor's control: orbit around its target, or that of a feature. */
+export type Navigation = 'orbit' | keyof FeatureNavigations;
+const NAVIGATIONS = Object.values(FEATURES).flatMap(({ navigation }) => navigation ?? []);
 
-/** Camera motion under a visitor's control: orbit around its target, fly, or walk on the floor. */
-export type Navigation = 'orbit' | 'fly' | 'walk';
-
-/**
- * One attribute, as in the tables of elements. The types `P` of the property and `V` of the parsed value exist only at
- * compile time; `V` is never if the element uses the property directly.
- */
-export interface Attribute<P, V = never> {
-  readonly lit: PropertyDeclaration;
-  readonly grammar?: AttributeGrammar<V>;
-  readonly property?: P;
-}
-
-/** Used as written. */
-export const text = <P = string | null>(): Attribute<P> => ({ lit: {} });
-/** True if present, except for `"false"`, because some frameworks write it as an attribute with a value. */
-export const flag = (): Attribute<boolean> => ({
-  lit: {
-    type: Boolean,
-    converter: { fromAttribute: (value: string | null): boolean => value !== null && value !== 'false' },
-  },
-});
-export const read = <V, P = string | null>(grammar: AttributeGrammar<V>): Attribute<P, V> => ({ lit: {}, grammar });
-const number = <V>(grammar: AttributeGrammar<V>): Attribute<number | string | null, V> => ({ lit: {}, grammar });
-/** The first is the default. */
-const keyword = <V extends string>(words: readonly V[]): Attribute<V | null, V> => read(keywordGrammar(words));
-/** `''` is the value of the bare attribute. */
-export const bareKeyword = <V extends string>(words: readonly V[]): Attribute<V | '' | null, V> =>
-  read(keywordGrammar(words));
-
-const map = <A, B>(grammar: AttributeGrammar<A>, to: (value: A) => B): AttributeGrammar<B> => ({
-  ...grammar,
-  parse: (written) => {
-    const value = grammar.parse(written);
-    return value === null ? null : to(value);
-  },
-});
-const milliseconds = (fallback: number): AttributeGrammar<number> =>
-  map(numberGrammar(fallback, 0, 'milliseconds, 0 or more'), timerMs);
 /** The renderer's own limit. */
 const MAX_DETAIL_PIXELS = 64;
 const detailGrammar: AttributeGrammar<DetailChoice> = {
@@ -147,13 +119,6 @@ export const ATTRIBUTES = {
    */
   reveal: keyword<Reveal>(['auto', 'manual']),
   /**
-   * How the scene appears: `fade`, `grow` from its center, `sweep` along an axis (`x`, `-y` ...), or `detail`, from coarse to fine while it loads; with a time such as `2s`. Visitors who
-   * ask for less motion see it at once. The property `revealProgress`, 0 to 1, drives it by hand.
-   * @default `none`
-   * @example reveal-effect="sweep y 2s"
-   */
-  revealEffect: text(),
-  /**
    * Lets visitors orbit, pan and zoom with mouse, touch and keyboard.
    * @example camera-controls
    */
@@ -199,12 +164,6 @@ export const ATTRIBUTES = {
    * @example orthographic
    */
   orthographic: flag(),
-  /**
-   * Named views that visitors can choose from. Either JSON (as a property, a list), `[{ name, orbit, target, fieldOfView }]`, or the URL of such a file,
-   * of `cameras.json` of a trainer, or of the settings of SuperSplat. Children with `data-orbit` are views, too.
-   * @example views='[{ "name": "Front", "orbit": "0deg 75deg 100%" }]'
-   */
-  views: text<object | string | null>(),
   /**
    * Lower limit of `camera-orbit`.
    * @default `auto`: phi 22.5deg, radius 2 %
@@ -269,120 +228,13 @@ export const ATTRIBUTES = {
    * @default `orbit`
    * @example navigation="walk"
    */
-  navigation: keyword<Navigation>(['orbit', 'fly', 'walk']),
-  /**
-   * URL of a map of the floor for `navigation="walk"`, written by `gaussian-splat floor`, or of voxels (`.voxel.json`) of splat-transform. `auto` makes one from the splats after the scene has loaded.
-   * @default `auto`
-   * @example walk-map="garden.floor"
-   */
-  walkMap: text(),
-  /**
-   * Height of a walker's eyes above the floor, with `m`, `cm` or `mm`.
-   * @default `1.6m`
-   * @example eye-height="1.2m"
-   */
-  eyeHeight: text(),
+  navigation: keyword<Navigation>(['orbit', ...NAVIGATIONS]),
   /**
    * Length of one unit of the scene's file, with `m`, `cm` or `mm`. Without it, walking and VR take a unit for one meter, and rulers show numbers alone.
    * @default unknown
    * @example unit="37cm"
    */
   unit: text(),
-  /**
-   * Offers VR if the browser has a headset: a button, which the slot `vr-button` replaces, and `activateVR()`.
-   * @example vr
-   */
-  vr: flag(),
-  /**
-   * Offers AR if the browser supports it: a button, which the slot `ar-button` replaces, and `activateAR()`. The
-   * subject of the scene stands on the real floor.
-   * @example ar
-   */
-  ar: flag(),
-  /**
-   * How AR is shown: `webxr` in the page; `quick-look` on iPhones, with the model of `ios-src`. `scene-viewer` is known and never chosen: it reads no splats.
-   * @default `webxr quick-look`
-   * @example ar-modes="webxr"
-   */
-  arModes: text(),
-  /**
-   * Placement of an object in AR: on the `floor` or on a `wall`.
-   * @default `floor`
-   * @example ar-placement="wall"
-   */
-  arPlacement: text(),
-  /**
-   * `auto` shows an object of AR 0.5 to 1 m large at first, and two fingers scale it. `fixed` keeps its true size, which takes `unit`.
-   * @default `auto`
-   * @example ar-scale="fixed"
-   */
-  arScale: text(),
-  /**
-   * URL of a USDZ model for iPhones, which have no WebXR: a link says that it is a simplified model.
-   * @default none
-   * @example ios-src="vase.usdz"
-   */
-  iosSrc: text(),
-  /**
-   * URL of an equirectangular image (JPEG, PNG, WebP or AVIF) that surrounds the scene. Its middle lies at +x, as in `<model-viewer>`. It is in saved images and videos, and not in VR and AR.
-   * @default none
-   * @example skybox-image="meadow.jpg"
-   */
-  skyboxImage: text(),
-  /**
-   * Darkness of the shadow on the ground under the scene, 0 to 1. It is computed from the splats and meshes once, and
-   * again when they change.
-   * @default `0`: none. AR has one of `1`
-   * @example shadow-intensity="1"
-   */
-  shadowIntensity: text<number | string | null>(),
-  /**
-   * How soft it is, 0 to 1.
-   * @default `1`
-   * @example shadow-softness="0.5"
-   */
-  shadowSoftness: text<number | string | null>(),
-  /**
-   * Gives visitors a ruler: a button, then two points by mouse, touch or keyboard. The event `measure` has the length.
-   * @example measure
-   */
-  measure: flag(),
-  /**
-   * Turns the camera around the scene until a visitor touches it. It does not start for visitors who ask for less motion, nor while the scene has the
-   * keyboard. A button stops it.
-   * @example auto-rotate
-   */
-  autoRotate: flag(),
-  /**
-   * Milliseconds at rest before it turns.
-   * @default `3000`
-   * @example auto-rotate-delay="10000"
-   */
-  autoRotateDelay: number(milliseconds(3_000)),
-  /**
-   * How fast it turns.
-   * @default `5.625deg`
-   * @example rotation-per-second="30deg"
-   */
-  rotationPerSecond: read(angleGrammar('5.625deg')),
-  /**
-   * `auto` shows visitors who have not touched the scene that it can be rotated. `none` does not.
-   * @default `auto`
-   * @example interaction-prompt="none"
-   */
-  interactionPrompt: keyword<InteractionPrompt>(['auto', 'none']),
-  /**
-   * `basic` is a still image. `wiggle` swings the camera once, which draws frames.
-   * @default `basic`
-   * @example interaction-prompt-style="wiggle"
-   */
-  interactionPromptStyle: keyword<InteractionPromptStyle>(['basic', 'wiggle']),
-  /**
-   * Milliseconds without interaction before the prompt is shown.
-   * @default `3000`
-   * @example interaction-prompt-threshold="0"
-   */
-  interactionPromptThreshold: number(milliseconds(3_000)),
   /**
    * The words of the element in the language of the page: JSON or, as a property, an object. Keys: `front`, `upper-front`, `lower-front`, the same three
    * of `right`, `back` and `left`; `scene`, `role`, `interaction-prompt`, `keys-orbit`, `keys-fly`, `keys-walk`, `keys-views`; `views`, `next-view`, `previous-view`;
@@ -512,11 +364,17 @@ export const ATTRIBUTES = {
   loop: flag(),
 };
 
-type Table = typeof ATTRIBUTES;
+/** Methods and properties that features add with their code. Their rows extend this interface. */
+export interface FeatureMembers {}
+
+/** Attributes of features. The rows of the table extend this interface. */
+export interface FeatureAttributes {}
+
+/** The own attributes of the element, and those of its features. */
+const ALL: AttributeTable = Object.assign({}, ATTRIBUTES, ...Object.values(FEATURES).map((row) => row.attributes));
+type Table = typeof ATTRIBUTES & FeatureAttributes;
 /** The properties of all attributes. */
-export type AttributeProperties = {
-  -readonly [K in keyof Table]: Table[K] extends Attribute<infer P, unknown> ? P : never;
-};
+export type AttributeProperties = PropertiesOf<Table>;
 
 /** An attribute's raw value: text, or the value of the property. */
 export type Raw = string | number | null | undefined;
@@ -529,17 +387,15 @@ export type Attributes = {
   readonly [K in keyof Table]: Table[K] extends Attribute<infer P, infer V> ? ([V] extends [never] ? P : V) : never;
 } & { readonly camera: CameraSettings };
 
-const entries = Object.entries(ATTRIBUTES) as [keyof Table, Attribute<unknown, unknown>][];
+const entries = Object.entries(ALL) as [keyof Table, Attribute<unknown, unknown>][];
 const attributeOf = (property: string): string => property.replace(/[A-Z]/g, (letter) => `-${letter.toLowerCase()}`);
 
 /** Converts to Fetch's option. */
 export const credentialsOf = (crossorigin: Attributes['crossorigin']): RequestCredentials =>
   crossorigin === 'use-credentials' ? 'include' : 'same-origin';
 
-/** Returns the property declarations that Lit needs for a table of attributes, by default that of `<gaussian-splat>`. */
-export const declarations = (
-  table: Readonly<Record<string, Attribute<unknown, unknown>>> = ATTRIBUTES,
-): PropertyDeclarations =>
+/** Returns the property declarations that Lit needs for a table of attributes, by default all of `<gaussian-splat>`. */
+export const declarations = (table: AttributeTable = ALL): PropertyDeclarations =>
   Object.fromEntries(Object.entries(table).map(([name, { lit }]) => [name, { ...lit, attribute: attributeOf(name) }]));
 
 /** The boolean properties. */

@@ -11,8 +11,9 @@ import {
 import { OrbitCamera, type Pivot } from './camera/orbit-camera.js';
 import { frameOf, limitsOf, poseOf, type CameraSettings, type SceneBounds } from './camera/settings.js';
 import { CameraOrbit, CameraTarget, FieldOfView } from './camera/values.js';
+import type { CameraAction } from './camera/gestures.js';
 import type { CameraChangeSource } from './events.js';
-import type { ViewContext } from '../features/views/camera-view.js';
+import type { ViewContext } from './camera/camera-view.js';
 
 /**
  * Returns the bounds with the center and the radius that the camera frames: those of an isolated subject, otherwise
@@ -223,6 +224,24 @@ export class CameraController {
     this.#moveByUser();
   }
 
+  /**
+   * Applies a visitor's gesture or key. With the eye as {@link pivot}, a drag by the height of the frame rotates by the
+   * field of view, so that the scene follows the pointer.
+   * @returns Whether it has an effect; false only for a zoom beyond its limit.
+   */
+  act(action: CameraAction): boolean {
+    const isEye = this.#camera.pivot === 'eye';
+    if (action.type === 'zoom' && !isEye) return this.zoomBy(action.factor);
+    if (action.type === 'reset') this.reset('user-interaction');
+    else if (action.type === 'pan') this.panBy(action.right, action.up);
+    else if (action.type === 'zoom') this.moveBy(0, 0, -Math.log(action.factor) * this.#bounds.radius);
+    else if (isEye) {
+      const share = this.fieldOfView.radians / (2 * Math.PI);
+      this.lookBy(-share * action.theta, -share * action.phi);
+    } else this.orbitBy(action.theta, action.phi);
+    return true;
+  }
+
   /** Flies by a visitor's input: moves camera and target along the camera's own axes, in world units. */
   moveBy(right: number, up: number, forward: number): void {
     this.#camera.moveBy(right, up, forward);
@@ -230,7 +249,7 @@ export class CameraController {
   }
 
   /** Walks by a visitor's input: moves the eye to a point of viewer space. Limits of the target do not apply to it. */
-  walkTo(eye: Vector3): void {
+  moveEyeTo(eye: Vector3): void {
     this.#camera.setEye(eye);
     this.#moveByUser();
   }

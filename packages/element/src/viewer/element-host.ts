@@ -1,3 +1,5 @@
+import type { SplatShader } from '@gaussian-splat/renderer/modifiers';
+import type { ReactiveControllerHost, ReactiveElement } from 'lit';
 import type { SharedDevice } from '../gpu/shared-device.js';
 import type { SceneLimits } from '../loading/protocol.js';
 import type { SceneLoader } from '../loading/scene-loader.js';
@@ -26,8 +28,19 @@ export interface Source {
   readonly postprocess: string | null;
 }
 
+/** The element as its features see it: its properties of playback and of effects besides those of HTMLElement. */
+export interface ViewerElement extends ReactiveControllerHost, HTMLElement, Pick<ReactiveElement, 'isUpdatePending'> {
+  readonly splatShader: SplatShader | null;
+  readonly revealProgress: number | null;
+  readonly currentTime: number;
+  readonly playbackRate: number;
+  readonly paused: boolean;
+  readonly seeking: boolean;
+  readonly readyState: number;
+}
+
 /**
- * Interface of the element for its {@link ElementCore}: its source, and the parts of its shadow tree after the first
+ * Interface of the element for its {@link Viewer}: its source, and the parts of its shadow tree after the first
  * rendering.
  */
 export interface ElementHost {

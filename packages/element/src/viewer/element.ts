@@ -1,7 +1,7 @@
 import { loadModule } from '@gaussian-splat/core';
 import { isServer, type PropertyValues, type ReactiveElement, type TemplateResult } from 'lit';
 import { adoptStyles, styles } from './styles.js';
-import { readAttributes, type Attributes } from './attributes.js';
+import { readAttributes, type Attributes, type FeatureMembers } from './attributes.js';
 import type { CameraSettings } from './camera/settings.js';
 import { visitorMessage, type ElementError } from './errors.js';
 import { SharedDevice } from '../gpu/shared-device.js';
@@ -9,13 +9,11 @@ import { SceneLoader } from '../loading/scene-loader.js';
 import type { GeneratorInput } from '../sources/generator/inputs.js';
 import type { SceneLimits } from '../loading/protocol.js';
 import { CONTROL_PREFIX, readControls, readNumbers } from '../sources/generator/values.js';
-import { ElementCore } from './element-core.js';
+import { Viewer } from './viewer.js';
 import type { SceneStats } from './stats.js';
-import { template } from './template.js';
+import { template, type TemplateModel } from './template.js';
 import { ViewingMethods } from './viewing.js';
 import { readSpokenStrings, type A11yStrings } from './strings.js';
-import type { SoundProperties } from '../features/sound/sound-properties.js';
-import type { ImmersiveMethods } from '../features/xr/methods.js';
 
 /** The properties that move the camera, and the setting of each. */
 const CAMERA_SETTINGS: ReadonlyMap<unknown, keyof CameraSettings> = new Map([
@@ -44,28 +42,12 @@ const STATES = ['loading', 'preview', 'ready', 'playing', 'error', 'unsupported'
  * @tagname gaussian-splat
  * @slot poster - Shown until the scene is.
  * @slot progress-bar - Shown while the scene loads.
- * @slot interaction-prompt - Shown to visitors who have not touched the scene yet.
  * @slot fallback - Shown if neither WebGPU nor WebGL 2 can draw the scene.
  * @slot error - Shown if the scene cannot be displayed.
- * @slot view - Buttons of the page for its views, each with `data-orbit`.
- * @slot sound - An `<audio>` or `<video>` element that plays along with a moving scene; its captions are shown.
- * @slot vr-button - Replaces the button that starts VR.
- * @slot ar-button - Replaces the button that starts AR.
- * @slot exit-ar-button - Replaces the button that ends AR on a phone.
- * @slot ar-prompt - Shown over the image of the camera until the scene is placed in AR.
- * @slot ar-fallback - Shown where the browser has no AR, such as a link for another device.
- * @slot hotspot-* - A label of the page at the scene point in its `data-position`.
  * @csspart canvas - The frame.
  * @csspart poster - The image of the `poster` attribute.
  * @csspart poster-button - The button around it with `reveal="manual"`.
  * @csspart poster-icon - The play symbol in the center of that button.
- * @csspart interaction-prompt - The default interaction prompt.
- * @csspart reset-button - Resets the camera: shown to visitors who have moved it by touch.
- * @csspart views - The bar of the views.
- * @csspart view-name - The name of the current view in that bar.
- * @csspart previous-view - The button of that bar for the previous view.
- * @csspart next-view - The button of that bar for the next view.
- * @csspart pause-button - The button that pauses `auto-rotate` and `autoplay`.
  * @csspart progress-track - The background of the progress bar.
  * @csspart progress-bar - The progress bar.
  * @csspart controls-panel - The panel of the attribute `controls-panel`.
@@ -74,15 +56,6 @@ const STATES = ['loading', 'preview', 'ready', 'playing', 'error', 'unsupported'
  * @csspart control-label - The label of a control.
  * @csspart control-input - The slider, field or button of a control.
  * @csspart control-value - The number beside a slider.
- * @csspart vr-button - The button of the attribute `vr`.
- * @csspart ar-button - The button of the attribute `ar`.
- * @csspart exit-ar-button - The button that ends AR on a phone.
- * @csspart ar-link - The link to the model of `ios-src`.
- * @csspart measure-button - The button of the attribute `measure`.
- * @csspart measure-label - The length beside the ruler.
- * @csspart joystick - The stick of `navigation="walk"` on touch screens.
- * @csspart scene-button - The focusable area of a child with `interactive`.
- * @csspart captions - Lines of the sound's captions.
  * @csspart fallback - The default text if neither WebGPU nor WebGL 2 can draw the scene.
  * @csspart error - The default text after an error.
  * @cssproperty [--poster-fit=cover] - `object-fit` of the poster.
@@ -90,20 +63,6 @@ const STATES = ['loading', 'preview', 'ready', 'playing', 'error', 'unsupported'
  * @cssproperty --progress-bar-color - Color of the progress bar.
  * @cssproperty --progress-track-color - Background color of the progress bar.
  * @cssproperty [--progress-bar-height=4px] - Height of the progress bar.
- * @cssproperty [--interaction-prompt-display=flex] - `none` hides the interaction prompt.
- * @cssproperty --interaction-prompt-background - Background of the default prompt.
- * @cssproperty --interaction-prompt-color - Text color of the default prompt.
- * @cssproperty [--pause-button-display=block] - `none` hides the pause button, for pages with a control of their own.
- * @cssproperty [--reset-button-display=block] - `none` hides the reset button.
- * @cssproperty [--views-display=flex] - `none` hides the bar of the views.
- * @cssproperty [--min-hotspot-opacity=0.25] - Opacity of hotspots that are hidden.
- * @cssproperty [--max-hotspot-opacity=1] - Opacity of visible hotspots.
- * @cssproperty --measure-background - Background of the length beside the ruler.
- * @cssproperty --measure-color - Color of the ruler and its length.
- * @cssproperty [--scene-focus-color=highlight] - Color of the outline of a focused child with `interactive`.
- * @cssproperty --captions-background - Background of captions.
- * @cssproperty --captions-color - Text color of captions.
- * @cssproperty --captions-font - Font of captions.
  * @cssproperty --message-background - Background of the default texts.
  * @cssproperty --message-color - Text color of the default texts.
  * @cssproperty --message-font - Font of the default texts.
@@ -117,13 +76,7 @@ const STATES = ['loading', 'preview', 'ready', 'playing', 'error', 'unsupported'
  * @fires {ProgressEvent} progress - Fired when bytes have arrived.
  * @fires {CustomEvent<PreviewDetail>} preview - Fired when a part of the scene becomes visible while the rest loads.
  * @fires {CustomEvent<ElementError>} error - Fired when the scene cannot be displayed; `detail` is the same object as the property `error`.
- * @fires {CustomEvent<GaussianSplatError>} shader-error - Fired when the function of `splatShader` does not compile; `detail` contains the line. The scene is drawn without it.
  * @fires {CustomEvent<CameraChangeDetail>} camera-change - Fired when the camera has moved; `detail.source` is what moved it.
- * @fires {CustomEvent<ViewChangeDetail>} view-change - Fired when the camera starts to move to a view of the list.
- * @fires {CustomEvent<WalkReadyDetail>} walk-ready - Fired when the floor of `navigation="walk"` is known and the camera stands on it.
- * @fires {CustomEvent<ImmersiveStatusDetail>} vr-status - Fired when VR becomes available, starts, ends, or fails.
- * @fires {CustomEvent<ImmersiveStatusDetail>} ar-status - Fired when AR becomes available, starts, ends, or fails, and when the object is placed in the room.
- * @fires {CustomEvent<MeasureDetail>} measure - Fired when a visitor has measured a length.
  * @fires {Event} poster-dismissed - Fired when the poster is dismissed.
  * @fires {CustomEvent<VisibilityDetail>} model-visibility - Fired when the element enters or leaves the viewport.
  * @fires {CustomEvent<ElementError>} generator-error - Fired when a run of the generator fails; the last valid frame stays.
@@ -190,12 +143,12 @@ export class GaussianSplatElement extends ViewingMethods {
   #controlObserver: MutationObserver | undefined;
   readonly #warned = new Set<string>();
   /** @internal */
-  protected readonly core: ElementCore;
+  protected readonly core: Viewer;
 
   constructor() {
     super();
     this.#internals = (!isServer && this.attachInternals?.()) || null;
-    this.core = new ElementCore(this, this.#readAttributes(), {
+    this.core = new Viewer(this, this.#readAttributes(), {
       source: this,
       services: this.constructor as typeof GaussianSplatElement,
       part: <T extends HTMLElement>(selector: string) => this.renderRoot?.querySelector<T>(selector) ?? null,
@@ -320,16 +273,13 @@ export class GaussianSplatElement extends ViewingMethods {
   }
 
   protected override render(): TemplateResult {
-    const { attributes, strings, sources, reveal, behaviors, labels } = this.core;
+    const { attributes, strings, sources, reveal, features, announcer } = this.core;
     const { state, progress, hasImage } = sources;
     // If one of several scenes fails, the others stay visible.
     const error = hasImage ? null : sources.error;
-    const { prompt, promptWiggles, announcer, motion } = behaviors;
-    return template({
+    const model: TemplateModel = {
       label: this.alt ?? this.getAttribute?.('aria-label') ?? null,
       canMove: this.cameraControls && error === null,
-      navigation: attributes.navigation,
-      walkKeys: this.core.walk.value?.keys,
       poster: this.poster,
       posterLoading: attributes.loading,
       showPoster: reveal.isCovered,
@@ -338,14 +288,12 @@ export class GaussianSplatElement extends ViewingMethods {
       progress,
       error,
       hasPoster: this.#hasPoster,
-      prompt: !prompt?.isShown ? 'none' : promptWiggles ? 'wiggle' : 'basic',
-      motionView: motion.value?.view,
-      onReset: this.core.offersReset ? this.#onReset : null,
       strings,
       spoken: error ? this.#spokenError(error) : (announcer.value?.text ?? ''),
-      hotspots: labels.value?.names ?? [],
-      handsView: this.core.handsView,
-    });
+      slots: features.call('slots').flat(),
+    };
+    const parts = features.call('view', model).filter((part) => part !== undefined);
+    return template(model, parts);
   }
 
   /** The page's own text, if there is one; none for a poster that replaces the scene. */
@@ -367,12 +315,6 @@ export class GaussianSplatElement extends ViewingMethods {
   readonly #onReveal = (): void => {
     this.dismissPoster();
     void this.updateComplete.then(() => this.focus());
-  };
-
-  readonly #onReset = (): void => {
-    this.core.behaviors.act({ type: 'reset' });
-    // The button is removed.
-    this.focus({ preventScroll: true });
   };
 
   /** Lit ignores a value that is set again; for the camera it counts, so that a bookmark works twice. */
@@ -460,9 +402,9 @@ export class GaussianSplatElement extends ViewingMethods {
   }
 }
 
-/** Methods of VR and AR are added with their code. */
+/** Members that features add with their code. */
 // eslint-disable-next-line @typescript-eslint/no-unsafe-declaration-merging
-export interface GaussianSplatElement extends ImmersiveMethods, SoundProperties {}
+export interface GaussianSplatElement extends FeatureMembers {}
 
 declare global {
   interface HTMLElementTagNameMap {

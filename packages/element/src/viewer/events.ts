@@ -1,5 +1,3 @@
-import type { GaussianSplatError } from '@gaussian-splat/core';
-import type { ScenePoint } from './camera/values.js';
 import type { ElementError } from './errors.js';
 
 /**
@@ -10,38 +8,6 @@ export type CameraChangeSource = 'user-interaction' | 'automatic' | 'none';
 
 export interface CameraChangeDetail {
   readonly source: CameraChangeSource;
-}
-
-export interface ViewChangeDetail {
-  /** Name of the view. */
-  readonly name: string;
-  /** Index of the view in the list, from 0. */
-  readonly index: number;
-}
-
-export interface WalkReadyDetail {
-  /** Area of the floor, m². */
-  readonly area: number;
-}
-
-export interface ImmersiveStatusDetail {
-  readonly status: 'not-presenting' | 'session-started' | 'object-placed' | 'failed';
-  /** Reason of the failure, in English; only with the status `failed`. */
-  readonly reason?: string;
-}
-
-export interface MeasureDetail {
-  /** Start of the ruler in viewer space. */
-  readonly from: ScenePoint;
-  readonly to: ScenePoint;
-  /** Length in units of the scene. */
-  readonly length: number;
-  /** Uncertainty of the length, in units of the scene. */
-  readonly uncertainty: number;
-  /** Length in meters; null unless the attribute `unit` defines the unit. */
-  readonly meters: number | null;
-  /** Meters per unit of the scene; null if unknown. */
-  readonly unit: number | null;
 }
 
 export interface LoadDetail {
@@ -96,25 +62,10 @@ export interface GaussianSplatEventMap {
    * view-dependent colors.
    */
   preview: CustomEvent<PreviewDetail>;
-  /** Fired when the hook of `splatShader` does not compile; `detail` names the line. The scene is drawn without it. */
-  'shader-error': CustomEvent<GaussianSplatError>;
   /** Fired when the scene cannot be shown; `detail` is the same object as `element.error`. */
   error: CustomEvent<ElementError>;
   /** Fired when the camera has moved; at most once in each frame. */
   'camera-change': CustomEvent<CameraChangeDetail>;
-  /** Fired when the camera starts moving to a view of the list. */
-  'view-change': CustomEvent<ViewChangeDetail>;
-  /** Fired when the floor of `navigation="walk"` is known and the camera stands on it. */
-  'walk-ready': CustomEvent<WalkReadyDetail>;
-  /** Fired when VR can be started, has started, has ended, or failed. */
-  'vr-status': CustomEvent<ImmersiveStatusDetail>;
-  /**
-   * Fired when AR can be started, has started, has ended or failed, and when the scene is placed in the real
-   * environment.
-   */
-  'ar-status': CustomEvent<ImmersiveStatusDetail>;
-  /** Fired when a visitor has measured a length. */
-  measure: CustomEvent<MeasureDetail>;
   /** Fired when the poster is dismissed and the scene becomes visible. */
   'poster-dismissed': Event;
   /** Fired when the element enters or leaves the viewport. */

@@ -1,12 +1,19 @@
 import { Lazy, type Camera } from '@gaussian-splat/core';
 import type { FrameTarget } from '@gaussian-splat/renderer';
-import type { Attributes } from './attributes.js';
+import type { TemplateResult } from 'lit';
+import type { AttributeTable } from './attribute.js';
+import type { FeatureNavigations } from './attributes.js';
+import type { CameraAction } from './camera/gestures.js';
 import type { Frame } from '../sources/generator/frame-filter.js';
 import type { LoadedGaussians } from '../gpu/loaded-gaussians.js';
+import type { Player } from './playback-controller.js';
+import type { TemplateModel } from './template.js';
+import type { Viewer } from './viewer.js';
 
 /**
  * A capability whose code is loaded when a page uses it: walking, views, labels, effects, the sky, the shadow ... The
- * element calls these members at the times that they name, and knows nothing else of it.
+ * viewer calls these members at the times that they name, and knows nothing else of it. Of the members that return a
+ * value or undefined, the first value counts, in the order of the rows.
  */
 export interface Feature {
   /**
@@ -27,62 +34,112 @@ export interface Feature {
   cleared?(): void;
   /** Called after the children of the element have changed. */
   childrenChanged?(): void;
+  /** Called after the camera has moved. */
+  cameraMoved?(): void;
+  /** Called when a visitor moves the camera. */
+  touched?(): void;
+  /** Called when a visitor or a flight takes the camera, so that automatic motion waits. */
+  rest?(): void;
+  /** Applies a visitor's gesture or key. @returns Whether it has an effect; undefined leaves it to others. */
+  act?(action: CameraAction): boolean | undefined;
+  /** Takes a double click or a double tap at CSS pixels of the viewport. */
+  pick?(clientX: number, clientY: number): true | undefined;
+  /** Stops or resumes automatic motion, for the space bar. @returns true if there is any. */
+  toggleMotion?(): true | undefined;
+  /** Whether automatic motion is allowed. The visitor may have stopped it. */
+  mayMove?(): boolean;
+  /** Returns the player of all automatic playback: `player` together with that of the feature. */
+  playerWith?(player: Player | undefined): Player | undefined;
+  /** Help text for the keys, for screen readers. */
+  keys?(): string | undefined;
+  /** Parts of the shadow tree. They lie over the frame, and below the poster. */
+  view?(model: TemplateModel): TemplateResult | undefined;
+  /** Names of slots. Each gets a box in the layer over the frame. */
+  slots?(): readonly string[];
+}
+
+/** A row of the table of features: when its code is loaded, and what it adds to the element. */
+export interface FeatureRow {
+  /** Purpose of the code for error messages, as in "the code for walking". */
+  readonly what: string;
+  readonly attributes?: AttributeTable;
+  /** Kind of camera motion that the feature adds to the attribute `navigation`. */
+  readonly navigation?: keyof FeatureNavigations;
+  /** Whether the page needs the feature. Checked after each update of the element; loaded code stays. */
+  readonly by?: (viewer: Viewer) => unknown;
+  /** Selector of children that need the feature. */
+  readonly children?: string;
+  /** Whether the first frame of a scene waits for code that is being loaded. */
+  readonly precedesFrames?: boolean;
+  /** Imports the code, and returns the feature. */
+  readonly open: (viewer: Viewer) => Promise<object>;
 }
 
 type Call<K extends keyof Feature> = NonNullable<Feature[K]>;
+type Result<K extends keyof Feature> = ReturnType<Call<K>>;
 
-/** When the code of a feature is loaded without being asked for; it stays loaded. */
-export interface Wanted {
-  /** Checked after each update of the element. */
-  readonly by?: (attributes: Attributes) => unknown;
-  /** Selector of children that need the feature. */
-  readonly children?: string;
-}
-
-/** The features of an element: what loads each of them, and those that are loaded. */
+/** The features of one element: when each of them is loaded, and those that are. */
 export class Features {
-  readonly #rows: (readonly [Wanted, Lazy<unknown>])[] = [];
-  readonly #loaded: Feature[] = [];
-  readonly #update: () => void;
+  readonly #rows: ReadonlyMap<string, readonly [FeatureRow, Lazy<Feature>]>;
+  readonly #loaded = new Map<string, Feature>();
+  readonly #viewer: Viewer;
 
-  /** @param update Called when the code of a feature is loaded. */
-  constructor(update: () => void) {
-    this.#update = update;
+  constructor(table: Readonly<Record<string, FeatureRow>>, viewer: Viewer) {
+    this.#viewer = viewer;
+    const lazy = ([name, row]: [string, FeatureRow]): [string, [FeatureRow, Lazy<Feature>]] => {
+      const open = async (): Promise<Feature> => {
+        const feature = (await row.open(viewer)) as Feature;
+        this.#loaded.set(name, feature);
+        return feature;
+      };
+      return [name, [row, new Lazy(row.what, open, () => viewer.element.requestUpdate())]];
+    };
+    this.#rows = new Map(Object.entries(table).map(lazy));
   }
 
-  /**
-   * Adds a feature.
-   * @param what Purpose of the code for error messages, as in "the code for walking".
-   * @param open Imports the code, and returns the feature or any other object.
-   */
-  add<T extends object>(what: string, wanted: Wanted, open: () => Promise<T>): Lazy<T> {
-    const load = async (): Promise<T> => this.use<T & Feature>(await open());
-    const lazy = new Lazy(what, load, this.#update);
-    this.#rows.push([wanted, lazy]);
-    return lazy;
+  /** Returns a feature by the name of its row, for code that calls more of it than {@link Feature} has. */
+  get<T extends object>(name: string): Lazy<T> {
+    return this.#rows.get(name)![1] as unknown as Lazy<T>;
   }
 
-  /** Calls a feature from now on. */
-  use<T extends Feature>(feature: T): T {
-    this.#loaded.push(feature);
-    return feature;
+  /** Fulfills when no code of features is being loaded. Never rejects. */
+  get settled(): Promise<unknown> {
+    return Promise.all([...this.#rows.values()].map(([, lazy]) => lazy.settled));
+  }
+
+  /** Fulfills when the code is loaded that a first frame waits for. Never rejects. */
+  get readyForFrames(): Promise<unknown> {
+    return Promise.all([...this.#rows.values()].map(([row, lazy]) => row.precedesFrames && lazy.settled));
   }
 
   /** Loads the code that attributes need. */
-  readAttributes(attributes: Attributes, onError: (error: Error) => void): void {
-    for (const [{ by }, lazy] of this.#rows) if (by?.(attributes)) lazy.want(onError);
+  readAttributes(): void {
+    for (const [{ by }, lazy] of this.#rows.values()) if (by?.(this.#viewer)) lazy.want(this.#viewer.warnOf);
   }
 
   /** Loads the code that children need, and calls `childrenChanged`. */
-  readChildren(element: HTMLElement, onError: (error: Error) => void): void {
-    for (const [{ children }, lazy] of this.#rows) if (children && element.querySelector(children)) lazy.want(onError);
+  readChildren(): void {
+    const { element, warnOf } = this.#viewer;
+    for (const [{ children }, lazy] of this.#rows.values())
+      if (children && element.querySelector(children)) lazy.want(warnOf);
     this.call('childrenChanged');
   }
 
-  /** Calls a member of all loaded features that have it. */
-  call<K extends keyof Feature>(name: K, ...args: Parameters<Call<K>>): ReturnType<Call<K>>[] {
-    return this.#loaded.flatMap((feature) =>
-      feature[name] ? [(feature[name] as (...args: unknown[]) => ReturnType<Call<K>>)(...args)] : [],
-    );
+  /** Calls a member of all loaded features that have it, in the order of the rows. */
+  call<K extends keyof Feature>(name: K, ...args: Parameters<Call<K>>): Result<K>[] {
+    return [...this.#rows.keys()].flatMap((row) => {
+      const feature = this.#loaded.get(row);
+      return feature?.[name] ? [(feature[name] as (...args: unknown[]) => Result<K>)(...args)] : [];
+    });
+  }
+
+  /** Returns the first defined result of {@link call}, and calls no further feature. */
+  first<K extends keyof Feature>(name: K, ...args: Parameters<Call<K>>): Result<K> | undefined {
+    for (const row of this.#rows.keys()) {
+      const feature = this.#loaded.get(row);
+      const result = (feature?.[name] as ((...args: unknown[]) => Result<K>) | undefined)?.apply(feature, args);
+      if (result !== undefined) return result;
+    }
+    return undefined;
   }
 }

@@ -1,6 +1,6 @@
 import { SplatProperties } from './properties.js';
 import type { Timeline } from '../sources/generator/dynamic-model.js';
-import type { ElementCore } from './element-core.js';
+import type { Viewer } from './viewer.js';
 import { SceneTimeRanges } from './time-ranges.js';
 import type { LitElement } from 'lit';
 
@@ -28,7 +28,7 @@ const isSaid = (value: number | null | undefined): boolean => value !== null && 
 /** Playback of an animated scene, with the interface of HTMLMediaElement, so that controls for video work. */
 export abstract class MediaProperties extends SplatProperties {
   /** @internal */
-  protected abstract readonly core: ElementCore;
+  protected abstract readonly core: Viewer;
   /** Fulfills when the scene is shown or nothing is pending. */
   abstract get ready(): Promise<void>;
 

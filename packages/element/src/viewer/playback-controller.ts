@@ -27,6 +27,9 @@ export interface PlaybackHost {
   playbackEvent(type: PlaybackEvent): void;
 }
 
+/** The part of a clock that a button for automatic motion uses. */
+export type Player = Pick<PlaybackController, 'canPlay' | 'paused' | 'play' | 'pause'>;
+
 /** Events of a scene that can be played, as a video fires them for HAVE_ENOUGH_DATA. */
 export const PLAYABLE = ['canplay', 'canplaythrough'] as const;
 

@@ -4,7 +4,7 @@ import { boxPoints } from './camera/box-points.js';
 import { toViewer } from './camera/orbit.js';
 import { unproject } from './camera/projection.js';
 import { ScenePoint, type PickedPoint } from './camera/values.js';
-import type { SplatChild } from '../features/children/child.js';
+import type { SourceEntry } from './source-entry.js';
 import type { CameraController } from './camera-controller.js';
 import type { ViewController } from './view-controller.js';
 import { isGone } from '../gpu/device-failures.js';
@@ -75,7 +75,7 @@ function whose(
 ): Pick<PickedPoint, 'element' | 'splat' | 'mesh' | 'material'> {
   const childOf = (isIt: (member: WorldEntry) => boolean): Element =>
     [...element.children].find((child) => {
-      const member = (child as Partial<SplatChild>).entry?.member;
+      const member = (child as { readonly entry?: SourceEntry }).entry?.member;
       return member !== undefined && isIt(member);
     }) ?? element;
   if (splat) {

@@ -9,7 +9,7 @@ import type { ProgressListener, SceneRequest } from '../loading/protocol.js';
 import { LatestTask } from './latest-task.js';
 import { isSameContract } from '../loading/same-contract.js';
 import type { Services } from './element-host.js';
-import { timerMs } from './attributes.js';
+import { timerMs } from './attribute.js';
 
 /**
  * State of the requested scene. `empty`: no scene is requested. `waiting`: loading may not start yet, for example

@@ -1,4 +1,4 @@
-import { Lazy, type Camera } from '@gaussian-splat/core';
+import { Lazy, type Camera, type Matrix4 } from '@gaussian-splat/core';
 import type { ReactiveControllerHost, ReactiveElement } from 'lit';
 import type { Attributes } from './attributes.js';
 import type { DetailHost } from '../sources/stream/detail-controller.js';
@@ -79,6 +79,8 @@ export interface SourceOwner {
   readonly open?: SceneHost['owner']['open'];
   /** Sets the transform of the source; absent if its frame is that of the world. */
   place?(member: WorldEntry, core: EntryCore): void;
+  /** Returns the matrix from the coordinates of nested children (y up) to the world; absent for the element itself. */
+  frameToWorld?(member: WorldEntry): Matrix4;
   /** Converts a camera from world coordinates to those of the source; absent if they are equal. */
   seenFrom?(camera: Camera, member: WorldEntry | undefined, core: EntryCore): Camera;
   warn(sentence: string): void;

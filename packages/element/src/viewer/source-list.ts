@@ -2,7 +2,7 @@ import { Lazy, type Camera } from '@gaussian-splat/core';
 import { World } from '@gaussian-splat/renderer';
 import { boundsOfWorld } from '@gaussian-splat/renderer/tools';
 import type { SceneBounds } from './camera/settings.js';
-import type { MotionCore } from '../features/auto-rotate/motion-controller.js';
+import type { Player } from './playback-controller.js';
 import type { Entrance, SceneState } from './scene-controller.js';
 import type { ElementError } from './errors.js';
 import type { ViewerFrame } from './camera/orbit.js';
@@ -285,7 +285,7 @@ export class SourceList implements EntryList {
   }
 
   /** Plays and pauses all sources that play automatically; undefined if there are none. */
-  get player(): MotionCore['player'] {
+  get player(): Player | undefined {
     const clocks = this.#all.flatMap(({ player }) => player ?? []);
     if (clocks.length === 0) return undefined;
     const playable = clocks.filter(({ canPlay }) => canPlay);

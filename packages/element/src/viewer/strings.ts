@@ -1,7 +1,5 @@
 /** Texts of the element for visitors, and texts of the page that replace them. */
-import type { ViewName } from './camera/spoken.js';
-import type { ElementErrorCode } from './errors.js';
-import type { PANEL_WORDS } from '../sources/generator/controls-panel.js';
+import type { WordKey } from '../generated/languages.js';
 
 /**
  * English texts of the base code. In `show`, `…` is replaced by the text alternative of the scene. The keys are also
@@ -15,40 +13,11 @@ export const WORDS = {
   details: 'Details',
 } as const;
 
-/** Texts for lists of views; loaded with their code. */
-export type ViewString = 'views' | 'next-view' | 'previous-view' | 'keys-views';
-
-/** Texts for walking; loaded with its code. */
-export type WalkWord = 'keys-walk' | 'blocked';
-
-/** Texts for visitors who may move the camera; loaded with the input code. */
-export type HandWord = 'keys-orbit' | 'keys-fly' | 'interaction-prompt' | 'reset';
-
-/** Texts of the button that pauses automatic motion; loaded with its code. */
-export type MotionWord = 'pause' | 'play';
-
-/** Texts for VR, AR and measuring; loaded with their code. */
-export type ExtraWord =
-  'vr' | 'ar' | 'exit-ar' | 'ar-simplified' | 'measure' | 'measure-keys' | 'measure-first' | 'measure-none';
-
 /**
  * All texts of the element in one language. The key `error-…` has the sentence for visitors for an
- * `element.error.code`.
+ * `element.error.code`. English texts are with the code that uses them; `languages/*.json` have the other languages.
  */
-export type Words = Readonly<
-  Record<
-    | ViewName
-    | keyof typeof WORDS
-    | keyof typeof PANEL_WORDS
-    | `error-${ElementErrorCode}`
-    | ViewString
-    | WalkWord
-    | HandWord
-    | MotionWord
-    | ExtraWord,
-    string
-  >
->;
+export type Words = Readonly<Record<WordKey, string>>;
 
 /** Texts of the page, or in the language of the page, that replace English texts. */
 export type A11yStrings = Partial<Words>;

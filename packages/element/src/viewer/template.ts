@@ -8,9 +8,6 @@ export interface TemplateModel {
   readonly label: string | null;
   /** Whether visitors may move the camera. */
   readonly canMove: boolean;
-  readonly navigation: 'orbit' | 'fly' | 'walk';
-  /** Help text for the keys of walking; undefined until walking is requested and its code is loaded. */
-  readonly walkKeys: string | undefined;
   readonly poster: string | null;
   readonly posterLoading: 'lazy' | 'eager';
   readonly showPoster: boolean;
@@ -22,29 +19,21 @@ export interface TemplateModel {
   readonly error: ElementError | null;
   /** Whether the page has a poster, in the attribute or the slot. */
   readonly hasPoster: boolean;
-  /** Style of the prompt that shows that the scene can be moved. */
-  readonly prompt: 'none' | 'basic' | 'wiggle';
-  /** Resets the camera; null if the reset button is not shown. */
-  readonly onReset: (() => void) | null;
   /** Texts of the page that replace English texts. */
   readonly strings: A11yStrings;
   /** Text that screen readers announce when it changes: the error, or else the view of the camera. */
   readonly spoken: string;
-  /** Template of the prompt, reset button and keyboard help; undefined until its code is loaded. */
-  readonly handsView: ((model: TemplateModel) => TemplateResult) | undefined;
-  /** The button that pauses automatic motion; undefined if nothing moves automatically. */
-  readonly motionView: TemplateResult | undefined;
-  /** Names of the slots of the hotspots. */
-  readonly hotspots: readonly string[];
+  /** Names of the slots over the frame. */
+  readonly slots: readonly string[];
 }
 
 const PLAY_SIGN = 'M8 5v14l11-7z';
 
-/** Returns the content of the element's shadow tree. */
-export function template(model: TemplateModel): TemplateResult {
+/** Returns the content of the element's shadow tree. @param parts Those of the features. */
+export function template(model: TemplateModel, parts: readonly TemplateResult[]): TemplateResult {
   return html`
-    ${view(model)} ${hotspots(model)} ${model.handsView?.(model)} ${model.motionView} ${poster(model)}
-    ${model.isLoading ? progressBar(model) : nothing} ${model.error ? message(model, model.error) : nothing}
+    ${view(model)} ${slots(model)} ${parts} ${poster(model)} ${model.isLoading ? progressBar(model) : nothing}
+    ${model.error ? message(model, model.error) : nothing}
     <div class="for-screen-readers" role="status" lang=${languageOf(model.strings) ?? nothing}>${model.spoken}</div>
   `;
 }
@@ -73,12 +62,12 @@ function view({ label, canMove: controls, onReveal, strings }: TemplateModel): T
 }
 
 /**
- * Template of the hotspots: one box with a slot per name, which the hotspot controller positions. Not visible while a
- * poster is shown.
+ * Template of the slots over the frame: one box for each, which a feature positions. Not visible while a poster is
+ * shown.
  */
-function hotspots({ hotspots, showPoster }: TemplateModel): TemplateResult {
+function slots({ slots, showPoster }: TemplateModel): TemplateResult {
   return html`<div id="hotspots" class="layer ${showPoster ? 'gone' : ''}">
-    ${hotspots.map(
+    ${slots.map(
       (name) =>
         html`<div class="hotspot hidden">
           <div><slot name=${name}></slot></div>

@@ -25,13 +25,11 @@ export interface ViewHost extends FrameSource {
     /** Called when drawing has failed permanently. */
     fail(error: unknown): void;
   };
-  readonly behaviors: {
-    /**
-     * Called once in each frame before the camera steps, so that automatic motions advance. `now` is
-     * requestAnimationFrame's clock, ms.
-     */
-    advance(now: number): void;
-  };
+  /**
+   * Called once in each frame before the camera steps, so that automatic motions advance. `now` is
+   * requestAnimationFrame's clock, ms.
+   */
+  advance(now: number): void;
   readonly camera: CameraController;
   readonly size: SizeController;
   readonly scheduler: FrameScheduler;
@@ -186,7 +184,7 @@ export class ViewController implements FrameClient {
     const pixels = this.#pixelsOf(backend);
     // A canvas without a size is not drawn. The size observer requests a frame when the canvas has a size.
     if (pixels === null) return this.#finishUnseen();
-    this.#host.behaviors.advance(now);
+    this.#host.advance(now);
     const source = camera.step(now, this.#host.decayMs);
     try {
       const request = this.#frameRequest(backend, pixels);

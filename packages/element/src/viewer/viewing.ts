@@ -1,12 +1,18 @@
-import { loadModule } from '@gaussian-splat/core';
 import type { CameraOrbit, CameraTarget, FieldOfView, PickedPoint } from './camera/values.js';
-import type { HotspotPlace } from '../features/labels/hotspot-controller.js';
 import { MediaProperties } from './media.js';
-import type * as capture from '../features/recording/capture-image.js';
-import type { FrameOptions, RecordOptions } from '../features/recording/recording.js';
 import { boxOf, type SceneBox } from './scene-queries.js';
-import type { CameraView } from '../features/views/camera-view.js';
-import type { FlightOptions, PathOptions } from '../features/views/tour.js';
+import type { CameraView } from './camera/camera-view.js';
+import type {
+  FlightOptions,
+  FrameOptions,
+  HotspotController,
+  HotspotPlace,
+  InputController,
+  PathOptions,
+  Recording,
+  RecordOptions,
+  Tour,
+} from './feature-table.js';
 
 /** Options of `toBlob()`. */
 export interface ImageOptions {
@@ -78,22 +84,22 @@ export abstract class ViewingMethods extends MediaProperties {
    * camera. Rejects with `argument/camera` for a malformed view or an unknown name.
    */
   async flyTo(view: CameraView | string | number, options?: FlightOptions): Promise<boolean> {
-    return (await this.core.tour.get()).flyTo(view, options);
+    return (await this.#tour).flyTo(view, options);
   }
 
   /** Flies to the next view of the list, and from the last to the first. See {@link flyTo}. */
   async nextView(options?: FlightOptions): Promise<boolean> {
-    return (await this.core.tour.get()).step(1, options);
+    return (await this.#tour).step(1, options);
   }
 
   /** Flies to the previous view of the list. See {@link flyTo}. */
   async previousView(options?: FlightOptions): Promise<boolean> {
-    return (await this.core.tour.get()).step(-1, options);
+    return (await this.#tour).step(-1, options);
   }
 
   /** Flies through all views of the list on one smooth path, or along the keyframes of its file. See {@link flyTo}. */
   async flyPath(options?: PathOptions): Promise<boolean> {
-    return (await this.core.tour.get()).flyPath(options);
+    return (await this.#tour).flyPath(options);
   }
 
   /**
@@ -101,12 +107,12 @@ export abstract class ViewingMethods extends MediaProperties {
    * @param share 0..1, from the first view to the last
    */
   async seekPath(share: number): Promise<void> {
-    return (await this.core.tour.get()).seekPath(share);
+    return (await this.#tour).seekPath(share);
   }
 
   /** Shows the interaction prompt again, as if no visitor had moved the scene. */
   resetInteractionPrompt(): void {
-    this.core.behaviors.prompt?.reset();
+    this.core.features.get<InputController>('input').value?.prompt.reset();
   }
 
   /** Moves the camera to frame the scene, as after loading, for generators whose scene has grown or moved. */
@@ -136,7 +142,7 @@ export abstract class ViewingMethods extends MediaProperties {
    * position has this name.
    */
   queryHotspot(name: string): HotspotPlace | null {
-    return this.core.labels.value?.query(name) ?? null;
+    return this.core.features.get<HotspotController>('labels').value?.query(name) ?? null;
   }
 
   /**
@@ -170,8 +176,12 @@ export abstract class ViewingMethods extends MediaProperties {
     yield* (await this.#images()).recordFrames(this.core, options);
   }
 
-  async #images(): Promise<typeof capture> {
-    const images = await loadModule('the code for images', () => import('../features/recording/capture-image.js'));
+  get #tour(): Promise<Tour> {
+    return this.core.features.get<Tour>('views').get();
+  }
+
+  async #images(): Promise<Recording> {
+    const images = await this.core.features.get<Recording>('recording').get();
     this.applyAttributes();
     return images;
   }

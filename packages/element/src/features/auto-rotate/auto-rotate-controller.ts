@@ -1,25 +1,11 @@
-import type { ReactiveController, ReactiveControllerHost } from 'lit';
-import type { Attributes } from '../../viewer/attributes.js';
-import type { CameraController } from '../../viewer/camera-controller.js';
+import type { ReactiveController } from 'lit';
 import { MAX_MOVER_STEP_MS } from '../../viewer/motion.js';
 import type { Feature } from '../../viewer/features.js';
-
-export interface AutoRotateHost {
-  readonly core: {
-    readonly attributes: Pick<Attributes, 'autoRotateDelay' | 'rotationPerSecond'>;
-    requestFrame(): void;
-  };
-  readonly camera: Pick<CameraController, 'turnBy'>;
-  /**
-   * Whether the camera may rotate: the attribute `auto-rotate` is set, the scene is visible, motion is not reduced or
-   * stopped, and the frame has no keyboard focus.
-   */
-  readonly mayTurn: boolean;
-}
+import type { Viewer } from '../../viewer/viewer.js';
 
 /** Rotates the camera around the scene while no visitor interacts, as on a turntable. */
 export class AutoRotateController implements ReactiveController, Feature {
-  readonly #of: AutoRotateHost;
+  readonly #viewer: Viewer;
   #timer: ReturnType<typeof setTimeout> | undefined;
   #isTurning = false;
   #lastStep: number | undefined;
@@ -29,46 +15,55 @@ export class AutoRotateController implements ReactiveController, Feature {
    */
   #direction = -1;
 
-  constructor(host: ReactiveControllerHost, of: AutoRotateHost) {
-    this.#of = of;
-    host.addController(this);
+  constructor(viewer: Viewer) {
+    this.#viewer = viewer;
+    viewer.element.addController(this);
+  }
+
+  /**
+   * Whether the camera may rotate: the attribute `auto-rotate` is set, the scene is visible, motion is not reduced or
+   * stopped, and the frame has no keyboard focus.
+   */
+  get #mayTurn(): boolean {
+    const { attributes, mayMove, surface } = this.#viewer;
+    return attributes.autoRotate && mayMove && !surface?.matches(':focus-visible');
   }
 
   hostUpdated(): void {
-    if (!this.#of.mayTurn) this.hostDisconnected();
+    if (!this.#mayTurn) this.hostDisconnected();
     else if (!this.#isTurning && this.#timer === undefined) this.rest();
   }
 
   /** Stops the rotation, and starts it again after `autoRotateDelay` milliseconds without another call. */
   rest(): void {
     this.hostDisconnected();
-    if (!this.#of.mayTurn) return;
-    this.#timer = setTimeout(() => this.start(), this.#of.core.attributes.autoRotateDelay);
+    if (!this.#mayTurn) return;
+    this.#timer = setTimeout(() => this.start(), this.#viewer.attributes.autoRotateDelay);
   }
 
   /** Starts the rotation without a delay. */
   start(): void {
     this.hostDisconnected();
-    if (!this.#of.mayTurn) return;
+    if (!this.#mayTurn) return;
     this.#isTurning = true;
-    this.#of.core.requestFrame();
+    this.#viewer.requestFrame();
   }
 
   advance(now: number): boolean {
     if (!this.#isTurning) return false;
-    if (!this.#of.mayTurn) {
+    if (!this.#mayTurn) {
       this.hostDisconnected();
       return false;
     }
     const stepMs = this.#lastStep === undefined ? 0 : Math.min(MAX_MOVER_STEP_MS, now - this.#lastStep);
     this.#lastStep = now;
-    const speed = this.#of.core.attributes.rotationPerSecond;
+    const speed = this.#viewer.attributes.rotationPerSecond;
     const step = (speed * stepMs) / 1000;
     // A change of the attribute requests the next frame.
     if (speed === 0) return false;
-    if (step === 0 || this.#of.camera.turnBy(this.#direction * step) !== 0) return true;
+    if (step === 0 || this.#viewer.camera.turnBy(this.#direction * step) !== 0) return true;
     this.#direction = -this.#direction;
-    if (this.#of.camera.turnBy(this.#direction * step) !== 0) return true;
+    if (this.#viewer.camera.turnBy(this.#direction * step) !== 0) return true;
     // The limits of the orbit allow no rotation in either direction.
     this.#isTurning = false;
     return false;

@@ -2,10 +2,16 @@
  * The attributes of `<splat-scene>` and `<splat-mesh>`. Each is defined once, as those of `<gaussian-splat>` in
  * ../attributes.ts. Properties of the same names accept numbers as well.
  */
-import { bareKeyword, flag, read, text, type Attribute } from '../../viewer/attributes.js';
+import { bareKeyword, flag, read, text } from '../../viewer/attribute.js';
 import { upGrammar } from '../../viewer/camera/grammar.js';
 import type { Numbers } from '../../sources/generator/values.js';
-import { anglesGrammar, boxGrammar, opacityGrammar, pointGrammar, scaleGrammar } from './grammar.js';
+import {
+  anglesGrammar,
+  boxGrammar,
+  opacityGrammar,
+  pointGrammar,
+  scaleGrammar,
+} from '../../viewer/camera/placing-grammar.js';
 
 /** Attributes that `<splat-scene>` and `<splat-mesh>` share. */
 const PLACED = {
@@ -111,9 +117,4 @@ export const MESH_ATTRIBUTES = {
    */
   src: text<string | Blob | null>(),
   ...PLACED,
-};
-
-/** The element's properties that a table of attributes defines. */
-export type PropertiesOf<Table> = {
-  -readonly [K in keyof Table]: Table[K] extends Attribute<infer P, unknown> ? P : never;
 };

@@ -1,18 +1,28 @@
 import { Lazy, multiply, type Camera, type Matrix4, type Vector3 } from '@gaussian-splat/core';
 import { ReactiveElement, type PropertyDeclarations } from 'lit';
 import type { Box } from '@gaussian-splat/renderer';
-import { declarations, type Attribute, type Attributes } from '../../viewer/attributes.js';
+import type { AttributeTable, PropertiesOf } from '../../viewer/attribute.js';
+import { declarations, type Attributes } from '../../viewer/attributes.js';
 import { readAttribute } from '../../viewer/camera/grammar.js';
 import type { ElementError } from '../../viewer/errors.js';
 import type { GaussianSplatEventMap } from '../../viewer/events.js';
 import type { DynamicState } from '../../sources/generator/dynamic-model.js';
 import { frameOf } from '../../viewer/camera/settings.js';
 import type { Source } from '../../viewer/element-host.js';
-import { CLOCK_ATTRIBUTES, type MESH_ATTRIBUTES, type PropertiesOf } from './attributes.js';
+import { CLOCK_ATTRIBUTES, type MESH_ATTRIBUTES } from './attributes.js';
+import type { Viewer } from '../../viewer/viewer.js';
 import type { WorldEntry } from '../../viewer/world-entry.js';
 import { SourceEntry, type EntryCore, type SourceOwner } from '../../viewer/source-entry.js';
-import { cameraInScene, isSolid, matrixOf, matrixOfFrame, readMatrix, sceneToWorld, transposed } from './placing.js';
-import type { Interaction, InteractionHost, ScenePointerEvent } from './interaction.js';
+import {
+  cameraInScene,
+  isSolid,
+  matrixOf,
+  matrixOfFrame,
+  readMatrix,
+  sceneToWorld,
+  transposed,
+} from '../../viewer/camera/placing.js';
+import type { Interaction, ScenePointerEvent } from './interaction.js';
 
 type Written = string | number | ArrayLike<number | string> | null | undefined;
 
@@ -42,23 +52,29 @@ export type ChildEventMap = Record<
   'click' | 'pointerover' | 'pointerout' | 'pointerenter' | 'pointerleave',
   ScenePointerEvent
 > &
-  Omit<
+  Pick<
     GaussianSplatEventMap,
-    | 'camera-change'
-    | 'poster-dismissed'
-    | 'shader-error'
-    | 'model-visibility'
-    | 'view-change'
-    | 'walk-ready'
-    | 'vr-status'
-    | 'ar-status'
-    | 'measure'
-    | 'volumechange'
-    | 'contextlost'
-    | 'contextrestored'
-    | 'loadeddata'
-    | 'canplay'
-    | 'canplaythrough'
+    | 'load'
+    | 'progress'
+    | 'preview'
+    | 'error'
+    | 'generator-error'
+    | 'inputs-change'
+    | 'generator-memory'
+    | 'generator-fallback'
+    | 'play'
+    | 'playing'
+    | 'waiting'
+    | 'pause'
+    | 'timeupdate'
+    | 'seeking'
+    | 'seeked'
+    | 'ended'
+    | 'ratechange'
+    | 'durationchange'
+    | 'loadedmetadata'
+    | 'loadstart'
+    | 'emptied'
   >;
 
 /** Properties of a child that a page may set, for the types of frameworks. */
@@ -72,7 +88,7 @@ export abstract class SplatChild extends ReactiveElement implements SourceOwner 
   /** The entry of this child in the list of sources of its `<gaussian-splat>`. @internal */
   readonly entry = new SourceEntry(this);
   /** @internal */
-  protected abstract readonly table: Readonly<Record<string, Attribute<unknown, unknown>>>;
+  protected abstract readonly table: AttributeTable;
   readonly #warned = new Set<string>();
   #isDriven = false;
   #place: ChildPlace | undefined;
@@ -311,9 +327,7 @@ export interface SplatChild extends Omit<PropertiesOf<typeof MESH_ATTRIBUTES>, '
 }
 
 /** Returns the property declarations of a child for Lit. */
-export const childDeclarations = (
-  table: Readonly<Record<string, Attribute<unknown, unknown>>>,
-): PropertyDeclarations => ({
+export const childDeclarations = (table: AttributeTable): PropertyDeclarations => ({
   ...declarations(table),
   matrix: { attribute: false },
   hidden: { type: Boolean, reflect: true },
@@ -322,11 +336,8 @@ export const childDeclarations = (
   playbackRate: { attribute: false, noAccessor: true },
 });
 
-/** Interface of the parent element for its children. */
-export type ChildCore = EntryCore & InteractionHost;
-
 /** Cores of the elements that can have children. */
-export const cores = new WeakMap<Element, ChildCore>();
+export const cores = new WeakMap<Element, Viewer>();
 
 const interactions = new WeakMap<Element, Lazy<Interaction>>();
 

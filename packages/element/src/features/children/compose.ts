@@ -1,5 +1,6 @@
 /** Defines the children of an element. The module is loaded for the first `<splat-scene>` or `<splat-mesh>`. */
-import { adopt, SplatChild, cores, type ChildCore } from './child.js';
+import type { Viewer } from '../../viewer/viewer.js';
+import { adopt, SplatChild, cores } from './child.js';
 import { SplatMeshElement } from './splat-mesh.js';
 import { SplatSceneElement } from './splat-scene.js';
 
@@ -11,7 +12,7 @@ export function define(): void {
 }
 
 /** Enables an element to have children, and attaches those that it already has. */
-export function compose(core: ChildCore): void {
+export function compose(core: Viewer): void {
   cores.set(core.element, core);
   define();
   for (const child of core.element.children) if (child instanceof SplatChild) adopt(child);

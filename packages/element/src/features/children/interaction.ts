@@ -1,25 +1,14 @@
 /**
  * Dispatches clicks and pointer moves to children. The module is loaded when a child of an element is `interactive`.
  */
-import type { Camera } from '@gaussian-splat/core';
 import { boundsOfWorld } from '@gaussian-splat/renderer/tools';
-import { css, type ReactiveControllerHost } from 'lit';
+import { css } from 'lit';
 import { project } from '../../viewer/camera/projection.js';
 import type { PickedPoint } from '../../viewer/camera/values.js';
 import { adoptStyles } from '../../viewer/styles.js';
-import { word, type A11yStrings } from '../../viewer/strings.js';
+import { word } from '../../viewer/strings.js';
+import type { Viewer } from '../../viewer/viewer.js';
 import { SplatChild } from './child.js';
-
-/** Interface of the element for pointer events on its children. */
-export interface InteractionHost {
-  readonly element: ReactiveControllerHost & HTMLElement;
-  readonly surface: HTMLElement | null;
-  /** The camera of the last frame; undefined before the first. */
-  readonly drawnFrom: Camera | undefined;
-  readonly isOnShow: boolean;
-  readonly strings: A11yStrings;
-  positionFromPoint(clientX: number, clientY: number): Promise<PickedPoint | null>;
-}
 
 /** A click or pointer event on a child, analogous to the browser's events on HTML elements. */
 export class ScenePointerEvent extends PointerEvent {
@@ -67,7 +56,7 @@ const STYLES = css`
  * ignores pointers.
  */
 export class Interaction {
-  readonly #of: InteractionHost;
+  readonly #of: Viewer;
   readonly #layer: HTMLElement;
   readonly #buttons = new Map<SplatChild, HTMLButtonElement>();
   #surface: HTMLElement | undefined;
@@ -76,7 +65,7 @@ export class Interaction {
   #moved: PointerEvent | undefined;
   #isLooking = false;
 
-  constructor(of: InteractionHost) {
+  constructor(of: Viewer) {
     this.#of = of;
     const { element } = of;
     adoptStyles(element.shadowRoot!, STYLES);

@@ -2,7 +2,8 @@ import { loadModule } from '@gaussian-splat/core';
 import type { PropertyDeclarations } from 'lit';
 import type { openGaussians } from '../../gpu/open-scene.js';
 import type { Source } from '../../viewer/element-host.js';
-import { MESH_ATTRIBUTES, type PropertiesOf } from './attributes.js';
+import type { PropertiesOf } from '../../viewer/attribute.js';
+import { MESH_ATTRIBUTES } from './attributes.js';
 import { childDeclarations, SplatChild } from './child.js';
 
 /**

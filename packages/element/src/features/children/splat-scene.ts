@@ -3,7 +3,8 @@ import type { Source } from '../../viewer/element-host.js';
 import { CONTROL_PREFIX, readControls, readNumbers, type ControlValues } from '../../sources/generator/values.js';
 import type { GeneratorInput } from '../../sources/generator/inputs.js';
 import type { DynamicState } from '../../sources/generator/dynamic-model.js';
-import { SCENE_ATTRIBUTES, type PropertiesOf } from './attributes.js';
+import type { PropertiesOf } from '../../viewer/attribute.js';
+import { SCENE_ATTRIBUTES } from './attributes.js';
 import { childDeclarations, SplatChild, type ChildPlace } from './child.js';
 
 type Properties = PropertiesOf<typeof SCENE_ATTRIBUTES>;

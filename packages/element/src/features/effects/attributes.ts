@@ -1,6 +1,6 @@
 /** Attributes of `<splat-cut>`. Each is defined once, like those of `<gaussian-splat>` in ../attributes.ts. */
 import type { Vector3 } from '@gaussian-splat/core';
-import { read } from '../../viewer/attributes.js';
+import { read } from '../../viewer/attribute.js';
 import {
   angleGrammar,
   keywordGrammar,
@@ -9,7 +9,7 @@ import {
   METERS_PER_UNIT,
 } from '../../viewer/camera/grammar.js';
 import type { AttributeGrammar } from '../../viewer/camera/grammar.js';
-import { anglesGrammar, pointGrammar, scaleGrammar } from '../children/grammar.js';
+import { anglesGrammar, pointGrammar, scaleGrammar } from '../../viewer/camera/placing-grammar.js';
 
 type Numbers = string | number | readonly number[] | null;
 

@@ -8,44 +8,21 @@ import {
   type SplatCut,
   type SplatShader,
 } from '@gaussian-splat/renderer/modifiers';
-import type { ReactiveControllerHost } from 'lit';
-import type { ViewerFrame } from '../../viewer/camera/orbit.js';
-import type { SceneBounds } from '../../viewer/camera/settings.js';
-import { SplatChild } from '../children/child.js';
-import { matrixOfFrame, transposed } from '../children/placing.js';
-import type { MotionCore } from '../auto-rotate/motion-controller.js';
+import { matrixOfFrame, transposed } from '../../viewer/camera/placing.js';
+import type { Player } from '../../viewer/playback-controller.js';
+import type { Viewer } from '../../viewer/viewer.js';
 import { MAX_MOVER_STEP_MS, prefersReducedMotion } from '../../viewer/motion.js';
 import type { Feature } from '../../viewer/features.js';
 import type { LoadedGaussians } from '../../gpu/loaded-gaussians.js';
 import type { WorldEntry } from '../../viewer/world-entry.js';
-import type { SourceEntry } from '../../viewer/source-entry.js';
+import type { SourceEntry, SourceOwner } from '../../viewer/source-entry.js';
 import { defineCuts } from './define.js';
 import { NO_REVEAL, parseReveal, revealedBy, REVEAL_FORM, type RevealEffect } from './reveal.js';
 import { SplatCutElement, showers, type PlacedCut } from './splat-cut.js';
 
-/** The part of the element that effects use. */
-export interface EffectsHost {
-  readonly element: ReactiveControllerHost &
-    HTMLElement & { splatShader: SplatShader | null; revealProgress: number | null };
-  readonly attributes: { readonly revealEffect: string | null };
-  readonly frame: ViewerFrame;
-  readonly isOnShow: boolean;
-  readonly sources: {
-    readonly ownEntry: SourceEntry;
-    readonly entries: readonly SourceEntry[];
-    readonly bounds: SceneBounds | null;
-    readonly isPreview: boolean;
-    readonly progress: number | null;
-  };
-  requestFrame(): void;
-  warn(sentence: string): void;
-}
-
-type Player = NonNullable<MotionCore['player']>;
-
 /** Applies the cuts of children, the reveal effect, and the page's shader to the splats of all scenes. */
 export class Effects implements Feature {
-  readonly #host: EffectsHost;
+  readonly #viewer: Viewer;
   /** Compiled program of the current shader by device. */
   #programs = new WeakMap<GPUDevice, SplatProgram>();
   readonly #compiling = new WeakMap<GPUDevice, Promise<void>>();
@@ -63,28 +40,28 @@ export class Effects implements Feature {
   #startedAt: number | undefined;
   #progress = 0;
 
-  constructor(host: EffectsHost) {
-    this.#host = host;
-    showers.set(host.element, this);
+  constructor(viewer: Viewer) {
+    this.#viewer = viewer;
+    showers.set(viewer.element, this);
     defineCuts();
-    host.element.addController({ hostUpdated: () => this.#update() });
+    viewer.element.addController({ hostUpdated: () => this.#update() });
     // Without a scene no frame is drawn.
-    host.element.addEventListener('emptied', () => this.#freeRemoved());
+    viewer.element.addEventListener('emptied', () => this.#freeRemoved());
     this.#update();
     // Earlier frames were drawn without effects, because this code was not loaded.
-    host.requestFrame();
+    viewer.requestFrame();
   }
 
   cutsChanged(): void {
     this.#cuts = undefined;
-    this.#host.requestFrame();
+    this.#viewer.requestFrame();
   }
 
   /**
    * Returns the interface with which the button for automatic motion plays and pauses `other` together with an animated
    * shader. Returns `other` itself if the shader is not animated.
    */
-  playerWith(other: MotionCore['player']): MotionCore['player'] {
+  playerWith(other: Player | undefined): Player | undefined {
     if (!this.#shader?.animated) return other;
     const players: Player[] = [this.#player, ...(other?.canPlay ? [other] : [])];
     return {
@@ -98,8 +75,8 @@ export class Effects implements Feature {
   get #player(): Player {
     const turn = (isPlaying: boolean): void => {
       this.#isPlaying = isPlaying;
-      this.#host.requestFrame();
-      this.#host.element.requestUpdate();
+      this.#viewer.requestFrame();
+      this.#viewer.element.requestUpdate();
     };
     return { canPlay: true, paused: !this.#isPlaying, play: () => turn(true), pause: () => turn(false) };
   }
@@ -107,24 +84,24 @@ export class Effects implements Feature {
   advance(now: number): boolean {
     const step = Math.min(MAX_MOVER_STEP_MS, now - (this.#last ?? now));
     this.#last = now;
-    const moves = Boolean(this.#shader?.animated && this.#isPlaying && this.#host.isOnShow);
+    const moves = Boolean(this.#shader?.animated && this.#isPlaying && this.#viewer.isOnShow);
     if (moves) this.#time += step / 1000;
     return this.#advanceReveal(now) || moves;
   }
 
   /** Compiles the pipelines that a scene needs for effects, before its first frame. Never rejects. */
   async prepareFor(scene: LoadedGaussians): Promise<void> {
-    this.#restartReveal(this.#host.sources.ownEntry);
+    this.#restartReveal(this.#viewer.sources.ownEntry);
     if (this.#isWanted) await this.#compile(scene);
   }
 
   /** Writes the effects of all scenes to the world. Called before each frame. */
   prepareFrame(): void {
-    const { entries, ownEntry: own } = this.#host.sources;
+    const { entries, ownEntry: own } = this.#viewer.sources;
     this.#restartReveal(own);
     this.#freeRemoved();
     const shared = this.#sharedChanges;
-    for (const { owner, member } of entries) if (member) this.#modify(member, owner.element, shared);
+    for (const { owner, member } of entries) if (member) this.#modify(member, owner, shared);
   }
 
   get #isRevealing(): boolean {
@@ -138,7 +115,7 @@ export class Effects implements Feature {
 
   /** Progress that the page sets; undefined without one, and for NaN. */
   get #givenProgress(): number | undefined {
-    const { revealProgress } = this.#host.element;
+    const { revealProgress } = this.#viewer.element;
     return typeof revealProgress === 'number' && !Number.isNaN(revealProgress) ? revealProgress : undefined;
   }
 
@@ -147,13 +124,13 @@ export class Effects implements Feature {
   }
 
   get #children(): readonly SplatCutElement[] {
-    const found = this.#host.element.querySelectorAll(':scope > splat-cut, :scope > splat-scene > splat-cut');
+    const found = this.#viewer.element.querySelectorAll(':scope > splat-cut, :scope > splat-scene > splat-cut');
     return (this.#cuts ??= [...found].filter((each) => each instanceof SplatCutElement));
   }
 
   /** Changes that apply to all scenes: the reveal effect, and cuts that are children of the element. */
   get #sharedChanges(): SplatChanges {
-    const { frame, sources, element } = this.#host;
+    const { frame, sources, element } = this.#viewer;
     const bounds = this.#isRevealing ? sources.bounds : null;
     const toWorld = transposed(matrixOfFrame(frame));
     const reveal = bounds
@@ -171,22 +148,22 @@ export class Effects implements Feature {
       .flatMap(({ cut }) => (cut ? [inWorld(cut, toWorld)] : []));
   }
 
-  #modify(member: WorldEntry, element: HTMLElement, shared: SplatChanges): void {
+  #modify(member: WorldEntry, owner: SourceOwner, shared: SplatChanges): void {
     const { placement, scene } = member;
-    const isChild = element !== this.#host.element && element instanceof SplatChild;
-    const own = isChild ? this.#cutsOf(element, element.frameToWorld(member)) : [];
+    const toWorld = owner.frameToWorld?.(member);
+    const own = toWorld ? this.#cutsOf(owner.element, toWorld) : [];
     const changes = own.length > 0 ? { ...shared, cuts: [...own, ...(shared.cuts ?? [])] } : shared;
     const { grown = 1, share = 1, cuts = [] } = changes;
     const isChanged = cuts.length > 0 || grown < 1 || share < 1 || this.#shader !== null;
     let modifier = this.#modifiers.get(member);
-    if (cuts.length > MAX_CUTS) this.#host.warn(tooManyCuts(cuts.length));
-    if (isChanged && scene.renderer === 'webgl') return this.#host.warn(NO_WEBGL);
+    if (cuts.length > MAX_CUTS) this.#viewer.warn(tooManyCuts(cuts.length));
+    if (isChanged && scene.renderer === 'webgl') return this.#viewer.warn(NO_WEBGL);
     if (!isChanged || scene.drawn.blocks.length === 0) {
       if (modifier) this.#forget(member, modifier);
       return;
     }
     const program = this.#programs.get(scene.place.device);
-    if (!program) return void this.#compile(scene).then(() => this.#host.requestFrame());
+    if (!program) return void this.#compile(scene).then(() => this.#viewer.requestFrame());
     if (modifier?.program !== program) {
       modifier?.destroy();
       this.#modifiers.set(member, (modifier = new SplatModifier(scene.place.device, program)));
@@ -196,7 +173,7 @@ export class Effects implements Feature {
 
   /** Frees the modifiers of scenes that are not shown any more. Their placements have left the world. */
   #freeRemoved(): void {
-    const { entries } = this.#host.sources;
+    const { entries } = this.#viewer.sources;
     for (const [member, modifier] of this.#modifiers) {
       if (entries.some((entry) => entry.member === member)) continue;
       this.#modifiers.delete(member);
@@ -237,14 +214,14 @@ export class Effects implements Feature {
     if (shader === null) return;
     this.#shader = null;
     this.#refused = shader;
-    this.#host.warn(error.message);
-    this.#host.element.dispatchEvent(new CustomEvent('shader-error', { detail: error }));
-    this.#host.requestFrame();
+    this.#viewer.warn(error.message);
+    this.#viewer.element.dispatchEvent(new CustomEvent('shader-error', { detail: error }));
+    this.#viewer.requestFrame();
   }
 
   /** Reads the attribute and the property that select effects, after an update of the element. */
   #update(): void {
-    const { element, attributes } = this.#host;
+    const { element, attributes } = this.#viewer;
     this.#readReveal(attributes.revealEffect);
     const shader = element.splatShader ?? null;
     if (shader !== null && shader === this.#refused) return;
@@ -257,21 +234,21 @@ export class Effects implements Feature {
     this.#shader = shader;
     if (shader?.animated && !before?.animated) this.#isPlaying = !prefersReducedMotion();
     // The button for automatic motion was rendered earlier in this update, so it needs another one.
-    if (shader?.animated !== before?.animated) this.#host.element.requestUpdate();
-    this.#host.requestFrame();
+    if (shader?.animated !== before?.animated) this.#viewer.element.requestUpdate();
+    this.#viewer.requestFrame();
     // If only values have changed, the program stays the same.
     if (shader && before && isSameCode(shader, before)) return;
-    const scenes = this.#host.sources.entries.flatMap(({ member }) => member?.scene ?? []);
+    const scenes = this.#viewer.sources.entries.flatMap(({ member }) => member?.scene ?? []);
     // The current program is used until the next one is compiled.
     if (scenes.length === 0) this.#programs = new WeakMap();
-    for (const scene of scenes) void this.#compile(scene).then(() => this.#host.requestFrame());
+    for (const scene of scenes) void this.#compile(scene).then(() => this.#viewer.requestFrame());
   }
 
   #readReveal(text: string | null): void {
     if (text === this.#revealText) return;
     this.#revealText = text;
     const effect = parseReveal(text);
-    if (effect === null) this.#host.warn(`<gaussian-splat> reveal-effect: expected ${REVEAL_FORM}, found "${text}".`);
+    if (effect === null) this.#viewer.warn(`<gaussian-splat> reveal-effect: expected ${REVEAL_FORM}, found "${text}".`);
     this.#reveal = effect ?? NO_REVEAL;
   }
 
@@ -288,9 +265,9 @@ export class Effects implements Feature {
   }
 
   #advanceReveal(now: number): boolean {
-    if (!this.#isRevealing || !this.#host.isOnShow || this.#givenProgress !== undefined) return false;
+    if (!this.#isRevealing || !this.#viewer.isOnShow || this.#givenProgress !== undefined) return false;
     this.#startedAt ??= now;
-    const { isPreview, progress } = this.#host.sources;
+    const { isPreview, progress } = this.#viewer.sources;
     const byTime = (now - this.#startedAt) / Math.max(1, this.#reveal.milliseconds);
     // The effect `detail` does not exceed the fraction of data that has arrived.
     this.#progress = this.#reveal.kind === 'detail' && isPreview ? Math.min(byTime, progress ?? 0, 0.95) : byTime;

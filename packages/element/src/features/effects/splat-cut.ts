@@ -3,8 +3,8 @@ import type { Matrix4, Vector3 } from '@gaussian-splat/core';
 import { lightened, recolored, tinted, type SplatCut } from '@gaussian-splat/renderer/modifiers';
 import { declarations } from '../../viewer/attributes.js';
 import { readAttribute, type AttributeGrammar } from '../../viewer/camera/grammar.js';
-import type { PropertiesOf } from '../children/attributes.js';
-import { matrixOf, readMatrix } from '../children/placing.js';
+import type { PropertiesOf } from '../../viewer/attribute.js';
+import { matrixOf, readMatrix } from '../../viewer/camera/placing.js';
 import { CUT_ATTRIBUTES, type CutEffect } from './attributes.js';
 
 type Name = keyof typeof CUT_ATTRIBUTES;
@@ -132,7 +132,7 @@ export class SplatCutElement extends ReactiveElement {
   }
 }
 
-// eslint-disable-next-line @typescript-eslint/no-unsafe-declaration-merging, @typescript-eslint/no-empty-object-type
+// eslint-disable-next-line @typescript-eslint/no-unsafe-declaration-merging
 export interface SplatCutElement extends PropertiesOf<typeof CUT_ATTRIBUTES> {}
 
 declare global {

@@ -1,16 +1,12 @@
-import type { ReactiveController, ReactiveControllerHost } from 'lit';
-import type { CameraController } from '../../viewer/camera-controller.js';
+import type { ReactiveController } from 'lit';
 import { MAX_MOVER_STEP_MS } from '../../viewer/motion.js';
 import type { Feature } from '../../viewer/features.js';
+import type { Viewer } from '../../viewer/viewer.js';
 
-export interface FlyHost {
-  /** The radius of its bounds scales the speed. */
-  readonly camera: Pick<CameraController, 'bounds'>;
-  readonly core: { readonly surface: HTMLElement | null; requestFrame(): void };
-  readonly mayFly: boolean;
-  /** Moves the camera along its own axes, in world units. */
-  flyBy(right: number, up: number, forward: number): void;
-}
+/** Help text for the keys. */
+const KEYS =
+  'Arrow keys look around, W and S fly forward and back, A and D to the sides, E and Q up and down, with Shift faster, ' +
+  'Home brings the view back.';
 
 type Direction = readonly [right: number, up: number, forward: number];
 
@@ -37,20 +33,28 @@ const FIRST_STEP_MS = 50;
  * `FAST` times faster.
  */
 export class FlyController implements ReactiveController, Feature {
-  readonly #of: FlyHost;
+  readonly #viewer: Viewer;
   readonly #held = new Map<string, Direction>();
   #isFast = false;
   #lastStep: number | undefined;
   #listening: AbortController | undefined;
 
-  constructor(host: ReactiveControllerHost, of: FlyHost) {
-    this.#of = of;
-    host.addController(this);
+  constructor(viewer: Viewer) {
+    this.#viewer = viewer;
+    viewer.element.addController(this);
+  }
+
+  get #mayFly(): boolean {
+    return this.#viewer.input.enabled && this.#viewer.navigation === 'fly';
+  }
+
+  keys(): string | undefined {
+    return this.#mayFly ? (this.#viewer.strings['keys-fly'] ?? KEYS) : undefined;
   }
 
   hostUpdated(): void {
-    const { surface } = this.#of.core;
-    if (!this.#of.mayFly || surface === null) return this.hostDisconnected();
+    const { surface } = this.#viewer;
+    if (!this.#mayFly || surface === null) return this.hostDisconnected();
     if (this.#listening !== undefined) return;
     this.#listening = new AbortController();
     const { signal } = this.#listening;
@@ -75,8 +79,10 @@ export class FlyController implements ReactiveController, Feature {
   }
 
   #move([right, up, forward]: Direction, stepMs: number): void {
-    const way = (this.#of.camera.bounds.radius * SPEED * (this.#isFast ? FAST : 1) * stepMs) / 1000;
-    if (way > 0) this.#of.flyBy(way * right, way * up, way * forward);
+    const way = (this.#viewer.camera.bounds.radius * SPEED * (this.#isFast ? FAST : 1) * stepMs) / 1000;
+    if (way === 0) return;
+    this.#viewer.touched();
+    this.#viewer.camera.moveBy(way * right, way * up, way * forward);
   }
 
   readonly #onDown = (event: KeyboardEvent): void => {
@@ -86,7 +92,7 @@ export class FlyController implements ReactiveController, Feature {
     this.#isFast = event.shiftKey;
     if (!event.repeat) this.#move(direction, FIRST_STEP_MS);
     this.#held.set(event.code, direction);
-    this.#of.core.requestFrame();
+    this.#viewer.requestFrame();
   };
 
   readonly #onUp = (event: KeyboardEvent): void => {

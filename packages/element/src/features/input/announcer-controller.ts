@@ -1,13 +1,7 @@
-import type { ReactiveController, ReactiveControllerHost } from 'lit';
-import type { ViewName } from '../../viewer/camera/spoken.js';
-import type { A11yStrings } from '../../viewer/strings.js';
-
-export interface AnnouncerHost {
-  readonly viewName: ViewName;
-  readonly core: { readonly strings: A11yStrings };
-  /** Whether the frame has keyboard focus. */
-  readonly isFocused: boolean;
-}
+import type { ReactiveController } from 'lit';
+import type { Announcer } from '../../viewer/announcer.js';
+import { viewName, type ViewName } from '../../viewer/camera/spoken.js';
+import type { Viewer } from '../../viewer/viewer.js';
 
 /** Minimum interval between two announcements, ms, because a screen reader that is always interrupted says nothing. */
 const INTERVAL_MS = 700;
@@ -16,34 +10,41 @@ const INTERVAL_MS = 700;
  * Announces the side from which the camera views the scene, for visitors who move the camera by keyboard and cannot see
  * the frame. Speaks only while the frame has keyboard focus, and at a limited rate.
  */
-export class AnnouncerController implements ReactiveController {
-  readonly #host: ReactiveControllerHost & HTMLElement;
-  readonly #of: AnnouncerHost;
-  /** Whether camera moves are not announced: during a flight, which announces its own destination. */
+export class AnnouncerController implements ReactiveController, Announcer {
+  readonly #viewer: Viewer;
   isQuiet = false;
   #text = '';
   #spoken: ViewName | undefined;
   #timer: ReturnType<typeof setTimeout> | undefined;
 
-  constructor(host: ReactiveControllerHost & HTMLElement, of: AnnouncerHost) {
-    this.#host = host;
-    this.#of = of;
-    host.addController(this);
+  constructor(viewer: Viewer) {
+    this.#viewer = viewer;
+    viewer.element.addController(this);
   }
 
-  /** Text of the live region that screen readers announce; empty without an announcement. */
+  get #viewName(): ViewName {
+    const { theta, phi } = this.#viewer.camera.orbit;
+    return viewName(theta, phi);
+  }
+
+  /** Whether the frame has the focus and the view has sides; in flight it has none. */
+  get #isFocused(): boolean {
+    const { attributes, surface } = this.#viewer;
+    return attributes.navigation === 'orbit' && (surface?.matches(':focus') ?? false);
+  }
+
   get text(): string {
     return this.#text;
   }
 
   hostConnected(): void {
-    this.#host.addEventListener('focusin', this.#onFocus);
-    this.#host.addEventListener('focusout', this.#onBlur);
+    this.#viewer.element.addEventListener('focusin', this.#onFocus);
+    this.#viewer.element.addEventListener('focusout', this.#onBlur);
   }
 
   hostDisconnected(): void {
-    this.#host.removeEventListener('focusin', this.#onFocus);
-    this.#host.removeEventListener('focusout', this.#onBlur);
+    this.#viewer.element.removeEventListener('focusin', this.#onFocus);
+    this.#viewer.element.removeEventListener('focusout', this.#onBlur);
     clearTimeout(this.#timer);
     this.#timer = undefined;
   }
@@ -53,21 +54,21 @@ export class AnnouncerController implements ReactiveController {
    * the last announced one.
    */
   cameraMoved(): void {
-    if (this.isQuiet || this.#timer !== undefined || !this.#of.isFocused) return;
+    if (this.isQuiet || this.#timer !== undefined || !this.#isFocused) return;
     this.#timer = setTimeout(this.#speak, INTERVAL_MS);
   }
 
   readonly #speak = (): void => {
     this.#timer = undefined;
-    const name = this.#of.viewName;
-    if (!this.#of.isFocused || name === this.#spoken) return;
+    const name = this.#viewName;
+    if (!this.#isFocused || name === this.#spoken) return;
     this.#spoken = name;
-    this.say(this.#of.core.strings[name] ?? `View from ${name.replace('-', ' ')}`);
+    this.say(this.#viewer.strings[name] ?? `View from ${name.replace('-', ' ')}`);
   };
 
   /** Screen readers read the name and the keys of the frame on focus, so only later moves are announced. */
   readonly #onFocus = (): void => {
-    this.#spoken = this.#of.viewName;
+    this.#spoken = this.#viewName;
   };
 
   readonly #onBlur = (): void => {
@@ -80,6 +81,6 @@ export class AnnouncerController implements ReactiveController {
   say(text: string): void {
     if (text === this.#text) return;
     this.#text = text;
-    this.#host.requestUpdate();
+    this.#viewer.element.requestUpdate();
   }
 }

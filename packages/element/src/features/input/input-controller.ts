@@ -1,7 +1,10 @@
-import type { ReactiveController, ReactiveControllerHost } from 'lit';
-import type { WheelZoom } from '../../viewer/attributes.js';
+import type { ReactiveController, TemplateResult } from 'lit';
 import { boxMoves } from '../../viewer/camera/box-points.js';
-import { addHandStyles } from './hands-view.js';
+import type { Feature } from '../../viewer/features.js';
+import type { TemplateModel } from '../../viewer/template.js';
+import type { Viewer } from '../../viewer/viewer.js';
+import { addHandStyles, handsView } from './hands-view.js';
+import { PromptController } from './prompt-controller.js';
 import { DoubleTap } from '../../viewer/camera/double-tap.js';
 import {
   isCameraDrag,
@@ -14,42 +17,9 @@ import {
   type CameraAction,
   type Point,
 } from '../../viewer/camera/gestures.js';
-import { isWithin, labelParts, scrollsAround } from '../labels/label-parts.js';
+import { isWithin, labelParts, scrollsAround } from '../../shared/label-parts.js';
 
-export { handsView } from './hands-view.js';
 export { AnnouncerController } from './announcer-controller.js';
-export { PromptController } from '../prompt/prompt-controller.js';
-
-/** Interactions that the page allows. */
-export interface InputOptions {
-  readonly enabled: boolean;
-  readonly zoom: boolean;
-  readonly pan: boolean;
-  /** Whether double clicks and double taps have an effect. */
-  readonly tap: boolean;
-  /** Condition under which the wheel zooms: see the attribute `zoom`. */
-  readonly wheel: WheelZoom;
-  /** CSS `touch-action` of the frame: the one-finger gestures that are left to the page. */
-  readonly touchAction: string;
-}
-
-/** Interface of the element that receives the input. */
-export interface InputHost {
-  /** The element that receives drags and keyboard focus; null until it is rendered. */
-  readonly surface: HTMLElement | null;
-  /** The layer of the page's labels; a drag may begin on a label, too. */
-  readonly hotspotLayer: HTMLElement | null;
-  /** Interactions that the page allows. The controller reads them after every update of the element. */
-  readonly input: InputOptions;
-  readonly behaviors: {
-    /** Applies a camera action. @returns False if the action has no effect, for example a zoom at the limit. */
-    act(action: CameraAction): boolean;
-  };
-  /** Called for a double click or a double tap, with its position in CSS pixels of the viewport. */
-  pick(clientX: number, clientY: number): void;
-  /** Called for the space bar: stops or resumes automatic motion. Returns false if there is no automatic motion. */
-  toggleMotion(): boolean;
-}
 
 const LEFT_BUTTON = 0;
 const RIGHT_BUTTON = 2;
@@ -68,9 +38,10 @@ interface Pointer extends Point {
 }
 
 /** Handles mouse, pen, touch, wheel and keys on the frame and its labels, and converts them to camera actions. */
-export class InputController implements ReactiveController {
-  readonly #host: ReactiveControllerHost & HTMLElement;
-  readonly #of: InputHost;
+export class InputController implements ReactiveController, Feature {
+  readonly #viewer: Viewer;
+  /** Shows visitors that they can move the camera. */
+  readonly prompt: PromptController;
   readonly #pointers = new Map<number, Pointer>();
   readonly #doubleTap = new DoubleTap();
   /**
@@ -86,27 +57,49 @@ export class InputController implements ReactiveController {
   #listening: AbortController | undefined;
   #wheel: AbortController | undefined;
 
-  constructor(host: ReactiveControllerHost & HTMLElement, of: InputHost) {
-    this.#host = host;
-    this.#of = of;
-    host.addController(this);
-    addHandStyles(host.shadowRoot!);
+  constructor(viewer: Viewer) {
+    this.#viewer = viewer;
+    this.prompt = new PromptController(viewer);
+    viewer.element.addController(this);
+    addHandStyles(viewer.element.shadowRoot!);
   }
 
-  /** Whether the last pressed pointer was a finger. */
-  get isTouch(): boolean {
-    return this.#isTouch;
+  advance(now: number): boolean {
+    return this.prompt.advance(now);
   }
+
+  touched(): void {
+    this.prompt.dismiss();
+  }
+
+  view({ canMove }: TemplateModel): TemplateResult {
+    const { strings, features } = this.#viewer;
+    const kind = !this.prompt.isShown ? 'none' : this.prompt.wiggles ? 'wiggle' : 'basic';
+    const keys = canMove ? (features.first('keys') ?? '') : null;
+    return handsView({ keys, prompt: kind, onReset: this.#offersReset ? this.#onReset : null, strings });
+  }
+
+  /** Whether the reset button is offered: for touch users who have moved the camera, because they have no Home key. */
+  get #offersReset(): boolean {
+    const { input, isOnShow, camera } = this.#viewer;
+    return input.enabled && isOnShow && this.#isTouch && camera.isTouched;
+  }
+
+  readonly #onReset = (): void => {
+    this.#viewer.act({ type: 'reset' });
+    // The button is removed.
+    this.#viewer.element.focus({ preventScroll: true });
+  };
 
   hostConnected(): void {
     this.hostUpdated();
   }
 
   hostUpdated(): void {
-    this.#surface = this.#of.surface;
-    const layer = this.#of.hotspotLayer;
+    this.#surface = this.#viewer.surface;
+    const layer = this.#viewer.slotLayer;
     if (this.#surface === null || layer === null) return;
-    const { enabled, zoom, wheel, touchAction } = this.#of.input;
+    const { enabled, zoom, wheel, touchAction } = this.#viewer.input;
     const targets = [this.#surface, layer];
     for (const { style } of targets) style.touchAction = !enabled ? '' : zoom ? touchAction : withPinch(touchAction);
     if (!enabled) setSelectable(layer, true);
@@ -165,7 +158,7 @@ export class InputController implements ReactiveController {
     if (isOnLabel && !this.#takesFromLabel(event)) return;
     const pans = event.button === RIGHT_BUTTON || event.shiftKey || event.ctrlKey || event.metaKey;
     const isTouch = event.pointerType === 'touch';
-    if (isTouch !== this.#isTouch) this.#host.requestUpdate();
+    if (isTouch !== this.#isTouch) this.#viewer.element.requestUpdate();
     this.#isTouch = isTouch;
     if (isTouch && !isOnLabel) this.#doubleTap.down(positionOf(event), event.timeStamp, this.#pointers.size === 0);
     const owner = isTouch || isOnLabel ? 'undecided' : 'camera';
@@ -225,7 +218,7 @@ export class InputController implements ReactiveController {
    */
   #decide({ pointerId, pointerType }: PointerEvent, from: Pointer, to: Point): void {
     if (Math.hypot(to.x - from.x, to.y - from.y) < TOUCH_SLOP) return;
-    const isCamera = pointerType !== 'touch' || isCameraDrag(this.#of.input.touchAction, from, to);
+    const isCamera = pointerType !== 'touch' || isCameraDrag(this.#viewer.input.touchAction, from, to);
     this.#pointers.set(pointerId, { ...from, ...to, owner: isCamera ? 'camera' : 'page' });
     if (isCamera) this.#capture(pointerId);
   }
@@ -243,7 +236,7 @@ export class InputController implements ReactiveController {
     if (event.ctrlKey || event.altKey || event.metaKey) return;
     if (event.key === ' ') {
       // The repeats of a held key must not scroll the page, either.
-      this.#toggles = event.repeat ? this.#toggles : this.#of.toggleMotion();
+      this.#toggles = event.repeat ? this.#toggles : this.#viewer.toggleMotion();
       if (this.#toggles) event.preventDefault();
       return;
     }
@@ -256,7 +249,7 @@ export class InputController implements ReactiveController {
   };
 
   #pick({ clientX, clientY }: MouseEvent): void {
-    if (this.#of.input.tap) this.#of.pick(clientX, clientY);
+    if (this.#viewer.input.tap) this.#viewer.pick(clientX, clientY);
   }
 
   /**
@@ -282,19 +275,20 @@ export class InputController implements ReactiveController {
    */
   readonly #onWheel = (event: WheelEvent): void => {
     if (!this.#wheelZooms(event)) return;
-    if (this.#of.behaviors.act(wheelOf(event)) || event.ctrlKey) event.preventDefault();
+    if (this.#viewer.act(wheelOf(event)) || event.ctrlKey) event.preventDefault();
   };
 
   #wheelZooms(event: WheelEvent): boolean {
-    const { wheel } = this.#of.input;
+    const { wheel } = this.#viewer.input;
     if (isWithin(event, labelParts.panel)) return false;
     // Movements to the side scroll a carousel. Touchpads also report a small vertical part of them.
     if (!event.ctrlKey && Math.abs(event.deltaX) > Math.abs(event.deltaY)) return false;
     if (event.ctrlKey || event.metaKey || wheel === 'always') return true;
     if (wheel !== 'auto') return false;
     // A label may contain a scrollable box, which the wheel then scrolls.
-    if (event.currentTarget !== this.#surface && scrollsAround(event.target as Element, this.#host)) return false;
-    return this.#host.matches(':focus-within') || !scrollsAround(this.#host);
+    if (event.currentTarget !== this.#surface && scrollsAround(event.target as Element, this.#viewer.element))
+      return false;
+    return this.#viewer.element.matches(':focus-within') || !scrollsAround(this.#viewer.element);
   }
 
   /**
@@ -302,7 +296,7 @@ export class InputController implements ReactiveController {
    * menu.
    */
   readonly #onContextMenu = (event: Event): void => {
-    if (this.#of.input.pan && !isWithin(event, labelParts.withMenu)) event.preventDefault();
+    if (this.#viewer.input.pan && !isWithin(event, labelParts.withMenu)) event.preventDefault();
   };
 
   /**
@@ -311,18 +305,18 @@ export class InputController implements ReactiveController {
    */
   readonly #onTouchMove = (event: TouchEvent): void => {
     if (event.touches.length < 2 || !event.cancelable || isWithin(event, labelParts.panel)) return;
-    if (this.#of.input.zoom) event.preventDefault();
+    if (this.#viewer.input.zoom) event.preventDefault();
   };
 
   #ofPair(from: readonly [Point, Point], to: readonly [Point, Point], height: number): readonly CameraAction[] {
-    return this.#of.input.zoom ? pinchOf(from, to, height) : [];
+    return this.#viewer.input.zoom ? pinchOf(from, to, height) : [];
   }
 
   /** Passes an action to the host. Returns false if the page does not allow it. */
   #perform(action: CameraAction): boolean {
-    const { zoom, pan } = this.#of.input;
+    const { zoom, pan } = this.#viewer.input;
     if ((action.type === 'zoom' && !zoom) || (action.type === 'pan' && !pan)) return false;
-    this.#of.behaviors.act(action);
+    this.#viewer.act(action);
     return true;
   }
 }

@@ -1,12 +1,12 @@
 import type { Camera } from '@gaussian-splat/core';
-import type { ProbeAnswer, ProbePoint } from '@gaussian-splat/renderer/tools';
-import { css, type ReactiveController, type ReactiveControllerHost } from 'lit';
+import { css, type ReactiveController } from 'lit';
 import { parsePoint } from '../../viewer/camera/grammar.js';
 import { ScenePoint } from '../../viewer/camera/values.js';
 import { adoptStyles } from '../../viewer/styles.js';
-import type { CameraController } from '../../viewer/camera-controller.js';
-import { LabelBox, LabelView, type Located } from './label-box.js';
-import { labelParts } from './label-parts.js';
+import type { Feature } from '../../viewer/features.js';
+import type { Viewer } from '../../viewer/viewer.js';
+import { LabelBox, LabelView, type Located } from '../../shared/label-box.js';
+import { labelParts } from '../../shared/label-parts.js';
 import { windowOf } from '../../viewer/size-controller.js';
 
 const STYLES = css`
@@ -47,18 +47,6 @@ const STYLES = css`
     }
   }
 `;
-
-export interface HotspotHost {
-  readonly camera: Pick<CameraController, 'viewerFrame' | 'bounds'>;
-  /** Contains one box for each of {@link HotspotController.names}, in their order; null until it is rendered. */
-  readonly hotspotLayer: HTMLElement | null;
-  /**
-   * Returns the transmittance in front of each point in the last frame. Positions are in pixels of the frame, depths in
-   * world units. Rejects if the frame is gone, with its scene or its device.
-   */
-  probe(points: readonly ProbePoint[]): Promise<readonly ProbeAnswer[]>;
-  warn(sentence: string): void;
-}
 
 /** A hotspot at a point of the scene, as returned by `queryHotspot`. */
 export interface HotspotPlace {
@@ -107,9 +95,8 @@ const PROBE_INTERVAL_MS = 100;
  * Keeps children with `slot="hotspot-…"` at their points of the scene, and fades the occluded ones and those that face
  * away.
  */
-export class HotspotController implements ReactiveController {
-  readonly #host: ReactiveControllerHost & HTMLElement;
-  readonly #of: HotspotHost;
+export class HotspotController implements ReactiveController, Feature {
+  readonly #viewer: Viewer;
   #hotspots = new Map<string, Hotspot>();
   #observer: MutationObserver | undefined;
   #camera: Camera | undefined;
@@ -120,30 +107,28 @@ export class HotspotController implements ReactiveController {
   #isProbing = false;
   #isStale = false;
 
-  constructor(host: ReactiveControllerHost & HTMLElement, of: HotspotHost) {
-    this.#host = host;
-    this.#of = of;
-    adoptStyles(host.shadowRoot!, STYLES);
-    host.addController(this);
+  constructor(viewer: Viewer) {
+    this.#viewer = viewer;
+    adoptStyles(viewer.element.shadowRoot!, STYLES);
+    viewer.element.addController(this);
   }
 
-  /** Slot names of the children that are labels; each name occurs once. */
-  get names(): readonly string[] {
+  slots(): readonly string[] {
     return [...this.#hotspots.keys()];
   }
 
   hostConnected(): void {
     this.#observer = new MutationObserver((records) => this.#onMutations(records));
     const attributeFilter = ['slot', 'data-position', 'data-normal', 'data-orbit', 'open'];
-    this.#observer.observe(this.#host, { childList: true, subtree: true, attributeFilter });
+    this.#observer.observe(this.#viewer.element, { childList: true, subtree: true, attributeFilter });
     // The event `toggle` does not bubble, so the listeners are capturing ones.
-    for (const type of PANEL_EVENTS) this.#host.addEventListener(type, this.#findPanels, true);
+    for (const type of PANEL_EVENTS) this.#viewer.element.addEventListener(type, this.#findPanels, true);
     this.#collect();
   }
 
   hostDisconnected(): void {
     this.#observer?.disconnect();
-    for (const type of PANEL_EVENTS) this.#host.removeEventListener(type, this.#findPanels, true);
+    for (const type of PANEL_EVENTS) this.#viewer.element.removeEventListener(type, this.#findPanels, true);
   }
 
   #onMutations(records: readonly MutationRecord[]): void {
@@ -194,16 +179,16 @@ export class HotspotController implements ReactiveController {
 
   #collect(): void {
     const before = this.#hotspots;
-    const children = [...this.#host.children].filter(
+    const children = [...this.#viewer.element.children].filter(
       (child): child is HTMLElement => 'dataset' in child && child.slot.startsWith(PREFIX),
     );
     this.#hotspots = new Map(
       [...groupBySlot(children)].map(([name, elements]) => [name, this.#read(elements, before.get(name))]),
     );
-    this.#host.requestUpdate();
+    this.#viewer.element.requestUpdate();
     if (before.size + this.#hotspots.size === 0) return;
     // The positions are computed with the boxes, which Lit renders first.
-    void this.#host.updateComplete.then(() => this.#look());
+    void this.#viewer.element.updateComplete.then(() => this.#look());
   }
 
   #read(elements: readonly HTMLElement[], before: Hotspot | undefined): Hotspot {
@@ -211,7 +196,9 @@ export class HotspotController implements ReactiveController {
     const read = (name: string, text: string | undefined): Located['position'] => {
       const point = text === undefined ? null : parsePoint(text);
       if (text !== undefined && point === null)
-        this.#of.warn(`<gaussian-splat> ${slot}: ${name} expects "x y z" in meters, found "${text.slice(0, 200)}".`);
+        this.#viewer.warn(
+          `<gaussian-splat> ${slot}: ${name} expects "x y z" in meters, found "${text.slice(0, 200)}".`,
+        );
       return point;
     };
     const position = read('data-position', dataset.position);
@@ -225,12 +212,12 @@ export class HotspotController implements ReactiveController {
    * Moves the boxes to the positions of their points in the last frame. Hides the boxes of points behind the camera.
    */
   hostUpdated(): void {
-    const boxes = this.#of.hotspotLayer?.children;
+    const boxes = this.#viewer.slotLayer?.children;
     if (boxes === undefined) return;
     // All reads precede all writes, because each read after a write would cause another layout.
-    const { clientWidth: width, clientHeight: height } = this.#host;
-    const minMove = VISIBLE_MOVE / windowOf(this.#host).devicePixelRatio || 0;
-    const view = this.#camera && new LabelView(this.#camera, this.#of.camera.viewerFrame, width, height);
+    const { clientWidth: width, clientHeight: height } = this.#viewer.element;
+    const minMove = VISIBLE_MOVE / windowOf(this.#viewer.element).devicePixelRatio || 0;
+    const view = this.#camera && new LabelView(this.#camera, this.#viewer.camera.viewerFrame, width, height);
     let i = 0;
     for (const hotspot of this.#hotspots.values()) {
       const element = boxes[i++] as HTMLElement | undefined;
@@ -274,7 +261,7 @@ export class HotspotController implements ReactiveController {
     if (this.#isProbing) return;
     this.#isProbing = true;
     try {
-      while (this.#isStale && this.#host.isConnected) {
+      while (this.#isStale && this.#viewer.element.isConnected) {
         this.#isStale = false;
         await this.#lookOnce();
         await new Promise((resolve) => setTimeout(resolve, PROBE_INTERVAL_MS));
@@ -287,17 +274,17 @@ export class HotspotController implements ReactiveController {
   }
 
   async #lookOnce(): Promise<void> {
-    const { clientWidth, clientHeight } = this.#host;
+    const { clientWidth, clientHeight } = this.#viewer.element;
     const camera = this.#camera;
     const asked = [...this.#hotspots.values()].filter(({ depth }) => depth > 0);
     if (camera === undefined || asked.length === 0) return;
-    const margin = IN_FRONT * this.#of.camera.bounds.radius;
+    const margin = IN_FRONT * this.#viewer.camera.bounds.radius;
     const points = asked.map(({ x, y, depth }) => ({
       x: (x * camera.width) / clientWidth,
       y: (y * camera.height) / clientHeight,
       depth: depth - margin,
     }));
-    const answers = await this.#of.probe(points);
+    const answers = await this.#viewer.probe(points);
     answers.forEach(({ transmittance }, i) => (asked[i].isOccluded = transmittance < HIDDEN_BELOW));
     this.hostUpdated();
   }

@@ -1,16 +1,16 @@
-import type { ReactiveController, ReactiveControllerHost } from 'lit';
+import type { ReactiveController } from 'lit';
+import type { Viewer } from '../../viewer/viewer.js';
 
 /**
  * Shows a copy of the frame over the canvas while the page is printed, because browsers do not print WebGPU canvases.
  */
 export class PrintController implements ReactiveController {
-  readonly #draw: () => HTMLCanvasElement | null;
+  readonly #viewer: Viewer;
   #copy: HTMLCanvasElement | undefined;
 
-  /** @param draw Draws a frame synchronously and returns its canvas; null if there is nothing to draw. */
-  constructor(host: ReactiveControllerHost, draw: () => HTMLCanvasElement | null) {
-    this.#draw = draw;
-    host.addController(this);
+  constructor(viewer: Viewer) {
+    this.#viewer = viewer;
+    viewer.element.addController(this);
   }
 
   hostConnected(): void {
@@ -26,7 +26,7 @@ export class PrintController implements ReactiveController {
 
   readonly #put = (): void => {
     this.#take();
-    const drawn = this.#draw();
+    const drawn = this.#viewer.drawNow();
     if (drawn === null) return;
     // The copy has the same part name, so that the page's styles of the canvas apply to it.
     const copy = drawn.cloneNode() as HTMLCanvasElement;

@@ -1,19 +1,8 @@
 /** Takes images for scripts: of any size, with a background color and the CSS filters of the element. */
 import type { PixelSize } from '../../viewer/size-controller.js';
-import type { ViewController } from '../../viewer/view-controller.js';
+import type { Viewer } from '../../viewer/viewer.js';
 import type { Backend } from '../../gpu/backend.js';
 import type { ImageOptions } from '../../viewer/viewing.js';
-
-export interface ImageHost {
-  readonly element: HTMLElement;
-  readonly canvas: HTMLCanvasElement | null;
-  readonly view: Pick<ViewController, 'backend'>;
-  warn(sentence: string): void;
-  /** Loads again the scenes that were released out of view. */
-  present(): Promise<unknown>;
-  /** Draws a frame into the element's canvas at once and returns the canvas; null if there is nothing to draw. */
-  drawNow(pixels?: PixelSize, background?: Rgba): HTMLCanvasElement | null;
-}
 
 export { record, recordFrames } from './recording.js';
 
@@ -25,7 +14,7 @@ const MAX_RUNS = 10;
 /** Message for an image whose device was lost. */
 const LOST = 'The GPU device was lost before the image was drawn: take it again after the event contextrestored';
 
-export async function takeImage(host: ImageHost, options: ImageOptions): Promise<Blob> {
+export async function takeImage(host: Viewer, options: ImageOptions): Promise<Blob> {
   const { mimeType = 'image/png', qualityArgument, background } = options;
   await host.present();
   const { backend } = host.view;
@@ -111,7 +100,7 @@ function onColor(drawn: HTMLCanvasElement, color: string): HTMLCanvasElement {
  * Returns a copy of the canvas with the CSS filters of canvas and element applied, or the canvas itself if there are
  * none.
  */
-function withFilters(host: ImageHost, drawn: HTMLCanvasElement): HTMLCanvasElement {
+function withFilters(host: Viewer, drawn: HTMLCanvasElement): HTMLCanvasElement {
   const filter = [host.canvas!, host.element]
     .map((node) => getComputedStyle(node).filter)
     .filter((text) => text !== '' && text !== 'none')

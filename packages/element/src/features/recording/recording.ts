@@ -1,11 +1,8 @@
 /** Videos: recorded by the browser in real time, or drawn frame by frame as images. */
-import type { Lazy } from '@gaussian-splat/core';
-import type { CameraController } from '../../viewer/camera-controller.js';
-import type { PlaybackController } from '../../viewer/playback-controller.js';
-import { nothingToDraw, takeImage, type ImageHost } from './capture-image.js';
+import { nothingToDraw, takeImage } from './capture-image.js';
 import type { ImageOptions } from '../../viewer/viewing.js';
-import { frameCount, frameShares, type CameraPath, type PathName } from '../views/camera-path.js';
-import type { Tour } from '../views/tour.js';
+import { frameCount, frameShares, type CameraPath, type PathName } from '../../viewer/camera/camera-path.js';
+import type { Viewer } from '../../viewer/viewer.js';
 
 /** Path, duration and frame rate of a video. */
 interface VideoOptions {
@@ -38,15 +35,9 @@ export interface FrameOptions extends VideoOptions, ImageOptions {
   readonly frames?: number;
 }
 
-export interface RecordingHost extends ImageHost {
-  readonly camera: CameraController;
-  readonly playback: PlaybackController;
-  readonly behaviors: { rest(): void };
-  readonly tour: Pick<Lazy<Tour>, 'get'>;
-  readonly settled: Promise<unknown>;
-  /** Called after each frame, in the task that has drawn it. */
-  onFrame: (() => void) | undefined;
-  requestFrame(): void;
+/** The part of the list of views that has the paths. */
+interface Paths {
+  path(name: PathName, aspect?: number): Promise<CameraPath | null>;
 }
 
 const FRAME_RATE = 30;
@@ -60,7 +51,7 @@ const recorded = new WeakSet<HTMLElement>();
  * Reserves an element for one recording, until the returned function is called.
  * @throws DOMException `InvalidStateError` during another recording of the element
  */
-function reserve({ element }: RecordingHost, method: string): () => void {
+function reserve({ element }: Viewer, method: string): () => void {
   if (recorded.has(element))
     throw new DOMException(
       `${method}: expected no other recording of this element, found one; wait until it ends, or end it by its signal or by return()`,
@@ -71,7 +62,7 @@ function reserve({ element }: RecordingHost, method: string): () => void {
 }
 
 /** Records a video in real time: see `record()` of the element. */
-export async function record(host: RecordingHost, options: RecordOptions): Promise<Blob> {
+export async function record(host: Viewer, options: RecordOptions): Promise<Blob> {
   const { frameRate = FRAME_RATE, bitsPerSecond, signal } = options;
   const mimeType = typeOf(options.mimeType);
   const path = await pathOf(host, options.path);
@@ -111,7 +102,7 @@ export async function record(host: RecordingHost, options: RecordOptions): Promi
 }
 
 /** Requests frames, and moves the camera along `path`, for `duration` milliseconds or until the signal is aborted. */
-function drive(host: RecordingHost, path: CameraPath | null, duration: number, signal?: AbortSignal): Promise<void> {
+function drive(host: Viewer, path: CameraPath | null, duration: number, signal?: AbortSignal): Promise<void> {
   return new Promise((resolve) => {
     const start = performance.now();
     const end = (): void => {
@@ -128,7 +119,7 @@ function drive(host: RecordingHost, path: CameraPath | null, duration: number, s
     const step = (): void => {
       if (isOver) return;
       if (path) {
-        host.behaviors.rest();
+        host.rest();
         host.camera.moveTo(path.at(Math.min(1, (performance.now() - start) / duration)));
       }
       // Browsers add a frame to the video only if the canvas changes.
@@ -144,7 +135,7 @@ function drive(host: RecordingHost, path: CameraPath | null, duration: number, s
  * constant size.
  */
 function paperFor(
-  host: RecordingHost,
+  host: Viewer,
   { width, height }: HTMLCanvasElement,
   background: string | undefined,
 ): { context: CanvasRenderingContext2D; copy: () => void } {
@@ -177,7 +168,7 @@ function typeOf(asked: string | undefined): string {
 }
 
 /** Yields the images of a video one by one: see `recordFrames()` of the element. */
-export async function* recordFrames(host: RecordingHost, options: FrameOptions): AsyncGenerator<Blob, void> {
+export async function* recordFrames(host: Viewer, options: FrameOptions): AsyncGenerator<Blob, void> {
   const { path: name, duration, frameRate = FRAME_RATE, frames: count, ...image } = options;
   const { width, height } = image;
   const path = await pathOf(host, name, width && height ? width / height : undefined);
@@ -191,7 +182,7 @@ export async function* recordFrames(host: RecordingHost, options: FrameOptions):
   if (!before.isPaused) playback.pause();
   try {
     for (const [frame, share] of frameShares(frames, path ?? { isClosed: false }).entries()) {
-      host.behaviors.rest();
+      host.rest();
       if (path) camera.moveTo(path.at(share));
       if (playback.canPlay) await seek(host, Math.min(playback.duration, before.time + frame / frameRate));
       yield await takeImage(host, image);
@@ -207,7 +198,7 @@ export async function* recordFrames(host: RecordingHost, options: FrameOptions):
 }
 
 /** Seeks to a time in seconds, and waits until its frame is drawn. Rejects if the scene is removed or replaced. */
-async function seek({ element, playback }: RecordingHost, seconds: number): Promise<void> {
+async function seek({ element, playback }: Viewer, seconds: number): Promise<void> {
   if (playback.currentTime === seconds) return;
   const over = new AbortController();
   const { signal } = over;
@@ -224,10 +215,10 @@ async function seek({ element, playback }: RecordingHost, seconds: number): Prom
  * @param aspect width by height; default: that of the element
  * @throws TypeError if the page has no views
  */
-async function pathOf(host: RecordingHost, name: PathName | undefined, aspect?: number): Promise<CameraPath | null> {
+async function pathOf(host: Viewer, name: PathName | undefined, aspect?: number): Promise<CameraPath | null> {
   await host.settled;
   if (name === undefined) return null;
-  const path = await (await host.tour.get()).path(name, aspect);
+  const path = await (await host.features.get<Paths>('views').get()).path(name, aspect);
   if (path === null) throw new TypeError('Expected views as a path to record, found none: see the attribute views');
   return path;
 }

@@ -1,13 +1,20 @@
 import { css, type ReactiveController, type ReactiveControllerHost } from 'lit';
+import { buttonBarOf } from '../../viewer/button-bar.js';
 import { project } from '../../viewer/camera/projection.js';
 import { toScene } from '../../viewer/camera/orbit.js';
 import type { ScenePoint } from '../../viewer/camera/values.js';
-import type { MeasureDetail } from '../../viewer/events.js';
-import type { XrHost } from '../xr/xr-host.js';
+import type { Viewer } from '../../viewer/viewer.js';
 import { adoptStyles } from '../../viewer/styles.js';
-import { languageOf, type ExtraWord } from '../../viewer/strings.js';
-import { unitOf } from '../xr/vr.js';
-import { WORDS } from '../xr/xr-offer.js';
+import { languageOf } from '../../viewer/strings.js';
+import { unitOf } from '../../viewer/unit.js';
+import type { MeasureDetail } from './row.js';
+
+const WORDS = {
+  measure: 'Measure',
+  'measure-keys': 'Press Enter to set each end of the ruler; the arrow keys turn the view. Escape puts the ruler away.',
+  'measure-first': 'First end set',
+  'measure-none': 'No surface here',
+};
 
 const STYLES = css`
   .ruler {
@@ -57,7 +64,7 @@ const DIGITS = 3;
 /** A ruler: two ends on surfaces of the scene, a line, and its length with its uncertainty. */
 export class Measure implements ReactiveController {
   readonly #element: ReactiveControllerHost & HTMLElement;
-  readonly #core: XrHost;
+  readonly #core: Viewer;
   readonly #place: HTMLElement;
   readonly #button: HTMLButtonElement;
   readonly #drawing: SVGSVGElement;
@@ -69,10 +76,11 @@ export class Measure implements ReactiveController {
   #pressed: readonly [number, number] | undefined;
   #hasKeyboard = false;
 
-  constructor(element: ReactiveControllerHost & HTMLElement, core: XrHost, place: HTMLElement) {
+  constructor(core: Viewer) {
+    const { element } = core;
     this.#element = element;
     this.#core = core;
-    this.#place = place;
+    this.#place = buttonBarOf(core);
     adoptStyles(element.shadowRoot!, STYLES);
     const page = element.ownerDocument;
     this.#button = Object.assign(page.createElement('button'), { type: 'button' });
@@ -101,12 +109,12 @@ export class Measure implements ReactiveController {
     if (!this.#button.isConnected) this.#place.append(this.#button);
   }
 
-  #word(key: ExtraWord): string {
+  #word(key: keyof typeof WORDS): string {
     return this.#core.strings[key] ?? WORDS[key];
   }
 
   #say(text: string): void {
-    const { value } = this.#core.behaviors.announcer;
+    const { value } = this.#core.announcer;
     // Screen readers announce changes only. A space makes a repeated text another one.
     value?.say(text !== '' && text === value.text ? `${text}\u00A0` : text);
   }

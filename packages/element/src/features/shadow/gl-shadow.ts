@@ -3,7 +3,7 @@ import { multiply, type Camera } from '@gaussian-splat/core';
 import { DATA_WIDTH, GlGaussians, GlRenderer } from '@gaussian-splat/renderer/webgl';
 import type { WebGlBackend } from '../../webgl/webgl-backend.js';
 import type { Taker } from './shadow-controller.js';
-import { alphaOfScene } from './take-alpha-gl.js';
+import { alphaOfScene } from '../../shared/take-alpha-gl.js';
 
 const upTo = (count: number): Uint32Array => Uint32Array.from({ length: count }, (_, i) => i);
 

@@ -1,41 +1,16 @@
 /** Draws the shadow under the scene. Loaded for elements with the attribute `shadow-intensity`. */
-import { eyeOf, Lazy, multiply, type Camera, type Matrix4 } from '@gaussian-splat/core';
-import { GaussianBuffers, type FrameTarget, type Placement, type World } from '@gaussian-splat/renderer';
-import type { ReactiveController, ReactiveControllerHost } from 'lit';
-import type { Attributes } from '../../viewer/attributes.js';
-import { numberGrammar, readAttribute } from '../../viewer/camera/grammar.js';
+import { eyeOf, Lazy, multiply, type Matrix4 } from '@gaussian-splat/core';
+import { GaussianBuffers, type Placement } from '@gaussian-splat/renderer';
+import type { ReactiveController } from 'lit';
 import { toViewer, type ViewerFrame } from '../../viewer/camera/orbit.js';
-import type { SceneBounds } from '../../viewer/camera/settings.js';
-import { matrixOfFrame, transposed } from '../children/placing.js';
+import { matrixOfFrame, transposed } from '../../viewer/camera/placing.js';
 import type { Feature } from '../../viewer/features.js';
+import type { Viewer } from '../../viewer/viewer.js';
 import type { Backend, DeviceOwner } from '../../gpu/backend.js';
 import type { WebGpuBackend } from '../../gpu/webgpu-backend.js';
 import type { Frame } from '../../sources/generator/frame-filter.js';
-import type { SceneLoader } from '../../loading/scene-loader.js';
-import type { WorldEntry } from '../../viewer/world-entry.js';
-import { shadowSplats, takeShadow, type ShadowMap, type TakeAlpha } from './shadow-map.js';
-import { packSplats } from './splat-file.js';
-
-/** The part of the element that the shadow uses. */
-export interface ShadowHost {
-  readonly element: ReactiveControllerHost & HTMLElement;
-  readonly attributes: Pick<Attributes, 'shadowIntensity' | 'shadowSoftness'>;
-  readonly services: { readonly sceneLoader: SceneLoader };
-  readonly frame: ViewerFrame;
-  readonly camera: { view(width: number, height: number): Camera };
-  readonly isImmersed: boolean;
-  readonly view: { readonly backend: Backend | null };
-  readonly sources: {
-    readonly world: World;
-    readonly members: readonly WorldEntry[];
-    readonly isPreview: boolean;
-    readonly bounds: SceneBounds | null;
-    readonly meshes: { readonly value: { readonly version: string } | undefined };
-  };
-  drawBeneath(frame: Frame): Partial<FrameTarget>;
-  requestFrame(): void;
-  warn(sentence: string): void;
-}
+import { readShadow, shadowSplats, takeShadow, type ShadowMap, type TakeAlpha } from '../../shared/shadow-map.js';
+import { packSplats } from '../../shared/splat-file.js';
 
 /**
  * Limits for the shadow of a moving scene: the minimum interval between updates, milliseconds, and the minimum ratio of
@@ -47,20 +22,6 @@ const [MIN_MS, SHARE] = [500, 10];
  * ground the shadow is invisible.
  */
 const FADE = 0.08;
-
-/** Parses `shadow-intensity` and `shadow-softness`, 0..1 each. */
-export function readShadow({ attributes, warn }: Pick<ShadowHost, 'attributes' | 'warn'>): {
-  readonly intensity: number;
-  readonly softness: number;
-} {
-  const of = (name: string, value: number | string | null, fallback: number): number =>
-    readAttribute(name, value, numberGrammar(fallback, 0, 'a number from 0 to 1', 1), warn);
-  const { shadowIntensity, shadowSoftness } = attributes;
-  return {
-    intensity: of('shadow-intensity', shadowIntensity, 0),
-    softness: of('shadow-softness', shadowSoftness, 1),
-  };
-}
 
 /** A shadow that is drawn in the world of an element. */
 interface Shown {
@@ -80,7 +41,7 @@ const isGl = ({ place }: Backend): boolean => place.context instanceof WebGL2Ren
  * scene.
  */
 export class ShadowController implements ReactiveController, Feature {
-  readonly #core: ShadowHost;
+  readonly #core: Viewer;
   /** Key of the content that the current shadow was made for. */
   #key = '';
   #shown: Shown | undefined;
@@ -94,11 +55,11 @@ export class ShadowController implements ReactiveController, Feature {
   );
   readonly #gpu = new Lazy(
     'the code of shadows',
-    () => import('./take-alpha.js'),
+    () => import('../../shared/take-alpha.js'),
     () => this.#core.requestFrame(),
   );
 
-  constructor(core: ShadowHost) {
+  constructor(core: Viewer) {
     this.#core = core;
     core.element.addController(this);
     // Without a scene no frame is drawn that would remove the shadow.
@@ -115,10 +76,10 @@ export class ShadowController implements ReactiveController, Feature {
   }
 
   advance(now: number): boolean {
-    const { view, isImmersed } = this.#core;
+    const { view, isShownElsewhere } = this.#core;
     const { backend } = view;
     if (this.#shown && this.#shown.context !== backend?.place.context) this.#remove();
-    if (!backend || backend.place.isLost || isImmersed) return false;
+    if (!backend || backend.place.isLost || isShownElsewhere) return false;
     // Waits for the end of the task, because this frame may still cut or move splats.
     queueMicrotask(() => this.#follow(backend, now));
     this.#fade();

@@ -2,13 +2,13 @@
 import { bytesOf, fetchPatiently } from '@gaussian-splat/core/fetch';
 import { boundedImageHeader } from '@gaussian-splat/formats';
 import type { FrameTarget } from '@gaussian-splat/renderer';
-import type { ReactiveController, ReactiveControllerHost } from 'lit';
-import { credentialsOf, type Attributes } from '../../viewer/attributes.js';
-import type { ViewerFrame } from '../../viewer/camera/orbit.js';
+import type { ReactiveController } from 'lit';
+import { credentialsOf } from '../../viewer/attributes.js';
 import type { Feature } from '../../viewer/features.js';
-import type { Backend } from '../../gpu/backend.js';
+import type { Viewer } from '../../viewer/viewer.js';
 import { LatestTask } from '../../viewer/latest-task.js';
 import type { Frame } from '../../sources/generator/frame-filter.js';
+import type { Backend } from '../../gpu/backend.js';
 import type { WebGlBackend } from '../../webgl/webgl-backend.js';
 import { SkyGl } from './sky-gl.js';
 import { hasTarget, SkyGpu } from './sky-gpu.js';
@@ -16,35 +16,26 @@ import { hasTarget, SkyGpu } from './sky-gpu.js';
 /** Maximum size of the image file, bytes. */
 const MAX_BYTES = 2 ** 26;
 
-/** The part of the element that the sky uses. */
-export interface SkyHost {
-  readonly element: ReactiveControllerHost & HTMLElement;
-  readonly attributes: Pick<Attributes, 'skyboxImage' | 'crossorigin'>;
-  readonly frame: ViewerFrame;
-  readonly view: { readonly backend: Backend | null };
-  requestFrame(): void;
-  warn(sentence: string): void;
-}
-
 /** Fetches the image, and draws it beneath the splats with the API that draws the splats. */
 export class Sky implements ReactiveController, Feature {
-  readonly #host: SkyHost;
+  readonly #viewer: Viewer;
   readonly #loading = new LatestTask();
   #url: string | null = null;
   #image: ImageBitmap | undefined;
   #gpu: SkyGpu | undefined;
   #gl: SkyGl | undefined;
 
-  constructor(host: SkyHost) {
-    this.#host = host;
-    host.element.addController(this);
+  constructor(viewer: Viewer) {
+    this.#viewer = viewer;
+    const { element } = viewer;
+    element.addController(this);
     // Without a scene nothing is drawn, so that the sky must not wait for a frame to be freed.
-    host.element.addEventListener('emptied', () => host.view.backend === null && this.#free());
+    element.addEventListener('emptied', () => viewer.view.backend === null && this.#free());
     this.hostUpdated();
   }
 
   hostUpdated(): void {
-    const { skyboxImage: url } = this.#host.attributes;
+    const { skyboxImage: url } = this.#viewer.attributes;
     if (url === this.#url) return;
     this.#url = url;
     if (url) return this.#loading.run((signal) => this.#load(url, signal), this.#fail);
@@ -54,11 +45,11 @@ export class Sky implements ReactiveController, Feature {
 
   /** Attaches the sky to splats that WebGL draws. */
   prepareFrame(): void {
-    const { backend } = this.#host.view;
+    const { backend } = this.#viewer.view;
     if (!backend || backend.place.isLost || !(backend.place.context instanceof WebGL2RenderingContext)) return;
     const { beneath } = backend as WebGlBackend;
     const sky = this.#image && this.#glOn(backend.place.context, this.#image);
-    beneath.sky = sky && ((camera) => sky.draw(camera, this.#host.frame));
+    beneath.sky = sky && ((camera) => sky.draw(camera, this.#viewer.frame));
   }
 
   /**
@@ -66,14 +57,14 @@ export class Sky implements ReactiveController, Feature {
    * @returns properties of the target that let the splats blend over the sky; none without a sky
    */
   drawBeneath(frame: Frame): Partial<FrameTarget> {
-    const { backend } = this.#host.view;
+    const { backend } = this.#viewer.view;
     if (!this.#image || !backend || !hasTarget(frame)) return {};
     const { device } = backend;
     if (this.#gpu?.device !== device) {
       this.#gpu?.destroy();
       this.#gpu = new SkyGpu(device, this.#image);
     }
-    return this.#gpu.draw(frame, this.#host.frame);
+    return this.#gpu.draw(frame, this.#viewer.frame);
   }
 
   #glOn(gl: WebGL2RenderingContext, image: ImageBitmap): SkyGl {
@@ -83,7 +74,7 @@ export class Sky implements ReactiveController, Feature {
   }
 
   async #load(url: string, signal: AbortSignal): Promise<void> {
-    const { element, attributes, view } = this.#host;
+    const { element, attributes, view } = this.#viewer;
     const address = new URL(url, element.baseURI);
     const response = await fetchPatiently(address, { credentials: credentialsOf(attributes.crossorigin), signal });
     if (!response.ok) throw new Error(`expected an image at ${address.href}, found status ${response.status}`);
@@ -97,7 +88,7 @@ export class Sky implements ReactiveController, Feature {
 
   readonly #fail = (error: unknown): void => {
     this.#show(undefined);
-    this.#host.warn(`<gaussian-splat> skybox-image: ${error instanceof Error ? error.message : String(error)}`);
+    this.#viewer.warn(`<gaussian-splat> skybox-image: ${error instanceof Error ? error.message : String(error)}`);
   };
 
   /** Frees the GPU memory. The next frame uploads the image again. */
@@ -112,8 +103,8 @@ export class Sky implements ReactiveController, Feature {
     this.#image?.close();
     this.#image = image;
     this.#free();
-    this.#host.view.backend?.filter?.invalidate();
-    this.#host.requestFrame();
+    this.#viewer.view.backend?.filter?.invalidate();
+    this.#viewer.requestFrame();
   }
 }
 

@@ -1,5 +1,6 @@
 /** Plays sound with animated scenes. The module is loaded only if an element has a child with `slot="sound"`. */
 import { css } from 'lit';
+import type { ViewerElement } from '../../viewer/element-host.js';
 import { adoptStyles } from '../../viewer/styles.js';
 
 const STYLES = css`
@@ -34,18 +35,9 @@ const STILL_MS = 1_000;
 /** Minimum and maximum playback rate that browsers support; 1 is real time. */
 const [SLOWEST, FASTEST] = [0.0625, 16];
 
-/** The part of the element that its sound follows. */
-export interface SoundHost extends HTMLElement {
-  readonly currentTime: number;
-  readonly playbackRate: number;
-  readonly paused: boolean;
-  readonly seeking: boolean;
-  readonly readyState: number;
-}
-
 /** Synchronizes an `<audio>` or `<video>` of the page with an animated scene, and shows its captions. */
 export class Sound {
-  readonly #element: SoundHost;
+  readonly #element: ViewerElement;
   readonly #captions: HTMLElement;
   #track: HTMLMediaElement | undefined;
   #listening: AbortController | undefined;
@@ -57,7 +49,7 @@ export class Sound {
   #isRefused = false;
   #still: ReturnType<typeof setTimeout> | undefined;
 
-  constructor(element: SoundHost) {
+  constructor(element: ViewerElement) {
     this.#element = element;
     adoptStyles(element.shadowRoot!, STYLES);
     this.#captions = Object.assign(element.ownerDocument.createElement('div'), { className: 'captions' });

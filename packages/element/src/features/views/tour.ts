@@ -1,19 +1,17 @@
 import { bytesOf, fetchPatiently } from '@gaussian-splat/core/fetch';
-import { css, html, nothing, render, type ReactiveController, type ReactiveControllerHost } from 'lit';
-import type { Attributes } from '../../viewer/attributes.js';
+import { css, html, nothing, render, type ReactiveController } from 'lit';
 import { adoptStyles } from '../../viewer/styles.js';
-import type { Behaviors } from '../../viewer/behaviors.js';
 import type { CameraPose } from '../../viewer/camera/orbit.js';
 import { poseOf } from '../../viewer/camera/settings.js';
-import type { CameraController } from '../../viewer/camera-controller.js';
+import type { Viewer } from '../../viewer/viewer.js';
 import { prefersReducedMotion } from '../../viewer/motion.js';
 import type { Feature } from '../../viewer/features.js';
-import { languageOf, type A11yStrings, type ViewString } from '../../viewer/strings.js';
-import { fail, poseOfView, type CameraView, type ViewContext } from './camera-view.js';
+import { languageOf } from '../../viewer/strings.js';
+import { fail, poseOfView, type CameraView, type ViewContext } from '../../viewer/camera/camera-view.js';
 import { Flight } from './flight.js';
-import { pathOfList, turntable, type CameraPath, type PathName } from './camera-path.js';
-import { easingOf, pathThrough, unwound, type Easing } from './path.js';
-import { readViews, type NamedView, type ViewList } from './read-views.js';
+import { pathOfList, turntable, type CameraPath, type PathName } from '../../viewer/camera/camera-path.js';
+import { easingOf, pathThrough, unwound, type Easing } from '../../viewer/camera/path.js';
+import { readViews, type NamedView, type ViewList } from '../../viewer/camera/read-views.js';
 
 /** Options of a flight. */
 export interface FlightOptions {
@@ -35,23 +33,9 @@ export interface PathOptions {
   readonly path?: PathName;
 }
 
-export interface TourHost {
-  readonly camera: CameraController;
-  readonly behaviors: Behaviors;
-  /** Fulfills when no scene is loading or pending. Never rejects. */
-  readonly settled: Promise<unknown>;
-  readonly surface: HTMLElement | null;
-  readonly strings: A11yStrings;
-  readonly attributes: Pick<Attributes, 'views'>;
-  /** Whether the scene is visible. */
-  readonly isOnShow: boolean;
-  warn(sentence: string): void;
-  requestFrame(): void;
-}
-
 const DURATION_MS = 1_200;
 
-const WORDS: Readonly<Record<ViewString, string>> = {
+const WORDS = {
   views: 'Views',
   'next-view': 'Next view',
   'previous-view': 'Previous view',
@@ -94,8 +78,7 @@ const STYLES = css`
 
 /** Views of an element: the list, flights between views, and the bar, keys and texts to select a view. */
 export class Tour implements ReactiveController, Feature {
-  readonly #element: ReactiveControllerHost & HTMLElement;
-  readonly #of: TourHost;
+  readonly #viewer: Viewer;
   #flight: Flight | undefined;
   #source: unknown;
   #list: Promise<ViewList> = Promise.resolve(NO_VIEWS);
@@ -105,9 +88,9 @@ export class Tour implements ReactiveController, Feature {
   #bar: HTMLElement | undefined;
   #keys: AbortController | undefined;
 
-  constructor(element: ReactiveControllerHost & HTMLElement, of: TourHost) {
-    this.#element = element;
-    this.#of = of;
+  constructor(viewer: Viewer) {
+    this.#viewer = viewer;
+    const { element } = viewer;
     element.addController(this);
     element.addEventListener('click', this.#onClick);
     this.hostUpdated();
@@ -115,7 +98,7 @@ export class Tour implements ReactiveController, Feature {
 
   hostUpdated(): void {
     this.#readChildren();
-    const { views } = this.#of.attributes;
+    const { views } = this.#viewer.attributes;
     if (views !== this.#source) {
       this.#source = views;
       this.#list = this.#load(views);
@@ -131,7 +114,7 @@ export class Tour implements ReactiveController, Feature {
     const flight = this.#flight;
     if (flight === undefined || flight.isOver) return false;
     // Delays automatic rotation until the camera has arrived.
-    this.#of.behaviors.rest();
+    this.#viewer.rest();
     flight.advance(now);
     return !flight.isOver;
   }
@@ -169,7 +152,7 @@ export class Tour implements ReactiveController, Feature {
     const path = await this.path();
     if (path === null) return;
     this.#flight?.cancel();
-    this.#of.camera.moveTo(path.at(Math.min(1, Math.max(0, share || 0))));
+    this.#viewer.camera.moveTo(path.at(Math.min(1, Math.max(0, share || 0))));
   }
 
   /**
@@ -177,8 +160,8 @@ export class Tour implements ReactiveController, Feature {
    * the children.
    */
   async #ready(): Promise<ViewList> {
-    await this.#element.updateComplete;
-    await this.#of.settled;
+    await this.#viewer.element.updateComplete;
+    await this.#viewer.settled;
     this.#readChildren();
     const { path } = await this.#list;
     return { views: this.#views, path };
@@ -191,9 +174,9 @@ export class Tour implements ReactiveController, Feature {
    * Returns a path of the camera by name; null if the list has no views.
    * @param aspect Width / height of the frames. Default: that of the element.
    */
-  async path(name: PathName = 'views', aspect = this.#of.camera.context.aspect): Promise<CameraPath | null> {
+  async path(name: PathName = 'views', aspect = this.#viewer.camera.context.aspect): Promise<CameraPath | null> {
     const list = await this.#ready();
-    const { context } = this.#of.camera;
+    const { context } = this.#viewer.camera;
     if (name === 'turntable') return turntable(poseFor(aspect, context));
     const place = JSON.stringify({ ...context, from: undefined, aspect });
     if (!this.#known || this.#known.place !== place || !isSameList(this.#known.list, list))
@@ -206,7 +189,7 @@ export class Tour implements ReactiveController, Feature {
     { duration = DURATION_MS, easing = 'ease-in-out' }: FlightOptions,
     index: number,
   ): Promise<boolean> {
-    const { camera } = this.#of;
+    const { camera } = this.#viewer;
     // A flight begins where the camera is, which may still be on the way to its goal.
     const { theta, phi, radius } = camera.orbit;
     const { x, y, z } = camera.target;
@@ -216,18 +199,18 @@ export class Tour implements ReactiveController, Feature {
     const along = pathThrough([from, to], [0, 1]);
     const path = (elapsed: number): CameraPose => (elapsed >= duration ? to : along(ease(elapsed / duration)));
     this.#choose(index);
-    const isSeen = this.#of.isOnShow && !prefersReducedMotion();
+    const isSeen = this.#viewer.isOnShow && !prefersReducedMotion();
     return this.#start(path, isSeen ? Math.max(0, duration) : 0, index);
   }
 
   async #start(path: (elapsed: number) => CameraPose, duration: number, index = -1): Promise<boolean> {
     this.#flight?.cancel();
-    const { behaviors, camera } = this.#of;
+    const { camera } = this.#viewer;
     const flight = (this.#flight = new Flight(camera, duration === 0 ? () => path(Infinity) : path, duration));
-    behaviors.rest();
-    const announcer = behaviors.announcer.value!;
+    this.#viewer.rest();
+    const announcer = this.#viewer.announcer.value!;
     announcer.isQuiet = true;
-    this.#of.requestFrame();
+    this.#viewer.requestFrame();
     const arrived = await flight.finished;
     if (this.#flight === flight) announcer.isQuiet = false;
     const view = this.#views[index];
@@ -240,20 +223,20 @@ export class Tour implements ReactiveController, Feature {
     this.#show();
     if (index < 0) return;
     const { name } = this.#views[index];
-    this.#element.dispatchEvent(new CustomEvent('view-change', { detail: { name, index } }));
+    this.#viewer.element.dispatchEvent(new CustomEvent('view-change', { detail: { name, index } }));
   }
 
   async #load(source: object | string | null): Promise<ViewList> {
     const isCurrent = (): boolean => this.#source === source;
     try {
-      const json = typeof source === 'string' ? await readJson(source, this.#element.baseURI) : source;
+      const json = typeof source === 'string' ? await readJson(source, this.#viewer.element.baseURI) : source;
       const list = json ? readViews(json) : NO_VIEWS;
       if (isCurrent()) this.#setViews(list.views);
       return list;
     } catch (error) {
       if (isCurrent()) {
         this.#setViews([]);
-        this.#of.warn(`<gaussian-splat> views: ${error instanceof Error ? error.message : String(error)}`);
+        this.#viewer.warn(`<gaussian-splat> views: ${error instanceof Error ? error.message : String(error)}`);
       }
       return NO_VIEWS;
     }
@@ -271,7 +254,7 @@ export class Tour implements ReactiveController, Feature {
    * at its own point.
    */
   #readChildren(): void {
-    this.#children = [...this.#element.querySelectorAll<HTMLElement>(':scope > [data-orbit]')];
+    this.#children = [...this.#viewer.element.querySelectorAll<HTMLElement>(':scope > [data-orbit]')];
     this.#join();
   }
 
@@ -301,11 +284,11 @@ export class Tour implements ReactiveController, Feature {
     this.step(by).catch(this.#warnOf);
   }
 
-  readonly #warnOf = ({ message }: Error): void => this.#of.warn(`<gaussian-splat> views: ${message}`);
+  readonly #warnOf = ({ message }: Error): void => this.#viewer.warn(`<gaussian-splat> views: ${message}`);
 
   #show(): void {
-    const root = this.#element.shadowRoot;
-    const { surface } = this.#of;
+    const root = this.#viewer.element.shadowRoot;
+    const { surface } = this.#viewer;
     if (root === null || surface === null) return;
     this.#children.forEach((child, i) => {
       if (i === this.#current) child.setAttribute('aria-current', 'true');
@@ -313,15 +296,15 @@ export class Tour implements ReactiveController, Feature {
     });
     this.#bar ??= addBar(root);
     this.#listen(surface);
-    const { isOnShow } = this.#of;
+    const { isOnShow } = this.#viewer;
     render(isOnShow && this.#views.length > 0 ? this.#template() : nothing, this.#bar);
     if (this.#bar.querySelector('#view-keys') && surface.getAttribute('aria-describedby') === 'keys')
       surface.setAttribute('aria-describedby', 'keys view-keys');
   }
 
   #template(): unknown {
-    const { strings } = this.#of;
-    const word = (key: ViewString): string => strings[key] ?? WORDS[key];
+    const { strings } = this.#viewer;
+    const word = (key: keyof typeof WORDS): string => strings[key] ?? WORDS[key];
     const lang = languageOf(strings) ?? nothing;
     const hasSlot = this.#children.some(({ slot }) => slot === 'view');
     const name = this.#views[this.#current]?.name ?? `${this.#views.length}`;

@@ -1,46 +1,27 @@
 import { subtract, type Vector3 } from '@gaussian-splat/core';
 import type { WalkMap } from '@gaussian-splat/formats/walk';
-import type { ReactiveController, ReactiveControllerHost } from 'lit';
-import type { Attributes } from '../../viewer/attributes.js';
+import type { ReactiveController } from 'lit';
 import { readAttribute } from '../../viewer/camera/grammar.js';
 import { lengthGrammar, optionalLengthGrammar } from '../../viewer/camera/lengths.js';
-import { eyeOfPose, type ViewerFrame } from '../../viewer/camera/orbit.js';
-import type { ScenePoint } from '../../viewer/camera/values.js';
-import type { AnnouncerController } from '../input/announcer-controller.js';
-import type { CameraController } from '../../viewer/camera-controller.js';
+import { eyeOfPose } from '../../viewer/camera/orbit.js';
+import type { CameraAction } from '../../viewer/camera/gestures.js';
 import { MAX_MOVER_STEP_MS, prefersReducedMotion } from '../../viewer/motion.js';
 import type { Feature } from '../../viewer/features.js';
 import { LatestTask } from '../../viewer/latest-task.js';
-import type { SceneRequest } from '../../loading/protocol.js';
-import type { SceneLoader } from '../../loading/scene-loader.js';
-import type { A11yStrings, WalkWord } from '../../viewer/strings.js';
-import { openFloor } from './floor-source.js';
+import type { Viewer } from '../../viewer/viewer.js';
+import { openFloor } from '../../floor/floor-source.js';
 import { Gamepads } from './gamepads.js';
 import { Joystick } from './joystick.js';
-import { Walker } from './walker.js';
+import { FloorBody } from '../../floor/floor-body.js';
 
-export interface WalkHost {
-  readonly element: HTMLElement;
-  readonly attributes: Pick<Attributes, 'navigation' | 'walkMap' | 'eyeHeight' | 'unit' | 'cameraControls'>;
-  readonly camera: CameraController;
-  readonly behaviors: { readonly announcer: { readonly value: Pick<AnnouncerController, 'say'> | undefined } };
-  readonly surface: HTMLElement | null;
-  readonly frame: ViewerFrame;
-  readonly strings: A11yStrings;
-  readonly services: { readonly sceneLoader: SceneLoader };
-  /** Request of the displayed scene; null while no scene is shown, and for one that moves. */
-  readonly walkable: SceneRequest | null;
-  requestFrame(): void;
-  positionFromPoint(clientX: number, clientY: number): Promise<ScenePoint | null>;
-  warn(sentence: string): void;
-}
-
-const WORDS: Readonly<Record<WalkWord, string>> = {
+const WORDS = {
   'keys-walk':
     'The up and down arrow keys walk, left and right turn, W, A, S and D walk to all sides, with Shift faster. ' +
     'A click on the floor walks there. Home brings the view back.',
   blocked: 'Blocked',
 };
+/** Meters that a zoom by the factor e moves the camera. */
+const WHEEL_METERS = 2;
 /** Minimum area of a floor, m². */
 const MIN_AREA = 4;
 /** Duration of motion that a short key press causes at least, milliseconds. */
@@ -64,12 +45,11 @@ const KEYS: Readonly<Record<string, readonly [right: number, forward: number, tu
 
 /** Moves the camera on the floor of the scene: by keys, clicks and taps on the floor, a joystick, and gamepads. */
 export class WalkController implements ReactiveController, Feature {
-  readonly #host: ReactiveControllerHost & HTMLElement;
-  readonly #of: WalkHost;
+  readonly #viewer: Viewer;
   readonly #held = new Map<string, readonly [number, number, number]>();
   readonly #joystick: Joystick;
   readonly #gamepads: Gamepads;
-  #walker: Walker | undefined;
+  #walker: FloorBody | undefined;
   /** Point near the start of the walk, viewer space in meters. */
   #start: Vector3 = [0, 0, 0];
   /** Position of the camera's eye after the last motion of the walker, viewer space in scene units. */
@@ -80,33 +60,42 @@ export class WalkController implements ReactiveController, Feature {
   /** Key of the scene and settings that the floor was requested for; undefined before a request. */
   #askedFor: string | undefined;
   readonly #opening = new LatestTask();
-  /** Whether the scene has no floor, so that the camera flies. */
-  #isRefused = false;
   #isSaid = false;
 
-  constructor(host: ReactiveControllerHost & HTMLElement, of: WalkHost) {
-    this.#host = host;
-    this.#of = of;
-    this.#joystick = new Joystick(host.ownerDocument, () => of.requestFrame());
-    this.#gamepads = new Gamepads(host.ownerDocument.defaultView, () => of.requestFrame());
-    host.addController(this);
+  constructor(viewer: Viewer) {
+    this.#viewer = viewer;
+    const { ownerDocument: page } = viewer.element;
+    this.#joystick = new Joystick(page, () => viewer.requestFrame());
+    this.#gamepads = new Gamepads(page.defaultView, () => viewer.requestFrame());
+    viewer.element.addController(this);
   }
 
-  get isRefused(): boolean {
-    return this.#isRefused;
+  /** Whether the camera walks on the floor. It does not move until a floor is found. */
+  get #walks(): boolean {
+    return this.#viewer.navigation === 'walk';
   }
 
-  /** Help text for the keys; undefined if the camera does not walk. */
-  get keys(): string | undefined {
-    return this.#of.attributes.navigation === 'walk' && !this.#isRefused ? this.#word('keys-walk') : undefined;
+  keys(): string | undefined {
+    return this.#walks ? this.#word('keys-walk') : undefined;
+  }
+
+  act(action: CameraAction): boolean | undefined {
+    if (!this.#walks) return undefined;
+    if (action.type === 'zoom') this.#ahead(-WHEEL_METERS * Math.log(action.factor));
+    return action.type === 'zoom' || action.type === 'pan' ? true : undefined;
+  }
+
+  /** A click selects a destination, also the second one of a double click. */
+  pick(): true | undefined {
+    return this.#viewer.attributes.navigation === 'walk' || undefined;
   }
 
   hostUpdated(): void {
-    const { attributes, surface } = this.#of;
+    const { attributes, surface } = this.#viewer;
     if (attributes.navigation !== 'walk' || surface === null || !surface.isConnected) return this.hostDisconnected();
     this.#ask();
     this.#joystick.isShown = attributes.cameraControls && this.#walker !== undefined && isTouchScreen();
-    if (!attributes.cameraControls || this.#isRefused) return this.#deafen();
+    if (!attributes.cameraControls || !this.#walks) return this.#deafen();
     if (this.#listening !== undefined) return;
     this.#listening = new AbortController();
     const { signal } = this.#listening;
@@ -115,7 +104,7 @@ export class WalkController implements ReactiveController, Feature {
     surface.addEventListener('keyup', this.#onUp, { signal });
     surface.addEventListener('blur', this.#release, { signal });
     surface.addEventListener('click', this.#onClick, { signal });
-    this.#host.addEventListener('click', this.#onSceneClick, { signal });
+    this.#viewer.element.addEventListener('click', this.#onSceneClick, { signal });
     this.#gamepads.listen(signal);
     surface.after(this.#joystick.element);
   }
@@ -123,7 +112,7 @@ export class WalkController implements ReactiveController, Feature {
   advance(now: number): boolean {
     if (this.#walker === undefined) return false;
     // A reset of the camera also returns the walker to the start. A new scene has its own start.
-    if (!this.#of.camera.isTouched && this.#of.walkable !== null) this.#begin(this.#walker.map);
+    if (!this.#viewer.camera.isTouched && this.#viewer.stillRequest !== null) this.#begin(this.#walker.map);
     const stick = this.#stick();
     const [right, forward, turn] = [...this.#held.values(), stick].reduce(
       (sum, held) => [sum[0] + held[0], sum[1] + held[1], sum[2] + held[2]] as const,
@@ -140,17 +129,17 @@ export class WalkController implements ReactiveController, Feature {
   }
 
   /** Walks forward, or backward if negative, by a distance in meters. For the wheel and pinch gestures. */
-  ahead(meters: number): void {
+  #ahead(meters: number): void {
     const walker = this.#walker;
     if (walker === undefined) return;
     this.#land();
-    const { theta } = this.#of.camera.goal;
+    const { theta } = this.#viewer.camera.goal;
     walker.step(Math.abs(meters) / 1.4, -Math.sin(theta) * Math.sign(meters), -Math.cos(theta) * Math.sign(meters));
     this.#follow();
   }
 
   #move(right: number, forward: number, turn: number, stepMs: number): void {
-    const { camera } = this.#of;
+    const { camera } = this.#viewer;
     if (stepMs === 0) return;
     const seconds = stepMs / 1000;
     this.#land();
@@ -164,8 +153,8 @@ export class WalkController implements ReactiveController, Feature {
 
   /** Moves the walker to its start at once, and levels the view. */
   #begin(map: WalkMap): void {
-    const { camera } = this.#of;
-    this.#walker = new Walker(map, this.#start);
+    const { camera } = this.#viewer;
+    this.#walker = new FloorBody(map, this.#start);
     camera.lookBy(0, Math.PI / 2 - camera.goal.phi);
     this.#follow();
     camera.jumpToGoal();
@@ -173,18 +162,18 @@ export class WalkController implements ReactiveController, Feature {
 
   /** Moves the camera's eye to its height above the feet. */
   #follow(): void {
-    const { camera } = this.#of;
+    const { camera } = this.#viewer;
     const { at, eyeFloor } = this.#walker!;
     const { unit = 1, eyeHeight } = this.#settings();
-    camera.walkTo([at[0] / unit, (eyeFloor + eyeHeight) / unit, at[2] / unit]);
+    camera.moveEyeTo([at[0] / unit, (eyeFloor + eyeHeight) / unit, at[2] / unit]);
     this.#eye = eyeOfPose(camera.goal);
-    this.#of.requestFrame();
+    this.#viewer.requestFrame();
   }
 
   /** Moves the walker to the floor below the camera if a view, a flight or an attribute has moved the camera. */
   #land(): void {
     const { unit = 1 } = this.#settings();
-    const eye = eyeOfPose(this.#of.camera.goal);
+    const eye = eyeOfPose(this.#viewer.camera.goal);
     const [x, y, z] = subtract(eye, this.#eye);
     if (Math.hypot(x, y, z) * unit > STRAYED) this.#walker!.land(inMeters(eye, unit));
   }
@@ -192,14 +181,14 @@ export class WalkController implements ReactiveController, Feature {
   /** Announces to screen readers, once, that a wall blocks the way. */
   #notifyBlocked(isWalking: boolean): void {
     const isBlocked = isWalking && this.#walker!.isBlocked;
-    if (isBlocked && !this.#isSaid) this.#of.behaviors.announcer.value?.say(this.#word('blocked'));
-    if (!isBlocked && this.#isSaid && isWalking) this.#of.behaviors.announcer.value?.say('');
+    if (isBlocked && !this.#isSaid) this.#viewer.announcer.value?.say(this.#word('blocked'));
+    if (!isBlocked && this.#isSaid && isWalking) this.#viewer.announcer.value?.say('');
     this.#isSaid = isBlocked || (this.#isSaid && !isWalking);
   }
 
   /** Computes or fetches the floor, once for each scene and settings. */
   #ask(): void {
-    const { walkable: request, camera, frame, services } = this.#of;
+    const { stillRequest: request, camera, frame, services } = this.#viewer;
     if (request === null) return;
     const { walkMap, eyeHeight, unit } = this.#settings();
     const key = JSON.stringify([request.url, walkMap, eyeHeight, unit, frame]);
@@ -211,25 +200,24 @@ export class WalkController implements ReactiveController, Feature {
     const options = { loader: services.sceneLoader, request, frame, metersPerUnit, eyeHeight, near };
     this.#opening.run(
       async (signal) => {
-        const mapUrl = walkMap === 'auto' ? null : new URL(walkMap, this.#of.element.baseURI).href;
+        const mapUrl = walkMap === 'auto' ? null : new URL(walkMap, this.#viewer.element.baseURI).href;
         const map = await openFloor({ ...options, mapUrl }, signal);
         if (signal.aborted) return;
         if (map.area < MIN_AREA) return this.#refuse(`its floor has ${map.area.toFixed(1)} m², ${MIN_AREA} are needed`);
         this.#begin(map);
-        this.#host.requestUpdate();
-        this.#of.element.dispatchEvent(new CustomEvent('walk-ready', { detail: { area: map.area } }));
+        this.#viewer.element.requestUpdate();
+        this.#viewer.element.dispatchEvent(new CustomEvent('walk-ready', { detail: { area: map.area } }));
       },
       (error) => this.#refuse((error as Error).message),
     );
   }
 
   #refuse(why: string): void {
-    this.#isRefused = true;
-    this.#of.warn(
+    this.#viewer.refuseNavigation('walk');
+    this.#viewer.warn(
       `<gaussian-splat> navigation="walk": ${why}. Visitors fly instead. ` +
         'Check the attributes up and unit, or name a file of gaussian-splat floor in walk-map.',
     );
-    this.#host.requestUpdate();
   }
 
   readonly #onDown = (event: KeyboardEvent): void => {
@@ -244,7 +232,7 @@ export class WalkController implements ReactiveController, Feature {
     // A short key press may end before the next frame, so it moves the camera at once.
     if (!event.repeat && !this.#held.has(event.code)) this.#move(...direction, FIRST_STEP_MS);
     this.#held.set(event.code, direction);
-    this.#of.requestFrame();
+    this.#viewer.requestFrame();
   };
 
   readonly #onUp = (event: KeyboardEvent): void => {
@@ -258,13 +246,13 @@ export class WalkController implements ReactiveController, Feature {
 
   /** Walks to a click on the frame. If it may belong to an interactive child, {@link #onSceneClick} follows. */
   readonly #onClick = (event: MouseEvent): void => {
-    const children = [...this.#host.children] as (HTMLElement & { readonly interactive?: boolean })[];
+    const children = [...this.#viewer.element.children] as (HTMLElement & { readonly interactive?: boolean })[];
     if (!children.some(({ interactive, hidden }) => interactive && !hidden)) this.#walkTo(event);
   };
 
   /** Walks to a click that was dispatched to the element itself, because it hits no interactive child. */
   readonly #onSceneClick = (event: MouseEvent): void => {
-    if (event.target === this.#host && 'hit' in event) this.#walkTo(event);
+    if (event.target === this.#viewer.element && 'hit' in event) this.#walkTo(event);
   };
 
   /** Walks to the point of a click or tap on the floor. Visitors who prefer reduced motion jump there at once. */
@@ -272,7 +260,7 @@ export class WalkController implements ReactiveController, Feature {
     const walker = this.#walker;
     if (walker === undefined) return;
     const { unit = 1 } = this.#settings();
-    this.#of.positionFromPoint(clientX, clientY).then(
+    this.#viewer.positionFromPoint(clientX, clientY).then(
       (point) => {
         if (point === null || this.#walker !== walker) return;
         this.#land();
@@ -281,9 +269,9 @@ export class WalkController implements ReactiveController, Feature {
           walker.jump();
           this.#follow();
         }
-        this.#of.requestFrame();
+        this.#viewer.requestFrame();
       },
-      (error: Error) => this.#of.warn(error.message),
+      (error: Error) => this.#viewer.warn(error.message),
     );
   }
 
@@ -295,8 +283,8 @@ export class WalkController implements ReactiveController, Feature {
 
   /** Returns the settings of the attributes. Lengths are in meters; `unit` is undefined if the page does not set it. */
   #settings(): { walkMap: string; eyeHeight: number; unit: number | undefined } {
-    const { walkMap, eyeHeight, unit } = this.#of.attributes;
-    const warn = (sentence: string): void => this.#of.warn(sentence);
+    const { walkMap, eyeHeight, unit } = this.#viewer.attributes;
+    const warn = (sentence: string): void => this.#viewer.warn(sentence);
     return {
       walkMap: walkMap?.trim() || 'auto',
       eyeHeight: readAttribute('eye-height', eyeHeight, lengthGrammar('1.6m'), warn),
@@ -304,15 +292,16 @@ export class WalkController implements ReactiveController, Feature {
     };
   }
 
-  #word(key: WalkWord): string {
-    return this.#of.strings[key] ?? WORDS[key];
+  #word(key: keyof typeof WORDS): string {
+    return this.#viewer.strings[key] ?? WORDS[key];
   }
 
   #forget(): void {
     this.#opening.renew();
     this.#askedFor = undefined;
     this.#walker = undefined;
-    this.#isRefused = this.#isSaid = false;
+    this.#isSaid = false;
+    this.#viewer.refuseNavigation(undefined);
   }
 
   #deafen(): void {

@@ -1,7 +1,7 @@
 import type { Camera } from '@gaussian-splat/core';
 import { parsePoint } from '../../viewer/camera/grammar.js';
 import type { ViewerFrame } from '../../viewer/camera/orbit.js';
-import { LabelBox, LabelView, type Located } from '../labels/label-box.js';
+import { LabelBox, LabelView, type Located } from '../../shared/label-box.js';
 
 /** Minimum movement of a label, device pixels. Smaller movements are not applied. */
 const MIN_MOVE = 0.5;

@@ -1,6 +1,6 @@
 import { css } from 'lit';
 import { ArLabels } from './ar-labels.js';
-import type { XrHost } from './xr-host.js';
+import type { Viewer } from '../../viewer/viewer.js';
 import { languageOf } from '../../viewer/strings.js';
 import { WORDS } from './xr-offer.js';
 
@@ -39,12 +39,13 @@ export const AR_STYLES = css`
 export class ArOverlay {
   readonly root: HTMLElement;
   readonly labels: ArLabels;
-  readonly #core: XrHost;
+  readonly #core: Viewer;
   readonly #prompt: HTMLSlotElement;
   readonly #exit: HTMLButtonElement;
   onExit: () => void = () => undefined;
 
-  constructor(element: HTMLElement, core: XrHost) {
+  constructor(core: Viewer) {
+    const { element } = core;
     const { ownerDocument: page } = element;
     this.#core = core;
     this.root = page.createElement('div');

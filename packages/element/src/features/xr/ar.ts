@@ -1,18 +1,17 @@
 import { dot, multiply, subtract, type Vector3 } from '@gaussian-splat/core';
-import type { ReactiveControllerHost } from 'lit';
 import { toViewer } from '../../viewer/camera/orbit.js';
-import type { XrHost } from './xr-host.js';
+import type { Viewer } from '../../viewer/viewer.js';
 import { adoptStyles } from '../../viewer/styles.js';
 import { AR_STYLES, ArOverlay } from './ar-overlay.js';
-import { readShadow } from '../shadow/shadow-controller.js';
-import { shadowSplats, takeShadow } from '../shadow/shadow-map.js';
-import { alphaOfScene } from '../shadow/take-alpha-gl.js';
+import { readShadow, shadowSplats, takeShadow } from '../../shared/shadow-map.js';
+import { alphaOfScene } from '../../shared/take-alpha-gl.js';
 import { fingersOn, type Fingers, type Plane } from './fingers.js';
 import { GlDrawing } from './gl-drawing.js';
 import { placeOf } from './marker-splats.js';
 import type { XrScene } from './xr-scene.js';
 import { SimplifiedModel } from './simplified-model.js';
-import { metersOf, unitOf } from './vr.js';
+import { unitOf } from '../../viewer/unit.js';
+import { metersOf } from './vr.js';
 import type { XrFrame, XrHit, XrAnchor, XrHitTestSource, XrPose } from './webxr.js';
 import { XrOffer, type XrKind, type XrStarted } from './xr-offer.js';
 import type { XrEye, XrMarker } from './xr-drawing.js';
@@ -52,7 +51,7 @@ interface Footprint {
  * of them.
  * @param positions [N, 3] relative to `origin`
  */
-export function footprintOf(core: XrHost, positions: Float32Array, origin: Vector3): Footprint {
+export function footprintOf(core: Viewer, positions: Float32Array, origin: Vector3): Footprint {
   const { center, radius } = core.camera.bounds;
   const { frame } = core;
   const kept = positions.slice();
@@ -77,16 +76,17 @@ export function footprintOf(core: XrHost, positions: Float32Array, origin: Vecto
 }
 
 /** Offers AR: with WebXR if it is available, or on iPhones with the author's own model. */
-export function offerAr(element: ReactiveControllerHost & HTMLElement, core: XrHost, place: HTMLElement): XrOffer {
+export function openAr(core: Viewer): XrOffer {
+  const { element } = core;
   adoptStyles(element.shadowRoot!, AR_STYLES);
-  const overlay = new ArOverlay(element, core);
-  const offer = new XrOffer(element, core, place, arKind(core, overlay));
+  const overlay = new ArOverlay(core);
+  const offer = new XrOffer(core, arKind(core, overlay));
   overlay.onExit = () => offer.end();
-  element.addController(new SimplifiedModel(element, core, place, offer));
+  element.addController(new SimplifiedModel(core, offer));
   return offer;
 }
 
-const arKind = (core: XrHost, overlay: ArOverlay): XrKind => ({
+const arKind = (core: Viewer, overlay: ArOverlay): XrKind => ({
   ...{ mode: 'immersive-ar', name: 'ar', word: 'ar' },
   isWanted: () => core.attributes.ar && /(^|\s)webxr(\s|$)/.test(core.attributes.arModes?.trim() || 'webxr'),
   options: () => ({
@@ -94,7 +94,7 @@ const arKind = (core: XrHost, overlay: ArOverlay): XrKind => ({
     optionalFeatures: ['anchors', 'local-floor', 'dom-overlay'],
     domOverlay: { root: overlay.root },
   }),
-  canShow: () => core.walkable !== null,
+  canShow: () => core.stillRequest !== null,
   spaces: ['local-floor', 'local'],
   open: (session, source) => GlDrawing.open(session, core, source),
   guide: (started) => new ArGuide(core, started, overlay),
@@ -103,7 +103,7 @@ const arKind = (core: XrHost, overlay: ArOverlay): XrKind => ({
 /** Places the subject where the view ray first hits a real surface. Gestures then move, turn and scale it. */
 class ArGuide implements XrGuide {
   readonly background = [0, 0, 0, 0] as const;
-  readonly #core: XrHost;
+  readonly #core: Viewer;
   readonly #of: XrStarted;
   readonly #overlay: ArOverlay;
   #shadow: { readonly splats: XrMarker; readonly half: number } | undefined;
@@ -119,7 +119,7 @@ class ArGuide implements XrGuide {
   #fingers: Fingers | undefined;
   #placed: Float64Array | undefined;
 
-  constructor(core: XrHost, of: XrStarted, overlay: ArOverlay) {
+  constructor(core: Viewer, of: XrStarted, overlay: ArOverlay) {
     this.#core = core;
     this.#of = of;
     this.#overlay = overlay;

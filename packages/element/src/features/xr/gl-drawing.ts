@@ -1,6 +1,6 @@
 import { drawn } from '@gaussian-splat/renderer/webgl';
-import type { SplatRow } from '../shadow/splat-file.js';
-import type { XrHost } from './xr-host.js';
+import type { SplatRow } from '../../shared/splat-file.js';
+import type { Viewer } from '../../viewer/viewer.js';
 import { MarkerSplats } from './marker-splats.js';
 import { ViewOrder } from './view-order.js';
 import { makeLayer, type XrLayer, type XrSession, type XrView, type XrViewport } from './webxr.js';
@@ -25,12 +25,12 @@ export class GlDrawing implements XrDrawing {
   readonly #context: XrContext;
   readonly #layer: XrLayer;
   readonly #source: XrSceneSource;
-  readonly #core: XrHost;
+  readonly #core: Viewer;
   readonly #over = new AbortController();
   #scene: XrScene | undefined;
   #order: ViewOrder | undefined;
 
-  constructor(session: XrSession, context: XrContext, source: XrSceneSource, core: XrHost) {
+  constructor(session: XrSession, context: XrContext, source: XrSceneSource, core: Viewer) {
     this.#context = context;
     this.#source = source;
     this.#core = core;
@@ -43,7 +43,7 @@ export class GlDrawing implements XrDrawing {
   }
 
   /** Opens a context for the scene that the element displays. */
-  static async open(session: XrSession, core: XrHost, { shown, request }: XrShown): Promise<GlDrawing> {
+  static async open(session: XrSession, core: Viewer, { shown, request }: XrShown): Promise<GlDrawing> {
     if (request === null) throw unsupported('a scene that has loaded', 'none');
     const { sceneLoader: loader } = core.services;
     return new GlDrawing(session, await contextFor(shown), { shown, request, loader }, core);

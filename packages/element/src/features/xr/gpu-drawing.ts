@@ -2,17 +2,17 @@ import { multiply, type Camera } from '@gaussian-splat/core';
 import { GaussianBuffers, Rectangle, Stereo, Viewpoint, World, type FrameSettings } from '@gaussian-splat/renderer';
 import { isHandheld } from '../../gpu/memory-budget.js';
 import type { WebGpuBackend } from '../../gpu/webgpu-backend.js';
-import { packSplats, type SplatRow } from '../shadow/splat-file.js';
+import { packSplats, type SplatRow } from '../../shared/splat-file.js';
 import type { GpuImage, GpuTarget } from './gpu-targets.js';
 import type { XrFrame, XrView, XrViewport } from './webxr.js';
 import type { XrBetween, XrColor, XrDrawing, XrEye, XrMarker } from './xr-drawing.js';
-import type { XrHost } from './xr-host.js';
+import type { Viewer } from '../../viewer/viewer.js';
 
 /** Maximum number of splats per frame, for scenes with levels of detail in stand-alone headsets. */
 const HANDHELD_SPLATS = 400_000;
 
 /** Returns the page's backend if it draws with WebGPU; undefined otherwise, and if its device is lost. */
-export function gpuOf({ view: { backend } }: XrHost): WebGpuBackend | undefined {
+export function gpuOf({ view: { backend } }: Viewer): WebGpuBackend | undefined {
   return backend && 'viewpoint' in backend && !backend.place.isLost ? (backend as WebGpuBackend) : undefined;
 }
 
@@ -23,7 +23,7 @@ export class GpuDrawing implements XrDrawing {
   readonly clipDepth: XrDrawing['clipDepth'];
   readonly renderState: object;
   onLost: (what: string) => void = () => undefined;
-  readonly #core: XrHost;
+  readonly #core: Viewer;
   readonly #backend: WebGpuBackend;
   readonly #target: GpuTarget;
   readonly #stereo: Stereo;
@@ -32,7 +32,7 @@ export class GpuDrawing implements XrDrawing {
   /** The values of the settings, as text. */
   #settingsKey = '';
 
-  constructor(core: XrHost, backend: WebGpuBackend, target: GpuTarget) {
+  constructor(core: Viewer, backend: WebGpuBackend, target: GpuTarget) {
     this.#core = core;
     this.#backend = backend;
     this.#target = target;

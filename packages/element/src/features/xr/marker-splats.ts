@@ -1,7 +1,7 @@
 import { multiply, type Camera, type Matrix4, type Vector3 } from '@gaussian-splat/core';
 import { DATA_WIDTH, GlGaussians, GlRenderer } from '@gaussian-splat/renderer/webgl';
 import type { SceneLoader } from '../../loading/scene-loader.js';
-import { packSplats, type SplatRow } from '../shadow/splat-file.js';
+import { packSplats, type SplatRow } from '../../shared/splat-file.js';
 
 /** Number of splats of the ring, its radius in meters, and standard deviation of a splat in meters. */
 const [RING_SPLATS, RING_RADIUS, RING_SIGMA] = [48, 0.25, 0.012];

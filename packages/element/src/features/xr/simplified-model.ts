@@ -1,5 +1,6 @@
 import type { ReactiveController } from 'lit';
-import type { XrHost } from './xr-host.js';
+import { buttonBarOf } from '../../viewer/button-bar.js';
+import type { Viewer } from '../../viewer/viewer.js';
 import { languageOf } from '../../viewer/strings.js';
 import { WORDS, type XrOffer } from './xr-offer.js';
 
@@ -15,16 +16,17 @@ const opensModels = (page: Document): boolean =>
  * otherwise the author's content in the slot `ar-fallback`.
  */
 export class SimplifiedModel implements ReactiveController {
-  readonly #core: XrHost;
+  readonly #core: Viewer;
   readonly #place: HTMLElement;
   readonly #offer: XrOffer;
   readonly #link: HTMLAnchorElement;
   readonly #element: HTMLElement;
   readonly #fallback: HTMLSlotElement;
 
-  constructor(element: HTMLElement, core: XrHost, place: HTMLElement, offer: XrOffer) {
+  constructor(core: Viewer, offer: XrOffer) {
+    const { element } = core;
     this.#core = core;
-    this.#place = place;
+    this.#place = buttonBarOf(core);
     this.#offer = offer;
     this.#element = element;
     this.#link = Object.assign(element.ownerDocument.createElement('a'), { rel: 'ar' });

@@ -1,6 +1,6 @@
 import { multiply, subtract, type Vector3 } from '@gaussian-splat/core';
 import { floorAt, type WalkMap } from '@gaussian-splat/formats/walk';
-import { Walker } from '../walk/walker.js';
+import { FloorBody } from '../../floor/floor-body.js';
 import type { XrFrame, XrInput, XrPose, XrSpace } from './webxr.js';
 
 /** Assumed height of the eyes above the floor, meters. */
@@ -66,7 +66,7 @@ export class VrRig {
   /** Position of the session space's origin in viewer space, meters; undefined before the first pose. */
   #origin: Vector3 | undefined;
   #map: WalkMap | undefined;
-  #walker: Walker | undefined;
+  #walker: FloorBody | undefined;
   /** Destination of a teleport, viewer space in meters; undefined if the user does not aim at the floor. */
   target: Vector3 | undefined;
 
@@ -138,7 +138,7 @@ export class VrRig {
   #begin(x: number, z: number): Vector3 {
     const { eye, isFloor } = this.#start;
     const head = this.#turned([x, 0, z]);
-    if (this.#map) this.#walker = new Walker(this.#map, eye);
+    if (this.#map) this.#walker = new FloorBody(this.#map, eye);
     const below = this.#walker ? this.#walker.at : undefined;
     const y = below ? this.#floorY(below[1]) : isFloor ? eye[1] - EYE_HEIGHT : eye[1];
     const [atX, atZ] = below ? [below[0], below[2]] : [eye[0], eye[2]];
@@ -263,10 +263,10 @@ export class VrRig {
    * Returns the walker, which moves under the head if there is a floor. Undefined without a map, and while the head has
    * been over no floor yet.
    */
-  #walkerUnder(head: Vector3): Walker | undefined {
-    const isUnder = ({ at }: Walker): boolean => Math.hypot(head[0] - at[0], head[2] - at[2]) <= STRAYED;
+  #walkerUnder(head: Vector3): FloorBody | undefined {
+    const isUnder = ({ at }: FloorBody): boolean => Math.hypot(head[0] - at[0], head[2] - at[2]) <= STRAYED;
     if (!this.#walker && this.#map) {
-      const walker = new Walker(this.#map, head);
+      const walker = new FloorBody(this.#map, head);
       if (isUnder(walker)) this.#walker = walker;
     } else if (this.#walker && !isUnder(this.#walker)) this.#walker.land(head);
     return this.#walker;
@@ -287,7 +287,7 @@ export class VrRig {
     const head = this.#headAt(pose);
     const origin = this.#origin!;
     this.#origin = [origin[0] + to[0] - head[0], this.#floorY(to[1]), origin[2] + to[2] - head[2]];
-    if (this.#map) this.#walker = new Walker(this.#map, to);
+    if (this.#map) this.#walker = new FloorBody(this.#map, to);
   }
 
   /**

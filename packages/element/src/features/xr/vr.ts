@@ -1,10 +1,11 @@
 import type { Vector3 } from '@gaussian-splat/core';
 import { eyeOfPose, type ViewerFrame } from '../../viewer/camera/orbit.js';
 import { readAttribute } from '../../viewer/camera/grammar.js';
-import { lengthGrammar, optionalLengthGrammar } from '../../viewer/camera/lengths.js';
+import { lengthGrammar } from '../../viewer/camera/lengths.js';
+import { unitOf } from '../../viewer/unit.js';
 import { prefersReducedMotion } from '../../viewer/motion.js';
-import type { XrHost } from './xr-host.js';
-import { openFloor } from '../walk/floor-source.js';
+import type { Viewer } from '../../viewer/viewer.js';
+import { openFloor } from '../../floor/floor-source.js';
 import { GlDrawing } from './gl-drawing.js';
 import { GpuDrawing, gpuOf } from './gpu-drawing.js';
 import { BindingTarget, CopyTarget } from './gpu-targets.js';
@@ -23,10 +24,6 @@ const FEATURES = ['local-floor', 'hand-tracking'];
 /** Minimum area of a floor, m². */
 const MIN_AREA = 4;
 
-/** Meters per unit of the scene, according to the attribute `unit`; undefined without it. */
-export const unitOf = (core: XrHost): number | undefined =>
-  readAttribute('unit', core.attributes.unit, optionalLengthGrammar, (sentence) => core.warn(sentence));
-
 /** Returns the transform from scene coordinates to viewer space in meters, 4x4, row-major. */
 export const metersOf = ([x, y, z]: ViewerFrame, unit: number): Float64Array =>
   Float64Array.from([
@@ -43,14 +40,14 @@ export const metersOf = ([x, y, z]: ViewerFrame, unit: number): Float64Array =>
   ]);
 
 /** Definition of VR sessions: in a headset that does not show the real environment. */
-export function vrKind(core: XrHost): XrKind {
+export function vrKind(core: Viewer): XrKind {
   // Whether the WebGPU binding can be used: false after the browser has refused a session with it or could not open it.
   let isUsable = true;
   const mayUseBinding = (): boolean => isUsable && gpuBindingClass() !== undefined && gpuOf(core) !== undefined;
   return {
     ...{ mode: 'immersive-vr', name: 'vr', word: 'vr' },
     isWanted: () => core.attributes.vr,
-    canShow: () => core.walkable !== null || isDrawnByGpu(core),
+    canShow: () => core.stillRequest !== null || isDrawnByGpu(core),
     options: () => ({ optionalFeatures: [...FEATURES, ...(mayUseBinding() ? ['webgpu'] : [])] }),
     simplerOptions: () => (mayUseBinding() ? { optionalFeatures: FEATURES } : undefined),
     simplerGranted: () => (isUsable = false),
@@ -66,7 +63,7 @@ export function vrKind(core: XrHost): XrKind {
 }
 
 /** Whether WebGPU draws the complete scenes of the page, which may move. */
-const isDrawnByGpu = (core: XrHost): boolean => {
+const isDrawnByGpu = (core: Viewer): boolean => {
   const { shown, isPreview, ownEntry } = core.sources;
   return gpuOf(core) !== undefined && shown.length > 0 && !isPreview && !ownEntry.scene.isOutgoing;
 };
@@ -75,7 +72,7 @@ const isDrawnByGpu = (core: XrHost): boolean => {
  * Opens the drawing of a session: WebGPU if the session has its binding, or WebGL for one scene file. Otherwise a
  * WebGPU canvas is copied, because WebGL draws neither moving nor several scenes.
  */
-async function drawingOf(core: XrHost, session: XrSession, source: XrShown): Promise<XrDrawing> {
+async function drawingOf(core: Viewer, session: XrSession, source: XrShown): Promise<XrDrawing> {
   const backend = gpuOf(core);
   if (session.enabledFeatures?.includes('webgpu')) {
     if (!backend) throw unsupported('WebGPU in the page, which the session has asked for', 'none');
@@ -86,7 +83,7 @@ async function drawingOf(core: XrHost, session: XrSession, source: XrShown): Pro
   return new GpuDrawing(core, backend, await CopyTarget.open(session, backend.device));
 }
 
-function guideOf(core: XrHost, { session, space, spaceType, signal, drawing }: XrStarted): XrGuide {
+function guideOf(core: Viewer, { session, space, spaceType, signal, drawing }: XrStarted): XrGuide {
   const unit = unitOf(core) ?? 1;
   const { goal } = core.camera;
   const rig = new VrRig(
@@ -119,8 +116,8 @@ function guideOf(core: XrHost, { session, space, spaceType, signal, drawing }: X
   };
 }
 
-async function findFloor(core: XrHost, unit: number, signal: AbortSignal): ReturnType<typeof openFloor> {
-  const { attributes, camera, frame, services, walkable: request, element } = core;
+async function findFloor(core: Viewer, unit: number, signal: AbortSignal): ReturnType<typeof openFloor> {
+  const { attributes, camera, frame, services, stillRequest: request, element } = core;
   if (request === null) throw new Error('no floor');
   const eye = eyeOfPose(camera.goal).map((value) => value * unit) as unknown as Vector3;
   const eyeHeight = readAttribute('eye-height', attributes.eyeHeight, lengthGrammar('1.6m'), () => undefined);

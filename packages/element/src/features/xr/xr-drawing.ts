@@ -1,5 +1,5 @@
 import type { Camera, Matrix4 } from '@gaussian-splat/core';
-import type { SplatRow } from '../shadow/splat-file.js';
+import type { SplatRow } from '../../shared/splat-file.js';
 import type { XrFrame, XrView, XrViewport } from './webxr.js';
 
 /** A view of a frame, usually of one eye, with its cameras. */

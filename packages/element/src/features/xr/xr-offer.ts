@@ -1,8 +1,8 @@
 import { GaussianSplatError } from '@gaussian-splat/core';
 import type { ReactiveController, ReactiveControllerHost } from 'lit';
 import type { LoadedGaussians } from '../../gpu/loaded-gaussians.js';
-import type { XrHost } from './xr-host.js';
-import type { ExtraWord } from '../../viewer/strings.js';
+import { buttonBarOf } from '../../viewer/button-bar.js';
+import type { Viewer } from '../../viewer/viewer.js';
 import type { XrDrawing } from './xr-drawing.js';
 import { unsupported, type XrShown } from './xr-scene.js';
 import { XrLoop, type XrGuide } from './xr-session.js';
@@ -15,7 +15,7 @@ export interface XrKind {
   readonly mode: XrMode;
   /** Name of the attribute and of the button's slot, and prefix of the status event. */
   readonly name: 'vr' | 'ar';
-  readonly word: ExtraWord;
+  readonly word: keyof typeof WORDS;
   /** Whether the attributes of the page enable the session. */
   readonly isWanted: () => boolean;
   /** Returns the options for `requestSession`. Called in the click handler. */
@@ -54,7 +54,7 @@ interface Running {
 
 /** Offers one kind of session: shows a button if the browser supports it, runs the session, and reports its status. */
 export class XrOffer implements ReactiveController {
-  readonly core: XrHost;
+  readonly core: Viewer;
   readonly kind: XrKind;
   readonly #element: ReactiveControllerHost & HTMLElement;
   readonly #slot: HTMLSlotElement;
@@ -69,11 +69,12 @@ export class XrOffer implements ReactiveController {
   #watching: AbortController | undefined;
   #isWarned = false;
 
-  constructor(element: ReactiveControllerHost & HTMLElement, core: XrHost, place: HTMLElement, kind: XrKind) {
+  constructor(core: Viewer, kind: XrKind) {
+    const { element } = core;
     this.#element = element;
     this.core = core;
     this.kind = kind;
-    this.#place = place;
+    this.#place = buttonBarOf(core);
     const { ownerDocument: page } = element;
     this.#slot = Object.assign(page.createElement('slot'), { name: `${kind.name}-button` });
     this.#button = Object.assign(page.createElement('button'), { type: 'button' });
@@ -206,7 +207,7 @@ export class XrOffer implements ReactiveController {
     this.#running = running;
     session.addEventListener('end', () => this.#ended(running), { once: true });
     core.reveal.dismiss();
-    core.isImmersed = true;
+    core.isShownElsewhere = true;
     core.sources.suspend();
     this.#element.requestUpdate();
     this.status('session-started');
@@ -224,7 +225,7 @@ export class XrOffer implements ReactiveController {
     const { core, kind } = this;
     const { session, over, shown } = running;
     const { signal } = over;
-    const drawing = (running.drawing = await kind.open(session, { shown, request: core.walkable }));
+    const drawing = (running.drawing = await kind.open(session, { shown, request: core.stillRequest }));
     if (signal.aborted) return this.#free(running);
     drawing.onLost = (what) => this.#lost(running, what);
     const [spaceType, space] = await spaceOf(session, kind.spaces);
@@ -245,7 +246,7 @@ export class XrOffer implements ReactiveController {
     this.#free(running);
     this.#running = undefined;
     this.#isOffered = false;
-    this.core.isImmersed = false;
+    this.core.isShownElsewhere = false;
     // The page has drawn no frames meanwhile, so that this time does not count.
     this.core.sources.suspend();
     if (this.#element.getAttribute(`${this.kind.name}-status`) !== 'failed') this.status('not-presenting');
@@ -293,15 +294,11 @@ export class XrOffer implements ReactiveController {
   }
 }
 
-export const WORDS: Readonly<Record<ExtraWord, string>> = {
+export const WORDS = {
   vr: 'View in VR',
   ar: 'View in your room',
   'ar-simplified': 'View a simplified model in AR',
   'exit-ar': 'Leave AR',
-  measure: 'Measure',
-  'measure-keys': 'Press Enter to set each end of the ruler; the arrow keys turn the view. Escape puts the ruler away.',
-  'measure-first': 'First end set',
-  'measure-none': 'No surface here',
 };
 
 async function spaceOf(session: XrSession, types: readonly string[]): Promise<[string, XrSpace]> {

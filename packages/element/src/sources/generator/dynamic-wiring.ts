@@ -6,7 +6,7 @@ import type { LoadedGaussians } from '../../gpu/loaded-gaussians.js';
 import type { Services } from '../../viewer/element-host.js';
 import type { DynamicListeners, DynamicState } from './dynamic-model.js';
 import type { Backend } from '../../gpu/backend.js';
-import type { PostHost } from '../../features/post/post-controller.js';
+import type { PostHost } from './post-controller.js';
 
 /** Interface of the element for its models. */
 export interface DynamicHost {
@@ -24,7 +24,7 @@ export interface DynamicHost {
 /** Connects the models of an element, which are generators and post-processors, with its state and its events. */
 export class DynamicWiring implements PostHost {
   readonly #post = new Lazy('the code that runs post-processors', async () => {
-    const { PostController } = await import('../../features/post/post-controller.js');
+    const { PostController } = await import('./post-controller.js');
     return new PostController(this);
   });
   #postUrls: readonly string[] = [];

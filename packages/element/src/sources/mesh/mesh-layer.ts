@@ -19,7 +19,7 @@ import {
 import type { ViewerFrame } from '../../viewer/camera/orbit.js';
 import type { MeshModel } from '../../gpu/loaded-gaussians.js';
 import type { Frame } from '../generator/frame-filter.js';
-import { matrixOfFrame, transposed } from '../../features/children/placing.js';
+import { matrixOfFrame, transposed } from '../../viewer/camera/placing.js';
 import type { PlacedModel } from './meshes.js';
 import type { Model } from './model.js';
 import { makeEnvironment } from './environment.js';

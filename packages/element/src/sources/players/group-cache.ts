@@ -50,7 +50,7 @@ export class GroupCache {
     this.#source = source;
   }
 
-  /** Number of groups of which any part is in memory or in transit. */
+  /** Number of groups with a part in memory or in transit. */
   get held(): number {
     return new Set(
       [...this.#entries.values()].filter(({ content, abort }) => content ?? abort).map(({ group }) => group),

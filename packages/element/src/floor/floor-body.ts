@@ -1,0 +1,116 @@
+import type { Vector3 } from '@gaussian-splat/core';
+import { floorAt, stepOn, wayTo, type WalkMap } from '@gaussian-splat/formats/walk';
+
+/** Walking speed, meters per second. */
+const SPEED = 1.4;
+const FAST = 2.5;
+/** Time constant with which the eyes follow steps of the floor, seconds. */
+const EYE_SECONDS = 0.08;
+/** Distance to a waypoint, meters, below which it is reached. */
+const REACHED = 0.05;
+
+type Place = readonly [x: number, y: number, z: number];
+
+/** A body on a map of the floor: meters in viewer space. Independent of page and camera. */
+export class FloorBody {
+  readonly map: WalkMap;
+  #at: Place;
+  /** Height of the floor under the eyes, smoothed over time, meters. */
+  #eyeFloor: number;
+  #path: readonly Place[] = [];
+  #isBlocked = false;
+
+  constructor(map: WalkMap, near: Vector3) {
+    this.map = map;
+    this.#at = map.start;
+    this.#eyeFloor = this.#at[1];
+    this.land(near);
+  }
+
+  /** Position of the feet in viewer space, meters. */
+  get at(): Place {
+    return this.#at;
+  }
+
+  /** Height of the floor for the eyes, meters. It follows steps of the floor smoothly. */
+  get eyeFloor(): number {
+    return this.#eyeFloor;
+  }
+
+  /** Whether the last step did not move the body. */
+  get isBlocked(): boolean {
+    return this.#isBlocked;
+  }
+
+  /** Whether the motion needs more steps: the body follows a path, or the eyes have not reached their height. */
+  get isMoving(): boolean {
+    return this.#path.length > 0 || this.#eyeFloor !== this.#at[1];
+  }
+
+  /** Moves the body at once to the floor below a point. It stays where it is if there is no floor. */
+  land(near: Vector3): void {
+    const below = floorBelow(this.map, near);
+    if (below === undefined) return;
+    this.#path = [];
+    this.#at = [near[0], below, near[2]];
+    this.#eyeFloor = below;
+  }
+
+  /** Starts to walk to a point on the floor. @returns whether there is a path to it */
+  goTo(to: Vector3): boolean {
+    const height = floorAt(this.map, to[0], to[2], to[1]);
+    this.#path = height === undefined ? [] : wayTo(this.map, this.#at, [to[0], height, to[2]]);
+    return this.#path.length > 0;
+  }
+
+  /** Moves the body to the end of its path at once. */
+  jump(): void {
+    const end = this.#path.at(-1);
+    this.#path = [];
+    if (end) this.#at = end;
+    this.#eyeFloor = this.#at[1];
+  }
+
+  /**
+   * Moves the body for some seconds in the direction x, z of viewer space. A direction longer than 1 counts as 1; 0, 0
+   * follows the path.
+   */
+  step(seconds: number, x: number, z: number, isFast = false): void {
+    const way = SPEED * (isFast ? FAST : 1) * seconds;
+    const length = Math.max(1, Math.hypot(x, z));
+    if (x !== 0 || z !== 0) {
+      this.#path = [];
+      this.#go((way * x) / length, (way * z) / length);
+    } else this.#follow(way);
+    const share = 1 - Math.exp(-seconds / EYE_SECONDS);
+    const rest = this.#at[1] - this.#eyeFloor;
+    this.#eyeFloor = Math.abs(rest) < 1e-3 ? this.#at[1] : this.#eyeFloor + share * rest;
+  }
+
+  #follow(way: number): void {
+    for (let left = way; left > 0 && this.#path.length > 0;) {
+      const [next] = this.#path;
+      const [dx, dz] = [next[0] - this.#at[0], next[2] - this.#at[2]];
+      const distance = Math.hypot(dx, dz);
+      const share = Math.min(1, left / Math.max(distance, 1e-9));
+      left -= distance;
+      if (distance > 0 && !this.#go(share * dx, share * dz)) this.#path = [];
+      if (distance <= Math.max(REACHED, way)) this.#path = this.#path.slice(1);
+    }
+  }
+
+  #go(dx: number, dz: number): boolean {
+    const to = stepOn(this.map, this.#at, dx, dz);
+    this.#isBlocked = to === this.#at;
+    this.#at = to;
+    return !this.#isBlocked;
+  }
+}
+
+/** Returns the height of the highest floor below a point, meters; undefined if there is none. */
+function floorBelow({ corner, cell, width, depth, layers }: WalkMap, [x, y, z]: Vector3): number | undefined {
+  const [i, j] = [Math.floor((x - corner[0]) / cell), Math.floor((z - corner[1]) / cell)];
+  if (!(i >= 0 && j >= 0 && i < width && j < depth)) return undefined;
+  const below = layers.map((layer) => layer[i + width * j]).filter((height) => height <= y);
+  return below.length > 0 ? Math.max(...below) : undefined;
+}

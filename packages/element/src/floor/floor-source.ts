@@ -1,0 +1,46 @@
+import type { ViewerFrame } from '../viewer/camera/orbit.js';
+import { isVoxelPath, type FloorOptions, type WalkMap } from '@gaussian-splat/formats/walk';
+import { GaussianSplatError, type Vector3 } from '@gaussian-splat/core';
+import { isStreamed } from '../gpu/open-scene.js';
+import type { SceneRequest } from '../loading/protocol.js';
+import type { SceneLoader } from '../loading/scene-loader.js';
+
+/** Sources and settings from which {@link openFloor} makes a map of the floor. */
+export interface FloorSource {
+  readonly loader: SceneLoader;
+  /** The request that loaded the scene. */
+  readonly request: SceneRequest;
+  /** Absolute URL of a `.floor` or `.voxel.json` file; null to compute the map from the splats. */
+  readonly mapUrl: string | null;
+  readonly frame: ViewerFrame;
+  readonly metersPerUnit: number;
+  /** Height of the eyes above the floor, meters. */
+  readonly eyeHeight: number;
+  /** Position of the camera's eye in viewer space, meters. */
+  readonly near: Vector3;
+}
+
+/** Free height above the eyes, meters, that a body needs. */
+const ABOVE_EYES = 0.1;
+
+/**
+ * Returns the map of a scene's floor: from its file, or computed from the splats in a worker. Rejects with
+ * GaussianSplatError, or with the signal's reason after it is aborted.
+ */
+export async function openFloor(source: FloorSource, signal: AbortSignal): Promise<WalkMap> {
+  const { loader, request, mapUrl, frame, metersPerUnit, eyeHeight, near } = source;
+  const { url, file, credentials, limits } = request;
+  const voxelUrl = mapUrl !== null && isVoxelPath(new URL(mapUrl).pathname) ? mapUrl : undefined;
+  const isMap = mapUrl !== null && voxelUrl === undefined;
+  const map = isMap ? await loader.fetchFile({ url: mapUrl, credentials, limits }, signal) : undefined;
+  if (mapUrl === null && isStreamed(request))
+    throw new GaussianSplatError('argument/value', {
+      where: 'walk-map',
+      expected: 'a file of the floor, because the scene is streamed',
+      found: 'none',
+      remedy: 'make one with gaussian-splat floor from the file that the folder was made from',
+    });
+  const options: FloorOptions = { metersPerUnit, frame, height: eyeHeight + ABOVE_EYES, near };
+  const asked = { url, file, credentials, limits, options, voxelUrl, map };
+  return loader.ask({ type: 'floor', request: asked }, signal, ({ makeFloor }) => makeFloor(asked, signal));
+}

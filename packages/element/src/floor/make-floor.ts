@@ -1,0 +1,43 @@
+/** Finds the walkable floor of a scene file. The worker loads this module on demand. */
+import { fetchScene, fileOpenerFor, readScene, type FetchSceneOptions } from '@gaussian-splat/formats';
+import {
+  decodeWalkMap,
+  floorOf,
+  makeWalkMap,
+  readVoxels,
+  voxelTreePath,
+  type WalkMap,
+} from '@gaussian-splat/formats/walk';
+import { fileLimits, fileName, limitsFrom, named } from '../loading/load-scene.js';
+import type { FloorRequest } from '../loading/protocol.js';
+
+/**
+ * Reads a scene file again, usually from the browser's cache, and finds its floor. If the request has a `voxelUrl` or a
+ * `map`, reads that instead. Throws GaussianSplatError (`network/*`, `decode/*`, `out-of-memory/*`), or the signal's
+ * reason if that is aborted.
+ */
+export async function makeFloor(request: FloorRequest, signal: AbortSignal): Promise<WalkMap> {
+  const { credentials, options, voxelUrl, map } = request;
+  const url = voxelUrl ?? request.url;
+  const name = fileName(url);
+  try {
+    if (map !== undefined) return decodeWalkMap(new Uint8Array(map));
+    const limits = limitsFrom(request);
+    const fetchOptions = (): FetchSceneOptions => ({ mode: 'cors', credentials, signal, ...fileLimits(limits()) });
+    const bytes = await fetchScene(url, fetchOptions());
+    if (voxelUrl !== undefined) {
+      const address = new URL(url);
+      address.pathname = voxelTreePath(address.pathname);
+      const tree = await fetchScene(address.href, fetchOptions());
+      const { frame, metersPerUnit = 1 } = options;
+      const { grid, solid } = readVoxels({ head: bytes, tree, name, limits: limits() }, frame, metersPerUnit);
+      return floorOf(grid, solid, { ...options, limits: limits() });
+    }
+    const openFile = /^(blob|data):/.test(url) ? undefined : fileOpenerFor(url, fetchOptions);
+    const cloud = await readScene(bytes, { name, signal, openFile, ...limits() });
+    return makeWalkMap(cloud, { ...options, limits: limits() });
+  } catch (error) {
+    signal.throwIfAborted();
+    throw named(error, name);
+  }
+}

@@ -1,0 +1,43 @@
+/** All features of the element. The order is that of their calls: see {@link Feature}. */
+import { autoRotate, motion } from '../features/auto-rotate/row.js';
+import { children } from '../features/children/row.js';
+import { effects } from '../features/effects/row.js';
+import { flight } from '../features/flight/row.js';
+import { announcer, input } from '../features/input/row.js';
+import { labels } from '../features/labels/row.js';
+import { print } from '../features/print/row.js';
+import type * as capture from '../features/recording/capture-image.js';
+import { recording } from '../features/recording/row.js';
+import { ruler } from '../features/ruler/row.js';
+import { shadow } from '../features/shadow/row.js';
+import { sky } from '../features/sky/row.js';
+import { sound } from '../features/sound/row.js';
+import { views } from '../features/views/row.js';
+import { walk } from '../features/walk/row.js';
+import { ar, vr } from '../features/xr/row.js';
+import type { FeatureRow } from './features.js';
+// The declarations of the package keep these imports, whose rows add attributes and members to the types of the element.
+import '../features/auto-rotate/row.js';
+import '../features/effects/row.js';
+import '../features/flight/row.js';
+import '../features/shadow/row.js';
+import '../features/sky/row.js';
+import '../features/sound/row.js';
+
+export type { InputController } from '../features/input/input-controller.js';
+export type { InteractionPrompt, InteractionPromptStyle } from '../features/input/row.js';
+export type { HotspotController, HotspotPlace } from '../features/labels/hotspot-controller.js';
+export type { FrameOptions, RecordOptions } from '../features/recording/recording.js';
+export type { MeasureDetail } from '../features/ruler/row.js';
+export type { ViewChangeDetail } from '../features/views/row.js';
+export type { FlightOptions, PathOptions, Tour } from '../features/views/tour.js';
+export type { WalkReadyDetail } from '../features/walk/row.js';
+export type { ImmersiveStatusDetail } from '../features/xr/row.js';
+
+/** Functions for images and videos. */
+export type Recording = typeof capture;
+
+export const FEATURES: Readonly<Record<string, FeatureRow>> = {
+  ...{ children, views, autoRotate, walk, flight, vr, ar, ruler, shadow, sky, sound, effects, labels, input, motion },
+  ...{ announcer, print, recording },
+};
