@@ -1,5 +1,5 @@
 /**
- * `npm run lab:firefox [-- --firefox PATH]`: the built element and site in Firefox (Debian's firefox-esr, or another by its path). First without WebGPU and WebGL, when every page must still work; then in a window of Xvfb, with WebGL 2; then with WebGPU switched on (`dom.webgpu.enabled`; without a GPU that is Mesa's lavapipe, package
+ * `npm run lab -- firefox [--firefox PATH]`: the built element and site in Firefox (Debian's firefox-esr, or another by its path). First without WebGPU and WebGL, when every page must still work; then in a window of Xvfb, with WebGL 2; then with WebGPU switched on (`dom.webgpu.enabled`; without a GPU that is Mesa's lavapipe, package
  * mesa-vulkan-drivers). Screenshots are compared with those of Chromium. After `npm run build`. Not part of `npm test`.
  */
 import { readFileSync } from 'node:fs';

@@ -1,5 +1,5 @@
 /**
- * `npm run lab:fuzz:formats [-- FORMAT] [--count N] [--seed S]`: 10,000 damaged scenes of every format. The first that is neither read nor
+ * `npm run lab -- fuzz-formats [FORMAT] [--count N] [--seed S]`: 10,000 damaged scenes of every format. The first that is neither read nor
  * refused by name, takes too long or too much memory ends the run and is named; the same seed makes it again.
  */
 import { parseArgs } from 'node:util';

@@ -1,5 +1,5 @@
 /**
- * `npm run lab:screenshots [-- --only REGEX] [--out FOLDER] [--scheme light|dark] [--seconds 40] [--widths 390,1280] [--first] [--scenes]`: a screenshot of every page of
+ * `npm run lab -- screenshots [--only REGEX] [--out FOLDER] [--scheme light|dark] [--seconds 40] [--widths 390,1280] [--first] [--scenes]`: a screenshot of every page of
  * the built site at 390 and 1280 CSS pixels, for people to look at. Scenes in the first screen get some seconds to appear; SwiftShader is slow. `--scenes` waits for
  * those below it, too; `--first` takes the first screen alone.
  */

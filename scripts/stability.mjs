@@ -1,5 +1,5 @@
 /**
- * `npm run lab:stability`: every row of the catalog at full length, each in a process of its own, in Node and in Chromium. `-- PATTERN` runs the rows whose file name contains it;
+ * `npm run lab -- stability`: every row of the catalog at full length, each in a process of its own, in Node and in Chromium. `-- PATTERN` runs the rows whose file name contains it;
  * `-- --peers` puts the peers through the rows that a page can run; `-- --report` also writes docs/stability.md, its charts and figures.json, which the demo reads;
  * `-- --merge FILE...` runs nothing and adds measurements of another machine: its .cache/stability/runs.jsonl, or reports that the page POSTed.
  */

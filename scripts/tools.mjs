@@ -1,5 +1,5 @@
 /**
- * `npm run lab:tools`: converts one scene with the newest versions of public tools, reads their output, has them read our output, and prints how far places, sizes
+ * `npm run lab -- tools`: converts one scene with the newest versions of public tools, reads their output, has them read our output, and prints how far places, sizes
  * and opacities are from the source. It needs the npm registry.
  */
 import { execFileSync } from 'node:child_process';

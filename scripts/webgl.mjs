@@ -1,5 +1,5 @@
 /**
- * `npm run lab:webgl [-- --firefox PATH] [--chromium-only]`: the WebGL renderer in Chromium and in Firefox (Debian's firefox-esr, or another by its path), on the reference views
+ * `npm run lab -- webgl [--firefox PATH] [--chromium-only]`: the WebGL renderer in Chromium and in Firefox (Debian's firefox-esr, or another by its path), on the reference views
  * against the float64 oracle; the element without WebGPU; how old orders are while the camera moves; bytes of code. After `npm run build`. Not part of `npm test`.
  */
 import { readdirSync, readFileSync } from 'node:fs';

@@ -1,5 +1,5 @@
 /**
- * `npm run lab:webkit`: the built element and site in WebKitGTK, in a window of Xvfb (Debian: webkit2gtk-driver, xvfb). It has no WebGPU, so WebGL 2 draws. Screenshots are compared
+ * `npm run lab -- webkit`: the built element and site in WebKitGTK, in a window of Xvfb (Debian: webkit2gtk-driver, xvfb). It has no WebGPU, so WebGL 2 draws. Screenshots are compared
  * with those of Chromium; those of whole pages are left in `.cache/engines/webkit`. After `npm run build`. Not part of `npm test`.
  */
 import {

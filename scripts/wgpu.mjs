@@ -1,5 +1,5 @@
 /**
- * `npm run lab:wgpu [-- PATTERN]`: the golden tests on wgpu, the WebGPU of Firefox, in Deno. Without a GPU that is Mesa's lavapipe (Debian: mesa-vulkan-drivers). Deno is installed from
+ * `npm run lab -- wgpu [PATTERN]`: the golden tests on wgpu, the WebGPU of Firefox, in Deno. Without a GPU that is Mesa's lavapipe (Debian: mesa-vulkan-drivers). Deno is installed from
  * npm into `.cache/wgpu` on the first run. After `npm run build -- --packages`. Not part of `npm test`: lavapipe takes up to seven minutes to a file. `TESTS=lab` also runs each file's laboratory part.
  */
 import { spawnSync } from 'node:child_process';

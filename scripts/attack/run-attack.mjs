@@ -1,4 +1,4 @@
-/** The work behind `npm run lab:attack`. */
+/** The work behind `npm run lab -- attack`. */
 import { spawnSync } from 'node:child_process';
 import {
   copyFileSync,
@@ -23,7 +23,7 @@ import { root } from '../lib/run.mjs';
 import { serve } from '../../packages/cli/src/lib/server.mjs';
 import { peakBytes } from './peak.mjs';
 
-const USAGE = `usage: npm run lab:attack -- [FOLDER (default ../shared/cases/attack)] [--only PATTERN] [--renderer webgl] [--seconds N (default 40)]
+const USAGE = `usage: npm run lab -- attack [FOLDER (default ../shared/cases/attack)] [--only PATTERN] [--renderer webgl] [--seconds N (default 40)]
 
 Reads every scene file of a folder in Node, and shows each in Chromium, files named mesh-* and csp-* as meshes, with an honest scene of 400 splats (honest.ply of the folder, or of
 ../attack) half a second later, and again when it is removed; both with a heap of 300 MB. A folder within the folder is a streamed scene. Prints the result, the time, the maximum memory of

@@ -1,11 +1,11 @@
-/** The work behind `npm run lab:bench`. */
+/** The work behind `npm run lab -- bench`. */
 import { readFileSync, writeFileSync } from 'node:fs';
 import { join, resolve } from 'node:path';
 import { parseArgs } from 'node:util';
 import { runPage } from '../lib/browser-page.mjs';
 import { benchTable } from './table.mjs';
 
-const USAGE = `usage: npm run lab:bench -- [options]
+const USAGE = `usage: npm run lab -- bench [options]
 
   --splats N        splats; the scene is repeated up to that number (default 100000)
   --size WxH        image size (default 960x540)

@@ -1,4 +1,4 @@
-/** `npm run lab:load`: the cost of loading ordinary files in Chromium with our element and with others: time to the first preview and to the scene, the page's longest task and the peak memory of its process. */
+/** `npm run lab -- load`: the cost of loading ordinary files in Chromium with our element and with others: time to the first preview and to the scene, the page's longest task and the peak memory of its process. */
 import { statSync, writeFileSync } from 'node:fs';
 import { basename, dirname, join, resolve } from 'node:path';
 import { parseArgs } from 'node:util';
@@ -8,7 +8,7 @@ import { peakBytes } from '../attack/peak.mjs';
 import { findChromium, gpuFlags } from '../lib/chromium.mjs';
 import { root } from '../lib/run.mjs';
 
-const USAGE = `usage: npm run lab:load -- FILE ... [options]
+const USAGE = `usage: npm run lab -- load FILE ... [options]
 
   FILE             scenes: .ply, .compressed.ply, .spz, .sog. node scripts/tile-scene.mjs makes large ones
   --viewers A,B    from ours, spark, playcanvas (default all); each opens each file in a separate browser

@@ -1,5 +1,5 @@
 /**
- * `npm run lab:bytes`: bytes against accuracy of scene files, ours and others', on the captured scenes of ../shared/data. Each is read, drawn in held-out views, and held against the scene that it was made of.
+ * `npm run lab -- bytes`: bytes against accuracy of scene files, ours and others', on the captured scenes of ../shared/data. Each is read, drawn in held-out views, and held against the scene that it was made of.
  * What takes long to make is kept in --work and taken from there the next time.
  */
 import { existsSync, mkdirSync, readdirSync, readFileSync, statSync, writeFileSync } from 'node:fs';
@@ -14,7 +14,7 @@ import { drawChart } from './chart.mjs';
 import { halfTurned, make, own, read, readFolder, timed, TRANSFORM } from './files.mjs';
 import { writeSplat } from './splat.mjs';
 
-const USAGE = `usage: npm run lab:bytes -- [options]
+const USAGE = `usage: npm run lab -- bytes [options]
 
   --data FOLDER    the captured scenes (default ../shared/data)
   --work FOLDER    where files that are made are kept (default bench-results/bytes)

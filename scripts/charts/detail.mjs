@@ -1,5 +1,5 @@
 /**
- * `npm run lab:detail:chart`: how many splats a frame draws for each that contributes, and the error of its image against the whole scene, at growing distances. Draws a
+ * `npm run lab -- detail-chart`: how many splats a frame draws for each that contributes, and the error of its image against the whole scene, at growing distances. Draws a
  * scene exactly and from its levels of detail on Dawn, and prints a table for docs/decisions/0013.
  */
 import { readFileSync } from 'node:fs';

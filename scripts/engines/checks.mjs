@@ -1,4 +1,4 @@
-/** Requirements of every engine on the built element and the site: the checks of `npm run lab:firefox` and `npm run lab:webkit`. */
+/** Requirements of every engine on the built element and the site: the checks of `npm run lab -- firefox` and `npm run lab -- webkit`. */
 import { mkdirSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { chromium } from 'playwright-core';

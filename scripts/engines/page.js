@@ -1,4 +1,4 @@
-/** The checks of `npm run lab:firefox` and `npm run lab:webkit` within a page. Every function returns text or bytes, which any protocol carries. */
+/** The checks of `npm run lab -- firefox` and `npm run lab -- webkit` within a page. Every function returns text or bytes, which any protocol carries. */
 const SIZE = 'display: block; width: 300px; height: 240px';
 
 const delay = (ms) => new Promise((resolve) => setTimeout(resolve, ms));

@@ -1,4 +1,4 @@
-/** The page side of `npm run lab:webgl`: frames of the renderer alone, and how old the order of a moving element is. */
+/** The page side of `npm run lab -- webgl`: frames of the renderer alone, and how old the order of a moving element is. */
 import { readScene } from '@gaussian-splat/formats';
 import { packGaussians } from '@gaussian-splat/renderer';
 import {

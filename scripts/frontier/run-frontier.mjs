@@ -1,4 +1,4 @@
-/** The work behind `npm run lab:frontier`: collects in the browser, or reads results of another machine, and draws. */
+/** The work behind `npm run lab -- frontier`: collects in the browser, or reads results of another machine, and draws. */
 import { mkdirSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join, resolve } from 'node:path';
@@ -10,7 +10,7 @@ import { root } from '../lib/run.mjs';
 import { drawChart } from './chart.mjs';
 import { bytesASplat, hypervolume, nonDominated, passing, perceptual, pointsOf, timeOf } from './front.mjs';
 
-const USAGE = `usage: npm run lab:frontier -- [options]
+const USAGE = `usage: npm run lab -- frontier [options]
 
   --size WxH        image size (default 480x270)
   --splats N        splats; 0, the default, is the scene as it is

@@ -1,5 +1,5 @@
 /**
- * `npm run lab:gate`: which files of a trained scene lose nothing that its photographs show. Each file is read, drawn as the cameras of the photographs saw the scene, and held against them; what
+ * `npm run lab -- gate`: which files of a trained scene lose nothing that its photographs show. Each file is read, drawn as the cameras of the photographs saw the scene, and held against them; what
  * the trained PLY itself has there is the measure. What takes long to make is kept in --work and taken from there the next time.
  */
 import { existsSync, mkdirSync, readFileSync, statSync, writeFileSync } from 'node:fs';
@@ -13,7 +13,7 @@ import { requestNodeAdapter } from '../../packages/cli/src/lib/node-gpu.mjs';
 import { halfTurned, make, own, read, readFolder, timed, TRANSFORM } from '../bytes/files.mjs';
 import { root } from '../lib/run.mjs';
 
-const USAGE = `usage: npm run lab:gate -- [options]
+const USAGE = `usage: npm run lab -- gate [options]
 
   --data FOLDER    the captured scenes and their photographs (default ../shared/data)
   --scene NAME=PLY,CAMERAS,IMAGES  another scene: its trained file, cameras.json of the training, and the folder of its

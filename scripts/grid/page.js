@@ -1,4 +1,4 @@
-/** The page of `npm run lab:grid`: scenes one below the other, written as documentation recommends. Its address names how many (`count`) and the renderer. */
+/** The page of `npm run lab -- grid`: scenes one below the other, written as documentation recommends. Its address names how many (`count`) and the renderer. */
 import { ledger } from '/soak/ledger.js';
 
 const query = new URLSearchParams(location.search);

@@ -1,5 +1,5 @@
 /**
- * `npm run lab:grid`: twelve scenes on a page of a phone's size, scrolled up and down by a finger for a minute. Peak GPU memory is compared with the peak of the scenes in view. Tasks of the main thread are read from the browser's trace: their work, and their wait for the GPU.
+ * `npm run lab -- grid`: twelve scenes on a page of a phone's size, scrolled up and down by a finger for a minute. Peak GPU memory is compared with the peak of the scenes in view. Tasks of the main thread are read from the browser's trace: their work, and their wait for the GPU.
  */
 import { writeFileSync } from 'node:fs';
 import { join } from 'node:path';
@@ -11,7 +11,7 @@ import { root } from '../lib/run.mjs';
 import { residentBytes } from '../soak/processes.mjs';
 import { longTasksOf } from './trace.mjs';
 
-const USAGE = `usage: npm run lab:grid -- [--seconds N (default 60)] [--renderer webgl] [--ms N (of one swipe, default 250)] [--pixel-ratio N (default 1, for SwiftShader; 2.6 with a GPU)] [--out FILE]
+const USAGE = `usage: npm run lab -- grid [--seconds N (default 60)] [--renderer webgl] [--ms N (of one swipe, default 250)] [--pixel-ratio N (default 1, for SwiftShader; 2.6 with a GPU)] [--out FILE]
 
 Ends with an error if the GPU's memory exceeds 1.2 times that of the scenes in view, if a task works and waits for the GPU for more than 50 ms, or if a scene does not come.`;
 const COUNT = 12;

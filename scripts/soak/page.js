@@ -1,4 +1,4 @@
-/** The page's side of `npm run lab:soak`: what can be done to elements, by name. */
+/** The page's side of `npm run lab -- soak`: what can be done to elements, by name. */
 import { devices, faults, ledger } from './ledger.js';
 
 const { GaussianSplatElement } = await import('/cdn/gaussian-splat.min.js');

@@ -1,4 +1,4 @@
-/** The work behind `npm run lab:soak`. */
+/** The work behind `npm run lab -- soak`. */
 import { writeFileSync } from 'node:fs';
 import { parseArgs } from 'node:util';
 import { chromium } from 'playwright-core';
@@ -10,7 +10,7 @@ import { residentBytes } from './processes.mjs';
 import { heapSlope } from './slope.mjs';
 import { summaryLine } from './summary.mjs';
 
-const USAGE = `usage: npm run lab:soak -- [--minutes N (default 120)] [--seed S] [--out FILE] [--max-mib N (default 6144)]
+const USAGE = `usage: npm run lab -- soak [--minutes N (default 120)] [--seed S] [--out FILE] [--max-mib N (default 6144)]
 
 Every five minutes a line that begins with "summary:" reports the progress, and FILE has the report until then. Ends with an error once the
 browser's processes hold more memory than --max-mib together (on Linux only).`;

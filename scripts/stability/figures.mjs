@@ -23,7 +23,7 @@ export function parseFigures(text, name) {
     }
     if (runs.length === 0)
       throw new Error(
-        `${name}: expected a line of the adapter first, found figures. Run the rows again with npm run lab:stability`,
+        `${name}: expected a line of the adapter first, found figures. Run the rows again with npm run lab -- stability`,
       );
     addEntry((runs.at(-1).rows[row] ??= { date, figures: [], curves: [] }), entry);
   }

@@ -1,4 +1,4 @@
-/** The levels of frames in motion against their measurements: docs/frontier/frontier-*.json, written by `npm run lab:frontier`. */
+/** The levels of frames in motion against their measurements: docs/frontier/frontier-*.json, written by `npm run lab -- frontier`. */
 import assert from 'node:assert/strict';
 import { readdirSync, readFileSync } from 'node:fs';
 import { test } from 'node:test';

@@ -1,4 +1,4 @@
-/** The fast core of `npm run lab:fuzz:formats`. */
+/** The fast core of `npm run lab -- fuzz-formats`. */
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { fuzzFormat, fuzzScenes } from './support/fuzz.js';

@@ -1,4 +1,4 @@
-/** LCC and LCC2, the formats of XGRIDS: `npm run lab:tools` holds them against the decoder of splat-transform. */
+/** LCC and LCC2, the formats of XGRIDS: `npm run lab -- tools` holds them against the decoder of splat-transform. */
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { zipSync } from 'fflate';

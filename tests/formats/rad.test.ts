@@ -1,4 +1,4 @@
-/** RAD, the format of Spark: `npm run lab:tools` holds it against Spark's own decoder. */
+/** RAD, the format of Spark: `npm run lab -- tools` holds it against Spark's own decoder. */
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { zipSync } from 'fflate';

@@ -1,4 +1,4 @@
-/** The frames of the SPZ files of tools, which decision 22 counts. `npm run lab:tools` counts again with the newest versions of the tools. */
+/** The frames of the SPZ files of tools, which decision 22 counts. `npm run lab -- tools` counts again with the newest versions of the tools. */
 import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
 import { test } from 'node:test';

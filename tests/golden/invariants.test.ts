@@ -55,7 +55,7 @@ function part(cloud: GaussianCloud, first: number, end: number): GaussianCloud {
 }
 
 for (const { make, frames } of [
-  // Two hundred of them, and turns between, are a row of `npm run lab:stability`.
+  // Two hundred of them, and turns between, are a row of `npm run lab -- stability`.
   { make: equalDepthPlane, frames: isLab ? 5 : 3 },
   { make: room, frames: isLab ? 8 : 3 },
 ]) {

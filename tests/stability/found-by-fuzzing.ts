@@ -1,5 +1,5 @@
 /**
- * Every case that `npm run lab:fuzz` has found worth keeping: faults that were fixed, and the worst images with the cause of each.
+ * Every case that `npm run lab -- fuzz` has found worth keeping: faults that were fixed, and the worst images with the cause of each.
  *
  * Who fails: no other renderer publishes such a corpus.
  *

@@ -3,10 +3,10 @@
  *
  * Who fails: Spark #286, #292, #318 and #408, SuperSplat #409, Cesium #13483: memory grows with every scene that is loaded and removed.
  *
- * Recipe: asked for 500 cycles of load and unload, and two hours. Run so; the two hours are `npm run lab:soak`.
+ * Recipe: asked for 500 cycles of load and unload, and two hours. Run so; the two hours are `npm run lab -- soak`.
  *
  * Passes: after 500 cycles of load, draw, resize, turn and destroy, with both rasterizers and with generators, exactly the buffers live that lived after the first. The heap of the page and two
- * hours on end are `npm run lab:soak`'s.
+ * hours on end are `npm run lab -- soak`'s.
  */
 import { test } from 'node:test';
 import assert from 'node:assert/strict';

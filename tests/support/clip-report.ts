@@ -1,5 +1,5 @@
 /**
- * `npm run lab:clip -- [options]`: the cost of a clip whose splats appear and disappear: a synthetic, seeded fountain of 150,000 splats at 30 frames a second. Prints one table of measures,
+ * `npm run lab -- clip [options]`: the cost of a clip whose splats appear and disappear: a synthetic, seeded fountain of 150,000 splats at 30 frames a second. Prints one table of measures,
  * aims and results: the rate, the bytes before the first frame, and how long each of them takes at 2 and 8 Mbit/s.
  *
  * --splats N    splats at any time (default 150000)

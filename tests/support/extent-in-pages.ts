@@ -9,7 +9,7 @@ export const isLab = isFull || ['lab', 'full'].includes((globalThis as { TESTS?:
 /** A test of the laboratory's: one that a clock judges, or that only widens another. */
 export const itInLab = isLab ? it : it.skip;
 
-/** One of two sizes of a test: a part of it in `npm test`, all of it in `npm test -- --full` and `npm run lab:stability`. */
+/** One of two sizes of a test: a part of it in `npm test`, all of it in `npm test -- --full` and `npm run lab -- stability`. */
 export const sized = <T>(fast: T, full: T): T => (isFull ? full : fast);
 
 /**

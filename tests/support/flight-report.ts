@@ -1,4 +1,4 @@
-/** `npm run lab:detail:flight -- FOLDER`: the flight over a folder that `gaussian-splat detail` wrote, simulated, with and without page requests for predicted cameras. */
+/** `npm run lab -- detail-flight FOLDER`: the flight over a folder that `gaussian-splat detail` wrote, simulated, with and without page requests for predicted cameras. */
 import { readFileSync } from 'node:fs';
 import { join, resolve } from 'node:path';
 import { checkManifest } from '@gaussian-splat/renderer';
@@ -8,7 +8,7 @@ import { fly, type FlightSecond } from './flight.js';
 const [given, ...values] = process.argv.slice(2);
 if (given === undefined)
   throw new Error(
-    'usage: npm run lab:detail:flight -- FOLDER [slots] [latency in ms] [bytes of a slot] [--copies] [--speed=SHARE]',
+    'usage: npm run lab -- detail-flight FOLDER [slots] [latency in ms] [bytes of a slot] [--copies] [--speed=SHARE]',
   );
 const folder = resolve(process.env.INIT_CWD ?? process.cwd(), given);
 const [slots = 17_500, latencyMs = 7, bytes = 65_856] = values.filter((value) => !value.startsWith('--')).map(Number);

@@ -6,7 +6,7 @@ import { isFull } from './extent.js';
 const devices = new Map<string, Promise<GPUDevice>>();
 
 /**
- * Tests in Deno, `npm run lab:wgpu`. Its driver on a machine without a GPU, lavapipe, truncates values that it blends into rgba16float: by 0.98 of a unit in the last place on average.
+ * Tests in Deno, `npm run lab -- wgpu`. Its driver on a machine without a GPU, lavapipe, truncates values that it blends into rgba16float: by 0.98 of a unit in the last place on average.
  * The self-test refuses such quads, and pages blend into rgba32float there; so do these tests.
  */
 const IS_WGPU = 'Deno' in globalThis;

@@ -1,4 +1,4 @@
-/** The committed run of `npm run lab:bytes`: for each scene the files of it, the smallest first. */
+/** The committed run of `npm run lab -- bytes`: for each scene the files of it, the smallest first. */
 import { existsSync, readFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { root } from '../../../scripts/lib/run.mjs';

@@ -1,4 +1,4 @@
-/** The committed runs of `npm run lab:frontier`: for each chart of docs/frontier the measurements, the adapter, and the date. */
+/** The committed runs of `npm run lab -- frontier`: for each chart of docs/frontier the measurements, the adapter, and the date. */
 import { readdirSync, readFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { timeOf } from '../../../scripts/frontier/front.mjs';

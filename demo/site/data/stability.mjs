@@ -1,4 +1,4 @@
-/** The report of `npm run lab:stability -- --report` as the page shows it: charts, rows with others beside ours, and every row of the catalog. */
+/** The report of `npm run lab -- stability --report` as the page shows it: charts, rows with others beside ours, and every row of the catalog. */
 import { readFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { latestOf, titleOf } from '../../../scripts/stability/figures.mjs';

@@ -45,7 +45,7 @@ async function withReleaseDelay(ms: number, work: () => Promise<void>): Promise<
 
 describe('a long life', () => {
   it('elements that come and go by the hundred leave the GPU and the heap as they were, on one device', async () => {
-    // 100, or what `npm run lab:lives` asks for.
+    // 100, or what `npm run lab -- lives` asks for.
     const cycles = Number(await (await fetch('/net/soak-cycles')).text());
     await withReleaseDelay(0, async () => {
       // It keeps the device, so that resources that the device shares do not count as created and destroyed.

@@ -1,4 +1,4 @@
-/** The work behind `npm run lab:fuzz`: random scenes and cameras against the oracle. A fault is shrunk and kept in the corpus. */
+/** The work behind `npm run lab -- fuzz`: random scenes and cameras against the oracle. A fault is shrunk and kept in the corpus. */
 import { writeFileSync } from 'node:fs';
 import { parseArgs } from 'node:util';
 import fc from 'fast-check';
@@ -8,7 +8,7 @@ import { fullDevice } from '../support/devices.js';
 import { sceneRecipe, type SceneRecipe } from '../support/random-scene.js';
 import { judge, type Cause, type Subject, type Verdict } from './judge.js';
 
-const USAGE = `usage: npm run lab:fuzz -- [options]
+const USAGE = `usage: npm run lab -- fuzz [options]
 
   --cases N        scenes (default 10000)
   --minutes M      stop after M minutes (default 240)

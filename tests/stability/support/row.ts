@@ -4,7 +4,7 @@ import { appendFileSync } from 'node:fs';
 import { test, type TestContext } from 'node:test';
 import { requestNodeAdapter } from '../../../packages/cli/src/lib/node-gpu.mjs';
 
-/** True under `npm run lab:stability`: whole recipes. `npm test` runs a part of each. */
+/** True under `npm run lab -- stability`: whole recipes. `npm test` runs a part of each. */
 export const isFull = process.env.STABILITY === 'full';
 
 /** One of two sizes of a recipe. */
