@@ -94,6 +94,7 @@ export default {
     'src/viewer/media.ts',
     'src/viewer/properties.ts',
     'src/viewer/attributes.ts',
+    'src/viewer/element-attributes.ts',
     'src/features/children/child.ts',
     'src/features/children/attributes.ts',
     'src/features/effects/attributes.ts',

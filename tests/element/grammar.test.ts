@@ -1,12 +1,8 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import fc from 'fast-check';
-import {
-  ATTRIBUTES,
-  credentialsOf,
-  readAttributes,
-  type RawAttributes,
-} from '../../packages/element/src/viewer/attributes.js';
+import { credentialsOf, type RawAttributes } from '../../packages/element/src/viewer/attributes.js';
+import { ALL_ATTRIBUTES, readAttributes } from '../../packages/element/src/viewer/element-attributes.js';
 import { MESH_ATTRIBUTES, SCENE_ATTRIBUTES } from '../../packages/element/src/features/children/attributes.js';
 import {
   fieldOfViewGrammar,
@@ -26,7 +22,7 @@ const DEGREE = Math.PI / 180;
 const ABSENT = {} as RawAttributes;
 
 test('the default of each attribute fits its own grammar', () => {
-  for (const table of [ATTRIBUTES, SCENE_ATTRIBUTES, MESH_ATTRIBUTES] as const)
+  for (const table of [ALL_ATTRIBUTES, SCENE_ATTRIBUTES, MESH_ATTRIBUTES] as const)
     for (const [name, { grammar }] of Object.entries(table as Record<string, { grammar?: AttributeGrammar<unknown> }>))
       if (grammar) assert.notEqual(grammar.parse(grammar.fallback), null, name);
 });

@@ -180,7 +180,7 @@ check('every member has a type and a description, every parameter a name and a t
 });
 
 check('its keywords are those that the attributes take, the default first', async () => {
-  const { readAttributes } = (await import(`${folder}dist/viewer/attributes.js`)) as {
+  const { readAttributes } = (await import(`${folder}dist/viewer/element-attributes.js`)) as {
     readAttributes: (raw: object, warn: (sentence: string) => void) => Record<string, unknown>;
   };
   const enumerated = (element?.attributes ?? [])
@@ -209,7 +209,7 @@ check('the table of the guide is what the build makes of it, with an example tha
   };
   const guide = readFileSync(`${folder}../../docs/guide/attributes.md`, 'utf8');
   assert.ok(guide.includes(`\n\n${attributeRows(element?.attributes)}\n\n`), 'npm run build writes it again');
-  const { readAttributes } = (await import(`${folder}dist/viewer/attributes.js`)) as {
+  const { readAttributes } = (await import(`${folder}dist/viewer/element-attributes.js`)) as {
     readAttributes: (raw: object, warn: (sentence: string) => void) => Record<string, unknown>;
   };
   for (const { name, fieldName, example = '' } of (element?.attributes ?? []) as (Named & Record<string, string>)[]) {

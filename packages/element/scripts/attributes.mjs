@@ -1,6 +1,6 @@
 /**
- * Generates the attributes of the manifest and rows of documents from the tables in src/viewer/attributes.ts, in
- * src/features/children/attributes.ts and src/features/effects/attributes.ts, and in the rows of features
+ * Generates the attributes of the manifest and rows of documents from the tables in src/viewer/attributes.ts and
+ * src/viewer/element-attributes.ts, in src/features/children/attributes.ts and src/features/effects/attributes.ts, and in the rows of features
  * (src/features/NAME/row.ts). A row also adds slots, parts, custom properties and events: the tags of its comment.
  */
 import { readFileSync, writeFileSync } from 'node:fs';
@@ -76,7 +76,7 @@ export function tableOfAttributes() {
         return { name: entry.name.getText(), type, description, ...(fallback && { default: fallback }), example };
       });
       found.set(node.name.getText(), entries);
-      if (isOfRow) ofFeatures.attributes.push(...entries);
+      if (isOfRow || moduleDoc.path.endsWith('element-attributes.ts')) ofFeatures.attributes.push(...entries);
     },
     packageLinkPhase({ customElementsManifest: { modules } }) {
       for (const element of modules.flatMap(({ declarations = [] }) => declarations)) {

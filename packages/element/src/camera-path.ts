@@ -3,7 +3,8 @@
  * attributes.
  */
 import type { Camera } from '@gaussian-splat/core';
-import { readAttributes, type RawAttributes } from './viewer/attributes.js';
+import type { RawAttributes } from './viewer/attributes.js';
+import { readAttributes } from './viewer/element-attributes.js';
 import type { SceneBounds } from './viewer/camera/settings.js';
 import { CameraController } from './viewer/camera-controller.js';
 import { frameCount, frameShares, pathOfList, turntable, type CameraPath } from './viewer/camera/camera-path.js';

@@ -20,6 +20,7 @@ export type {
   FlightOptions,
   FrameOptions,
   HotspotPlace,
+  ImageOptions,
   ImmersiveStatusDetail,
   InteractionPrompt,
   InteractionPromptStyle,
@@ -32,7 +33,6 @@ export type {
 export type { SceneStats } from './viewer/stats.js';
 export type { DynamicQualityReport } from './dynamic-quality/dynamic-quality-controller.js';
 export type { SettableProperties } from './viewer/media.js';
-export type { ImageOptions } from './viewer/viewing.js';
 export type { CameraView, LookView, MatrixView, OrbitView, TrainerView } from './viewer/camera/camera-view.js';
 export type { Easing } from './viewer/camera/path.js';
 export type { SplatShader, SplatUniform } from '@gaussian-splat/renderer/modifiers';

@@ -24,13 +24,11 @@ import {
   keywordGrammar,
   numberGrammar,
   orbitGrammar,
-  readAttribute,
   targetGrammar,
   upGrammar,
   type AttributeGrammar,
 } from './camera/grammar.js';
 import type { CameraSettings } from './camera/settings.js';
-import { FEATURES } from './feature-table.js';
 import type { Numbers } from '../sources/generator/values.js';
 import type { A11yStrings } from './strings.js';
 
@@ -66,7 +64,6 @@ export interface FeatureNavigations {}
 
 /** Camera motion under a visitor's control: orbit around its target, or that of a feature. */
 export type Navigation = 'orbit' | keyof FeatureNavigations;
-const NAVIGATIONS = Object.values(FEATURES).flatMap(({ navigation }) => navigation ?? []);
 
 /** The renderer's own limit. */
 const MAX_DETAIL_PIXELS = 64;
@@ -223,13 +220,6 @@ export const ATTRIBUTES = {
    */
   disableTap: flag(),
   /**
-   * `orbit` turns around the target. `fly` looks around, and moves with W, A, S, D, Q and E, faster with Shift. `walk` stays on the floor, which the element finds
-   * in the splats: with W, A, S, D or the arrow keys, a click or a tap on the floor, a stick for the thumb, or a gamepad.
-   * @default `orbit`
-   * @example navigation="walk"
-   */
-  navigation: keyword<Navigation>(['orbit', ...NAVIGATIONS]),
-  /**
    * Length of one unit of the scene's file, with `m`, `cm` or `mm`. Without it, walking and VR take a unit for one meter, and rulers show numbers alone.
    * @default unknown
    * @example unit="37cm"
@@ -370,8 +360,7 @@ export interface FeatureMembers {}
 /** Attributes of features. The rows of the table extend this interface. */
 export interface FeatureAttributes {}
 
-/** The own attributes of the element, and those of its features. */
-const ALL: AttributeTable = Object.assign({}, ATTRIBUTES, ...Object.values(FEATURES).map((row) => row.attributes));
+/** The own attributes of the element, and those of its features: see element-attributes.ts. */
 type Table = typeof ATTRIBUTES & FeatureAttributes;
 /** The properties of all attributes. */
 export type AttributeProperties = PropertiesOf<Table>;
@@ -387,42 +376,14 @@ export type Attributes = {
   readonly [K in keyof Table]: Table[K] extends Attribute<infer P, infer V> ? ([V] extends [never] ? P : V) : never;
 } & { readonly camera: CameraSettings };
 
-const entries = Object.entries(ALL) as [keyof Table, Attribute<unknown, unknown>][];
-const attributeOf = (property: string): string => property.replace(/[A-Z]/g, (letter) => `-${letter.toLowerCase()}`);
+/** Name of the attribute of a property. */
+export const attributeOf = (property: string): string =>
+  property.replace(/[A-Z]/g, (letter) => `-${letter.toLowerCase()}`);
 
 /** Converts to Fetch's option. */
 export const credentialsOf = (crossorigin: Attributes['crossorigin']): RequestCredentials =>
   crossorigin === 'use-credentials' ? 'include' : 'same-origin';
 
-/** Returns the property declarations that Lit needs for a table of attributes, by default all of `<gaussian-splat>`. */
-export const declarations = (table: AttributeTable = ALL): PropertyDeclarations =>
+/** Returns the property declarations that Lit needs for a table of attributes. */
+export const declarations = (table: AttributeTable): PropertyDeclarations =>
   Object.fromEntries(Object.entries(table).map(([name, { lit }]) => [name, { ...lit, attribute: attributeOf(name) }]));
-
-/** The boolean properties. */
-export const flags = entries.filter(([, { lit }]) => lit.type === Boolean).map(([name]) => name);
-
-/** Parses all attributes; `warn` is called with one sentence for each malformed one. */
-export function readAttributes(raw: RawAttributes, warn: (sentence: string) => void): Attributes {
-  const values = Object.fromEntries(
-    entries.map(([name, { grammar }]) => [
-      name,
-      grammar ? readAttribute(attributeOf(name), raw[name] as Raw, grammar, warn) : raw[name],
-    ]),
-  ) as unknown as Omit<Attributes, 'camera'>;
-  return {
-    ...values,
-    camera: {
-      orbit: values.cameraOrbit,
-      target: values.cameraTarget,
-      minTarget: values.minCameraTarget,
-      maxTarget: values.maxCameraTarget,
-      fieldOfView: values.fieldOfView,
-      minOrbit: values.minCameraOrbit,
-      maxOrbit: values.maxCameraOrbit,
-      minFieldOfView: values.minFieldOfView,
-      maxFieldOfView: values.maxFieldOfView,
-      up: values.up,
-      orthographic: values.orthographic,
-    },
-  };
-}

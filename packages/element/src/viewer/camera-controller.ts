@@ -131,7 +131,7 @@ export class CameraController {
     const { now } = this.#camera;
     const { min, max, center } = this.#bounds;
     const camera = cameraOfPose(now, this.viewerFrame, width, height, nearPlane(this.#bounds));
-    if (!this.#settings.orthographic || this.#camera.walks) return camera;
+    if (!this.#settings.orthographic || this.#camera.eyeIsFree) return camera;
     const away = subtract(toViewer(this.viewerFrame, center), [now.x, now.y, now.z]);
     return parallelCamera(camera, now.radius, Math.hypot(...away) + Math.hypot(...subtract(max, min)));
   }

@@ -1,7 +1,9 @@
 import { loadModule } from '@gaussian-splat/core';
 import { isServer, type PropertyValues, type ReactiveElement, type TemplateResult } from 'lit';
 import { adoptStyles, styles } from './styles.js';
-import { readAttributes, type Attributes, type FeatureMembers } from './attributes.js';
+import type { Attributes, FeatureMembers } from './attributes.js';
+import { readAttributes } from './element-attributes.js';
+import { FEATURES } from './feature-table.js';
 import type { CameraSettings } from './camera/settings.js';
 import { visitorMessage, type ElementError } from './errors.js';
 import { SharedDevice } from '../gpu/shared-device.js';
@@ -148,7 +150,7 @@ export class GaussianSplatElement extends ViewingMethods {
   constructor() {
     super();
     this.#internals = (!isServer && this.attachInternals?.()) || null;
-    this.core = new Viewer(this, this.#readAttributes(), {
+    this.core = new Viewer(this, FEATURES, this.#readAttributes(), {
       source: this,
       services: this.constructor as typeof GaussianSplatElement,
       part: <T extends HTMLElement>(selector: string) => this.renderRoot?.querySelector<T>(selector) ?? null,

@@ -15,7 +15,7 @@ import { sound } from '../features/sound/row.js';
 import { views } from '../features/views/row.js';
 import { walk } from '../features/walk/row.js';
 import { ar, vr } from '../features/xr/row.js';
-import type { FeatureRow } from './features.js';
+import type { FeatureTable } from './features.js';
 // The declarations of the package keep these imports, whose rows add attributes and members to the types of the element.
 import '../features/auto-rotate/row.js';
 import '../features/effects/row.js';
@@ -27,6 +27,7 @@ import '../features/sound/row.js';
 export type { InputController } from '../features/input/input-controller.js';
 export type { InteractionPrompt, InteractionPromptStyle } from '../features/input/row.js';
 export type { HotspotController, HotspotPlace } from '../features/labels/hotspot-controller.js';
+export type { ImageOptions } from '../features/recording/capture-image.js';
 export type { FrameOptions, RecordOptions } from '../features/recording/recording.js';
 export type { MeasureDetail } from '../features/ruler/row.js';
 export type { ViewChangeDetail } from '../features/views/row.js';
@@ -37,7 +38,7 @@ export type { ImmersiveStatusDetail } from '../features/xr/row.js';
 /** Functions for images and videos. */
 export type Recording = typeof capture;
 
-export const FEATURES: Readonly<Record<string, FeatureRow>> = {
+export const FEATURES: FeatureTable = {
   ...{ children, views, autoRotate, walk, flight, vr, ar, ruler, shadow, sky, sound, effects, labels, input, motion },
   ...{ announcer, print, recording },
 };

@@ -75,6 +75,9 @@ export interface FeatureRow {
   readonly open: (viewer: Viewer) => Promise<object>;
 }
 
+/** The rows of all features, by name, in the order of their calls. */
+export type FeatureTable = Readonly<Record<string, FeatureRow>>;
+
 type Call<K extends keyof Feature> = NonNullable<Feature[K]>;
 type Result<K extends keyof Feature> = ReturnType<Call<K>>;
 
@@ -84,7 +87,7 @@ export class Features {
   readonly #loaded = new Map<string, Feature>();
   readonly #viewer: Viewer;
 
-  constructor(table: Readonly<Record<string, FeatureRow>>, viewer: Viewer) {
+  constructor(table: FeatureTable, viewer: Viewer) {
     this.#viewer = viewer;
     const lazy = ([name, row]: [string, FeatureRow]): [string, [FeatureRow, Lazy<Feature>]] => {
       const open = async (): Promise<Feature> => {

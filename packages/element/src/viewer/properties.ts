@@ -1,6 +1,7 @@
 import type { SplatShader } from '@gaussian-splat/renderer/modifiers';
 import { LitElement, type PropertyDeclarations } from 'lit';
-import { declarations, flags, type AttributeProperties } from './attributes.js';
+import { declarations, type AttributeProperties } from './attributes.js';
+import { ALL_ATTRIBUTES, flags } from './element-attributes.js';
 import type { GaussianSplatEventMap } from './events.js';
 import type { ControlValues } from '../sources/generator/values.js';
 
@@ -13,7 +14,7 @@ type ElementEvents = GaussianSplatEventMap & Omit<HTMLElementEventMap, keyof Gau
 // eslint-disable-next-line @typescript-eslint/no-unsafe-declaration-merging
 export class SplatProperties extends LitElement {
   static override properties: PropertyDeclarations = {
-    ...declarations(),
+    ...declarations(ALL_ATTRIBUTES),
     inputValues: { attribute: false },
     splatShader: { attribute: false },
     revealProgress: { attribute: false },

@@ -8,8 +8,7 @@ import type { ViewerFrame } from './camera/orbit.js';
 import { frameOf } from './camera/settings.js';
 import type { PickedPoint } from './camera/values.js';
 import { CameraController } from './camera-controller.js';
-import { FEATURES } from './feature-table.js';
-import { Features } from './features.js';
+import { Features, type FeatureTable } from './features.js';
 import { prefersReducedMotion, reducedMotion } from './motion.js';
 import type { PlaybackController, Player } from './playback-controller.js';
 import { RevealController } from './reveal-controller.js';
@@ -80,16 +79,18 @@ export class Viewer implements SourceOwner {
   #children: MutationObserver | undefined;
 
   /** Capabilities whose code is loaded when a page uses them. */
-  readonly features = new Features(FEATURES, this);
+  readonly features: Features;
   /** The live region that screen readers read aloud. */
-  readonly announcer = this.features.get<Announcer>('announcer');
+  readonly announcer: Lazy<Announcer>;
   /** Whether something other than the page shows the scene, such as a headset. The page does not draw meanwhile. */
   isShownElsewhere = false;
   /** The navigation that the scene does not allow, for example without a floor. */
   #refused: Navigation | undefined;
 
-  constructor(element: ViewerElement, attributes: Attributes, host: ElementHost) {
+  constructor(element: ViewerElement, features: FeatureTable, attributes: Attributes, host: ElementHost) {
     this.element = element;
+    this.features = new Features(features, this);
+    this.announcer = this.features.get('announcer');
     this.attributes = attributes;
     ({ services: this.services, source: this.source, part: this.#part, warn: this.warn } = host);
     this.camera = new CameraController(attributes.camera, () => this.requestFrame());

@@ -7,28 +7,13 @@ import type {
   FrameOptions,
   HotspotController,
   HotspotPlace,
+  ImageOptions,
   InputController,
   PathOptions,
   Recording,
   RecordOptions,
   Tour,
 } from './feature-table.js';
-
-/** Options of `toBlob()`. */
-export interface ImageOptions {
-  /** Media type of the image. Default `image/png`. */
-  readonly mimeType?: string;
-  /** Quality of lossy formats such as `image/jpeg`, 0..1. */
-  readonly qualityArgument?: number;
-  /**
-   * Width of the image, pixels. Default: the drawn size of the element. If only one of `width` and `height` is set, the
-   * image keeps the aspect ratio.
-   */
-  readonly width?: number;
-  readonly height?: number;
-  /** CSS color behind the scene. Default: transparent. */
-  readonly background?: string;
-}
 
 /** Methods of the element for its poster, the camera, surface positions, and images. */
 export abstract class ViewingMethods extends MediaProperties {

@@ -2,7 +2,22 @@
 import type { PixelSize } from '../../viewer/size-controller.js';
 import type { Viewer } from '../../viewer/viewer.js';
 import type { Backend } from '../../gpu/backend.js';
-import type { ImageOptions } from '../../viewer/viewing.js';
+
+/** Options of `toBlob()`. */
+export interface ImageOptions {
+  /** Media type of the image. Default `image/png`. */
+  readonly mimeType?: string;
+  /** Quality of lossy formats such as `image/jpeg`, 0..1. */
+  readonly qualityArgument?: number;
+  /**
+   * Width of the image, pixels. Default: the drawn size of the element. If only one of `width` and `height` is set, the
+   * image keeps the aspect ratio.
+   */
+  readonly width?: number;
+  readonly height?: number;
+  /** CSS color behind the scene. Default: transparent. */
+  readonly background?: string;
+}
 
 export { record, recordFrames } from './recording.js';
 

@@ -1,6 +1,5 @@
 /** Videos: recorded by the browser in real time, or drawn frame by frame as images. */
-import { nothingToDraw, takeImage } from './capture-image.js';
-import type { ImageOptions } from '../../viewer/viewing.js';
+import { nothingToDraw, takeImage, type ImageOptions } from './capture-image.js';
 import { frameCount, frameShares, type CameraPath, type PathName } from '../../viewer/camera/camera-path.js';
 import type { Viewer } from '../../viewer/viewer.js';
 

@@ -29,10 +29,10 @@ export class OrbitCamera {
   readonly #dampers = KEYS.map(() => new Damper());
   #pivot: Pivot = 'target';
   /**
-   * Whether the camera walks. Limits of the target then do not apply, because they would move the eye. A change of the
+   * Whether the eye has been placed directly, as on a floor. Limits of the target then do not apply, because they would move the eye. A change of the
    * pivot ends it.
    */
-  walks = false;
+  eyeIsFree = false;
 
   constructor(pose: CameraPose) {
     this.#now = pose;
@@ -62,7 +62,7 @@ export class OrbitCamera {
   set pivot(pivot: Pivot) {
     if (pivot === this.#pivot) return;
     this.#pivot = pivot;
-    this.walks = false;
+    this.eyeIsFree = false;
     // The velocities of the dampers belong to the previous pivot.
     for (const damper of this.#dampers) damper.stop();
   }
@@ -77,7 +77,7 @@ export class OrbitCamera {
   setGoal(changes: Partial<CameraPose>): void {
     const { min, max } = this.#limits;
     const goal = { ...this.#goal, ...changes };
-    for (const key of this.walks ? VIEW : KEYS) goal[key] = Math.min(max[key], Math.max(min[key], goal[key]));
+    for (const key of this.eyeIsFree ? VIEW : KEYS) goal[key] = Math.min(max[key], Math.max(min[key], goal[key]));
     this.#goal = goal;
   }
 
@@ -151,7 +151,7 @@ export class OrbitCamera {
 
   /** Walks: moves the eye of the goal to a point in viewer space, without a change of direction. */
   setEye([x, y, z]: Vector3): void {
-    this.walks = true;
+    this.eyeIsFree = true;
     this.setGoal(withTargetAhead({ ...this.#goal, x, y, z }));
   }
 
