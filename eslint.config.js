@@ -56,7 +56,18 @@ const directions = Object.keys(MAY_IMPORT).map((name) => ({
 const FEATURES = readdirSync(new URL('packages/element/src/features', import.meta.url));
 
 export default tseslint.config(
-  { ignores: ['**/dist/', '**/cdn/', '**/generated/', '**/node_modules/', '.cache/', 'test-output/', 'coverage/'] },
+  {
+    ignores: [
+      '**/dist/',
+      '**/cdn/',
+      '**/generated/',
+      '**/node_modules/',
+      '.cache/',
+      'test-output/',
+      'coverage/',
+      '**/assembly/',
+    ],
+  },
   ...tseslint.configs.recommended,
   {
     files: ['**/*.ts'],

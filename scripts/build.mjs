@@ -31,8 +31,10 @@ const extent = ['element', 'packages'].find((name) => process.argv.includes(`--$
 
 const noteBuilt = beginBuild(extent);
 ensureDependencies();
+const assembly = mustSoon(process.execPath, ['scripts/build-assembly.mjs']);
 must(process.execPath, ['scripts/build-shaders.mjs']);
 must(process.execPath, ['scripts/build-languages.mjs']);
+await assembly;
 must(process.execPath, [TSC, '--build', ...projects()]);
 for (const project of projects()) removeStaleOutputs(project);
 writeLicenses();

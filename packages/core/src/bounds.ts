@@ -46,22 +46,48 @@ export function boundsOf(cloud: Pick<GaussianCloud, 'count' | 'positions' | 'opa
   if (count === 0) return { min: origin, max: origin, center: origin, radius: 1 };
   const toWorld = (p: readonly number[]): Vector3 => [p[0] + origin[0], p[1] + origin[1], p[2] + origin[2]];
   const [min, max] = boxOf(positions.subarray(0, 3 * count));
-  const places = sampleOpaque(opacities, count).map((i) => positions.subarray(3 * i, 3 * i + 3));
-  const center = [0, 1, 2].map((axis) => quantile(ascending(places.map((place) => place[axis])), 0.5));
-  const distances = places.map((place) => distance(place, center));
-  const sorted = ascending(distances);
+  const places = placesOf(positions, sampleOpaque(opacities, count));
+  const center = [0, 1, 2].map((axis) => quantile(axisOf(places, axis).sort(), 0.5));
+  const distances = distancesTo(places, center);
+  const sorted = distances.slice().sort();
   const end = quantile(sorted, OF_SUBJECT);
   const bounds = {
     ...{ min: toWorld(min), max: toWorld(max), center: toWorld(center) },
     radius: quantile(sorted, 0.9) || 1,
   };
   if (!(end > 0 && end <= ENDS_WITHIN * quantile(sorted, 0.99))) return bounds;
-  const subject = ballAround(places.filter((_, k) => distances[k] <= end));
+  const subject = ballAround(within(places, distances, end));
   return { ...bounds, subject: { ...subject, center: toWorld(subject.center) } };
 }
 
-const distance = (a: ArrayLike<number>, b: ArrayLike<number>): number =>
-  Math.hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]);
+/** Returns [N, 3] positions of some splats. */
+function placesOf(positions: Float32Array, indices: readonly number[]): Float32Array {
+  const places = new Float32Array(3 * indices.length);
+  let at = 0;
+  for (const i of indices) for (let axis = 0; axis < 3; axis++) places[at++] = positions[3 * i + axis];
+  return places;
+}
+
+function axisOf(places: Float32Array, axis: number): Float32Array {
+  const values = new Float32Array(places.length / 3);
+  for (let k = 0; k < values.length; k++) values[k] = places[3 * k + axis];
+  return values;
+}
+
+function distancesTo(places: Float32Array, [x, y, z]: readonly number[]): Float64Array {
+  const distances = new Float64Array(places.length / 3);
+  for (let k = 0; k < distances.length; k++)
+    distances[k] = Math.sqrt((places[3 * k] - x) ** 2 + (places[3 * k + 1] - y) ** 2 + (places[3 * k + 2] - z) ** 2);
+  return distances;
+}
+
+function within(places: Float32Array, distances: Float64Array, end: number): Float32Array {
+  const kept = new Float32Array(places.length);
+  let at = 0;
+  for (let k = 0; k < distances.length; k++)
+    if (distances[k] <= end) for (let axis = 0; axis < 3; axis++) kept[at++] = places[3 * k + axis];
+  return kept.subarray(0, at);
+}
 
 /** Returns the minimum and the maximum of each coordinate over [N, 3] positions. */
 function boxOf(positions: Float32Array): [number[], number[]] {
@@ -83,15 +109,10 @@ function boxOf(positions: Float32Array): [number[], number[]] {
 }
 
 /** Returns the smallest sphere around the points whose center is that of their box. */
-function ballAround(places: readonly Float32Array[]): { center: number[]; radius: number } {
-  const center = [0, 1, 2].map((axis) => {
-    const [min, max] = places.reduce(
-      ([min, max], place) => [Math.min(min, place[axis]), Math.max(max, place[axis])],
-      [Infinity, -Infinity],
-    );
-    return (min + max) / 2;
-  });
-  return { center, radius: places.reduce((max, place) => Math.max(max, distance(place, center)), 0) };
+function ballAround(places: Float32Array): { center: number[]; radius: number } {
+  const [min, max] = boxOf(places);
+  const center = min.map((low, axis) => (low + max[axis]) / 2);
+  return { center, radius: distancesTo(places, center).reduce((most, x) => Math.max(most, x), 0) };
 }
 
 /**
@@ -105,7 +126,5 @@ function sampleOpaque(opacities: Float32Array, count: number): number[] {
   return opaque.length > 0 ? opaque : all;
 }
 
-const ascending = (values: number[]): Float64Array => Float64Array.from(values).sort();
-
-const quantile = (sorted: Float64Array, share: number): number =>
+const quantile = (sorted: Float64Array | Float32Array, share: number): number =>
   sorted[Math.min(sorted.length - 1, Math.floor(share * sorted.length))];

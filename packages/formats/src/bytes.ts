@@ -77,11 +77,16 @@ const MAX_RESERVED = 2 ** 28;
 /** Maximum ratio of the reserved to the received bytes, up to the expected size. */
 const MAX_GROWTH = 8;
 
+/** Size of the buffer of a {@link GrowingBytes} that keeps only its last bytes. */
+const FORGETFUL_BYTES = 1 << 21;
+
 /** A byte buffer that grows as chunks arrive. */
 export class GrowingBytes {
   readonly #expected: number;
   #bytes: Uint8Array<ArrayBuffer>;
   #length = 0;
+  /** Number of bytes at the beginning that were discarded: see {@link forget}. */
+  #first = 0;
 
   /** @param expected Expected number of bytes. The actual number may be smaller or larger. */
   constructor(expected: number) {
@@ -89,13 +94,34 @@ export class GrowingBytes {
     this.#bytes = new Uint8Array(Math.min(expected, MAX_RESERVED));
   }
 
+  /** Number of received bytes, including those that were discarded. */
   get length(): number {
-    return this.#length;
+    return this.#first + this.#length;
+  }
+
+  /** Offset of the first byte of {@link view}. */
+  get first(): number {
+    return this.#first;
+  }
+
+  /** Discards all bytes but the last `kept`. */
+  forget(kept: number): void {
+    const from = Math.max(0, this.#length - kept);
+    if (from === 0) return;
+    const rest = this.#bytes.subarray(from, this.#length);
+    if (this.#bytes.length <= FORGETFUL_BYTES) this.#bytes.copyWithin(0, from, this.#length);
+    else (this.#bytes = new Uint8Array(FORGETFUL_BYTES)).set(rest);
+    this.#length -= from;
+    this.#first += from;
   }
 
   append(chunk: Uint8Array): void {
     const needed = this.#length + chunk.length;
-    if (needed > this.#bytes.length) {
+    if (needed > this.#bytes.length && this.#first > 0) {
+      const larger = new Uint8Array(2 * needed);
+      larger.set(this.#bytes.subarray(0, this.#length));
+      this.#bytes = larger;
+    } else if (needed > this.#bytes.length) {
       const growth = needed > this.#expected ? 2 * needed : Math.min(this.#expected, MAX_GROWTH * needed);
       const larger = new Uint8Array(growth);
       larger.set(this.#bytes.subarray(0, this.#length));

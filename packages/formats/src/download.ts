@@ -24,7 +24,12 @@ export class Download {
     this.#options = options;
   }
 
-  /** All received bytes. */
+  /** Number of received bytes. */
+  get length(): number {
+    return this.#body.length;
+  }
+
+  /** The received bytes that are kept: all, unless `onArrival` has taken them. */
   get bytes(): Uint8Array {
     return this.#body.view();
   }
@@ -124,7 +129,7 @@ export class Download {
       // Cross-origin, scripts cannot read Content-Encoding. A body longer than declared shows that it is compressed.
       const total = this.#total !== undefined && body.length <= this.#total ? this.#total : undefined;
       onProgress?.(body.length, total);
-      await onArrival?.(body.view(), total);
+      if (await onArrival?.(body.view(), total, body.first)) body.forget(OVERLAP);
     }
     // Some HTTP stacks end a broken connection without an error. Cross-origin, the length may be the compressed one.
     const isExact = this.#total !== undefined && this.#response?.type !== 'cors';
@@ -133,7 +138,8 @@ export class Download {
 
   /** Returns the new part of a chunk; undefined if the repeated part differs from the received bytes. */
   #rest(chunk: Uint8Array): Uint8Array | undefined {
-    const known = this.#body.view().subarray(this.#at, this.#at + chunk.length);
+    const from = this.#at - this.#body.first;
+    const known = this.#body.view().subarray(from, from + chunk.length);
     this.#at += chunk.length;
     return known.every((byte, i) => byte === chunk[i]) ? chunk.subarray(known.length) : undefined;
   }

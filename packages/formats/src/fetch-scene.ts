@@ -23,9 +23,14 @@ export interface FetchSceneOptions extends Pick<LoadLimits, 'maxBytes' | 'maxSec
   /**
    * Called after every chunk with all received bytes, and the total as in `onProgress`. Later chunks do not change these
    * bytes. The download continues when the promise resolves. If the whole file is requested again after an interruption,
-   * `bytes` starts again from the first byte.
+   * `bytes` starts again from the first byte. If the promise resolves to true, the bytes are not kept: `bytes` of the next
+   * call begins at offset `first` of the file, and the result of {@link fetchScene} has only the last bytes.
    */
-  readonly onArrival?: (bytes: Uint8Array, totalBytes: number | undefined) => void | Promise<void>;
+  readonly onArrival?: (
+    bytes: Uint8Array,
+    totalBytes: number | undefined,
+    first: number,
+  ) => void | boolean | Promise<void | boolean>;
   /**
    * Maximum number of consecutive retries without progress of 64 KiB. A retry continues at the same byte if the server
    * supports range requests. Default 3.
@@ -82,7 +87,7 @@ async function bring(download: Download, signal: AbortSignal | undefined, retrie
     } catch (error) {
       signal?.throwIfAborted();
       if (!(error instanceof GaussianSplatError) || error.code !== 'network/interrupted') throw error;
-      const { length } = download.bytes;
+      const { length } = download;
       if (length >= farthest + MIN_PROGRESS) [tries, farthest] = [0, length];
       // Any further error is reported as the interrupted connection.
       do await pause(error);

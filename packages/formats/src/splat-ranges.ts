@@ -15,7 +15,15 @@ export interface SplatRanges {
    * Location of the splats if each has the same size: offset of the first splat in the file, and size of a splat, in
    * bytes. Undefined for glTF.
    */
-  readonly rows?: { readonly start: number; readonly byteLength: number };
+  readonly rows?: {
+    readonly start: number;
+    readonly byteLength: number;
+    /**
+     * Byte offsets in a row: of x, y, z, three scales, four rotations, opacity, three constant colors, and [channel][15]
+     * harmonics, 0 for those above the degree. Undefined unless all are float32 of the host and keep their usual meaning.
+     */
+    readonly columns?: readonly number[] | undefined;
+  };
 }
 
 /**

@@ -54,20 +54,11 @@ export { sceneBytes, type PackedPortion } from './gaussian-buffers.js';
 export { boundsOfWorld } from './world-bounds.js';
 export { type Threads } from './stages/stage.js';
 export { bytesPerSplat, type Reservation } from './memory-ledger.js';
-export {
-  JoinedBlocks,
-  layoutOf,
-  packShard,
-  SHARD_SPLATS,
-  ShareCells,
-  sortBlock,
-  type PackedShard,
-  type ShareBlock,
-  type ShareCell,
-  type ShardInfo,
-  type ShareLayout,
-  type SortedBlock,
-} from './pack/shards.js';
+export { boundsOfPacked, JoinedBlocks, type RowLayout, type SortedBlock } from './pack/joined-blocks.js';
+export { packCloud } from './pack/pack-cloud.js';
+export { packerCode, type PackableRows } from './pack/packer-memory.js';
+export { type BlockBuffers, RowPacker } from './pack/row-packer.js';
+export { previewOf } from './pack/row-preview.js';
 export { readBack, readBackWith, type ReadPart } from './gpu/read-back.js';
 export { sortByKey } from './pack/radix-sort.js';
 export { RankedHeap } from './ranked-heap.js';

@@ -72,7 +72,7 @@ export function buildDetailTree(given: GaussianCloud, { geometry }: DetailTreeOp
   const cloud = recentered(standing);
   const kept = packedOrder(cloud);
   const { antialiased, filterVariance, origin, hints } = cloud;
-  const shPrecision = choosePrecision(noiseIn(cloud), kept);
+  const shPrecision = choosePrecision(noiseIn(cloud, kept), kept.length);
   const leaves = leavesOf(cloud, kept, geometry);
   const facts = {
     splats: kept.length,

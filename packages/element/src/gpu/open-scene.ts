@@ -128,7 +128,7 @@ async function openLoadedScene(
     parts ??= loadModule('the code that uploads large scenes', () => import('./part-uploads.js')).then(
       ({ PartUploads }) => new PartUploads(device, { ...options, beforeUpload }),
     );
-    parts.then((uploads) => uploads.add(part), ignore);
+    return parts.then((uploads) => uploads.add(part));
   };
   const loading = options.loader.open(request, abort.signal, options.onProgress, showPreview, onPart);
   try {

@@ -1,6 +1,6 @@
 /** Uploads scenes while their splats are sorted. The module is loaded for the first such scene. */
 import { GaussianBuffers } from '@gaussian-splat/renderer';
-import { sceneBytes, type PackedHead, type PackedPortion } from '@gaussian-splat/renderer/tools';
+import { sceneBytes, type BlockBuffers, type PackedHead, type PackedPortion } from '@gaussian-splat/renderer/tools';
 import type { ScenePart } from '../loading/protocol.js';
 
 export interface PartUploadOptions {
@@ -25,8 +25,11 @@ export class PartUploads {
     this.#options = options;
   }
 
-  /** Adds a part that the loader has sent. A head starts a new upload, and discards the previous one. */
-  add(part: ScenePart): void {
+  /**
+   * Adds a part that the loader has sent. A head starts a new upload, and discards the previous one. Resolves with the
+   * buffers of the part when they are no longer needed.
+   */
+  add(part: ScenePart): Promise<BlockBuffers | undefined> {
     if ('head' in part) {
       this.destroy();
       this.#gaussians = this.#allocate(part.head);
@@ -37,6 +40,9 @@ export class PartUploads {
     }
     // `finish` reports a failed allocation.
     this.#written.catch(ignore);
+    return this.#written.then(() =>
+      'portion' in part && part.portion.geometry ? (part.portion as BlockBuffers) : undefined,
+    );
   }
 
   /**
@@ -60,9 +66,6 @@ export class PartUploads {
     // Portions that were sent before a restart of the load are ignored.
     if (gaussians !== this.#gaussians) return;
     await made?.write(portion);
-    // Garbage collection comes late, so the words of a large scene would stay in memory beside those on the GPU.
-    for (const words of [portion.geometry, portion.sh])
-      (words?.buffer as { transfer?: (bytes: number) => unknown } | undefined)?.transfer?.(0);
   }
 
   async #allocate(head: PackedHead): Promise<GaussianBuffers> {

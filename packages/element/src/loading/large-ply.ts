@@ -1,57 +1,70 @@
-/**
- * Reads a large PLY with several workers, which pack its rows while the rest is in transit. The worker loads this
- * module for the first large PLY.
- */
-import { MAX_DROPPED_RATIO, splatRanges, type LoadLimits } from '@gaussian-splat/formats';
-import { boundsOf } from '@gaussian-splat/core';
-import { packGaussians } from '@gaussian-splat/renderer';
+/** Packs a large PLY while it is downloaded. The worker loads this module for the first large PLY. */
+import { MAX_DROPPED_RATIO, readPrefix, splatRanges, type LoadLimits } from '@gaussian-splat/formats';
+import type { GaussianCloud } from '@gaussian-splat/core';
 import {
+  boundsOfPacked,
+  choosePrecision,
   JoinedBlocks,
-  sortBlock,
-  type PackedPortion,
-  type ShareCell,
-  type ShareLayout,
+  noiseIn,
+  packerCode,
+  previewOf,
+  recentered,
+  RowPacker,
+  type RowLayout,
   type SortedBlock,
 } from '@gaussian-splat/renderer/tools';
 import type { LoadListeners } from './load-scene.js';
-import { packRows, release, type HelperAnswer, type HelperRequest } from './pack-shards.js';
-import { PartPreviews } from './part-previews.js';
-import { PlyHelpers, type HelperWork } from './ply-helpers.js';
-import { PlyShares, type Rows } from './ply-shards.js';
+import { PreviewTimes } from './part-previews.js';
 import type { LoadedScene, SceneRequest, SentScene } from './protocol.js';
+import { BATCH_ROWS, RowHelpers } from './row-helpers.js';
 
-/** Time without a helper after which this thread itself packs shards while bytes arrive, ms. */
-const ALONE_AFTER_MS = 500;
+/** Maximum number of splats in a preview. */
+const MAX_PREVIEW = 32_768;
+/** Number of rows that contain the properties of the scene. */
+const FIRST_ROWS = 1024;
+/** Number of rows that determine the layout. Nothing is packed before they have arrived. */
+const LAYOUT_ROWS = 1 << 14;
+/** Number of bytes that this thread packs before it looks for an idle helper. */
+const TURN_BYTES = 1 << 18;
 /** Interval after which this thread yields to pending messages while bytes arrive, ms. */
 const TURN_MS = 8;
+/** Number of positions that are sampled to find how far the scene is from its origin. */
+const POSITIONS = 4096;
+
+interface Rows {
+  readonly start: number;
+  readonly byteLength: number;
+  readonly columns: readonly number[];
+}
 
 /**
- * Packs a PLY while it is downloaded. The work consists of tickets: shards of rows to pack, and later blocks to sort.
+ * Packs the rows of a PLY as they arrive, so that the file is never in memory as a whole. After the last row only the
+ * order of the splats is missing.
  */
-export class LargePly implements HelperWork {
-  /** Bytes of the file before the first row. */
+export class LargePly {
+  readonly #name: string;
   readonly #header: Uint8Array;
+  readonly #rows: Rows;
   readonly #count: number;
   readonly #sh: SceneRequest['sh'];
   readonly #limits: () => LoadLimits;
-  readonly #signal: AbortSignal;
   readonly #listeners: LoadListeners;
-  readonly #shares: PlyShares;
-  readonly #helpers = new PlyHelpers(this);
-  readonly #previews: PartPreviews;
-  readonly #began = performance.now();
+  readonly #previews = new PreviewTimes();
+  readonly #helpers = new RowHelpers(({ first, count, bytes }) => this.#packer?.place(first, count, bytes));
+  /** Properties of the scene, from the first rows. */
+  #facts: GaussianCloud | undefined;
+  #layout: RowLayout | undefined;
+  #packer: RowPacker | undefined;
+  #isRefused = false;
+  /** Offset in the file of the next byte to pack. */
+  #next = 0;
+  /** The next batch for a helper, and the number of its bytes that have arrived. */
+  #batch: Uint8Array<ArrayBuffer> | undefined;
+  #filled = 0;
   /** Time when this thread last yielded to messages, in milliseconds of `performance.now()`. */
   #turned = 0;
-  /** Index of the first shard that has been neither assigned to a helper nor packed by this thread. */
-  #next = 0;
-  /** Tickets that are assigned before new shards, the last one first: those of lost helpers, and those of blocks. */
-  readonly #again: number[] = [];
-  /** Cells whose splats must be sorted as blocks, by their tickets. */
-  readonly #blocks = new Map<number, ShareCell>();
-  #joined: JoinedBlocks | undefined;
 
   /**
-   * Starts reading a file whose rows can be packed independently.
    * @param beginning First bytes of the file.
    * @param total Size of the file in bytes.
    * @returns Undefined for a file that must be read as a whole.
@@ -62,17 +75,14 @@ export class LargePly implements HelperWork {
     name: string,
     { sh }: SceneRequest,
     limits: () => LoadLimits,
-    signal: AbortSignal,
     listeners: LoadListeners,
   ): Promise<LargePly | undefined> {
     const { maxSplats = Infinity } = limits();
-    // A file with an invalid header, or above the limit of splats, is read as a whole, which reports the fault. The
-    // download itself checks the limit of bytes.
     const { rows, count = 0 } = (await splatRanges(beginning, name).catch(() => undefined)) ?? {};
-    const isWhole =
-      rows !== undefined && count > 0 && count <= maxSplats && rows.start + count * rows.byteLength <= total;
-    if (!isWhole) return undefined;
-    return new LargePly(name, beginning.slice(0, rows.start), rows, count, sh, limits, signal, listeners);
+    const columns = rows?.columns;
+    if (columns) void packerCode();
+    if (!columns || count === 0 || count > maxSplats || rows.start + count * rows.byteLength > total) return undefined;
+    return new LargePly(name, beginning.slice(0, rows.start), { ...rows, columns }, count, sh, limits, listeners);
   }
 
   private constructor(
@@ -82,166 +92,153 @@ export class LargePly implements HelperWork {
     count: number,
     sh: SceneRequest['sh'],
     limits: () => LoadLimits,
-    signal: AbortSignal,
     listeners: LoadListeners,
   ) {
+    this.#name = name;
     this.#header = header;
+    this.#rows = rows;
     this.#count = count;
     this.#sh = sh;
     this.#limits = limits;
-    this.#signal = signal;
     this.#listeners = listeners;
-    this.#shares = new PlyShares(name, rows, count);
-    this.#previews = new PartPreviews(this.#shares.length, (preview) =>
-      listeners.onPreview?.({
-        packed: packGaussians(preview, { sh: 'int8' }),
-        bounds: { ...boundsOf(preview), up: preview.hints?.up },
-      }),
-    );
-    listeners.askForHelp?.(this.#shares.length, (port) => this.#helpers.add(port));
+    listeners.askForHelp?.(Math.floor(count / BATCH_ROWS / 2), (port) => this.#helpers.add(port));
   }
 
-  /** Packs shards that have arrived. Call after each arrival of bytes, with all received bytes. */
-  async onArrival(bytes: Uint8Array): Promise<void> {
-    // The download has restarted, perhaps with another file, whose header `finish` compares.
-    if (bytes.length < this.#shares.bytes.length) this.#forget(undefined);
-    this.#shares.bytes = bytes;
-    await this.#shares.findLayout(this.#sh);
-    this.#helpers.feed();
-    const isAlone = !this.#helpers.areThere && performance.now() - this.#began > ALONE_AFTER_MS;
-    const request = isAlone ? this.next() : undefined;
-    if (request) await this.#workHere(request);
-    if (this.#listeners.onPreview) this.#previews.showIfDue();
+  #hasTaken = false;
+  /** Whether bytes of the file were not kept, so that it must be fetched again to be read as a whole. */
+  get hasTaken(): boolean {
+    return this.#hasTaken;
+  }
+
+  /**
+   * Packs the received bytes.
+   * @param bytes Received bytes from offset `first` of the file on.
+   * @returns Whether they need not be kept.
+   */
+  async onArrival(bytes: Uint8Array, first = 0): Promise<boolean> {
+    const { start, byteLength } = this.#rows;
+    const end = first + bytes.length;
+    // The download has restarted. Helpers may still have rows of the former one.
+    if (end < this.#next) {
+      this.#isRefused ||= this.#helpers.areBusy;
+      this.#packer = this.#batch = undefined;
+    }
+    if (this.#isRefused) return false;
+    if (!this.#packer) {
+      const sample = start + byteLength * Math.min(this.#count, LAYOUT_ROWS);
+      if (end < sample) return false;
+      await this.#begin(bytes.subarray(0, sample));
+      if (!this.#packer) return !(this.#isRefused = true);
+      this.#hasTaken = true;
+      this.#next = start;
+    }
+    const last = start + byteLength * this.#count;
+    this.#pack(bytes.subarray(this.#next - first, Math.max(0, Math.min(end, last) - first)));
+    this.#next = end;
+    if (this.#listeners.onPreview && this.#previews.isDue(this.#packer!.count / this.#count))
+      this.#previews.take(() => this.#showPreview());
     // A download that never waits would block the answers of helpers, which arrive as messages.
     if (this.#helpers.areThere && performance.now() - this.#turned > TURN_MS) {
       await turn();
       this.#turned = performance.now();
     }
+    return true;
   }
 
-  /**
-   * Returns the scene after the download. Undefined if bytes are missing or invalid, or if a restarted download has
-   * brought a file with another header: the caller then reads the file as a whole, which reports a fault.
-   */
-  async finish(bytes: Uint8Array): Promise<LoadedScene | SentScene | undefined> {
-    const shares = this.#shares;
-    shares.bytes = bytes;
-    if (shares.arrived < shares.length || !this.#header.every((byte, k) => byte === bytes[k])) return undefined;
-    for (;;) {
-      await shares.findLayout(this.#sh);
-      if (!shares.layout) return undefined;
-      await this.#workAll();
-      // Reading the file as a whole reports an exceeded time limit, and why splats were dropped.
-      if (this.#isLate || !shares.areAllDealt) return undefined;
-      const count = shares.splats;
-      const droppedCount = this.#count - count;
-      if (count === 0 || droppedCount > MAX_DROPPED_RATIO * this.#count) return undefined;
-      this.#listeners.onReading?.(true);
-      const layout = shares.layoutFor(this.#sh);
-      if (layout !== shares.layout) {
-        this.#forget(layout);
-        continue;
-      }
-      // Nothing can fail after this point. Freeing the file reduces the memory of the load to a third.
-      release(bytes);
-      const { antialiased = false, filterVariance, origin = [0, 0, 0], up, order, warnings } = shares.facts;
-      const { onPart } = this.#listeners;
-      const send = onPart && ((portion: SortedBlock): void => onPart({ portion: ofSplats(portion) }));
-      const scene = { antialiased, filterVariance, origin, droppedCount };
-      const joined = new JoinedBlocks(layout, count, scene, send);
-      onPart?.({ head: joined.head });
-      await this.#join(joined);
-      const facts = { bounds: { ...joined.bounds, up }, order, warnings };
-      if (!onPart) return { ...facts, packed: joined.packed };
-      onPart({ portion: { chunks: joined.chunks } });
-      return facts;
+  /** Packs the next bytes of the rows, or collects them for helpers. */
+  #pack(bytes: Uint8Array): void {
+    const packer = this.#packer!;
+    for (let from = 0; from < bytes.length;) {
+      if (!packer.missing) this.#batch ??= this.#helpers.room();
+      const size = Math.min(
+        bytes.length - from,
+        this.#batch ? this.#batch.length - this.#filled : packer.missing || TURN_BYTES,
+      );
+      const part = bytes.subarray(from, (from += size));
+      if (this.#batch) this.#fill(this.#batch, part);
+      else packer.push(part);
     }
   }
 
-  next(): HelperRequest | undefined {
-    const { layout, arrived } = this.#shares;
-    const { epoch, rooms } = this.#helpers;
-    if (!layout) return undefined;
-    const ticket = this.#again.pop() ?? (this.#next < arrived ? this.#next++ : undefined);
-    if (ticket === undefined) return undefined;
-    const cell = this.#blocks.get(ticket);
-    if (cell) return { ticket, epoch, block: cell.block(rooms.pop()) };
-    return { ticket, epoch, rows: this.#shares.rowsOf(ticket, rooms.pop()), layout };
+  #fill(batch: Uint8Array<ArrayBuffer>, part: Uint8Array): void {
+    batch.set(part, this.#filled);
+    this.#filled += part.length;
+    if (this.#filled < batch.length) return;
+    this.#batch = undefined;
+    this.#filled = 0;
+    const first = this.#packer!.reserve(BATCH_ROWS);
+    if (!this.#helpers.send({ first, bytes: batch })) this.#isRefused = true;
   }
 
-  take({ ticket, share, block }: HelperAnswer): void {
-    if (block) this.#joined!.add(block);
-    if (!share) return;
-    if (share.preview) this.#previews.add(ticket, share.preview);
-    this.#shares.take(ticket, share);
+  async #begin(beginning: Uint8Array): Promise<void> {
+    if (!this.#header.every((byte, k) => byte === beginning[k])) return;
+    const { start, byteLength, columns } = this.#rows;
+    const cloud = await readPrefix(beginning.subarray(0, start + byteLength * FIRST_ROWS), { name: this.#name });
+    if (cloud === undefined) return;
+    const all = Uint32Array.from({ length: cloud.count }, (_, i) => i);
+    const shPrecision = this.#sh === 'auto' ? choosePrecision(noiseIn(cloud, all), cloud.count) : this.#sh;
+    const rows = (beginning.length - start) / byteLength;
+    const view = new DataView(beginning.buffer, beginning.byteOffset + start);
+    const count = Math.min(POSITIONS, rows);
+    const positions = Float32Array.from({ length: 3 * count }, (_, k) =>
+      view.getFloat32(byteLength * Math.floor((Math.floor(k / 3) * rows) / count) + columns[k % 3], true),
+    );
+    const near = recentered({ ...cloud, count, positions });
+    const moved = near.origin.map((x, axis) => x - cloud.origin[axis]) as unknown as RowLayout['moved'];
+    this.#facts = cloud;
+    this.#layout = { shDegree: cloud.shDegree, shPrecision, moved };
+    this.#packer = await RowPacker.open({ count: this.#count, byteLength, columns }, this.#layout);
+    if (this.#packer) this.#helpers.begin({ byteLength, columns }, this.#layout);
   }
 
-  giveBack(tickets: Iterable<number>): void {
-    this.#again.push(...tickets);
-  }
-
-  /** Sorts the blocks of all cells, with the helpers, into the joined scene. */
-  async #join(joined: JoinedBlocks): Promise<void> {
-    this.#joined = joined;
-    // The largest blocks are sorted first, so that a large one does not delay the end.
-    const cells = this.#shares.takeCells().sort((a, b) => b.count - a.count);
-    cells.forEach((cell, k) => {
-      this.#blocks.set(this.#shares.length + k, cell);
-      this.#again.push(this.#shares.length + k);
+  #showPreview(): void {
+    const { antialiased, filterVariance, hints } = this.#facts!;
+    if (this.#packer!.count === 0) return;
+    const { geometry, sh, chunks, count } = previewOf(this.#packer!, MAX_PREVIEW);
+    const origin = this.#origin;
+    this.#listeners.onPreview!({
+      packed: {
+        ...{ count, shDegree: 0, shPrecision: 'int8', antialiased, filterVariance, origin },
+        ...{ droppedCount: 0, geometry, sh, chunks },
+      },
+      bounds: { ...boundsOfPacked(geometry, origin, 8), up: hints?.up },
     });
-    // `next` takes the last ticket first.
-    this.#again.reverse();
-    this.#helpers.rooms.length = 0;
-    await this.#workAll();
   }
 
-  get #isLate(): boolean {
+  get #origin(): readonly [number, number, number] {
+    const { moved } = this.#layout!;
+    return this.#facts!.origin.map((x, axis) => x + moved[axis]) as unknown as readonly [number, number, number];
+  }
+
+  /** Returns the scene after the download; undefined if the file must be read as a whole, which reports a fault. */
+  async finish(): Promise<LoadedScene | SentScene | undefined> {
+    const [packer, layout, facts] = [this.#packer, this.#layout, this.#facts];
+    if (!packer || !layout || !facts || this.#isRefused) return undefined;
+    const { start, byteLength } = this.#rows;
+    if (this.#next < start + byteLength * this.#count) return undefined;
+    if (this.#batch) packer.push(this.#batch.subarray(0, this.#filled));
+    await this.#helpers.settle();
+    const droppedCount = this.#count - packer.count;
     const { maxSeconds = Infinity } = this.#limits();
-    return maxSeconds <= 0;
-  }
-
-  #forget(layout: ShareLayout | undefined): void {
-    this.#shares.forget(layout);
-    this.#again.length = this.#next = 0;
-    this.#helpers.forget();
-    this.#previews.forget();
-  }
-
-  async #workHere(request: HelperRequest): Promise<void> {
+    const isUnusual = packer.count === 0 || droppedCount > MAX_DROPPED_RATIO * this.#count;
+    if (this.#helpers.hasLost || maxSeconds <= 0 || isUnusual) return undefined;
     this.#listeners.onReading?.(true);
-    const { ticket, epoch } = request;
-    if ('block' in request) this.take({ ticket, epoch, block: sortBlock(request.block) });
-    else this.take({ ticket, epoch, share: await packRows(request.rows, request.layout) });
-  }
-
-  /**
-   * Runs all remaining work on the available helpers and on this thread. Returns early if the time limit is exceeded
-   * before blocks are sorted.
-   */
-  async #workAll(): Promise<void> {
-    for (;;) {
-      this.#signal.throwIfAborted();
-      if (this.#isLate && !this.#joined) return;
-      this.#helpers.feed();
-      const isHelped = this.#helpers.areBusy;
-      // Helpers sort the blocks alone if there are any, because their answers occupy this thread.
-      const request = isHelped && this.#joined ? undefined : this.next();
-      if (request) {
-        await this.#workHere(request);
-        await turn();
-      } else if (isHelped) {
-        await this.#helpers.answerSoon();
-      } else {
-        return;
-      }
-    }
+    packer.sort();
+    if (packer.precisionFor(this.#sh) !== layout.shPrecision) return undefined;
+    const { antialiased, filterVariance, origin, hints, warnings } = facts;
+    const { onPart } = this.#listeners;
+    // The bounds of chunks are sent at the end for all blocks.
+    const send = onPart && (({ start, geometry, sh }: SortedBlock) => onPart({ portion: { start, geometry, sh } }));
+    const joined = new JoinedBlocks(layout, packer.count, { antialiased, filterVariance, origin, droppedCount }, send);
+    void onPart?.({ head: joined.head });
+    await packer.finish((block) => joined.add(block));
+    const { up, order } = hints ?? {};
+    const own = { bounds: { ...joined.bounds, up }, order, warnings };
+    if (!onPart) return { ...own, packed: joined.packed };
+    void onPart({ portion: { chunks: joined.chunks } });
+    return own;
   }
 }
-
-/**
- * Returns the splats of a block as a portion, without the bounds of chunks, which are sent at the end for all blocks.
- */
-const ofSplats = ({ start, geometry, sh }: SortedBlock): PackedPortion => ({ start, geometry, sh });
 
 let own: MessageChannel | undefined;
 

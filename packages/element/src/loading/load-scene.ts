@@ -25,6 +25,10 @@ import type {
 
 /** Delay of the first preview after the start of the load, ms. Shorter downloads need no preview. */
 const PREVIEW_AFTER_MS = 300;
+/** Minimum number of splats that are packed by code that is loaded for this purpose, because it is faster. */
+const MANY_SPLATS = 1 << 14;
+/** Minimum size in bytes of a file for which that code is loaded before the file is read. */
+const MANY_BYTES = 1 << 18;
 /** Result if the code of previews cannot be loaded: the scene loads without previews. */
 const none = (): undefined => undefined;
 
@@ -59,7 +63,7 @@ export async function loadScene(
   signal: AbortSignal,
   listeners: LoadListeners,
 ): Promise<LoadedScene | SentScene | LoadedSequence> {
-  const { onProgress, onPreview, onReading, askForHelp } = listeners;
+  const { onProgress, onPreview, onReading } = listeners;
   try {
     const { url, credentials } = request;
     const name = fileName(url);
@@ -69,13 +73,18 @@ export async function loadScene(
       ...{ mode: 'cors', credentials, signal, onProgress: progress.add() },
       ...fileLimits(limits()),
     });
-    const pack = (cloud: GaussianCloud, bounds = boundsOf(cloud)): LoadedScene => ({
-      packed: packGaussians(cloud, { sh: request.sh }),
-      bounds: { ...bounds, ...cloud.hints },
-      warnings: cloud.warnings,
-      order: cloud.hints?.order,
-      hasMeshes: cloud.hints?.meshes,
-    });
+    const packer = new Lazy('the code that packs large scenes', () => import('./pack-cloud.js'));
+    const pack = async (cloud: GaussianCloud, bounds = boundsOf(cloud)): Promise<LoadedScene> => {
+      const options = { sh: request.sh };
+      const code = cloud.count < MANY_SPLATS ? undefined : await packer.get().catch(none);
+      return {
+        packed: code ? await code.packCloud(cloud, options) : packGaussians(cloud, options),
+        bounds: { ...bounds, ...cloud.hints },
+        warnings: cloud.warnings,
+        order: cloud.hints?.order,
+        hasMeshes: cloud.hints?.meshes,
+      };
+    };
     if (request.streamBytes !== undefined) {
       const { loadWholeStream } = await loadModule('the code that streams scenes', () => import('./whole-stream.js'));
       const load = { name, limits, options, pack, onProgress, onPreview, onReading };
@@ -85,19 +94,25 @@ export async function loadScene(
     const previews = new Lazy('the code of previews', async () => {
       const { PreviewSchedule } = await import('./preview-schedule.js');
       const within = { name, signal, ...limits() };
-      return new PreviewSchedule(within, start, (cloud) => onPreview?.(pack(cloud)), onReading);
+      return new PreviewSchedule(within, start, async (cloud) => onPreview?.(await pack(cloud)), onReading);
     });
-    const shared = askForHelp && new SharedReading(request, name, limits, signal, listeners);
-    const onArrival = async (bytes: Uint8Array, total: number | undefined): Promise<void> => {
+    const shared = new SharedReading(request, name, limits, listeners);
+    const onArrival = async (bytes: Uint8Array, total: number | undefined, first: number): Promise<boolean> => {
+      if (total !== undefined && total >= MANY_BYTES) packer.get().catch(none);
       // `LargePly` shows its own previews.
-      if (shared?.mayBeShared(bytes, total)) await (await shared.plyIn(bytes, total))?.onArrival(bytes);
-      else if (onPreview && performance.now() - start >= PREVIEW_AFTER_MS)
+      if (shared.mayBeShared(bytes, total, first))
+        return (await (await shared.plyIn(bytes, total))?.onArrival(bytes, first)) ?? false;
+      if (onPreview && performance.now() - start >= PREVIEW_AFTER_MS)
         await (await previews.get().catch(none))?.onArrival(bytes, total);
+      return false;
     };
-    const bytes = await fetchScene(url, { ...options(), onArrival });
-    onReading?.(true);
-    const joined = await (await shared?.ply)?.finish(bytes);
+    let bytes = await fetchScene(url, { ...options(), onArrival });
+    const ply = await shared.ply;
+    const joined = await ply?.finish();
     if (joined) return joined;
+    // The bytes of a file that turned out to be unusual were not kept. The browser's cache usually has them.
+    if (ply?.hasTaken) bytes = await fetchScene(url, options());
+    onReading?.(true);
     if (isSequence(bytes)) {
       const { parseSequence } = await loadModule('the code that reads sequences', () => import('./sequence-of.js'));
       return parseSequence(bytes, name);
@@ -144,18 +159,12 @@ export const fileLimits = ({ maxBytes = Infinity, maxSeconds }: LoadLimits): Loa
   maxSeconds,
 });
 
-/** Minimum size in bytes of a PLY whose rows several workers share. */
-const LARGE_BYTES = 1 << 25;
+/** Minimum size in bytes of a PLY whose rows are packed while they arrive. */
+const LARGE_BYTES = 1 << 22;
 
 /** Reads a file in transit with several workers, if it is a PLY whose rows they can share. */
 class SharedReading {
-  readonly #of: readonly [
-    name: string,
-    request: SceneRequest,
-    limits: () => LoadLimits,
-    signal: AbortSignal,
-    listeners: LoadListeners,
-  ];
+  readonly #of: readonly [name: string, request: SceneRequest, limits: () => LoadLimits, listeners: LoadListeners];
   #isRefused = false;
   /**
    * The shared PLY; undefined before its header has arrived. Resolves with undefined for a file that must be read as a
@@ -163,22 +172,17 @@ class SharedReading {
    */
   ply: Promise<LargePly | undefined> | undefined;
 
-  constructor(
-    request: SceneRequest,
-    name: string,
-    limits: () => LoadLimits,
-    signal: AbortSignal,
-    listeners: LoadListeners,
-  ) {
-    this.#of = [name, request, limits, signal, listeners];
+  constructor(request: SceneRequest, name: string, limits: () => LoadLimits, listeners: LoadListeners) {
+    this.#of = [name, request, limits, listeners];
   }
 
   /**
    * Returns whether threads may share a file: a PLY of `LARGE_BYTES` or more that need not be read as a whole. `bytes`:
    * the received bytes; `total`: size of the file in bytes.
    */
-  mayBeShared(bytes: Uint8Array, total = 0): boolean {
-    return total >= LARGE_BYTES && bytes[0] === 0x70 && bytes[1] === 0x6c && bytes[2] === 0x79 && !this.#isRefused;
+  mayBeShared(bytes: Uint8Array, total = 0, first = 0): boolean {
+    if (total < LARGE_BYTES || this.#isRefused) return false;
+    return first > 0 || (bytes[0] === 0x70 && bytes[1] === 0x6c && bytes[2] === 0x79);
   }
 
   async plyIn(bytes: Uint8Array, total = 0): Promise<LargePly | undefined> {

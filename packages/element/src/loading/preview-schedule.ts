@@ -10,7 +10,7 @@ const GROWTH = 1.6;
 export class PreviewSchedule {
   readonly #options: ReadSceneOptions;
   readonly #onReading: ((isReading: boolean) => void) | undefined;
-  readonly #show: (cloud: GaussianCloud) => void;
+  readonly #show: (cloud: GaussianCloud) => void | Promise<void>;
   readonly #start: number;
   #spentMs = 0;
   #nextBytes = 0;
@@ -26,7 +26,7 @@ export class PreviewSchedule {
   constructor(
     options: ReadSceneOptions,
     start: number,
-    show: (cloud: GaussianCloud) => void,
+    show: (cloud: GaussianCloud) => void | Promise<void>,
     onReading?: (isReading: boolean) => void,
   ) {
     this.#start = start;
@@ -44,7 +44,7 @@ export class PreviewSchedule {
     this.#onReading?.(true);
     const cloud = await readPrefix(bytes, this.#options);
     if (cloud !== undefined) {
-      this.#show(cloud);
+      await this.#show(cloud);
       this.#shown = cloud.count;
     }
     this.#onReading?.(false);
@@ -53,7 +53,7 @@ export class PreviewSchedule {
   };
 
   /** Listener for `readScene`: shows a selection of the splats, unless the last preview has more. */
-  readonly onPreview = (cloud: GaussianCloud): void => {
-    if (cloud.count > this.#shown) this.#show(cloud);
+  readonly onPreview = async (cloud: GaussianCloud): Promise<void> => {
+    if (cloud.count > this.#shown) await this.#show(cloud);
   };
 }

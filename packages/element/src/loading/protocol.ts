@@ -8,6 +8,7 @@ import type { FloorOptions } from '@gaussian-splat/formats/walk';
 import type { ClipPart, LoadLimits, SceneSequence, TriangleFile } from '@gaussian-splat/formats';
 import type { PackedGaussians, StreamedScene } from '@gaussian-splat/renderer';
 import type {
+  BlockBuffers,
   CodedFile,
   LevelPage,
   LevelScene,
@@ -104,8 +105,11 @@ export interface SentScene extends LoadedFacts {
  */
 export type ScenePart = { readonly head: PackedHead } | { readonly portion: PackedPortion };
 
-/** Called with each part of a scene. The last part contains the bounds of all chunks. */
-export type PartListener = (part: ScenePart) => void;
+/**
+ * Called with each part of a scene. The last part contains the bounds of all chunks. Resolves when the part is used, with
+ * the buffers of its splats, which the worker uses again.
+ */
+export type PartListener = (part: ScenePart) => void | Promise<BlockBuffers | undefined>;
 
 /** The validated triangles of a file, and its decoded images. */
 export interface LoadedMesh extends Omit<TriangleFile, 'images'> {
@@ -210,6 +214,8 @@ export type PageMessage =
   | { readonly type: 'cancel'; readonly id: number }
   /** Requests a `pong`, which shows that the worker responds. */
   | { readonly type: 'ping' }
+  /** The next part of a scene was used. `buffers`: those of its splats, which are transferred back. */
+  | { readonly type: 'taken'; readonly id: number; readonly buffers: BlockBuffers | undefined }
   /** Provides a request with a port to another worker that packs splats. */
   | { readonly type: 'helper'; readonly id: number; readonly port: MessagePort }
   /** Makes the worker a helper, which runs the tasks from the port. */

@@ -6,6 +6,7 @@ import { loadModule } from '@gaussian-splat/core';
 import type { OpenedModel } from '@gaussian-splat/core/onnx';
 import { fetchScene } from '@gaussian-splat/formats';
 import type { DetailManifest } from '@gaussian-splat/renderer';
+import type { BlockBuffers } from '@gaussian-splat/renderer/tools';
 import {
   buffersOf,
   type BoxRequest,
@@ -18,6 +19,7 @@ import {
   type ModelRequest,
   type PageMessage,
   type ProgressListener,
+  type ScenePart,
   type SceneRequest,
   type WorkerMessage,
   type WorkerRequest,
@@ -103,6 +105,8 @@ interface Work {
   readonly abort: AbortController;
   /** Called with a port to each worker that helps with the request. */
   onHelper?: (port: MessagePort) => void;
+  /** Functions that are called with the returned buffers of the parts of the scene, in the order of the parts. */
+  readonly taken: ((buffers: BlockBuffers | undefined) => void)[];
 }
 
 function serve(scope: WorkerScope): void {
@@ -114,9 +118,7 @@ function serve(scope: WorkerScope): void {
       onPreview: message.wantsPreviews
         ? (preview) => scope.postMessage({ type: 'preview', id, scene: preview }, buffersOf(preview.packed))
         : undefined,
-      onPart: message.wantsParts
-        ? (part) => scope.postMessage({ type: 'part', id, part }, 'portion' in part ? buffersOf(part.portion) : [])
-        : undefined,
+      onPart: message.wantsParts ? (part) => sendPart(id, work, part) : undefined,
       onReading: (isReading) => scope.postMessage({ type: isReading ? 'reading' : 'rested', id }),
       askForHelp: (max, onHelper) => {
         work.onHelper = onHelper;
@@ -124,6 +126,18 @@ function serve(scope: WorkerScope): void {
       },
     });
     return [scene, 'packed' in scene && scene.packed ? buffersOf(scene.packed) : []];
+  }
+
+  /** Sends a part of a scene. Resolves with its buffers when the page returns them; rejects if the request is canceled. */
+  function sendPart(id: number, { taken, abort }: Work, part: ScenePart): Promise<BlockBuffers | undefined> {
+    scope.postMessage({ type: 'part', id, part }, 'portion' in part ? buffersOf(part.portion) : []);
+    const using = new Promise<BlockBuffers | undefined>((resolve, reject) => {
+      taken.push(resolve);
+      abort.signal.addEventListener('abort', () => reject(abort.signal.reason as Error), { once: true });
+    });
+    // Not every sender waits.
+    using.catch(() => undefined);
+    return using;
   }
 
   const progressOf =
@@ -179,7 +193,7 @@ function serve(scope: WorkerScope): void {
    * answered.
    */
   async function run(id: number, message: WorkerRequest): Promise<void> {
-    const work: Work = { abort: new AbortController() };
+    const work: Work = { abort: new AbortController(), taken: [] };
     const { signal } = work.abort;
     running.set(id, work);
     try {
@@ -199,8 +213,9 @@ function serve(scope: WorkerScope): void {
   scope.addEventListener('message', ({ data }) => {
     if (data.type === 'ping') scope.postMessage({ type: 'pong' });
     else if (data.type === 'cancel') running.get(data.id)?.abort.abort();
+    else if (data.type === 'taken') running.get(data.id)?.taken.shift()?.(data.buffers);
     else if (data.type === 'helper') running.get(data.id)?.onHelper?.(data.port);
-    else if (data.type === 'pack') serveWith(import('./pack-shards.js'), ({ packShares }) => packShares(data.port));
+    else if (data.type === 'pack') serveWith(import('./pack-rows.js'), ({ packRows }) => packRows(data.port));
     else if (data.type === 'sort')
       serveWith(import('./sort-splats.js'), ({ sortSplats }) => sortSplats(data.port, data.positions, data.areas));
     else if (data.type === 'run-on-cpu')

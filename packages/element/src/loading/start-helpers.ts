@@ -1,13 +1,13 @@
 /** Starts helping workers. The module is loaded only for scenes that several workers pack. */
 import type { PageMessage, WorkerMessage } from './protocol.js';
 
-/** Number of threads that helpers leave free: the main thread, and the thread of the worker that is helped. */
-const OTHERS = 2;
-/** Maximum number of helpers. More helpers would wait for the worker that distributes the shards. */
-const MAX_HELPERS = 7;
+/** Number of threads that helpers leave free: the worker that is helped, the main thread, and one for the network. */
+const OTHERS = 3;
+/** Maximum number of helpers. More helpers would wait for the worker that distributes the rows. */
+const MAX_HELPERS = 4;
 
 /**
- * Starts workers that pack shards of a scene for another worker.
+ * Starts workers that pack rows of a scene for another worker.
  * @param worker The worker that is helped.
  * @param id Number of the load that they help with.
  * @param max Maximum number of helpers.
@@ -15,7 +15,7 @@ const MAX_HELPERS = 7;
  */
 export function startHelpers(worker: Worker, id: number, max: number, spawn: () => Worker): () => void {
   const { hardwareConcurrency = 2 } = navigator;
-  const count = Math.min(max, MAX_HELPERS, Math.max(1, hardwareConcurrency - OTHERS));
+  const count = Math.max(0, Math.min(max, MAX_HELPERS, hardwareConcurrency - OTHERS));
   const helpers = Array.from({ length: count }, () => {
     const helper = spawn();
     helper.addEventListener(
@@ -28,7 +28,7 @@ export function startHelpers(worker: Worker, id: number, max: number, spawn: () 
       },
       { once: true },
     );
-    // If a helper fails to start or ends, the others take over its work.
+    // If a helper does not start, the others do its work.
     helper.addEventListener('error', (event) => event.preventDefault());
     return helper;
   });

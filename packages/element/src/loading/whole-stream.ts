@@ -30,7 +30,7 @@ export interface StreamLoad extends Pick<LoadListeners, 'onProgress' | 'onPrevie
   readonly limits: () => LoadLimits;
   /** Returns the options of another download, which adds to the progress. */
   readonly options: () => FetchSceneOptions;
-  readonly pack: (cloud: GaussianCloud) => LoadedScene;
+  readonly pack: (cloud: GaussianCloud) => Promise<LoadedScene>;
 }
 
 /**
@@ -59,7 +59,7 @@ async function loadSog(
   onReading?.(true);
   const cloud = await readScene(bytes, {
     ...{ name, signal, maxSplats, openFile: fileOpenerFor(url, options), ...limits() },
-    onPreview: onPreview && ((preview) => onPreview(pack(preview))),
+    onPreview: onPreview && (async (preview) => onPreview(await pack(preview))),
   });
   return pack(cloud);
 }
@@ -94,12 +94,12 @@ async function loadPages(
     }
     if (onPreview === undefined || k + 1 < due || k + 1 === pages.length) continue;
     onReading?.(true);
-    onPreview(pack(cloudOf(manifest, list, pages.slice(0, k + 1), words)));
+    onPreview(await pack(cloudOf(manifest, list, pages.slice(0, k + 1), words)));
     onReading?.(false);
     due = GROWTH * (k + 1);
   }
   onReading?.(true);
-  return { ...pack(cloudOf(manifest, list, pages, words)), order: manifest.order };
+  return { ...(await pack(cloudOf(manifest, list, pages, words))), order: manifest.order };
 }
 
 /**

@@ -1,5 +1,5 @@
 import { GaussianSplatError, Lazy } from '@gaussian-splat/core';
-import type { WorkerMessage, WorkerRequest } from './protocol.js';
+import { buffersOf, type PartListener, type WorkerMessage, type WorkerRequest } from './protocol.js';
 import { WorkerSlot, type Job } from './worker-slot.js';
 
 /** Time for which an idle worker is kept, ms, because pages with several elements load one scene after another. */
@@ -205,10 +205,16 @@ export class WorkerPool {
     const job = slot.jobs.get(message.id);
     if (message.type === 'progress') job?.onProgress?.(message.loaded, message.total);
     else if (message.type === 'preview') job?.onPreview?.(message.scene);
-    else if (message.type === 'part') job?.onPart?.(message.part);
+    else if (message.type === 'part') void this.#pass(slot, message.id, job?.onPart?.(message.part));
     else if (message.type === 'answer') job?.resolve(message.answer);
     else if (message.type === 'error') job?.reject(GaussianSplatError.fromData(message.error));
     else if (job) this.#help(slot, job.id, message.max).catch(() => undefined);
+  }
+
+  /** Returns the buffers of a part to the worker when the part has been used. */
+  async #pass(slot: WorkerSlot, id: number, using: ReturnType<PartListener>): Promise<void> {
+    const buffers = await Promise.resolve(using).catch(() => undefined);
+    if (slot.jobs.has(id)) slot.post({ type: 'taken', id, buffers: buffers ?? undefined }, buffersOf(buffers ?? {}));
   }
 
   /**

@@ -4,8 +4,9 @@ import { readPly } from '../readers/ply.js';
 import type { SceneSource, SplatRange } from '../scene-format.js';
 import { MAX_HEADER_BYTES } from '../signatures.js';
 import type { SplatRanges } from '../splat-ranges.js';
-import { findGaussians, TRAILING, withPlainNames } from './gaussian-layout.js';
-import { exceedsFloat32, parsePlyHeader } from './header.js';
+import { hostIsLittleEndian } from '../bytes.js';
+import { findGaussians, TRAILING, withPlainNames, type GaussianLayout } from './gaussian-layout.js';
+import { exceedsFloat32, parsePlyHeader, sizeOf, type PlyHeader } from './header.js';
 import { openElement } from './rows.js';
 
 /**
@@ -19,8 +20,36 @@ export function plyRanges(source: SceneSource): SplatRanges | undefined {
   const { start, rowBytes } = openElement({ ...source, isPrefix: true }, header, 'vertex');
   const isCoarse = vertex.properties.some(({ name, type }) => /^[xyz]$/.test(name) && exceedsFloat32(type));
   if (rowBytes === undefined || rowBytes === 0 || isCoarse || start > MAX_HEADER_BYTES) return undefined;
-  return { count: vertex.count, shDegree: keptDegree(degree), rows: { start, byteLength: rowBytes } };
+  return {
+    count: vertex.count,
+    shDegree: keptDegree(degree),
+    rows: { start, byteLength: rowBytes, columns: columnsOf(header, findGaussians(source, header)) },
+  };
 }
+
+/** Byte offsets of the properties of plain splats: see `SplatRanges.rows`. */
+function columnsOf({ encoding }: PlyHeader, layout: GaussianLayout): number[] | undefined {
+  const { vertex, degree, colorIsSh, hasThirdScale, hasFilter } = layout;
+  if (encoding !== 'little-endian' || !hostIsLittleEndian || !colorIsSh || !hasThirdScale || hasFilter)
+    return undefined;
+  const offsets = new Map<string, number>();
+  let at = 0;
+  for (const { name, type } of vertex.properties) {
+    if (type === 'float32') offsets.set(name, at);
+    at += sizeOf(type);
+  }
+  const perChannel = (degree + 1) ** 2 - 1;
+  const rest = [0, 1, 2].flatMap((channel) =>
+    Array.from({ length: 15 }, (_, k) => (k < perChannel ? `f_rest_${channel * perChannel + k}` : '')),
+  );
+  const columns = [...PLAIN_COLUMNS, ...rest].map((name) => (name === '' ? 0 : offsets.get(name)));
+  return columns.every((column) => column !== undefined) ? columns : undefined;
+}
+
+const PLAIN_COLUMNS = [
+  ...['x', 'y', 'z', 'scale_0', 'scale_1', 'scale_2', 'rot_0', 'rot_1', 'rot_2', 'rot_3'],
+  ...['opacity', 'f_dc_0', 'f_dc_1', 'f_dc_2'],
+];
 
 /** Reads a range of the rows of a PLY: copies its header and these rows to a smaller file, which `readPly` reads. */
 export function readPlyRange(source: SceneSource & { readonly range: SplatRange }): Promise<GaussianCloud> {

@@ -75,7 +75,7 @@ export function packGaussians(given: GaussianCloud, options: PackOptions = {}): 
   const droppedCount = cloud.droppedCount + cloud.count - kept.length;
   const asked = options.sh ?? 'auto';
   if (asked !== 'auto' && !Object.hasOwn(SH_PRECISION, asked)) throw unknownPrecision(asked);
-  const shPrecision = asked === 'auto' ? choosePrecision(noiseIn(cloud), kept) : asked;
+  const shPrecision = asked === 'auto' ? choosePrecision(noiseIn(cloud, kept), kept.length) : asked;
   const facts = { count: kept.length, shDegree, shPrecision, antialiased, filterVariance, origin, droppedCount };
   return { ...facts, ...packKept(cloud, kept, shPrecision) };
 }

@@ -24,20 +24,20 @@ const INT8_NOISE_DB = 62;
  */
 const INT8_PART_DB = 50;
 /** Number of neighboring splats in a block; they are adjacent in the packed order. */
-export const PART = 256;
+const PART = 256;
 /** Number of sampled splats in a block. */
 const PART_SAMPLES = 8;
 
-/** Returns the variance that rounding to `int8` adds to the color of a splat. */
-export type NoiseOf = (splat: number) => number;
+/** Returns the variance that rounding to `int8` adds to the color of a splat, by its index in the packed order. */
+export type NoiseOf = (k: number) => number;
 
-/** Returns the function {@link NoiseOf} for the splats of a cloud. */
-export function noiseIn({ sh, shDegree }: Pick<GaussianCloud, 'sh' | 'shDegree'>): NoiseOf {
+/** Returns the function {@link NoiseOf} for the splats `kept` of a cloud. */
+export function noiseIn({ sh, shDegree }: Pick<GaussianCloud, 'sh' | 'shDegree'>, kept: Uint32Array): NoiseOf {
   const bits = bitsOf(sh);
   const numbers = 3 * shCoefficientCount(shDegree);
-  return (splat) => {
+  return (k) => {
     let noise = 0;
-    let first = splat * numbers + 3;
+    let first = kept[k] * numbers + 3;
     for (let band = 0; band < shDegree; band++) {
       const end = first + 3 * BAND_SIZES[band];
       noise += BAND_SIZES[band] * CODE_NOISE[scaleCodeOf(bits, first, end)];
@@ -52,14 +52,14 @@ export function noiseIn({ sh, shDegree }: Pick<GaussianCloud, 'sh' | 'shDegree'>
  * Rounding errors of coefficients are at most s / 254, evenly distributed, for the scale s of their band. From a random
  * direction, band b adds a variance of (s / 127)² / 12 · (2b + 1) / 4π.
  */
-export function choosePrecision(noiseOf: NoiseOf, kept: Uint32Array): ShPrecision {
-  const parts = Math.max(1, Math.round(kept.length / PART));
+export function choosePrecision(noiseOf: NoiseOf, count: number): ShPrecision {
+  const parts = Math.max(1, Math.round(count / PART));
   let sum = 0;
   let worst = 0;
   for (let part = 0; part < parts; part++) {
-    const first = Math.floor((part * kept.length) / parts);
-    const end = Math.floor(((part + 1) * kept.length) / parts);
-    const variance = meanNoise(noiseOf, kept, first, end);
+    const first = Math.floor((part * count) / parts);
+    const end = Math.floor(((part + 1) * count) / parts);
+    const variance = meanNoise(noiseOf, first, end);
     sum += variance;
     worst = Math.max(worst, variance);
   }
@@ -72,16 +72,16 @@ export function choosePrecision(noiseOf: NoiseOf, kept: Uint32Array): ShPrecisio
  * @param mean Mean noise of `int8` over all splats, a variance.
  * @param worst Mean noise of `int8` in the noisiest block, a variance.
  */
-export function precisionFor(mean: number, worst: number): ShPrecision {
+function precisionFor(mean: number, worst: number): ShPrecision {
   return mean <= 10 ** (-INT8_NOISE_DB / 10) && worst <= 10 ** (-INT8_PART_DB / 10) ? 'int8' : 'float16';
 }
 
 /** Returns the mean noise over a sample of the splats in a block. */
-function meanNoise(noiseOf: NoiseOf, kept: Uint32Array, first: number, end: number): number {
+function meanNoise(noiseOf: NoiseOf, first: number, end: number): number {
   const step = Math.max(1, Math.floor((end - first) / PART_SAMPLES));
   let noise = 0;
   let samples = 0;
-  for (let k = first; k < end; k += step, samples++) noise += noiseOf(kept[k]);
+  for (let k = first; k < end; k += step, samples++) noise += noiseOf(k);
   return noise / Math.max(1, samples);
 }
 
@@ -130,7 +130,7 @@ const packHalf: Packer = ({ sh, shDegree }, kept, buffer, at, stride) => {
  * Factor from a coefficient to its code, for each code of a scale; 0 for bands that are too small or too large for a
  * scale.
  */
-const PER_UNIT = Float64Array.from({ length: MAX_CODE + 1 }, (_, code) =>
+export const PER_UNIT = Float64Array.from({ length: MAX_CODE + 1 }, (_, code) =>
   code && code < MAX_CODE ? 127 / scaleOf(code) : 0,
 );
 
@@ -168,7 +168,7 @@ const bitsOf = ({ buffer, byteOffset, length }: Float32Array): Int32Array => new
  * Bits of the largest float32 that the scale of each code covers. The added 1e-6 prevents a number that equals a scale
  * from rounding up to the next one.
  */
-const MAX_BITS = bitsOf(Float32Array.from({ length: MAX_CODE }, (_, code) => scaleOf(code + 1e-6)));
+export const MAX_BITS = bitsOf(Float32Array.from({ length: MAX_CODE }, (_, code) => scaleOf(code + 1e-6)));
 /** Upper 12 bits of the float32 that equals the scale of code 0. */
 const FIRST_EIGHTH = (127 - SCALE_BIAS) * SCALE_STEPS;
 

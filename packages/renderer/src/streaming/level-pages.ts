@@ -67,7 +67,7 @@ export function layoutLevels(
   const usable = usableIndices(cloud);
   const { sh = 'auto' } = options;
   const { shDegree, antialiased, filterVariance, origin, hints } = cloud;
-  const shPrecision = sh === 'auto' ? choosePrecision(noiseIn(cloud), usable) : sh;
+  const shPrecision = sh === 'auto' ? choosePrecision(noiseIn(cloud, usable), usable.length) : sh;
   const bounds = boundsWithin(coarsest, boxes.length);
   const kept = keptOfNodes(cloud, usable, boxes.length);
   const format = { shDegree, shPrecision, geometry: 'quantized' } as const;

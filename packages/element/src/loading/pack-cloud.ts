@@ -1,0 +1,1 @@
+export { packCloud } from '@gaussian-splat/renderer/tools';
