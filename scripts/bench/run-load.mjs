@@ -1,18 +1,20 @@
-/** `npm run lab -- load`: the cost of loading ordinary files in Chromium with our element and with others: time to the first preview and to the scene, the page's longest task and the peak memory of its process. */
+/** `npm run lab -- load`: the cost of loading ordinary files in Chromium with our element and with others: time from the navigation to the first preview and to the first frame of the whole scene, the page's longest task and the peak memory of its process. */
 import { statSync, writeFileSync } from 'node:fs';
+import { availableParallelism } from 'node:os';
 import { basename, dirname, join, resolve } from 'node:path';
 import { parseArgs } from 'node:util';
 import { chromium } from 'playwright-core';
 import { serve } from '../../packages/cli/src/lib/server.mjs';
 import { peakBytes } from '../attack/peak.mjs';
 import { findChromium, gpuFlags } from '../lib/chromium.mjs';
-import { root } from '../lib/run.mjs';
+import { root, run } from '../lib/run.mjs';
 
 const USAGE = `usage: npm run lab -- load FILE ... [options]
 
   FILE             scenes: .ply, .compressed.ply, .spz, .sog. node scripts/tile-scene.mjs makes large ones
   --viewers A,B    from ours, spark, playcanvas (default all); each opens each file in a separate browser
-  --rounds N       loads of each; the minimum time counts (default 2)
+  --rounds N       loads of each, in turns; the median counts (default 5)
+  --cores N        pins the browser to the first N cores (Linux)
   --seconds N      time limit of a load (default 120)
   --out FILE       file for the figures, as JSON`;
 
@@ -20,7 +22,8 @@ const { values, positionals } = parseArgs({
   allowPositionals: true,
   options: {
     viewers: { type: 'string', default: 'ours,spark,playcanvas' },
-    rounds: { type: 'string', default: '2' },
+    rounds: { type: 'string', default: '5' },
+    cores: { type: 'string' },
     seconds: { type: 'string', default: '120' },
     out: { type: 'string' },
     help: { type: 'boolean' },
@@ -31,25 +34,40 @@ if (values.help || positionals.length === 0) {
   process.exit(values.help ? 0 : 2);
 }
 
+const ALL_CORES = availableParallelism();
+
+/** Runs a function while processes that start are pinned to the first cores, if their number is given. */
+async function pinned(start) {
+  const cores = Number(values.cores ?? 0);
+  const pin = (list) => run('taskset', ['-p', '-c', list, String(process.pid)], { stdio: 'ignore' });
+  if (cores > 0 && pin(`0-${cores - 1}`) !== 0) throw new Error('--cores needs taskset, which Linux has');
+  try {
+    return await start();
+  } finally {
+    if (cores > 0) pin(`0-${ALL_CORES - 1}`);
+  }
+}
+
 /** One load in a browser that has just been started. */
 async function load(viewer, path, port) {
-  const browser = await chromium.launch({ executablePath: findChromium(), args: gpuFlags() });
+  const browser = await pinned(() => chromium.launch({ executablePath: findChromium(), args: gpuFlags() }));
   try {
     const page = await browser.newPage();
     const crash = new Promise((_, reject) => page.on('crash', () => reject(new Error('the page crashed'))));
     crash.catch(() => undefined);
-    await page.goto(`http://localhost:${port}/load/${viewer}.html`);
-    await page.waitForFunction('window.load');
     const before = peakBytes();
-    const limit = AbortSignal.timeout(1000 * Number(values.seconds));
-    const late = new Promise((_, reject) => limit.addEventListener('abort', () => reject(new Error('not in time'))));
-    const found = await Promise.race([page.evaluate((url) => window.load(url), path), crash, late]);
+    const timeout = 1000 * Number(values.seconds);
+    await page.goto(`http://localhost:${port}/load/${viewer}.html?file=${encodeURIComponent(path)}`);
+    await Promise.race([page.waitForFunction('window.result', undefined, { timeout }), crash]);
+    const { error, ...found } = await page.evaluate('window.result');
+    if (error) throw new Error(error);
     return { ...found, peakBytes: peakBytes(), emptyBytes: before };
   } finally {
     await browser.close();
   }
 }
 
+const median = (numbers) => numbers.sort((a, b) => a - b)[numbers.length >> 1];
 const megabytes = (bytes) => `${Math.round(bytes / 1e6)} MB`;
 const seconds = (ms) => (ms === undefined ? '   -' : (ms / 1000).toFixed(2).padStart(5));
 const rows = [];
@@ -64,24 +82,26 @@ for (const file of positionals.map((each) => resolve(process.env.INIT_CWD ?? pro
   });
   const { port } = server.address();
   console.log(`${basename(file)}, ${megabytes(statSync(file).size)}`);
-  for (const viewer of values.viewers.split(',')) {
-    const rounds = [];
-    for (let round = 0; round < Number(values.rounds); round++)
-      rounds.push(
-        await load(viewer, `/files/${encodeURIComponent(basename(file))}`, port).catch((error) => ({ error })),
-      );
+  const viewers = values.viewers.split(',');
+  const loads = new Map(viewers.map((viewer) => [viewer, []]));
+  // In turns, because a machine may be busy for a while.
+  for (let round = 0; round < Number(values.rounds); round++)
+    for (const viewer of viewers) {
+      const path = `/files/${encodeURIComponent(basename(file))}`;
+      loads.get(viewer).push(await load(viewer, path, port).catch((error) => ({ error })));
+    }
+  for (const [viewer, rounds] of loads) {
     const fine = rounds.filter(({ error }) => !error);
     if (fine.length === 0) {
       console.log(`  ${viewer.padEnd(12)} ${String(rounds[0].error.message).split('\n')[0].slice(0, 100)}`);
       continue;
     }
-    const min = (name) => fine.reduce((max, row) => (row[name] < (max ?? Infinity) ? row[name] : max), undefined);
-    const row = { file: basename(file), viewer, previewMs: min('previewMs'), loadMs: min('loadMs') };
-    Object.assign(row, {
-      longestMs: min('longestMs'),
-      peakBytes: min('peakBytes'),
-      emptyBytes: min('emptyBytes'),
-    });
+    const found = (name) => median(fine.map((row) => row[name]).filter((value) => value !== undefined));
+    const names = ['codeMs', 'previewMs', 'readyMs', 'loadMs', 'longestMs', 'peakBytes', 'emptyBytes'];
+    const row = {
+      ...{ file: basename(file), viewer, loads: fine.length },
+      ...Object.fromEntries(names.map((name) => [name, found(name)])),
+    };
     rows.push(row);
     console.log(
       `  ${viewer.padEnd(12)} preview ${seconds(row.previewMs)} s  load ${seconds(row.loadMs)} s  longest task ${Math.round(row.longestMs)} ms  ` +

@@ -8,7 +8,7 @@ export { readLodScene, sogAddress, type LodBox, type LodScene, type SogAddress, 
 export { readCoarsestLevel } from './lod/read-coarsest.js';
 export { SogFiles, type FetchBytes } from './lod/sog-files.js';
 export { readPrefix } from './read-prefix.js';
-export { MAX_DROPPED_RATIO, readScene, type ReadSceneOptions } from './read-scene.js';
+export { MAX_DROPPED_RATIO, prepareReader, readScene, type ReadSceneOptions } from './read-scene.js';
 export { boundedImageHeader, type ImageHeader } from './triangles/image-size.js';
 export { readTriangles, type TriangleFile, type TriangleSource } from './triangles/read-triangles.js';
 export { Ktx2Decoder } from './triangles/ktx2.js';

@@ -39,6 +39,21 @@ export interface ReadSceneOptions extends LoadLimits {
 }
 
 /**
+ * Starts to load the reader of a file that is still loading, so that {@link readScene} need not wait for it. Unknown
+ * files and failures have no effect.
+ * @param beginning The first bytes of the file.
+ */
+export async function prepareReader(beginning: FileBytes, name = 'scene', contentType = ''): Promise<void> {
+  try {
+    const bytes = plainBytes(beginning, name);
+    const format = signedFormat(bytes) ?? (await loadDetection()).findFormat(bytes, name, contentType);
+    if (format) await loadReader(format);
+  } catch {
+    // `readScene` reports the failure.
+  }
+}
+
+/**
  * Reads a scene file: PLY (INRIA layout), compressed PLY, SPZ version 1 to 4, SOG version 1 and 2, streamed SOG, glTF
  * with `KHR_gaussian_splatting`, .splat, .ksplat, or a ZIP archive of one of these; the format is detected from the
  * content. Works in windows, workers and Node; the reader of the format is loaded on demand.

@@ -1,5 +1,11 @@
 export { capture, type CaptureRequest } from './capture.js';
-export { autotune, pickInitialVariants, type AutotuneOptions, type StartOptions } from './autotune/autotune.js';
+export {
+  autotune,
+  pickInitialVariants,
+  prepareInitialVariants,
+  type AutotuneOptions,
+  type StartOptions,
+} from './autotune/autotune.js';
 export type { AutotuneStore } from './autotune/store.js';
 export { DynamicGaussians, type DynamicGaussiansOptions } from './dynamic-gaussians.js';
 export { GaussianBuffers, type UploadOptions } from './gaussian-buffers.js';

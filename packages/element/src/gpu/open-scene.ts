@@ -1,5 +1,5 @@
 import { loadModule, type GaussianSplatError } from '@gaussian-splat/core';
-import { pickInitialVariants } from '@gaussian-splat/renderer';
+import { pickInitialVariants, prepareInitialVariants } from '@gaussian-splat/renderer';
 import { sceneBytes } from '@gaussian-splat/renderer/tools';
 import type { DynamicRequest } from '../sources/generator/dynamic-model.js';
 import type {
@@ -99,7 +99,8 @@ async function openLoadedScene(
   const abort = new AbortController();
   const giveUp = (): void => abort.abort(options.signal.reason);
   options.signal.addEventListener('abort', giveUp, { once: true });
-  // Variants for the first frame are selected while the bytes are in transit.
+  // Variants for the first frame are selected while the bytes are in transit, and the splats are uploaded.
+  prepareInitialVariants();
   const choosing = acquiring.then(({ device }) => pickInitialVariants(device, images()));
   choosing.catch(ignore);
   const { onPreview } = options;
@@ -113,8 +114,7 @@ async function openLoadedScene(
       previews.then((uploads) => uploads.show(preview), ignore);
     });
   const endPreviews = (): void => void previews?.then((uploads) => uploads.end(), ignore);
-  const device = acquiring.then(async ({ device }) => {
-    await choosing.catch(unlessWrong);
+  const device = acquiring.then(({ device }) => {
     options.signal.throwIfAborted();
     limitScenes(device, options.memoryBudget);
     return device;
@@ -132,11 +132,21 @@ async function openLoadedScene(
   };
   const loading = options.loader.open(request, abort.signal, options.onProgress, showPreview, onPart);
   try {
+    const chosen = choosing.catch(unlessWrong);
+    chosen.catch(ignore);
     const [lease, scene] = await Promise.all([acquiring, loading, device]);
-    if ('frames' in scene) return await openSequence(request, lease, scene, options);
-    if (scene.packed === undefined) return shown(lease, await (await parts!).finish(), scene, options);
+    if ('frames' in scene) {
+      await chosen;
+      return await openSequence(request, lease, scene, options);
+    }
+    if (scene.packed === undefined) {
+      const gaussians = await (await parts!).finish();
+      await chosen;
+      options.signal.throwIfAborted();
+      return shown(lease, gaussians, scene, options);
+    }
     beforeUpload(sceneBytes(scene.packed));
-    return await upload(lease, scene, options);
+    return await upload(lease, scene, options, chosen);
   } catch (error) {
     endPreviews();
     parts?.then((uploads) => uploads.destroy(), ignore);

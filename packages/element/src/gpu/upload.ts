@@ -12,18 +12,25 @@ export interface SceneUploadOptions {
 }
 
 /**
- * Uploads a scene to the GPU. The returned scene owns the lease. Rejects with GaussianSplatError `out-of-memory/*`, or
- * the signal's reason; the caller then releases the lease.
+ * Uploads a scene to the GPU. The returned scene owns the lease. Rejects with GaussianSplatError `out-of-memory/*`, the
+ * signal's reason, or as `ready` does; the caller then releases the lease.
+ * @param ready Resolves when the scene can be drawn, usually during the upload.
  */
 export async function upload(
   lease: DeviceLease,
   scene: LoadedScene,
   options: SceneUploadOptions,
+  ready: Promise<unknown> = Promise.resolve(),
 ): Promise<LoadedGaussians> {
   const gaussians = await GaussianBuffers.upload(lease.device, scene.packed, options);
-  if (!options.signal.aborted) return shown(lease, gaussians, scene, options);
-  gaussians.destroy();
-  throw options.signal.reason;
+  try {
+    await ready;
+    options.signal.throwIfAborted();
+  } catch (error) {
+    gaussians.destroy();
+    throw error;
+  }
+  return shown(lease, gaussians, scene, options);
 }
 
 /** Returns a scene from uploaded Gaussians and the properties of its file. The scene owns the lease. */

@@ -5,6 +5,7 @@ import {
   HEADER_BYTES,
   isSequence,
   fileOpenerFor,
+  prepareReader,
   readScene,
   type FetchSceneOptions,
   type LoadLimits,
@@ -25,6 +26,12 @@ import type {
 
 /** Delay of the first preview after the start of the load, ms. Shorter downloads need no preview. */
 const PREVIEW_AFTER_MS = 300;
+/**
+ * A preview of a complete file is shown if reading it has taken this time, ms, because packing it will take about as
+ * long; or if the preview has this number of splats, a sixteenth of the scene.
+ */
+const MIN_REST_MS = 500;
+const MIN_PREVIEW_SPLATS = 1 << 15;
 /** Minimum number of splats that are packed by code that is loaded for this purpose, because it is faster. */
 const MANY_SPLATS = 1 << 14;
 /** Minimum size in bytes of a file for which that code is loaded before the file is read. */
@@ -97,7 +104,10 @@ export async function loadScene(
       return new PreviewSchedule(within, start, async (cloud) => onPreview?.(await pack(cloud)), onReading);
     });
     const shared = new SharedReading(request, name, limits, listeners);
+    let isPrepared = false;
     const onArrival = async (bytes: Uint8Array, total: number | undefined, first: number): Promise<boolean> => {
+      if (!isPrepared) void prepareReader(bytes, name);
+      isPrepared = true;
       if (total !== undefined && total >= MANY_BYTES) packer.get().catch(none);
       // `LargePly` shows its own previews.
       if (shared.mayBeShared(bytes, total, first))
@@ -120,13 +130,18 @@ export async function loadScene(
     // Files beside a `blob:` or `data:` URL do not exist.
     const openFile = /^(blob|data):/.test(url) ? undefined : fileOpenerFor(url, options);
     const level = request.levels ? 'all' : 0;
+    const began = performance.now();
+    const showPreview = async (cloud: GaussianCloud): Promise<void> => {
+      if (performance.now() - began >= MIN_REST_MS || cloud.count >= MIN_PREVIEW_SPLATS)
+        await (await previews.get().catch(none))?.onPreview(cloud);
+    };
     const cloud = await readScene(bytes, {
       ...{
         name,
         signal,
         openFile,
         level,
-        onPreview: onPreview && (async (cloud) => (await previews.get().catch(none))?.onPreview(cloud)),
+        onPreview: onPreview && showPreview,
       },
       ...limits(),
     });

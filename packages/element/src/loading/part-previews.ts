@@ -1,5 +1,7 @@
 /** Delay of the first preview after the start of the load, ms. Shorter downloads need no preview. */
 const FIRST_AFTER_MS = 300;
+/** Minimum remaining time of the load for which a preview is shown, ms. */
+const MIN_REST_MS = 500;
 /** Growth of the received part from one preview to the next. */
 const GROWTH = 2;
 /** Maximum fraction of the loading time that previews may take. */
@@ -14,8 +16,8 @@ export class PreviewTimes {
   /** @param share Received part of the scene, 0..1. */
   isDue(share: number): boolean {
     const elapsed = performance.now() - this.#start;
-    if (elapsed < FIRST_AFTER_MS || share < this.#due || share >= 1 || this.#spentMs > MAX_SHARE * elapsed)
-      return false;
+    if (elapsed < FIRST_AFTER_MS || share < this.#due || this.#spentMs > MAX_SHARE * elapsed) return false;
+    if (elapsed * (1 - share) < MIN_REST_MS * share) return false;
     this.#due = GROWTH * share;
     return true;
   }

@@ -3,6 +3,8 @@ import { readPrefix, type ReadSceneOptions } from '@gaussian-splat/formats';
 
 /** Maximum fraction of the loading time that previews may take, so that they do not slow the load. */
 const MAX_SHARE = 0.2;
+/** Minimum remaining time of the download for which a preview is shown, ms. */
+const MIN_REST_MS = 500;
 /** Factor by which the number of received bytes grows from one preview to the next. */
 const GROWTH = 1.6;
 
@@ -40,6 +42,8 @@ export class PreviewSchedule {
     const elapsed = performance.now() - this.#start;
     const isDue = bytes.length >= this.#nextBytes && bytes.length !== total;
     if (!isDue || this.#spentMs > MAX_SHARE * elapsed) return;
+    // The rest of the file would arrive before a preview is drawn.
+    if (total !== undefined && elapsed * (total - bytes.length) < MIN_REST_MS * bytes.length) return;
     const began = performance.now();
     this.#onReading?.(true);
     const cloud = await readPrefix(bytes, this.#options);

@@ -4,7 +4,7 @@ import type { ProgressListener } from './protocol.js';
 export class ProgressSum {
   readonly #onProgress: ProgressListener;
   readonly #files: { loaded: number; total: number | undefined }[] = [];
-  /** Number of files from which the total can be known. With fewer files it is reported as undefined. */
+  /** Minimum number of files for a known total. With fewer files it is reported as undefined. */
   readonly #min: number;
 
   /** @param hasParts Whether the first file names other files, whose bytes count. */

@@ -40,6 +40,12 @@ const SELF_TEST = 'the GPU self-test';
 /** Loads the self-test, while the bytes of a scene are in transit. */
 const loadTiming = (): Promise<typeof trials> => loadModule(SELF_TEST, () => import('./timing.js'));
 
+/** Starts to load the code of {@link pickInitialVariants}, for pages that still wait for their device. */
+export function prepareInitialVariants(): void {
+  // A failure is reported when the code is used.
+  loadTiming().catch(() => undefined);
+}
+
 /**
  * Selects variants for an early first frame, once for each device. The stored variants of an earlier visit come first.
  * Without them, the variants that most GPUs prefer are selected if they pass the self-test and are fast enough.
