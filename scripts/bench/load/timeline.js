@@ -47,7 +47,7 @@ globalThis.Worker = class extends Original {
   }
 };
 
-/** What the browser has recorded: fetched files, measures and the first paint. */
+/** Entries of the performance timeline: fetched files, measures and the first paint. */
 export const entries = () =>
   ['resource', 'measure', 'paint', 'longtask']
     .flatMap((type) => performance.getEntriesByType(type))

@@ -5,7 +5,7 @@ import { readPrefix, type ReadSceneOptions } from '@gaussian-splat/formats';
 const MAX_SHARE = 0.2;
 /** Minimum remaining time of the download for which a preview is shown, ms. */
 const MIN_REST_MS = 500;
-/** Factor by which the number of received bytes grows from one preview to the next. */
+/** Growth of the number of received bytes from one preview to the next. */
 const GROWTH = 1.6;
 
 /** Decides when the received part of a scene is shown as a preview. Loaded only for slow scenes. */
