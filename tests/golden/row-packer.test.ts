@@ -213,7 +213,7 @@ test('the bounds of joined blocks are those of the cloud', async () => {
 });
 
 test('a receiver that is late never has more than eight blocks, and its buffers are used again', async () => {
-  const cloud = scene({ count: 20 * 16_384, shDegree: 0 });
+  const cloud = scene({ count: 11 * 16_384, shDegree: 0 });
   const { packer } = await packerOf(cloud);
   const expected = packGaussians(cloud);
   const found: PackedGaussians = { ...expected, geometry: new Uint32Array(expected.geometry.length) };
@@ -242,7 +242,7 @@ test('a receiver that is late never has more than eight blocks, and its buffers 
 });
 
 test('a receiver that gives up ends the sending', async () => {
-  const { packer } = await packerOf(scene({ count: 20 * 16_384, shDegree: 0 }));
+  const { packer } = await packerOf(scene({ count: 11 * 16_384, shDegree: 0 }));
   await assert.rejects(
     packer.finish(() => Promise.reject(new Error('canceled'))),
     /canceled/,

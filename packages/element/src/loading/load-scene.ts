@@ -10,11 +10,11 @@ import {
   type FetchSceneOptions,
   type LoadLimits,
 } from '@gaussian-splat/formats';
-import { packGaussians } from '@gaussian-splat/renderer';
 import { fileName, named, throttled } from './load-helpers.js';
 import type { LargePly } from './large-ply.js';
 import { ProgressSum } from './progress-sum.js';
 import type {
+  LoadedFacts,
   LoadedScene,
   LoadedSequence,
   PartListener,
@@ -31,10 +31,8 @@ const PREVIEW_AFTER_MS = 300;
  * long; or if the preview has this number of splats, a sixteenth of the scene.
  */
 const MIN_REST_MS = 500;
-const MIN_PREVIEW_SPLATS = 1 << 15;
-/** Minimum number of splats that are packed by code that is loaded for this purpose, because it is faster. */
-const MANY_SPLATS = 1 << 14;
-/** Minimum size in bytes of a file for which that code is loaded before the file is read. */
+const MIN_PREVIEW_SPLATS = 1 << 16;
+/** Minimum size in bytes of a file for which the code that packs large scenes is loaded before the file is read. */
 const MANY_BYTES = 1 << 18;
 /** Result if the code of previews cannot be loaded: the scene loads without previews. */
 const none = (): undefined => undefined;
@@ -70,7 +68,7 @@ export async function loadScene(
   signal: AbortSignal,
   listeners: LoadListeners,
 ): Promise<LoadedScene | SentScene | LoadedSequence> {
-  const { onProgress, onPreview, onReading } = listeners;
+  const { onProgress, onPreview, onPart, onReading } = listeners;
   try {
     const { url, credentials } = request;
     const name = fileName(url);
@@ -80,17 +78,23 @@ export async function loadScene(
       ...{ mode: 'cors', credentials, signal, onProgress: progress.add() },
       ...fileLimits(limits()),
     });
-    const packer = new Lazy('the code that packs large scenes', () => import('./pack-cloud.js'));
-    const pack = async (cloud: GaussianCloud, bounds = boundsOf(cloud)): Promise<LoadedScene> => {
-      const options = { sh: request.sh };
-      const code = cloud.count < MANY_SPLATS ? undefined : await packer.get().catch(none);
-      return {
-        packed: code ? await code.packCloud(cloud, options) : packGaussians(cloud, options),
-        bounds: { ...bounds, ...cloud.hints },
-        warnings: cloud.warnings,
-        order: cloud.hints?.order,
-        hasMeshes: cloud.hints?.meshes,
-      };
+    const packer = new Lazy('the code that packs scenes', () => import('./pack-cloud.js'));
+    const factsOf = (cloud: GaussianCloud): LoadedFacts => ({
+      bounds: { ...boundsOf(cloud), ...cloud.hints },
+      warnings: cloud.warnings,
+      order: cloud.hints?.order,
+      hasMeshes: cloud.hints?.meshes,
+    });
+    const pack = async (cloud: GaussianCloud): Promise<LoadedScene> => ({
+      packed: await (await packer.get()).packCloud(cloud, { sh: request.sh }),
+      ...factsOf(cloud),
+    });
+    /** Sends the blocks of a large cloud one after another, as the page uploads them. */
+    const sendCloud = async (cloud: GaussianCloud): Promise<LoadedScene | SentScene> => {
+      const { packCloudInto } = await packer.get();
+      const facts = factsOf(cloud);
+      const packed = await packCloudInto(onPart!, cloud, { sh: request.sh });
+      return packed ? { packed, ...facts } : facts;
     };
     if (request.streamBytes !== undefined) {
       const { loadWholeStream } = await loadModule('the code that streams scenes', () => import('./whole-stream.js'));
@@ -105,10 +109,14 @@ export async function loadScene(
     });
     const shared = new SharedReading(request, name, limits, listeners);
     let isPrepared = false;
+    // Loads the code for the file while the rest of it is in transit. Failures are reported when the code is used.
+    const prepare = (beginning: Uint8Array, total = 0): void => {
+      void prepareReader(beginning, name);
+      packer.get().then((code) => (total < MANY_BYTES ? undefined : code.prepareToPack()), none);
+    };
     const onArrival = async (bytes: Uint8Array, total: number | undefined, first: number): Promise<boolean> => {
-      if (!isPrepared) void prepareReader(bytes, name);
+      if (!isPrepared) prepare(bytes, total);
       isPrepared = true;
-      if (total !== undefined && total >= MANY_BYTES) packer.get().catch(none);
       // `LargePly` shows its own previews.
       if (shared.mayBeShared(bytes, total, first))
         return (await (await shared.plyIn(bytes, total))?.onArrival(bytes, first)) ?? false;
@@ -147,7 +155,7 @@ export async function loadScene(
     });
     signal.throwIfAborted();
     onReading?.(true);
-    if (cloud.levelRuns === undefined) return pack(cloud);
+    if (cloud.levelRuns === undefined) return onPart ? sendCloud(cloud) : pack(cloud);
     const { packLevels } = await loadModule('the code that packs levels of detail', () => import('./pack-levels.js'));
     return packLevels(cloud, request.sh);
   } catch (error) {

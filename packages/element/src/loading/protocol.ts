@@ -19,7 +19,7 @@ import type {
 
 /** A scene file whose floor is to be found, and the dimensions of the walker. */
 export interface FloorRequest extends FileRequest {
-  /** Absolute address of a `.voxel.json`, from which the floor is found instead of the splats. */
+  /** Absolute address of a `.voxel.json`, which replaces the splats as the source of the floor. */
   readonly voxelUrl?: string | undefined;
   /** Bytes of a `.floor` file, which is decoded instead. */
   readonly map?: ArrayBuffer | undefined;

@@ -40,10 +40,13 @@ const SELF_TEST = 'the GPU self-test';
 /** Loads the self-test, while the bytes of a scene are in transit. */
 const loadTiming = (): Promise<typeof trials> => loadModule(SELF_TEST, () => import('./timing.js'));
 
-/** Starts to load the code of {@link pickInitialVariants}, for pages that still wait for their device. */
+/** Prepares {@link pickInitialVariants} while a page waits for its device: loads its code, and computes the expected image. */
 export function prepareInitialVariants(): void {
   // A failure is reported when the code is used.
-  loadTiming().catch(() => undefined);
+  loadTiming().then(
+    ({ expectedImage }) => expectedImage(),
+    () => undefined,
+  );
 }
 
 /**

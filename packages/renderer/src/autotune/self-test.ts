@@ -1,4 +1,4 @@
-import { multiply, type Camera } from '@gaussian-splat/core';
+import { multiply, type Camera, type GaussianCloud } from '@gaussian-splat/core';
 import { capture } from '../capture.js';
 import { GaussianBuffers } from '../gaussian-buffers.js';
 import { perDevice } from '../gpu/kernel.js';
@@ -42,6 +42,16 @@ const SHAPES = 500;
 /** Expected image, which is computed once for all variants and devices; undefined before the first test. */
 let reference: Promise<Float32Array> | undefined;
 
+/** Returns the two scenes of the test. */
+const testScenes = (): [large: GaussianCloud, small: GaussianCloud] => [
+  sphereCloud(LARGE, 0.8),
+  sphereCloud(SMALL, 0.08, 2.4, SHAPES),
+];
+
+/** Starts to compute the expected image, which requires no device. */
+export const expectedImage = (): Promise<Float32Array> =>
+  (reference ??= drawReference(testScenes(), shearedCamera(WIDTH, HEIGHT)));
+
 /** Resolves to whether a renderer with these options draws the expected image of two scenes with interleaved splats. */
 export const passesSelfTest = async (device: GPUDevice, options: FrameSettings): Promise<boolean> =>
   (await faultOf(device, options)) === undefined;
@@ -49,13 +59,12 @@ export const passesSelfTest = async (device: GPUDevice, options: FrameSettings):
 /** Resolves to the name of the first stage or frame that is wrong with these options; undefined if none is. */
 export async function faultOf(device: GPUDevice, options: FrameSettings): Promise<string | undefined> {
   const threads = options.threads === 'serial' ? 'serial' : 'parallel';
-  const large = sphereCloud(LARGE, 0.8);
-  const small = sphereCloud(SMALL, 0.08, 2.4, SHAPES);
+  const [large, small] = testScenes();
   const camera = shearedCamera(WIDTH, HEIGHT);
   // The CPU computes the image while the GPU sums and sorts.
   const [isSorted, expected] = await Promise.all([
     perDevice(device, `sums and sorts ${threads}`, () => sumsAndSorts(device, threads)),
-    (reference ??= drawReference([large, small], camera)),
+    expectedImage(),
   ]);
   if (!isSorted) return `${threads} prefix sums or the ${threads} sort`;
   // Each step is a task of its own, because a page that starts has frames to show meanwhile.

@@ -6,8 +6,10 @@ import { Viewpoint } from '../viewpoint.js';
 import { World } from '../world.js';
 import type { PackedGaussians } from '../pack/pack.js';
 import { faultsOf, type Variants } from '../variants.js';
-import { faultOf, viewpointOf } from './self-test.js';
+import { expectedImage, faultOf, viewpointOf } from './self-test.js';
 import { copiesOf, packSpheres, probeCamera, sphereCloud } from './spheres.js';
+
+export { expectedImage };
 
 /** Number of frames in one trial. */
 export const FRAMES = 4;

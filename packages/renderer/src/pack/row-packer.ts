@@ -11,6 +11,8 @@ import { INBOX_BYTES, packerCode, PackerMemory, strideOf, type PackableRows } fr
 import { choosePrecision } from './sh.js';
 import { CHUNK_NUMBERS, GEOMETRY_WORDS, type ShPrecision } from './words.js';
 
+export { packerCode };
+
 const { CULL_GROUP } = constants;
 
 /** Number of splats that are sent together. */
