@@ -38,7 +38,7 @@ test('a preview has no more splats than the page allows', async () => {
     [8, [8]],
   ] as const) {
     const counts: number[] = [];
-    const previews = new PreviewSchedule({ name: 'a.ply', maxSplats }, 0, ({ count }) => counts.push(count));
+    const previews = new PreviewSchedule({ name: 'a.ply', maxSplats }, 0, ({ count }) => void counts.push(count));
     await previews.onArrival(file, undefined);
     assert.deepEqual(counts, shown);
   }

@@ -48,8 +48,8 @@ describe('a large PLY', () => {
     expected = whole.packed;
     assertEqual(expected.droppedCount, Math.ceil(SPLATS / 16_911) * 17 - 3, 'splats that are of no use');
   });
-  before(() => Object.defineProperty(navigator, 'hardwareConcurrency', { value: 8, configurable: true }));
-  after(() => Reflect.deleteProperty(navigator, 'hardwareConcurrency'));
+  before(() => void Object.defineProperty(navigator, 'hardwareConcurrency', { value: 8, configurable: true }));
+  after(() => void Reflect.deleteProperty(navigator, 'hardwareConcurrency'));
   afterEach(() => {
     GaussianSplatElement.sceneLoader = original;
   });
