@@ -112,7 +112,7 @@ function boxOf(positions: Float32Array): [number[], number[]] {
 function ballAround(places: Float32Array): { center: number[]; radius: number } {
   const [min, max] = boxOf(places);
   const center = min.map((low, axis) => (low + max[axis]) / 2);
-  return { center, radius: distancesTo(places, center).reduce((most, x) => Math.max(most, x), 0) };
+  return { center, radius: distancesTo(places, center).reduce((max, x) => Math.max(max, x), 0) };
 }
 
 /**
