@@ -13,12 +13,14 @@ import { grouped, startsWith, viewOf } from './bytes.js';
 import { damaged } from './faults.js';
 import { isObject, parseJson, show, type Json } from './json.js';
 import { mergeClouds } from './merge-clouds.js';
-import { applyMotion, ANIMATED_ATTRIBUTES, ANIMATED_ATTRIBUTE_NAMES, readMotion, type Motion } from './motion.js';
+import { readMotion } from './clip/read-motion.js';
+import { applyMotion, ANIMATED_ATTRIBUTES, ANIMATED_ATTRIBUTE_NAMES, stillMotion, type Motion } from './motion.js';
 import { readScene } from './read-scene.js';
 import { toDegree } from './to-degree.js';
 
 const MAGIC = 'GSV\n';
-const VERSION = 1;
+/** Versions of files. Those of version 1 have no splats that never change, and motion of version 2 or 3. */
+const VERSIONS = [1, 2];
 /** Size of the head in bytes: the magic number, the version, and the size of the index, each of 4 bytes. */
 export const CLIP_HEAD_BYTES = 12;
 export const MAX_CLIP_INDEX_BYTES = 1 << 24;
@@ -36,7 +38,7 @@ export interface ClipPart {
   readonly start: number;
   /** Size in bytes of the part's scene, a scene file of any format. */
   readonly sceneBytes: number;
-  /** Size in bytes of the part's motion, which `readMotion` reads. */
+  /** Size in bytes of the part's motion, which `readMotion` reads; 0 if its splats never change. */
   readonly motionBytes: number;
   readonly splats: number;
   /** Number of code planes in the motion. A plane has one Int16 for each splat. */
@@ -63,12 +65,15 @@ export interface ClipIndex extends FilterRule {
   /** Factor of the scales of the first part's splats while other parts of its group are missing, 1 to 8. */
   readonly grow: number;
   readonly groups: readonly ClipGroup[];
+  /** Parts with the splats that never change, which every frame has: none, or up to 8, the first of which is coarse. */
+  readonly still: readonly ClipPart[];
   /** Size of the whole file in bytes. */
   readonly byteLength: number;
 }
 
 /** Input of {@link writeClipHead}: an index without the properties that follow from its lengths. */
-export interface ClipHead extends Omit<ClipIndex, 'groups' | 'byteLength' | 'frameCount' | 'durationSeconds'> {
+export interface ClipHead extends Omit<ClipIndex, 'groups' | 'still' | 'byteLength' | 'frameCount' | 'durationSeconds'> {
+  readonly still?: readonly Omit<ClipPart, 'start'>[];
   readonly groups: readonly {
     readonly frames: number;
     readonly parts: readonly Omit<ClipPart, 'start'>[];
@@ -86,8 +91,8 @@ export function clipIndexBytes(head: Uint8Array, name: string): number {
   if (!startsWith(head, MAGIC)) throw damaged(name, 'a clip', 'another file', 'decode/header');
   const view = viewOf(head);
   const [version, length] = [view.getUint32(4, true), view.getUint32(8, true)];
-  if (version !== VERSION)
-    throw damaged(name, `a clip of version ${VERSION}`, `version ${version}`, 'decode/unsupported');
+  if (!VERSIONS.includes(version))
+    throw damaged(name, `a clip of version ${VERSIONS.join(' or ')}`, `version ${version}`, 'decode/unsupported');
   if (length > MAX_CLIP_INDEX_BYTES)
     throw damaged(name, `an index of at most ${grouped(MAX_CLIP_INDEX_BYTES)} bytes`, grouped(length), 'decode/header');
   return length;
@@ -125,19 +130,19 @@ class IndexReader {
     if (!Array.isArray(groups) || groups.length < 1 || groups.length > MAX_GROUPS)
       this.#fail('groups', `1 to ${grouped(MAX_GROUPS)} groups`, groups);
     const found: ClipGroup[] = [];
-    let [first, at, count] = [0, start, 0];
+    const still = this.#still(this.#json.still, start);
+    let [first, at, count] = [0, endOf(still, start), still.length];
     for (const [k, group] of (groups as unknown[]).entries()) {
       const own = this.#group(`groups[${k}]`, group, first, at);
       found.push(own);
       count += own.parts.length;
       if (count > MAX_ALL_PARTS) this.#fail('groups', `at most ${grouped(MAX_ALL_PARTS)} parts`, count);
       first += own.frames;
-      const { start: begin, sceneBytes, motionBytes } = own.parts[own.parts.length - 1];
-      at = begin + sceneBytes + motionBytes;
+      at = endOf(own.parts, at);
     }
     if (!Number.isSafeInteger(at)) this.#fail('groups', 'a file whose bytes can be counted', at);
     return {
-      ...{ framesPerSecond, shDegree, groups: found, byteLength: at },
+      ...{ framesPerSecond, shDegree, groups: found, still, byteLength: at },
       ...{ frameCount: first, durationSeconds: first / framesPerSecond },
       origin: this.#vector('origin', origin),
       bounds: this.#bounds(bounds),
@@ -169,6 +174,25 @@ class IndexReader {
       return found;
     });
     return { first, frames, parts };
+  }
+
+  /** Reads the row of the splats that never change: `[[splats, bytes of the scene], ...]`. */
+  #still(rows: unknown, start: number): ClipPart[] {
+    if (rows === undefined) return [];
+    if (!Array.isArray(rows) || rows.length > MAX_PARTS) this.#fail('still', `up to ${MAX_PARTS} parts`, rows);
+    let at = start;
+    return (rows as unknown[]).map((row, k): ClipPart => {
+      const own = `still[${k}]`;
+      if (!Array.isArray(row) || row.length !== 2) this.#fail(own, 'splats, and a length in bytes', row);
+      const [splats, bytes] = row as unknown[];
+      const found = {
+        ...{ start: at, planes: 0, motionBytes: 0 },
+        splats: this.#whole(`${own}[0]`, splats, 1, 2 ** 28),
+        sceneBytes: this.#whole(`${own}[1]`, bytes, 1, 2 ** 31),
+      };
+      at += found.sceneBytes;
+      return found;
+    });
   }
 
   #bounds(bounds: unknown): ClipIndex['bounds'] {
@@ -208,11 +232,16 @@ class IndexReader {
   }
 }
 
+/** Returns the byte offset of the end of consecutive parts. */
+function endOf(parts: readonly ClipPart[], start: number): number {
+  return parts.reduce((end, { sceneBytes, motionBytes }) => end + sceneBytes + motionBytes, start);
+}
+
 /**
- * Returns the bytes of head and index. In the file, the scene and the motion of each part follow in order.
+ * Returns the bytes of head and index. In the file, the parts that never change follow, then the groups: the scene and the motion of each part follow in order.
  * @throws GaussianSplatError `argument/value` for an index that {@link parseClip} would refuse for its size.
  */
-export function writeClipHead({ groups, ...facts }: ClipHead): Uint8Array<ArrayBuffer> {
+export function writeClipHead({ groups, still = [], ...facts }: ClipHead): Uint8Array<ArrayBuffer> {
   requireAtMost(groups.length, MAX_GROUPS, 'groups');
   requireAtMost(
     groups.reduce((sum, { parts }) => sum + parts.length, 0),
@@ -223,12 +252,14 @@ export function writeClipHead({ groups, ...facts }: ClipHead): Uint8Array<ArrayB
     frames,
     ...parts.map(({ splats, planes, sceneBytes, motionBytes }) => [splats, planes, sceneBytes, motionBytes]),
   ]);
-  const index = new TextEncoder().encode(JSON.stringify({ ...facts, groups: rows }));
+  const stillRows = still.map(({ splats, sceneBytes }) => [splats, sceneBytes]);
+  const json = { ...facts, ...(still.length > 0 && { still: stillRows }), groups: rows };
+  const index = new TextEncoder().encode(JSON.stringify(json));
   requireAtMost(index.length, MAX_CLIP_INDEX_BYTES, 'bytes');
   const bytes = new Uint8Array(CLIP_HEAD_BYTES + index.length);
   bytes.set(new TextEncoder().encode(MAGIC));
   const view = viewOf(bytes);
-  view.setUint32(4, VERSION, true);
+  view.setUint32(4, VERSIONS[VERSIONS.length - 1], true);
   view.setUint32(8, index.length, true);
   bytes.set(index, CLIP_HEAD_BYTES);
   return bytes;
@@ -301,7 +332,8 @@ export async function readClipPart({
     throw damaged(name, `${grouped(splats)} splats, as the index says`, grouped(cloud.count), 'decode/header');
   if (cloud.shDegree > shDegree)
     throw damaged(name, `degree ${shDegree} at most, as the index says`, `degree ${cloud.shDegree}`, 'decode/header');
-  const motion = await readMotion({ bytes: bytes.subarray(sceneBytes), name, splats, frames, budget });
+  if (motionBytes === 0) return { cloud: toDegree(shDegree, cloud), motion: stillMotion(splats) };
+  const motion = await readMotion({ bytes: bytes.subarray(sceneBytes), name, cloud, frames, budget });
   const found = ANIMATED_ATTRIBUTE_NAMES.reduce(
     (sum, each) => sum + ANIMATED_ATTRIBUTES[each] * motion.parts[each].rank,
     0,
@@ -311,7 +343,7 @@ export async function readClipPart({
 }
 
 /**
- * Returns the splats that exist at a frame, from all given parts of one group.
+ * Returns the splats that exist at a frame, from all given parts of one group and of the splats that never change.
  * @param frame Index within the group; 0 is the group's first frame.
  * @throws GaussianSplatError `decode/empty`, `out-of-memory/budget`
  */

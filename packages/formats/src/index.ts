@@ -17,19 +17,21 @@ export type { MeshoptView } from './triangles/views.js';
 export { isSequence, MAX_HEADER_BYTES as HEADER_BYTES } from './signatures.js';
 export type { FileBytes } from './bytes.js';
 export { frameAt, framePath, parseSequence, sequencePaths, type FramePattern, type SceneSequence } from './sequence.js';
+export { writeCodedMotion, type WrittenMotion } from './clip/coded-motion.js';
+export { HarmonicsTurner } from './clip/turn-harmonics.js';
+export { curveBitsFor, roundedCurveValue } from './clip/code-curves.js';
+export { readMotion, type MotionFile } from './clip/read-motion.js';
 export {
   FADE_NAMES,
-  MOTION_MODES,
-  MOTION_VERSION,
   applyMotion,
   ANIMATED_ATTRIBUTES,
   ANIMATED_ATTRIBUTE_NAMES,
   fadeAt,
-  readMotion,
+  movedCloud,
+  stillMotion,
   type Fades,
   type Lives,
   type Motion,
-  type MotionFile,
   type AnimatedAttributeName,
   type AnimatedAttribute,
 } from './motion.js';

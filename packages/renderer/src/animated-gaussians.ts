@@ -15,10 +15,18 @@ import { CHUNK_NUMBERS, GEOMETRY_WORDS, shWords } from './pack/words.js';
 const { CULL_GROUP } = constants;
 const PIECES = ['bases', 'sh', 'codes', 'curves'] as const;
 
+interface PartRoom {
+  readonly rows: number;
+  readonly planes: number;
+  readonly frames: number;
+}
+
 /** Size of the buffers of a clip: the largest sizes of each part over all its groups of frames. */
 export interface AnimatedRoom extends FilterRule {
   /** Parts of a group in their order: splats, planes of codes, and frames. */
-  readonly parts: readonly { readonly rows: number; readonly planes: number; readonly frames: number }[];
+  readonly parts: readonly PartRoom[];
+  /** Parts with the splats that all groups share, because they never change. Default: none. */
+  readonly still?: readonly PartRoom[];
   readonly shDegree: ShDegree;
   readonly origin: Vector3;
   /** Factor that enlarges the splats of the first part while other parts are missing. */
@@ -44,6 +52,8 @@ interface SlotPart {
 
 /** Number of slots: one for the displayed group of frames, one for the next group. */
 export const ANIMATION_SLOTS = 2;
+/** Slot of the parts that never change, which are shown with the group of each other slot. */
+export const STILL_SLOT = ANIMATION_SLOTS;
 const FIELDS = layouts.Animate.fields;
 
 /**
@@ -58,10 +68,14 @@ export class AnimatedGaussians extends SceneBuffers {
   readonly #grow: number;
   #version = 0;
   #frameCount = 0;
+  /** Number of still parts that were uploaded when they were evaluated last; -1 before, or if they were enlarged. */
+  #stillShown = -1;
 
   private constructor(device: GPUDevice, memory: GpuMemory, room: AnimatedRoom) {
-    const rooms = room.parts.map(({ rows }) => CULL_GROUP * Math.ceil(rows / CULL_GROUP));
-    const count = rooms.reduce((sum, rows) => sum + rows, 0);
+    const { parts, still = [] } = room;
+    const [rooms, stillRooms] = [parts, still].map((own) => own.map(rowRoom));
+    const groupRows = rooms.reduce((sum, rows) => sum + rows, 0);
+    const count = stillRooms.reduce((sum, rows) => sum + rows, groupRows);
     super(memory, room, count);
     memory.reserve(whatOf(count), bytesOf(room, count), room.memoryBudget);
     this.#device = device;
@@ -77,14 +91,16 @@ export class AnimatedGaussians extends SceneBuffers {
       chunks: part('chunks', (CHUNK_NUMBERS * count) / CULL_GROUP),
     };
     this.blocks = [page];
-    this.#slots = Array.from({ length: ANIMATION_SLOTS }, () => {
-      let first = 0;
-      return room.parts.map((own, k) => {
-        const slot = this.#slotPart(room, own, rooms[k], first);
-        first += rooms[k];
+    const slotOf = (own: readonly PartRoom[], ownRooms: readonly number[], begin: number): SlotPart[] => {
+      let first = begin;
+      return own.map((each, k) => {
+        const slot = this.#slotPart(room, each, ownRooms[k], first);
+        first += ownRooms[k];
         return slot;
       });
-    });
+    };
+    const groupSlots = Array.from({ length: ANIMATION_SLOTS }, () => slotOf(parts, rooms, 0));
+    this.#slots = [...groupSlots, slotOf(still, stillRooms, groupRows)];
   }
 
   /**
@@ -105,7 +121,7 @@ export class AnimatedGaussians extends SceneBuffers {
     return this.#frameCount;
   }
 
-  /** Discards the content of a slot, 0 or 1. */
+  /** Discards the content of a slot. */
   clear(slot: number): void {
     for (const part of this.#slots[slot]) part.content = undefined;
   }
@@ -155,26 +171,39 @@ export class AnimatedGaussians extends SceneBuffers {
    * @param isWhole False while parts of the group are missing: the splats of the uploaded parts are then enlarged.
    */
   show(slot: number, frame: number, isWhole: boolean): void {
-    const parts = this.#slots[slot];
     const encoder = this.#device.createCommandEncoder({ label: 'gs.animate' });
     const pass = encoder.beginComputePass({ label: 'gs.animate' });
+    const factor = isWhole ? 1 : this.#grow;
     this.#frameCount = 0;
-    parts.forEach((part, k) => {
-      const content = this.isWritten(slot, k) ? part.content : undefined;
-      this.#frameCount += content?.rows ?? 0;
-      setValues(part.values, content, frame, isWhole ? 1 : this.#grow);
-      this.#device.queue.writeBuffer(part.uniform, 0, part.values);
-      this.#stage.record(pass, part.bindings, part.rowRoom);
-    });
+    for (let k = 0; k < this.#slots[slot].length; k++) this.#evaluate(pass, slot, k, frame, factor);
+    const still = this.#slots[STILL_SLOT];
+    let written = 0;
+    for (let k = 0; k < still.length; k++) if (this.isWritten(STILL_SLOT, k)) written++;
+    // Evaluated splats remain until other parts are uploaded.
+    const isShown = factor === 1 && written === this.#stillShown;
+    for (let k = 0; k < still.length; k++) {
+      if (isShown) this.#frameCount += this.isWritten(STILL_SLOT, k) ? still[k].content!.rows : 0;
+      else this.#evaluate(pass, STILL_SLOT, k, 0, factor);
+    }
+    this.#stillShown = factor === 1 ? written : -1;
     pass.end();
     this.#device.queue.submit([encoder.finish()]);
     this.#version++;
   }
 
+  #evaluate(pass: GPUComputePassEncoder, slot: number, k: number, frame: number, factor: number): void {
+    const part = this.#slots[slot][k];
+    const content = this.isWritten(slot, k) ? part.content : undefined;
+    this.#frameCount += content?.rows ?? 0;
+    setValues(part.values, content, frame, factor);
+    this.#device.queue.writeBuffer(part.uniform, 0, part.values);
+    this.#stage.record(pass, part.bindings, part.rowRoom);
+  }
+
   #slotPart(
     { shDegree }: AnimatedRoom,
-    { rows, planes, frames }: AnimatedRoom['parts'][number],
-    rowRoom: number,
+    { rows, planes, frames }: PartRoom,
+    ownRoom: number,
     first: number,
   ): SlotPart {
     const { storage, uniform, copyDestination } = BUFFER_USAGE;
@@ -184,16 +213,17 @@ export class AnimatedGaussians extends SceneBuffers {
     const buffers = { bases: buffer('bases'), sh: buffer('sh'), codes: buffer('codes'), curves: buffer('curves') };
     const values = new Uint32Array(layouts.Animate.size / 4);
     const nothing = { ranks: [0, 0, 0, 0], color_rank: 0, curve_count: 0, frame: 0, rows: 0, plane_codes: 0, grow: 1 };
+    const plain = { turns_harmonics: 0, aged: [0, 0, 0, 0], color_aged: 0 };
     writeStruct(
       layouts.Animate,
-      { ...nothing, row_room: rowRoom, first_row: first, sh_degree: shDegree },
+      { ...nothing, ...plain, row_room: ownRoom, first_row: first, sh_degree: shDegree },
       values.buffer,
     );
     const own = this.memory.buffer('gs.animate.uniform', layouts.Animate.size, uniform | copyDestination);
     const [{ geometry, sh, chunks }] = this.blocks;
     const { bases, sh: base_sh, codes, curves } = buffers;
     const bindings = this.#stage.bind({ animate: own, bases, base_sh, codes, curves, gaussians: geometry, sh, chunks });
-    return { buffers, uniform: own, values, bindings, rowRoom, content: undefined, written: 0 };
+    return { buffers, uniform: own, values, bindings, rowRoom: ownRoom, content: undefined, written: 0 };
   }
 }
 
@@ -210,21 +240,30 @@ function setValues(values: Uint32Array, content: PackedAnimation | undefined, fr
   values[FIELDS.frame.offset / 4] = frame;
   values[FIELDS.grow.offset / 4] = growBits[0];
   if (content === undefined) return;
-  const { ranks, rows } = content;
-  for (let k = 0; k < 4; k++) values[FIELDS.ranks.offset / 4 + k] = ranks[k];
+  const { ranks, aged, rows } = content;
+  for (let k = 0; k < 4; k++) {
+    values[FIELDS.ranks.offset / 4 + k] = ranks[k];
+    values[FIELDS.aged.offset / 4 + k] = aged[k];
+  }
   values[FIELDS.color_rank.offset / 4] = ranks[4];
+  values[FIELDS.color_aged.offset / 4] = aged[4];
+  values[FIELDS.turns_harmonics.offset / 4] = content.turnsHarmonics ? 1 : 0;
   values[FIELDS.curve_count.offset / 4] = ranks[0] + ranks[1] + ranks[2] + ranks[3] + ranks[4];
   values[FIELDS.plane_codes.offset / 4] = planeCodes(rows);
 }
 
 const sizeOf = (content: PackedAnimation): number => PIECES.reduce((sum, name) => sum + content[name].byteLength, 0);
 
-function bytesOf({ parts, shDegree }: AnimatedRoom, count: number): number {
-  const ofSlot = parts.reduce((sum, own) => {
-    const { bases, sh, codes, curves } = animationBytes({ ...own, shDegree });
-    return sum + bases + sh + codes + curves;
-  }, 0);
-  return ANIMATION_SLOTS * ofSlot + count * bytesPerSplat(shDegree, 'float16');
+/** Returns the capacity of a part in splats. */
+const rowRoom = ({ rows }: PartRoom): number => CULL_GROUP * Math.ceil(rows / CULL_GROUP);
+
+function bytesOf({ parts, still = [], shDegree }: AnimatedRoom, count: number): number {
+  const ofSlot = (own: readonly PartRoom[]): number =>
+    own.reduce((total, each) => {
+      const { bases, sh, codes, curves } = animationBytes({ ...each, shDegree });
+      return total + bases + sh + codes + curves;
+    }, 0);
+  return ANIMATION_SLOTS * ofSlot(parts) + ofSlot(still) + count * bytesPerSplat(shDegree, 'float16');
 }
 
 const whatOf = (count: number): string => `clip of up to ${count} splats`;

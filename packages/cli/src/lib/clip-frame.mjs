@@ -17,9 +17,7 @@ async function openFourDgs(bytes, name) {
 export async function openClip(bytes, name) {
   const clip = isFourDgs(name) ? await openFourDgs(bytes, name) : undefined;
   const index = clip?.index ?? parseClip(bytes, name);
-  const read = async (number) => {
-    if (clip) return [await clip.group(number)];
-    const { frames, parts } = index.groups[number];
+  const readParts = async (parts, frames) => {
     const contents = [];
     for (const part of parts) {
       const { start, sceneBytes, motionBytes } = part;
@@ -27,6 +25,12 @@ export async function openClip(bytes, name) {
       contents.push(await readClipPart({ bytes: own, part, frames, shDegree: index.shDegree, name }));
     }
     return contents;
+  };
+  const still = await readParts(index.still, 1);
+  const read = async (number) => {
+    if (clip) return [await clip.group(number)];
+    const { frames, parts } = index.groups[number];
+    return [...still, ...(await readParts(parts, frames))];
   };
   let [group, contents] = [-1, []];
   return {

@@ -4,17 +4,21 @@ import {
   ANIMATED_ATTRIBUTES,
   ANIMATED_ATTRIBUTE_NAMES,
   readScene,
+  writeCodedMotion,
   type ClipPartContent,
   type Fades,
   type Lives,
   type AnimatedAttributeName,
+  type WrittenMotion,
 } from '@gaussian-splat/formats';
 import { packedOrder } from '@gaussian-splat/renderer/tools';
-import { minCurve, motionFile, roundedPart, UNCHANGED, type Followed, type MotionSteps } from './write-motion.js';
-import type { Deflate } from '../pages/page-planes.js';
 import { splatsOf } from '../reduce.js';
+import { scaledSteps } from '../steps.js';
 import type { Encoding } from '../write/index.js';
+import { FINER, minCurve, type Followed, type MotionSteps } from './curves.js';
 import { takeFades } from './fades.js';
+import { roundMotion, UNCHANGED } from './round-motion.js';
+import { harmonicsTurn } from './turning-harmonics.js';
 import { followedWithin } from './partial-curves.js';
 import { changesOfTracks } from './track-changes.js';
 import type { Tracks } from './tracks.js';
@@ -33,24 +37,28 @@ export interface WrittenClipPart {
  * any steps.
  */
 export class TrackedPart {
+  /** [tracks] index of each track's splat in this part, or -1. */
+  readonly placeOf: Int32Array;
   readonly #scene: Uint8Array;
   readonly #cloud: GaussianCloud;
-  readonly #lives: Lives;
-  readonly #frames: number;
+  readonly #still: Omit<WrittenMotion, 'parts' | 'curveBits'>;
   readonly #followed: Readonly<Record<AnimatedAttributeName, Followed | undefined>>;
+  /** [splats] effect on images of errors of positions, and of other attributes; 1 on average. */
+  readonly #importance: Readonly<Record<'position' | 'other', Float32Array>>;
 
   private constructor(
     scene: Uint8Array,
     cloud: GaussianCloud,
-    lives: Lives,
-    frames: number,
+    placeOf: Int32Array,
+    still: Omit<WrittenMotion, 'parts' | 'curveBits'>,
     found: Readonly<Record<AnimatedAttributeName, Followed | undefined>>,
   ) {
     this.#scene = scene;
     this.#cloud = cloud;
-    this.#lives = lives;
-    this.#frames = frames;
+    this.placeOf = placeOf;
+    this.#still = still;
     this.#followed = found;
+    this.#importance = importanceOf(cloud);
   }
 
   /**
@@ -58,14 +66,14 @@ export class TrackedPart {
    * @param whole Splats of all tracks.
    * @param chosen Indices of the tracks of this part.
    * @param encoding Encoding of the scene.
-   * @param finest Minimum quantization steps of motion with which the part will be used.
+   * @param steps Quantization steps of motion; {@link contentAt} may be called with steps down to a sixteenth.
    */
   static async of(
     tracks: Tracks,
     whole: GaussianCloud,
     chosen: Uint32Array,
     encoding: Encoding,
-    finest: MotionSteps,
+    steps: MotionSteps,
   ): Promise<TrackedPart> {
     const given = splatsOf(whole, chosen);
     const scene = new Uint8Array(
@@ -80,6 +88,7 @@ export class TrackedPart {
     const livesOf = (own: Uint16Array): Uint16Array => Uint16Array.from(order, (i) => own[chosen[i]]);
     const lives = { first: livesOf(tracks.lives.first), end: livesOf(tracks.lives.end) };
     const frames = tracks.frames.length;
+    const finest = scaledSteps(steps, 1 / FINER);
     // Changes are relative to the source in the order of the file, so that static splats have no motion. The error of
     // rounding the scene is part of the scene's fraction of the allowed error.
     let fades: Fades | undefined;
@@ -93,46 +102,56 @@ export class TrackedPart {
       return changes && followedWithin(changes, frames, span, minCurve(finest[name]));
     };
     const found = Object.fromEntries(ANIMATED_ATTRIBUTE_NAMES.map((name) => [name, find(name)]));
-    return new TrackedPart(
-      scene,
-      cloud,
-      { ...lives, fades },
-      frames,
-      found as Record<AnimatedAttributeName, Followed | undefined>,
-    );
+    const turnsHarmonics = harmonicsTurn(tracks, { cloud: source, placeOf });
+    const still = { splats: cloud.count, frames, lives: { ...lives, fades } satisfies Lives, turnsHarmonics };
+    return new TrackedPart(scene, cloud, placeOf, still, found as Record<AnimatedAttributeName, Followed | undefined>);
   }
 
   /** Returns the content that a reader decodes if motion is quantized with the given steps. */
-  contentAt(steps: MotionSteps): ClipPartContent {
-    const parts = Object.fromEntries(
-      ANIMATED_ATTRIBUTE_NAMES.map((name) => {
-        const own = this.#followed[name];
-        return [
-          name,
-          own ? roundedPart(strongest(own, minCurve(steps[name])), steps[name], this.#cloud.count) : UNCHANGED,
-        ];
-      }),
-    ) as ClipPartContent['motion']['parts'];
-    return {
-      cloud: this.#cloud,
-      motion: { splats: this.#cloud.count, frames: this.#frames, parts, lives: this.#lives },
-    };
+  contentAt(steps: MotionSteps): ClipPartContent & { readonly motion: WrittenMotion } {
+    const rounded = ANIMATED_ATTRIBUTE_NAMES.map((name) => {
+      const own = this.#followed[name];
+      const importance = this.#importance[name === 'position' ? name : 'other'];
+      return own ? roundMotion(own, steps[name], importance) : UNCHANGED;
+    });
+    const parts = Object.fromEntries(ANIMATED_ATTRIBUTE_NAMES.map((name, k) => [name, rounded[k].part]));
+    const curveBits = rounded.map((own) => own.curveBits);
+    return { cloud: this.#cloud, motion: { ...this.#still, parts: parts as WrittenMotion['parts'], curveBits } };
   }
 
-  write(steps: MotionSteps, deflate: Deflate): WrittenClipPart {
-    const { parts } = this.contentAt(steps).motion;
-    const motion = motionFile({
-      ...{ splats: this.#cloud.count, frames: this.#frames, lives: this.#lives, deflate },
-      parts: ANIMATED_ATTRIBUTE_NAMES.map((name) => parts[name]),
-    });
+  write(steps: MotionSteps): WrittenClipPart {
+    const { motion } = this.contentAt(steps);
+    const bytes = writeCodedMotion(motion, this.#cloud);
     return {
       splats: this.#cloud.count,
-      planes: ANIMATED_ATTRIBUTE_NAMES.reduce((sum, name) => sum + ANIMATED_ATTRIBUTES[name] * parts[name].rank, 0),
+      planes: ANIMATED_ATTRIBUTE_NAMES.reduce(
+        (sum, name) => sum + ANIMATED_ATTRIBUTES[name] * motion.parts[name].rank,
+        0,
+      ),
       sceneBytes: this.#scene.length,
-      motionBytes: motion.length,
-      bytes: concatenated(Uint8Array, [this.#scene, motion]),
+      motionBytes: bytes.length,
+      bytes: concatenated(Uint8Array, [this.#scene, bytes]),
     };
   }
+}
+
+/**
+ * Returns the effect of errors on images. The sum of the squared error of pixels grows with the squared opacity and, for
+ * all attributes except position, with the area of the splat.
+ */
+function importanceOf({ count, opacities, scales }: GaussianCloud): Record<'position' | 'other', Float32Array> {
+  const position = new Float32Array(count);
+  const other = new Float32Array(count);
+  for (let i = 0; i < count; i++) {
+    const [a, b, c] = scales.subarray(3 * i, 3 * i + 3);
+    position[i] = opacities[i] ** 2;
+    other[i] = position[i] * Math.max(a * b, b * c, c * a);
+  }
+  for (const own of [position, other]) {
+    const mean = own.reduce((sum, value) => sum + value, 0) / count;
+    for (let i = 0; i < count; i++) own[i] = mean > 0 ? own[i] / mean : 1;
+  }
+  return { position, other };
 }
 
 /** Returns the indices in `given` of the splats of a file. Formats keep the order, or sort splats as packing does. */
@@ -145,20 +164,6 @@ function orderIn(read: GaussianCloud, given: GaussianCloud): Uint32Array {
     return sum;
   });
   return orders[apart[0] <= apart[1] ? 0 : 1];
-}
-
-/** Returns the curves, with their weights, whose root mean square weight is above `min`. */
-function strongest({ rows, frames, curves, shares }: Followed, min: number): Followed {
-  const isStrong = shares.map((own) => {
-    let sum = 0;
-    for (let row = 0; row < own.length; row++) sum += own[row] * own[row];
-    return sum / own.length > min * min;
-  });
-  return {
-    ...{ rows, frames },
-    curves: curves.filter((_, k) => isStrong[k]),
-    shares: shares.filter((_, k) => isStrong[k]),
-  };
 }
 
 const notWritten = (expected: number, found: number): GaussianSplatError =>

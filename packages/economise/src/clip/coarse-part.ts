@@ -4,19 +4,23 @@ import type { Tracks } from './tracks.js';
 
 /** Minimum number of neighboring splats for each splat of the coarse part. */
 const COARSE_RUN = 8;
-/** Approximate maximum number of splats of the coarse part. At 30 bytes each, it arrives within 1.7 s at 2 Mbit/s. */
+/** Approximate maximum number of splats of a coarse part. At 30 bytes each, it arrives within 1.7 s at 2 Mbit/s. */
 const MAX_COARSE = 12_000;
 
 /**
  * Divides tracks into a coarse part with splats from all regions of the scene, and the rest.
  * @param cloud Splats of the tracks.
+ * @param tracks Undefined for splats that never change.
  * @returns Indices of the tracks of each part that is not empty.
  */
-export function coarseAndRest(cloud: GaussianCloud, { lives, frames }: Tracks): readonly Uint32Array[] {
+export function coarseAndRest(cloud: GaussianCloud, tracks?: Tracks): readonly Uint32Array[] {
   const order = packedOrder(cloud);
   const weightOf = (i: number): number => {
     const [a, b, c] = cloud.scales.subarray(3 * i, 3 * i + 3);
-    return (cloud.opacities[i] * Math.max(a * b, b * c, c * a) * (lives.end[i] - lives.first[i])) / frames.length;
+    const area = Math.max(a * b, b * c, c * a);
+    if (!tracks) return cloud.opacities[i] * area;
+    const { lives, frames } = tracks;
+    return (cloud.opacities[i] * area * (lives.end[i] - lives.first[i])) / frames.length;
   };
   const coarse: number[] = [];
   const rest: number[] = [];

@@ -9,6 +9,7 @@ const MAX_SWEEPS = 30;
  */
 export function mainCurves(rows: Float32Array, length: number, min: number): Float64Array[] {
   const count = rows.length / length;
+  if (count === 0) return [];
   const stride = Math.max(1, Math.floor(count / MAX_ROWS));
   const products = new Float64Array(length * length);
   let used = 0;

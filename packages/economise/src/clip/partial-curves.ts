@@ -1,5 +1,5 @@
 import { mainCurves } from './main-curves.js';
-import { followed, type Followed } from './write-motion.js';
+import { followed, minCurveStep, type Followed } from './curves.js';
 
 /** Returns the range of valid frames of a row: from `first` to `end`, excluding `end`. */
 export type Span = (row: number) => readonly [first: number, end: number];
@@ -30,14 +30,21 @@ export function followedWithin(changes: Float32Array, frames: number, span: Span
     (end - first < frames ? passing : staying).push(row);
   }
   if (passing.length === 0) return followed(changes, frames, min);
-  if (staying.length === 0) return followedPartly(changes, frames, span, min);
   const found = [staying, passing].map((own) => {
-    const picked = new Float32Array(frames * own.length);
-    own.forEach((row, k) => picked.set(changes.subarray(frames * row, frames * (row + 1)), frames * k));
+    if (own.length === 0) return followed(changes.subarray(0, 0), frames, min);
     // A part of the rows has these curves, so that their mean weight over all rows is smaller.
     const ownMin = min * Math.sqrt(rows / own.length);
+    const picked = rowsOf(changes, frames, own);
     if (own === staying) return followed(picked, frames, ownMin);
-    return followedPartly(picked, frames, (k) => span(own[k]), ownMin);
+    const spans = own.map(span);
+    const inFrames = followedPartly(picked, frames, (k) => spans[k], ownMin);
+    const inAges = followedPartly(
+      agedRows(changes, frames, own, span),
+      frames,
+      (k) => [0, spans[k][1] - spans[k][0]],
+      ownMin,
+    );
+    return bitsOf(inAges, min) < bitsOf(inFrames, min) ? { ...inAges, isAged: true } : inFrames;
   });
   // A file has at most as many curves as frames.
   if (found.reduce((sum, { curves }) => sum + curves.length, 0) > frames)
@@ -51,7 +58,33 @@ export function followedWithin(changes: Float32Array, frames: number, span: Span
     ...{ rows, frames },
     curves: found.flatMap(({ curves }) => curves),
     shares: found.flatMap(({ shares }, kind) => shares.map((own) => spread([staying, passing][kind], own))),
+    passing: found[1].curves.length,
+    isAged: found[1].isAged,
   };
+}
+
+function rowsOf(changes: Float32Array, frames: number, rows: readonly number[]): Float32Array {
+  const picked = new Float32Array(frames * rows.length);
+  rows.forEach((row, k) => picked.set(changes.subarray(frames * row, frames * (row + 1)), frames * k));
+  return picked;
+}
+
+/** Returns rows over the ages of their splats: each begins with its first valid frame. */
+function agedRows(changes: Float32Array, frames: number, rows: readonly number[], span: Span): Float32Array {
+  const picked = new Float32Array(frames * rows.length);
+  rows.forEach((row, k) => {
+    const [first, end] = span(row);
+    picked.set(changes.subarray(frames * row + first, frames * row + end), frames * k);
+  });
+  return picked;
+}
+
+/** Returns the approximate number of bits of the weights of curves. @param min As for {@link followedWithin}. */
+function bitsOf({ shares }: Followed, min: number): number {
+  const step = minCurveStep(min);
+  let bits = 0;
+  for (const own of shares) for (let row = 0; row < own.length; row++) bits += Math.log2(1 + Math.abs(own[row]) / step);
+  return bits;
 }
 
 /** Finds curves of rows with missing frames. Repeatedly predicts missing frames from curves, and finds the curves again. */

@@ -1,6 +1,6 @@
 import { shCoefficientCount, type GaussianCloud } from '@gaussian-splat/core';
 import { ANIMATED_ATTRIBUTES, type AnimatedAttributeName } from '@gaussian-splat/formats';
-import { turnBetween } from './write-motion.js';
+import { turnBetween } from './curves.js';
 import type { Tracks } from './tracks.js';
 
 /** Splats of some tracks. */
@@ -75,9 +75,12 @@ function numbersOf(name: Exclude<AnimatedAttributeName, 'rotation'>, cloud: Gaus
   return reads[name];
 }
 
-/** Returns a function that writes rotation vectors. Of the vectors of a rotation, it selects that nearest to the last. */
+/**
+ * Returns a function that writes rotation vectors. Vectors of one rotation differ by whole turns; that nearest to the last
+ * vector is selected, so that a splat that spins has a steady vector.
+ */
 function turnsOf({ cloud }: TrackedSplats): Read {
-  const last = new Float64Array(4 * cloud.count);
+  const last = new Float64Array(3 * cloud.count);
   const turn = new Float64Array(4);
   const from = new Float32Array(4);
   const to = new Float32Array(4);
@@ -87,13 +90,16 @@ function turnsOf({ cloud }: TrackedSplats): Read {
       to[k] = frame.rotations[4 * i + k];
     }
     turnBetween(from, to, 0, turn);
-    let cosine = 0;
-    for (let k = 0; k < 4; k++) cosine += last[4 * place + k] * turn[k];
-    // For a splat without a previous frame, the vector with the smaller angle is selected.
-    const sign = (cosine || turn[0]) < 0 ? -1 : 1;
-    for (let k = 0; k < 4; k++) last[4 * place + k] = turn[k] *= sign;
-    const length = Math.hypot(turn[1], turn[2], turn[3]);
-    const factor = length > 1e-12 ? (2 * Math.atan2(length, turn[0])) / length : 2;
-    for (let k = 0; k < 3; k++) out[k] = factor * turn[k + 1];
+    const before = last.subarray(3 * place, 3 * place + 3);
+    const size = Math.hypot(turn[1], turn[2], turn[3]);
+    const lastSize = Math.hypot(before[0], before[1], before[2]);
+    // Near whole turns, the axis is that of the last vector.
+    const axisOf = (k: number): number =>
+      size > 1e-6 ? turn[k + 1] / size : lastSize > 0 ? before[k] / lastSize : 0;
+    const axis = [axisOf(0), axisOf(1), axisOf(2)];
+    const angle = 2 * Math.atan2(size, turn[0]);
+    const along = axis[0] * before[0] + axis[1] * before[1] + axis[2] * before[2];
+    const nearest = angle + 2 * Math.PI * Math.round((along - angle) / (2 * Math.PI));
+    for (let k = 0; k < 3; k++) before[k] = out[k] = nearest * axis[k];
   };
 }

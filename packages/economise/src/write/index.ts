@@ -5,7 +5,7 @@ import type { ReducedCloud } from '../reduce.js';
 import type { TaskPool } from '../parts/task-pool.js';
 import { writeGlb } from './glb.js';
 import { writePly } from './ply.js';
-import { tuneSog } from './tune-sog.js';
+import { tuneSog, type SogChoice } from './tune-sog.js';
 import { fractionalBitsOf, writeSpz } from './spz.js';
 import type { EncodeWebp } from './sog.js';
 import { isLodIndex } from './streamed-sog.js';
@@ -30,6 +30,8 @@ export interface Encoding {
    * bytes. Default: false.
    */
   readonly hasOneDegree?: boolean;
+  /** Settings that {@link tune} selected; undefined for other formats than SOG. */
+  readonly sog?: SogChoice;
   /** Returns this encoding with all steps multiplied by a factor. Undefined unless {@link tune} selected the steps. */
   readonly coarser?: (factor: number) => Encoding;
   /**

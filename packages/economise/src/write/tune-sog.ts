@@ -8,6 +8,12 @@ import { writeStreamedSog } from './streamed-sog.js';
 import { writeZip } from './zip.js';
 
 const USUAL: SogSteps = { place: 4, size: 1 / 12, turn: 4, opacity: 4, color: 1 / 32, harmonics: 1 / 64 };
+/** Settings of a SOG file that measurements select. */
+export interface SogChoice {
+  readonly steps: SogSteps;
+  readonly palette: number;
+}
+
 /** Number of values of a splat that each step quantizes. Harmonics depend on the palette; about half of them are 0. */
 const NUMBERS: Omit<SogSteps, 'harmonics'> = { place: 3, size: 3, turn: 3, opacity: 1, color: 3 };
 /** Finest steps that files support, in the units of {@link SogSteps}. */
@@ -50,6 +56,7 @@ function tunedSog(options: SogOptions, hasHarmonics: boolean, isStreamed: boolea
   return {
     title: `${isStreamed ? 'streamed ' : ''}${title}`,
     hasOneDegree: true,
+    sog: { steps, palette },
     write: async ({ cloud, kept }) => {
       const own = { ...options, seen: seen && kept ? splatsSeen(seen, kept) : seen };
       return isStreamed ? writeZip(await writeStreamedSog(cloud, own)) : writeSog(cloud, own);
@@ -57,6 +64,10 @@ function tunedSog(options: SogOptions, hasHarmonics: boolean, isStreamed: boolea
     coarser: (factor) => tunedSog({ ...options, steps: scaledSteps(steps, factor) }, hasHarmonics, isStreamed),
   };
 }
+
+/** Returns the encoding that {@link tuneSog} selected before. */
+export const sogOf = (choice: SogChoice, encodeWebp: EncodeWebp): Encoding =>
+  tunedSog({ ...choice, encodeWebp }, true, false);
 
 async function tuned(
   { cloud }: WrittenCloud,

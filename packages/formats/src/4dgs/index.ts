@@ -51,7 +51,7 @@ export class FourDgsClip {
     const first = await firstSplats(file);
     const bounds = { ...boundsOf(first), ...(file.up && { up: file.up }) };
     return new FourDgsClip(file, {
-      ...{ framesPerSecond, frameCount, groups, bounds, byteLength: bytes.length },
+      ...{ framesPerSecond, frameCount, groups, still: [], bounds, byteLength: bytes.length },
       ...{ durationSeconds: frameCount / framesPerSecond, shDegree: header.shDegree, origin: file.origin },
       ...{ antialiased: false, grow: 1 },
     });

@@ -44,7 +44,7 @@ export function sampledMotion({ clouds, isThere }: Moments): ClipPartContent {
       return [name, partOf(name, changes, base, first, end, frames)];
     }),
   ) as Record<AnimatedAttributeName, AnimatedAttribute>;
-  return { cloud: { ...base, shDegree }, motion: { splats: count, frames, parts, lives: { first, end } } };
+  return { cloud: { ...base, shDegree }, motion: { splats: count, frames, parts, lives: { first, end }, turnsHarmonics: false } };
 }
 
 /** Returns a cloud whose row i is copied from the frame `moments[i]`. */
@@ -113,7 +113,7 @@ function partOf(
   frames: number,
 ): AnimatedAttribute {
   const largest = changes.reduce((max, own) => own.reduce((m, value) => Math.max(m, Math.abs(value)), max), 0);
-  const still: AnimatedAttribute = { rank: 0, step: 1, curves: new Float32Array(0), codes: [] };
+  const still: AnimatedAttribute = { rank: 0, aged: 0, step: 1, curves: new Float32Array(0), codes: [] };
   if (largest === 0) return still;
   const lines = name === 'position' ? linesOf(changes, first, end, frames, minOf(base, largest)) : undefined;
   if (lines) {
@@ -122,6 +122,7 @@ function partOf(
     const codes = coded(lines, 1);
     return {
       rank: 1,
+      aged: 0,
       step: codes.step,
       curves: Float32Array.from({ length: frames }, (_, f) => f),
       codes: codes.codes,
@@ -129,7 +130,7 @@ function partOf(
   }
   const curves = new Float32Array(frames * frames);
   for (let f = 0; f < frames; f++) curves[frames * f + f] = 1;
-  return { rank: frames, curves, ...coded(changes, frames) };
+  return { rank: frames, aged: 0, curves, ...coded(changes, frames) };
 }
 
 /** Returns the smallest change of positions that is not ignored. It includes the rounding errors of float32 positions. */

@@ -14,6 +14,8 @@ export interface Motions {
       Attribute,
       {
         readonly rank: number;
+        /** Number of the last curves whose frames count from the first frame of each splat. */
+        readonly aged: number;
         readonly step: number;
         /** [frames, rank] values of each curve in each frame */
         readonly curves: Float32Array;
@@ -22,6 +24,8 @@ export interface Motions {
       }
     >
   >;
+  /** Whether spherical harmonics turn with the change of rotation. */
+  readonly turnsHarmonics: boolean;
   /** Range of frames that contain each splat. */
   readonly lives: {
     /** [splats] index of the first frame */
@@ -43,6 +47,9 @@ export interface PackedAnimation {
   readonly frames: number;
   /** Number of curves of each attribute. */
   readonly ranks: readonly number[];
+  /** Number of the last curves of each attribute that run in the age of a splat. */
+  readonly aged: readonly number[];
+  readonly turnsHarmonics: boolean;
   /** [rows, {@link BASE_WORDS}] words: `Base` of shaders/animate.wgsl. */
   readonly bases: Uint32Array;
   /** [rows, shWords] words, float16. */
@@ -82,7 +89,8 @@ export function packAnimation(cloud: GaussianCloud, motions: Motions, origin: Ve
     at += rank;
   }
   return {
-    ...{ rows, frames, ranks, codes, curves },
+    ...{ rows, frames, ranks, codes, curves, turnsHarmonics: motions.turnsHarmonics },
+    aged: ATTRIBUTES.map((name) => parts[name].aged),
     bases: packBases(cloud, motions, origin),
     sh: packSh(cloud, all, 'float16'),
   };

@@ -6,7 +6,7 @@ import type { SceneBounds } from '../../viewer/camera/settings.js';
 import type { OpenedClip } from '../../loading/clip-of.js';
 import type { ClipAnswer, ClipRequest, ProgressListener, SceneRequest } from '../../loading/protocol.js';
 import type { SceneWorker, SceneLoader } from '../../loading/scene-loader.js';
-import { GroupCache } from './group-cache.js';
+import { GroupCache, partsIn, STILL } from './group-cache.js';
 import { GroupSlots } from './group-slots.js';
 import { PlayDirection } from './play-direction.js';
 import type { DynamicListeners, DynamicState, Timeline } from '../generator/dynamic-model.js';
@@ -71,11 +71,9 @@ export class ClipPlayer implements Timeline {
     const cache = new GroupCache(index, {
       fetchPart: (group, part, aborted) => {
         const { groups, shDegree, origin } = index;
-        const { frames, parts } = groups[group];
-        return ask<PackedAnimation>(
-          { whole: file, part: { part: parts[part], group, frames, shDegree, origin } },
-          aborted,
-        );
+        const frames = group === STILL ? 1 : groups[group].frames;
+        const own = { part: partsIn(index, group)[part], group, frames, shDegree, origin };
+        return ask<PackedAnimation>({ whole: file, part: own }, aborted);
       },
       onArrival: () => {
         onProgress(file ? index.byteLength : cache.loadedBytes, index.byteLength);
@@ -88,7 +86,8 @@ export class ClipPlayer implements Timeline {
     try {
       const arriving = cache.first(first, signal);
       arriving.catch(() => undefined);
-      gaussians = await AnimatedGaussians.create(device, { ...index, parts: roomOf(index), memoryBudget });
+      const still = index.still.map(({ splats, planes }) => ({ rows: splats, planes, frames: 1 }));
+      gaussians = await AnimatedGaussians.create(device, { ...index, parts: roomOf(index), still, memoryBudget });
       await arriving;
       signal.throwIfAborted();
       const player = new ClipPlayer(options, index, gaussians, cache);
@@ -105,7 +104,7 @@ export class ClipPlayer implements Timeline {
     const { framesPerSecond, groups } = this.#index;
     const spans: [number, number][] = [];
     for (const [k, { first, frames }] of groups.entries()) {
-      if (!this.#cache.get(k, 0)) continue;
+      if (!this.#cache.canShow(k)) continue;
       const [start, end] = [first / framesPerSecond, (first + frames) / framesPerSecond];
       const last = spans.at(-1);
       if (last && last[1] === start) last[1] = end;
@@ -117,7 +116,7 @@ export class ClipPlayer implements Timeline {
   loadedUntil(timeSeconds: number): number {
     const { groups, framesPerSecond } = this.#index;
     let group = clipGroupAt(this.#index, frameAt(this.#index, timeSeconds));
-    while (group < groups.length && (this.#cache.get(group, 0) || this.#cache.isMissing(group, 0))) group++;
+    while (group < groups.length && (this.#cache.canShow(group) || this.#cache.isMissing(group, 0))) group++;
     return group < groups.length ? Math.max(timeSeconds, groups[group].first / framesPerSecond) : Infinity;
   }
 

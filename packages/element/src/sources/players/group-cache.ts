@@ -1,7 +1,14 @@
 import { BackOff } from '@gaussian-splat/core/fetch';
-import { clipPartBytes, type ClipIndex } from '@gaussian-splat/formats';
+import { clipPartBytes, type ClipIndex, type ClipPart } from '@gaussian-splat/formats';
 import type { PackedAnimation } from '@gaussian-splat/renderer/tools';
 import { indicesFrom } from './play-direction.js';
+
+/** Index in place of a group's for the parts that never change, which all groups share. */
+export const STILL = -1;
+
+/** Returns the parts of a group, or those that never change. */
+export const partsIn = ({ groups, still }: ClipIndex, group: number): readonly ClipPart[] =>
+  group === STILL ? still : groups[group].parts;
 
 export interface GroupSource {
   fetchPart(group: number, part: number, signal: AbortSignal): Promise<PackedAnimation>;
@@ -52,16 +59,15 @@ export class GroupCache {
 
   /** Number of groups with a part in memory or in transit. */
   get held(): number {
-    return new Set(
-      [...this.#entries.values()].filter(({ content, abort }) => content ?? abort).map(({ group }) => group),
-    ).size;
+    const held = [...this.#entries.values()].filter(({ content, abort }) => content ?? abort);
+    return new Set(held.map(({ group }) => group).filter((group) => group !== STILL)).size;
   }
 
   /** Number of bytes of the clip file whose content is in memory. */
   get loadedBytes(): number {
     let sum = 0;
     for (const { group, part, content } of this.#entries.values()) {
-      const { sceneBytes, motionBytes } = this.#index.groups[group].parts[part];
+      const { sceneBytes, motionBytes } = partsIn(this.#index, group)[part];
       if (content) sum += sceneBytes + motionBytes;
     }
     return sum;
@@ -71,15 +77,22 @@ export class GroupCache {
     return this.#entries.get(keyOf(group, part))?.content;
   }
 
+  /** Returns whether the coarse part of a group is in memory, and that of the splats that never change. */
+  canShow(group: number): boolean {
+    return this.get(group, 0) !== undefined && (this.#index.still.length === 0 || this.get(STILL, 0) !== undefined);
+  }
+
   /** Returns whether a part has failed and is not requested again yet. */
   isMissing(group: number, part: number): boolean {
     return this.#failures.isPaused(keyOf(group, part));
   }
 
-  /** Fetches the coarse part of the group of the first frame. Rejects with the error of the download. */
+  /** Fetches the coarse parts that the first frame needs. Rejects with the error of the download. */
   async first(group: number, signal: AbortSignal): Promise<void> {
-    const content = await this.#source.fetchPart(group, 0, signal);
-    this.#entries.set(keyOf(group, 0), { group, part: 0, content });
+    for (const own of this.#index.still.length > 0 ? [STILL, group] : [group]) {
+      const content = await this.#source.fetchPart(own, 0, signal);
+      this.#entries.set(keyOf(own, 0), { group: own, part: 0, content });
+    }
   }
 
   /**
@@ -93,7 +106,7 @@ export class GroupCache {
       this.#wanted = this.#wantedFrom(group, loops, direction);
       // A seek to a group that is not loaded does not wait for a part that is needed later.
       const isUrgent = !this.get(group, 0) && !this.isMissing(group, 0);
-      const needed = isUrgent ? this.#wanted.slice(0, 1) : this.#wanted;
+      const needed = isUrgent ? this.#wanted.filter(([own, part]) => part === 0 && (own === group || own === STILL)) : this.#wanted;
       for (const entry of this.#entries.values()) {
         if (!entry.abort || includes(needed, entry)) continue;
         entry.abort.abort();
@@ -111,7 +124,7 @@ export class GroupCache {
 
   /**
    * Returns the needed parts, the most urgent first. The coarse part of the next group has priority over the fine parts
-   * of the current group.
+   * of the current group. Parts that never change are always needed.
    */
   #wantedFrom(group: number, loops: boolean, direction: 1 | -1): (readonly [number, number])[] {
     const { groups, framesPerSecond } = this.#index;
@@ -124,11 +137,13 @@ export class GroupCache {
       seconds += groups[next].frames / framesPerSecond;
     }
     const fine = (own: number): (readonly [number, number])[] =>
-      groups[own].parts.slice(1).map((_, k) => [own, k + 1] as const);
+      partsIn(this.#index, own).slice(1).map((_, k) => [own, k + 1] as const);
     const [next, ...later] = ahead;
     return [
+      ...(this.#index.still.length > 0 ? [[STILL, 0] as const] : []),
       [group, 0],
       ...(next === undefined ? [] : [[next, 0] as const]),
+      ...fine(STILL),
       ...fine(group),
       ...(next === undefined ? [] : fine(next)),
       ...later.flatMap((own) => [[own, 0] as const, ...fine(own)]),
@@ -157,11 +172,17 @@ export class GroupCache {
       sum -= bytesOf(entry.content!);
       this.#entries.delete(key);
     }
-    return sum + needed <= MAX_BYTES || this.#wanted.slice(0, 2).some(([own]) => own === group);
+    return sum + needed <= MAX_BYTES || this.#isUrgent(group);
+  }
+
+  /** Returns whether a group is the current or the next one, or shared. */
+  #isUrgent(group: number): boolean {
+    const ahead = this.#wanted.filter(([own]) => own !== STILL).slice(0, 2);
+    return group === STILL || ahead.some(([own]) => own === group);
   }
 
   #bytesOf(group: number, part: number): number {
-    return clipPartBytes(this.#index.groups[group].parts[part]);
+    return clipPartBytes(partsIn(this.#index, group)[part]);
   }
 
   async #fetch([group, part]: readonly [number, number]): Promise<void> {

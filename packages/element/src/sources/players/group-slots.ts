@@ -1,6 +1,6 @@
 import type { ClipIndex } from '@gaussian-splat/formats';
-import { ANIMATION_SLOTS, type AnimatedGaussians } from '@gaussian-splat/renderer';
-import type { GroupCache } from './group-cache.js';
+import { ANIMATION_SLOTS, STILL_SLOT, type AnimatedGaussians } from '@gaussian-splat/renderer';
+import { partsIn, STILL, type GroupCache } from './group-cache.js';
 
 /** Maximum bytes per frame for uploading parts that are not needed at once. */
 const BYTES_PER_FRAME = 1 << 20;
@@ -34,12 +34,14 @@ export class GroupSlots {
    */
   show(frame: number, group: number, cache: GroupCache): boolean {
     const gaussians = this.#gaussians;
-    const coarse = cache.get(group, 0);
+    const coarse = cache.canShow(group) ? cache.get(group, 0) : undefined;
     let slot = this.#groups.indexOf(group);
     if (slot < 0 && coarse) slot = this.#take(group, this.#shownSlot);
     if (slot >= 0 && coarse && !gaussians.isWritten(slot, 0)) gaussians.write(slot, 0, coarse);
-    let left = BYTES_PER_FRAME;
-    if (slot >= 0) left -= this.#upload(slot, group, cache, left);
+    const still = cache.get(STILL, 0);
+    if (still && !gaussians.isWritten(STILL_SLOT, 0)) gaussians.write(STILL_SLOT, 0, still);
+    let left = BYTES_PER_FRAME - this.#upload(STILL_SLOT, STILL, cache, BYTES_PER_FRAME);
+    if (slot >= 0 && left > 0) left -= this.#upload(slot, group, cache, left);
     if (slot >= 0 && gaussians.isWritten(slot, 0)) this.#draw(slot, frame, group);
     const next = (group + 1) % this.#index.groups.length;
     if (left > 0 && slot >= 0 && next !== group && cache.get(next, 0)) {
@@ -59,7 +61,7 @@ export class GroupSlots {
 
   #upload(slot: number, group: number, cache: GroupCache, max: number): number {
     let written = 0;
-    this.#index.groups[group].parts.forEach((_, part) => {
+    partsIn(this.#index, group).forEach((_, part) => {
       const content = cache.get(group, part);
       if (content && written < max && !this.#gaussians.isWritten(slot, part))
         written += this.#gaussians.write(slot, part, content, max - written);
@@ -69,9 +71,12 @@ export class GroupSlots {
 
   #draw(slot: number, frame: number, group: number): void {
     const { first, parts } = this.#index.groups[group];
-    const there = parts.filter((_, part) => this.#gaussians.isWritten(slot, part)).length;
+    const { still } = this.#index;
+    const there =
+      parts.filter((_, part) => this.#gaussians.isWritten(slot, part)).length +
+      still.filter((_, part) => this.#gaussians.isWritten(STILL_SLOT, part)).length;
     if (frame === this.#shownFrame && there === this.#shownParts) return;
-    this.#gaussians.show(slot, frame - first, there === parts.length);
+    this.#gaussians.show(slot, frame - first, there === parts.length + still.length);
     this.#shownFrame = frame;
     this.#shownSlot = slot;
     this.#shownParts = there;

@@ -1,0 +1,24 @@
+import type { GaussianCloud } from '@gaussian-splat/core';
+import { readScene, stillMotion, type ClipPartContent } from '@gaussian-splat/formats';
+import { splatsOf } from '../reduce.js';
+import type { Encoding } from '../write/index.js';
+import type { WrittenClipPart } from './clip-part.js';
+
+/** A part of the splats that never change, and its content as a reader decodes it. */
+export interface StillPart {
+  readonly written: WrittenClipPart;
+  readonly content: ClipPartContent;
+}
+
+/** Encodes splats that never change. @param chosen Indices of the splats of the part. */
+export async function writeStillPart(cloud: GaussianCloud, chosen: Uint32Array, encoding: Encoding): Promise<StillPart> {
+  const own = splatsOf(cloud, chosen);
+  const degrees = new Uint8Array(own.count).fill(own.shDegree);
+  const bytes = new Uint8Array(await encoding.write({ cloud: own, degrees }));
+  return readStillPart({ splats: own.count, planes: 0, sceneBytes: bytes.length, motionBytes: 0, bytes });
+}
+
+export async function readStillPart(written: WrittenClipPart): Promise<StillPart> {
+  const cloud = await readScene(written.bytes, { name: 'splats that never change' });
+  return { written, content: { cloud, motion: stillMotion(cloud.count) } };
+}
