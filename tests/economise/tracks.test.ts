@@ -4,8 +4,8 @@ import { test } from 'node:test';
 import { shCoefficientCount, type GaussianCloud, type ShDegree } from '@gaussian-splat/core';
 import { cutTracks } from '../../packages/economise/src/clip/cut-tracks.js';
 import { followSplats } from '../../packages/economise/src/clip/tracks.js';
-import { clipFrame, clipGroupAt, LoadBudget, parseClip, readClipPart, upright } from '@gaussian-splat/formats';
-import { clipOf } from '../support/clips.js';
+import { parseClip, readClipPart, upright } from '@gaussian-splat/formats';
+import { clipOf, framesOf } from '../support/clips.js';
 import { cloudOf } from '../support/clouds.js';
 import { fountain } from '../support/scenes/fountain.js';
 
@@ -60,18 +60,7 @@ test('a track that goes over to another splat is divided, one that turns is not'
   );
 });
 
-/** The visible splats of a frame of a clip. */
-async function shownAt(bytes: Uint8Array, frame: number): Promise<GaussianCloud> {
-  const index = parseClip(bytes, 'a.gsv');
-  const { first, frames, parts } = index.groups[clipGroupAt(index, frame)];
-  const contents = await Promise.all(
-    parts.map((part) => {
-      const own = bytes.subarray(part.start, part.start + part.sceneBytes + part.motionBytes);
-      return readClipPart({ bytes: own, part, frames, shDegree: index.shDegree, name: 'a.gsv' });
-    }),
-  );
-  return clipFrame(contents, frame - first, 'a.gsv', new LoadBudget(bytes.length));
-}
+const shownAt = (bytes: Uint8Array, frame: number): Promise<GaussianCloud> => framesOf(bytes)(frame);
 
 /** Asserts that each splat of a cloud is visible in another one, at its place with its opacity and coefficients. */
 function assertShown(shown: GaussianCloud, source: GaussianCloud, what: string): void {

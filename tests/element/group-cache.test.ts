@@ -5,7 +5,7 @@ import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import type { ClipIndex } from '@gaussian-splat/formats';
 import type { PackedAnimation } from '@gaussian-splat/renderer/tools';
-import { GroupCache } from '../../packages/element/dist/sources/players/group-cache.js';
+import { GroupCache, partsIn } from '../../packages/element/dist/sources/players/group-cache.js';
 
 const FRAMES = 30;
 const SPLATS = 150_000;
@@ -22,10 +22,11 @@ const partOf = (splats: number): PackedAnimation =>
     curves: { byteLength: 0 },
   }) as unknown as PackedAnimation;
 
-function clip(groups: number): ClipIndex {
+function clip(groups: number, stillSplats: readonly number[] = []): ClipIndex {
   const part = (splats: number): object => ({ splats, planes: PLANES, sceneBytes: 1, motionBytes: 1, start: 0 });
   return {
     framesPerSecond: 30,
+    still: stillSplats.map(part),
     groups: Array.from({ length: groups }, (_, k) => ({
       ...{ first: FRAMES * k, frames: FRAMES },
       parts: [part(SPLATS / 8), part((7 * SPLATS) / 8)],
@@ -49,7 +50,7 @@ function bench(index: ClipIndex, fails: (group: number) => boolean = () => false
       await Promise.resolve();
       signal.throwIfAborted();
       if (fails(group)) throw new Error('lost');
-      return partOf(index.groups[group].parts[part].splats);
+      return partOf(partsIn(index, group)[part].splats);
     },
     onArrival: () => undefined,
     onError: (error) => errors.push(error),
@@ -172,11 +173,30 @@ test('what cannot be had is reported once, and passed over', async () => {
 test('of groups of a single frame, at 1,000 frames a second, some hundreds are fetched ahead', async () => {
   const part = { splats: 1, planes: 1, sceneBytes: 1, motionBytes: 1, start: 0 };
   const groups = Array.from({ length: 7_000 }, (_, first) => ({ first, frames: 1, parts: [part] }));
-  const { cache, asked, settle } = bench({ framesPerSecond: 1_000, groups } as unknown as ClipIndex);
+  const { cache, asked, settle } = bench({ framesPerSecond: 1_000, groups, still: [] } as unknown as ClipIndex);
   cache.want(0, true);
   for (let before = -1; asked.length > before;) {
     before = asked.length;
     await settle();
   }
   assert.ok(asked.length > 100 && asked.length < 500, `${asked.length} groups`);
+});
+
+test('parts that never change are fetched once, before the first group, and stay', async () => {
+  const index = clip(60, [20_000, 100_000]);
+  const { cache, asked, settle } = bench(index);
+  assert.equal(cache.canShow(0), false);
+  await cache.first(0, new AbortController().signal);
+  assert.deepEqual(asked, ['-1.0', '0.0']);
+  assert.equal(cache.canShow(0), true);
+  for (const group of [0, 1, 2, 30, 59, 0, 40]) {
+    cache.want(group, true);
+    await settle();
+    assert.ok(cache.canShow(group), `group ${group}`);
+    assert.ok(cache.held <= MAX_HELD, `${cache.held} groups`);
+  }
+  assert.deepEqual(
+    asked.filter((each) => each.startsWith('-1')),
+    ['-1.0', '-1.1'],
+  );
 });

@@ -3,6 +3,7 @@
  * SECURITY.md: "The size of a file bounds its cost".
  */
 import assert from 'node:assert/strict';
+import { readFileSync } from 'node:fs';
 import { test } from 'node:test';
 import { constants, deflateRawSync, inflateRawSync } from 'node:zlib';
 import type { GaussianCloud } from '@gaussian-splat/core';
@@ -15,9 +16,10 @@ import {
   readClipPart,
   readScene,
   type ClipIndex,
+  type ClipPart,
   type ClipPartContent,
 } from '@gaussian-splat/formats';
-import { clipOf } from '../support/clips.js';
+import { clipOf, framesOf } from '../support/clips.js';
 import { fountain } from '../support/scenes/fountain.js';
 
 const FRAMES = 24;
@@ -26,13 +28,16 @@ const sources = Array.from({ length: FRAMES }, (_, frame) => frameOf(frame));
 const clip = await clipOf((frame) => sources[frame], { frames: FRAMES, framesPerGroup: 12 });
 const index = parseClip(clip.bytes, 'a.gsv');
 
-const partsOf = (group: number): Promise<ClipPartContent[]> =>
+const readParts = (parts: readonly ClipPart[], frames: number): Promise<ClipPartContent[]> =>
   Promise.all(
-    index.groups[group].parts.map((part) => {
+    parts.map((part) => {
       const bytes = clip.bytes.subarray(part.start, part.start + part.sceneBytes + part.motionBytes);
-      return readClipPart({ bytes, part, frames: index.groups[group].frames, shDegree: index.shDegree, name: 'a.gsv' });
+      return readClipPart({ bytes, part, frames, shDegree: index.shDegree, name: 'a.gsv' });
     }),
   );
+const partsOf = (group: number): Promise<ClipPartContent[]> =>
+  readParts(index.groups[group].parts, index.groups[group].frames);
+const still = await readParts(index.still, 1);
 
 /** Distance from each splat that can be seen to the nearest of another cloud that has its color. */
 function farthest(from: GaussianCloud, to: GaussianCloud): number {
@@ -73,7 +78,7 @@ test('splats are followed though no frame says which they were, and are gone whe
   assert.ok(all < 2 * 1.5 * sources[0].count, `${all} splats in two groups`);
   for (const frame of [0, 5, 11, 12, 20, 23]) {
     const group = clipGroupAt(index, frame);
-    const found = clipFrame(await partsOf(group), frame - index.groups[group].first, 'a.gsv', new LoadBudget(1 << 24));
+    const found = clipFrame([...still, ...(await partsOf(group))], frame - index.groups[group].first, 'a.gsv', new LoadBudget(1 << 24));
     const alive = found.opacities.filter((opacity) => opacity > 0).length;
     assert.ok(Math.abs(alive - sources[frame].count) <= 0.02 * sources[frame].count, `frame ${frame}: ${alive} splats`);
     const [lost, added] = [farthest(sources[frame], found), farthest(found, sources[frame])];
@@ -86,10 +91,10 @@ test('splats fade in and out by their lives, not by curves', async () => {
     const parts = await partsOf(group);
     for (const { motion } of parts) {
       assert.ok(motion.lives.fades, 'a part has fades');
-      assert.ok(motion.parts.opacity.rank <= 1, `${motion.parts.opacity.rank} curves of opacities`);
+      assert.ok(motion.parts.opacity.rank <= 2, `${motion.parts.opacity.rank} curves of opacities`);
     }
     for (let frame = 0; frame < frames; frame++) {
-      const found = clipFrame(parts, frame, 'a.gsv', new LoadBudget(1 << 24));
+      const found = clipFrame([...still, ...parts], frame, 'a.gsv', new LoadBudget(1 << 24));
       const sum = (cloud: GaussianCloud): number => cloud.opacities.reduce((all, opacity) => all + opacity, 0);
       const [expected, seen] = [sum(sources[first + frame]), sum(found)];
       assert.ok(Math.abs(seen - expected) < 0.01 * expected, `frame ${first + frame}: ${seen} of ${expected}`);
@@ -126,6 +131,9 @@ test('what an index cannot say is refused by name', () => {
     ['endless planes', () => withPart(1, 1e6), /^decode\/header/],
     ['half a byte', () => withPart(2, 1.5), /^decode\/header/],
     ['bytes before the file', () => withPart(3, -5), /^decode\/header/],
+    ['still splats that are no parts', () => withIndex((json) => (json.still = 5)), /^decode\/header.*still/],
+    ['still parts without bytes', () => withIndex((json) => (json.still = [[4]])), /^decode\/header.*still\[0\]/],
+    ['endless still splats', () => withIndex((json) => (json.still = [[1e12, 4]])), /^decode\/header.*still\[0\]/],
     ['no bounds', () => withIndex((json) => delete json.bounds), /^decode\/header.*bounds/],
     ['no time', () => withIndex((json) => (json.framesPerSecond = 0)), /^decode\/header.*framesPerSecond/],
   ];
@@ -166,13 +174,14 @@ test('parts that are others than the index says are refused', async () => {
 });
 
 test('parts that say more than they hold, or hold more than they say, are refused by name', async () => {
-  const group = index.groups[0];
+  const old = new Uint8Array(readFileSync('tests/fixtures/clips/version-1.gsv'));
+  const { groups, shDegree } = parseClip(old, 'old.gsv');
+  const [group] = groups;
   const [part] = group.parts;
-  const scene = clip.bytes.subarray(part.start, part.start + part.sceneBytes);
+  const behind = part.start + part.sceneBytes;
+  const scene = old.subarray(part.start, behind);
   const motion = new Uint8Array(
-    inflateRawSync(clip.bytes.subarray(part.start + part.sceneBytes, part.start + part.sceneBytes + part.motionBytes), {
-      finishFlush: constants.Z_SYNC_FLUSH,
-    }),
+    inflateRawSync(old.subarray(behind, behind + part.motionBytes), { finishFlush: constants.Z_SYNC_FLUSH }),
   );
   const view = new DataView(motion.buffer);
   const ranks = [0, 1, 2, 3, 4].map((k) => view.getUint32(12 + 8 * k, true));
@@ -214,7 +223,7 @@ test('parts that say more than they hold, or hold more than they say, are refuse
     ['a flood behind it', concat(motion, new Uint8Array(2e8)), {}, /^decode\/truncated.*more/],
     ['a curve of no number', edited((_, own) => own.setFloat32(52, NaN, true)), {}, /^decode\/corrupt.*curves/],
     ['more splats than the page allows', motion, { limits: { maxSplats: part.splats - 1 } }, /^out-of-memory\/budget/],
-    ['more bytes than the page allows', motion, { limits: { maxBytes: 1000 } }, /^out-of-memory\/budget/],
+    ['more bytes than the page allows', motion, { limits: { maxBytes: 100 } }, /^out-of-memory\/budget/],
     ['splats that the scene lacks', motion, { splats: part.splats + 1 }, /^decode\/header/],
   ];
   for (const [name, raw, { limits, ...changes }, expected] of cases as readonly [
@@ -231,9 +240,7 @@ test('parts that say more than they hold, or hold more than they say, are refuse
         bytes: concat(scene, packed),
         part: own,
         frames: group.frames,
-        shDegree: index.shDegree,
-        name: 'a.gsv',
-        limits,
+        ...{ shDegree, name: 'a.gsv', limits },
       });
     } catch (error) {
       said = `${(error as { code: string }).code} ${(error as Error).message}`;
@@ -248,6 +255,64 @@ function concat(a: Uint8Array, b: Uint8Array): Uint8Array {
   both.set(b, a.length);
   return both;
 }
+
+test('a clip of version 1 has the splats that it always had', async () => {
+  const old = new Uint8Array(readFileSync('tests/fixtures/clips/version-1.gsv'));
+  const expected = JSON.parse(readFileSync('tests/fixtures/clips/version-1.json', 'utf8')) as {
+    splats: number;
+    opacity: number;
+    position: number[];
+  }[];
+  const { frameCount, still } = parseClip(old, 'old.gsv');
+  assert.deepEqual([frameCount, still], [expected.length, []]);
+  const frameAt = framesOf(old);
+  for (const [frame, { splats, opacity, position }] of expected.entries()) {
+    const { count, opacities, positions } = await frameAt(frame);
+    const sum = (of: (i: number) => number): number =>
+      Array.from({ length: count }, (_, i) => opacities[i] * of(i)).reduce((total, value) => total + value, 0);
+    assert.equal(opacities.filter((value) => value > 0).length, splats, `frame ${frame}: splats`);
+    const found = [sum(() => 1), ...[0, 1, 2].map((axis) => sum((i) => positions[3 * i + axis]))];
+    [opacity, ...position].forEach((value, k) =>
+      assert.ok(Math.abs(found[k] - value) < 1e-3, `frame ${frame}, sum ${k}: ${found[k]}, not ${value}`),
+    );
+  }
+});
+
+test('coded motion that is cut, continued or changed is refused, or read within the bounds of its index', async () => {
+  const group = index.groups[0];
+  const [part] = group.parts;
+  const own = clip.bytes.subarray(part.start, part.start + part.sceneBytes + part.motionBytes);
+  const read = async (bytes: Uint8Array, limits = {}): Promise<string> =>
+    readClipPart({
+      ...{ bytes, frames: group.frames, shDegree: index.shDegree, name: 'a.gsv', limits },
+      part: { ...part, motionBytes: bytes.length - part.sceneBytes },
+    }).then(
+      ({ motion: { lives, parts } }) => {
+        assert.ok(lives.first.every((first, i) => first < lives.end[i] && lives.end[i] <= group.frames));
+        assert.ok(Object.values(parts).every(({ curves }) => curves.every((value) => Math.abs(value) <= 2 ** 21)));
+        return 'nothing';
+      },
+      (error: Error & { code: string }) => `${error.code} ${error.message}`,
+    );
+  const edited = (at: number, value: number): Uint8Array => {
+    const copy = own.slice();
+    copy[part.sceneBytes + at] = value;
+    return copy;
+  };
+  assert.equal(await read(own), 'nothing');
+  assert.match(await read(own.subarray(0, part.sceneBytes + 20)), /^decode\/truncated.*head/);
+  assert.match(await read(own.subarray(0, own.length - 5)), /^decode\/truncated/);
+  assert.match(await read(concat(own, new Uint8Array(7))), /^decode\/corrupt.*7 more/);
+  assert.match(await read(edited(1, 5)), /^decode\/unsupported.*version 4/);
+  assert.match(await read(edited(2, 9)), /^decode\/unsupported/);
+  assert.match(await read(edited(4, own[part.sceneBytes + 4] ^ 1)), /^decode\/header.*splats/);
+  assert.match(await read(edited(13, 255)), /^decode\/header.*curves/);
+  assert.match(await read(own, { maxBytes: own.length + 2000 }), /^out-of-memory\/budget/);
+  let refused = 0;
+  for (let at = 52; at < own.length - part.sceneBytes; at += 61)
+    if ((await read(edited(at, own[part.sceneBytes + at] ^ 0x5a))) !== 'nothing') refused++;
+  assert.ok(refused > 0, 'no changed code was noticed');
+});
 
 test('a clip that is read as a scene, and a .4dgs container, are refused with what to do', async () => {
   const container = new TextEncoder().encode('    4DGS1\r\n').subarray(3);

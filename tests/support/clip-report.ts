@@ -15,10 +15,10 @@ import { availableParallelism, tmpdir } from 'node:os';
 import { join, resolve } from 'node:path';
 import { fileURLToPath } from 'node:url';
 import { parseArgs } from 'node:util';
-import { codeClip, type CodedClip } from '@gaussian-splat/economise';
+import { codeClip, drawOn, type CodedClip } from '@gaussian-splat/economise';
 import { CLIP_HEAD_BYTES, clipIndexBytes, parseClip, writeClipHead, type ClipIndex } from '@gaussian-splat/formats';
 import { deviceDescriptor, pickInitialVariants } from '@gaussian-splat/renderer';
-import { deflate, deflateQuickly, encodeWebp } from '../../packages/cli/src/lib/encoders.mjs';
+import { encodeWebp } from '../../packages/cli/src/lib/encoders.mjs';
 import { requestNodeAdapter } from '../../packages/cli/src/lib/node-gpu.mjs';
 import { fountain } from './scenes/fountain.js';
 
@@ -53,7 +53,7 @@ async function codeFrames(from: number, until: number, out: string): Promise<voi
     ...{ frameCount: until - from, framesPerSecond: FRAMES_PER_SECOND, framesPerGroup },
     minPsnr: Number(values['min-psnr']),
     openFrame: (frame) => Promise.resolve(frameOf(from + frame)),
-    ...{ device, encodeWebp, deflate, deflateQuickly },
+    ...{ draw: drawOn(device), encodeWebp },
     onStep: (step) => console.error(`${((performance.now() - begin) / 1000).toFixed(0)} s, from ${from} on: ${step}`),
   });
   writeFileSync(out, bytes);

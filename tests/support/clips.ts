@@ -1,7 +1,15 @@
-/** Small clips, written without measurement. */
-import { deflateRawSync, constants } from 'node:zlib';
+/** Small clips, written without measurement, and their frames. */
 import type { GaussianCloud } from '@gaussian-splat/core';
 import { codeClip, encodingsFor, type CodedClip } from '@gaussian-splat/economise';
+import {
+  clipFrame,
+  clipGroupAt,
+  LoadBudget,
+  parseClip,
+  readClipPart,
+  type ClipPart,
+  type ClipPartContent,
+} from '@gaussian-splat/formats';
 
 const STEPS = { position: 0.002, rotation: 0.01, scale: 0.01, opacity: 0.004, color: 0.01 };
 
@@ -19,9 +27,25 @@ export function clipOf(
   return codeClip({
     ...{ frameCount: frames, framesPerSecond, framesPerGroup, minPsnr: 45 },
     openFrame: async (frame) => frameOf(frame),
-    device: undefined as unknown as GPUDevice,
+    draw: () => Promise.reject(new Error('not needed')),
     encodeWebp: () => Promise.reject(new Error('not needed')),
-    deflate: (bytes) => deflateRawSync(bytes, { finishFlush: constants.Z_SYNC_FLUSH }),
     rounding: { encoding, steps: STEPS },
   });
+}
+
+/** Returns a function that decodes the splats of a frame of a clip, as the element shows them. */
+export function framesOf(bytes: Uint8Array): (frame: number) => Promise<GaussianCloud> {
+  const index = parseClip(bytes, 'a.gsv');
+  const read = (parts: readonly ClipPart[], frames: number): Promise<ClipPartContent[]> =>
+    Promise.all(
+      parts.map((part) => {
+        const own = bytes.subarray(part.start, part.start + part.sceneBytes + part.motionBytes);
+        return readClipPart({ bytes: own, part, frames, shDegree: index.shDegree, name: 'a.gsv' });
+      }),
+    );
+  return async (frame) => {
+    const { first, frames, parts } = index.groups[clipGroupAt(index, frame)];
+    const contents = [...(await read(index.still, 1)), ...(await read(parts, frames))];
+    return clipFrame(contents, frame - first, 'a.gsv', new LoadBudget(1 << 28));
+  };
 }

@@ -27,3 +27,4 @@ export { filesOfZip } from './write/zip.js';
 export type { MotionSteps } from './clip/curves.js';
 export { codeClip, type CodeClipOptions, type CodedClip } from './clip/code-clip.js';
 export type { ClipStore } from './clip/clip-store.js';
+export { drawOn, type DrawFrame, type FrameImages } from './clip/frame-judges.js';

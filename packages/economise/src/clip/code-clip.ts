@@ -9,7 +9,7 @@ import { writeState, readState, type ClipState, type ClipStore } from './clip-st
 import { coarseAndRest } from './coarse-part.js';
 import type { MotionSteps } from './curves.js';
 import { cutTracks } from './cut-tracks.js';
-import { FrameJudges } from './frame-judges.js';
+import { FrameJudges, type DrawFrame } from './frame-judges.js';
 import { codeGroup, growthIn, roundGroup, SCENE_SHARE, sizeOf, worstOf, type CodedGroup } from './group-coder.js';
 import { StillSplats } from './still-splats.js';
 import { readStillPart, writeStillPart, type StillPart } from './still-part.js';
@@ -23,7 +23,8 @@ export interface CodeClipOptions {
   readonly framesPerGroup: number;
   /** Target PSNR of frames against their sources in dB, over covered pixels. */
   readonly minPsnr: number;
-  readonly device: GPUDevice;
+  /** Draws the frames that are measured, for example {@link drawOn} a device. Unused with `rounding`. */
+  readonly draw: DrawFrame;
   readonly encodeWebp: EncodeWebp;
   /** Called with a sentence about each step. */
   readonly onStep?: (step: string) => void;
@@ -37,7 +38,7 @@ export interface CodeClipOptions {
    */
   readonly maxMbps?: number;
   /**
-   * Fixed quantization. Then images are not measured, and no GPU device is used. By default, measurements determine the
+   * Fixed quantization. Then images are not measured. By default, measurements determine the
    * quantization.
    */
   readonly rounding?: { readonly encoding: Encoding; readonly steps: MotionSteps };
@@ -212,7 +213,7 @@ class ClipCoder {
     begin: number,
     maxBytes: number,
   ): Promise<void> {
-    const judges = new FrameJudges(this.#options.device, (frame) => this.#shown(begin + frame));
+    const judges = new FrameJudges(this.#options.draw, (frame) => this.#shown(begin + frame));
     const still = this.#stillParts.map(({ content }) => content);
     try {
       const { contents, encoding, steps, ...group } = await codeGroup({
@@ -261,8 +262,8 @@ class ClipCoder {
 
   /** Returns an encoding of scenes whose steps are measured with a frame of the first group. */
   async #tune(cloud: GaussianCloud): Promise<Encoding> {
-    const { device, encodeWebp } = this.#options;
-    const judges = new FrameJudges(device, () => Promise.resolve(cloud));
+    const { draw, encodeWebp } = this.#options;
+    const judges = new FrameJudges(draw, () => Promise.resolve(cloud));
     const whole = { cloud, degrees: new Uint8Array(cloud.count).fill(cloud.shDegree) };
     const measure = async (bytes: Uint8Array): Promise<number> =>
       Math.max(...(await judges.compare(0, await readScene(bytes, { name: 'a group of frames' }))));

@@ -7,7 +7,7 @@ import {
   type ClipPartContent,
 } from '@gaussian-splat/formats';
 import { decibels, mean } from '../measure.js';
-import { findSteps, scaledSteps, type Steps } from '../steps.js';
+import { findSteps, fitSteps, scaledSteps, type Steps } from '../steps.js';
 import type { Encoding } from '../write/index.js';
 import { TrackedPart, type WrittenClipPart } from './clip-part.js';
 import type { MotionSteps } from './curves.js';
@@ -18,9 +18,9 @@ import type { Tracks } from './tracks.js';
 /** Fraction of the allowed error that the scenes of groups may cause; motion may cause the rest. */
 export const SCENE_SHARE = 0.4;
 const MAX_TRIES = 6;
-const NEAR_ENOUGH = 0.85;
-/** Fraction of the allowed error below which a group is coded again more coarsely. */
-const TOO_GOOD = 0.7;
+const NEAR_ENOUGH = 0.75;
+/** Number of frames that are added to those measured first, if other frames have larger errors. */
+const REMEMBERED = 3;
 /** Number of frames that are measured during the search for steps. */
 const SEARCHED = 3;
 const GROWTHS = [1, 1.25, 1.6, 2, 2.5, 3.2, 4];
@@ -60,38 +60,49 @@ export interface FoundGroup extends CodedGroup {
 }
 
 /**
- * Codes a group. The frames with the largest errors of attributes are measured, and some others; they are selected again
- * whenever steps change. If no steps reach the target, those with the smallest error are used.
+ * Codes a group. The frames with the largest estimated errors are measured first, and some others. If they reach the
+ * target, all frames are measured, because the order of splats in depth may change in any frame. The worst ones are among
+ * the first of the next attempt. If no steps reach the target, those with the smallest error are used.
  */
 export async function codeGroup(coding: GroupCoding): Promise<FoundGroup> {
-  const { tracks, still, judges, target, maxBytes } = coding;
-  let { encoding, steps } = coding;
-  let best: FoundGroup | undefined;
-  for (let tries = 1; ; tries++) {
-    const parts = await partsOf(coding, encoding, steps ?? usualSteps(coding.whole));
-    steps ??= await stepsFor(coding, parts);
-    const own = steps;
-    const contents = parts.map((part) => part.contentAt(own));
-    const estimated = attributeErrors(
-      tracks,
-      parts.map((part, k) => [part, contents[k]] as const),
-    );
-    const frames = [...new Set([...judges.frames, ...judgedFrames(estimated, coding.seed)])];
-    const errors = await judges.errorsIn(frames, [...still, ...contents]);
-    const written = parts.map((part) => part.write(own));
-    const found = { frames: tracks.frames.length, parts: written, errors, contents, encoding, steps };
-    best = betterOf(best, found, coding);
-    const worst = worstOf(errors);
-    const tooLarge = sizeOf(written) / maxBytes;
-    const isDone = tooLarge <= 1 && worst <= target && (worst >= TOO_GOOD * target || tries > 1);
-    if (isDone || (tooLarge <= 1 && maxBytes < Infinity) || tries === MAX_TRIES) return best;
-    const factor =
-      tooLarge > 1
-        ? Math.min(3, tooLarge ** 1.5)
-        : Math.max(0.5, Math.min(1.5, 0.96 * Math.sqrt(target / worst)));
-    steps = scaledSteps(steps, factor);
-    encoding = encoding.coarser!(factor);
+  const { target, maxBytes } = coding;
+  const first = coding.steps ?? (await stepsFor(coding, await partsOf(coding, coding.encoding, usualSteps(coding.whole))));
+  const tried = new Map<number, FoundGroup>();
+  const isWanted = ({ parts }: FoundGroup): boolean => sizeOf(parts) <= maxBytes;
+  await fitSteps({
+    ...{ steps: { scale: 1 }, target, tries: MAX_TRIES, nearEnough: NEAR_ENOUGH },
+    measure: async ({ scale }) => {
+      const encoding = scale === 1 ? coding.encoding : coding.encoding.coarser!(scale);
+      const found = tried.get(scale) ?? (await attempt(coding, encoding, scaledSteps(first, scale)));
+      tried.set(scale, found);
+      const error = worstOf(found.errors);
+      coding.onStep(`  ${sizeOf(found.parts)} bytes, ${decibels(error).toFixed(2)} dB in the worst view`);
+      // A group that is too large must become coarser, as if its error were too small.
+      return { error: isWanted(found) ? error : (0.5 * target * maxBytes) / sizeOf(found.parts) };
+    },
+  });
+  return [...tried.values()].reduce((best, next) => betterOf(best, next, coding));
+}
+
+/** Codes a group with some steps, and measures it. */
+async function attempt(coding: GroupCoding, encoding: Encoding, steps: MotionSteps): Promise<FoundGroup> {
+  const { tracks, still, judges, target } = coding;
+  const parts = await partsOf(coding, encoding, steps);
+  const contents = parts.map((part) => part.contentAt(steps));
+  const estimated = attributeErrors(
+    tracks,
+    parts.map((part, k) => [part, contents[k]] as const),
+  );
+  const frames = [...new Set([...judges.frames, ...judgedFrames(estimated, coding.seed)])];
+  const shown = [...still, ...contents];
+  let errors = await judges.errorsIn(frames, shown);
+  if (worstOf(errors) <= target) {
+    errors = await judges.errorsInAll(tracks.frames.length, shown);
+    const worst = [...errors].sort((a, b) => b.error - a.error).slice(0, REMEMBERED);
+    if (worstOf(worst) > target) await judges.errorsIn(worst.map(({ frame }) => frame), shown);
   }
+  const written = parts.map((part) => part.write(steps));
+  return { frames: tracks.frames.length, parts: written, errors, contents, encoding, steps };
 }
 
 /** Returns the parts of a group with fixed quantization, unmeasured. */
@@ -134,8 +145,7 @@ async function partsOf(
 }
 
 /** Returns the group that fits, has the smaller size if both reach the target, and otherwise the smaller error. */
-function betterOf(a: FoundGroup | undefined, b: FoundGroup, { target, maxBytes }: GroupCoding): FoundGroup {
-  if (!a) return b;
+function betterOf(a: FoundGroup, b: FoundGroup, { target, maxBytes }: GroupCoding): FoundGroup {
   const rank = ({ parts, errors }: FoundGroup): readonly number[] => {
     const size = sizeOf(parts);
     const worst = worstOf(errors);
