@@ -25,7 +25,7 @@ struct Animate {
   grow: f32,
   // 1 if harmonics turn with the change of rotation.
   turns_harmonics: u32,
-  // Of `ranks` and `color_rank`, the number of the last curves whose frames count from the first frame of each splat.
+  // Number of the last curves of each attribute whose frames count from the first frame of each splat.
   aged: vec4u,
   color_aged: u32,
 }

@@ -46,8 +46,7 @@ const draw: DrawFrame = async (frame, views) => {
   }));
   const references = await cpuPainter.draw(frame, small);
   return {
-    compare: async (cloud) =>
-      (await cpuPainter.draw(cloud, small)).map((image, k) => meanSquare(image, references[k])),
+    compare: async (cloud) => (await cpuPainter.draw(cloud, small)).map((image, k) => meanSquare(image, references[k])),
     destroy: () => undefined,
   };
 };
@@ -133,7 +132,7 @@ test('splats that never change are in the file once, and in every frame', async 
   const once = await clipOf(room, { frames: 30, framesPerGroup: 30 });
   const often = await clipOf(room, { frames: 30, framesPerGroup: 5 });
   assert.deepEqual([once.still, often.still], [0, 380]);
-  // Of six groups, each has the 20 splats that move.
+  // Each of the six groups has the 20 splats that move.
   assert.deepEqual([splatsOf(once.bytes), splatsOf(often.bytes)], [400, 380 + 6 * 20]);
   const frameAt = framesOf(often.bytes);
   for (const frame of [0, 4, 5, 17, 29]) {

@@ -164,7 +164,7 @@ test('every invalid case is refused with what is wrong', async () => {
     assert.match(message, REFUSED[name][1], name);
   }
   for (const name of Object.keys(reference).filter(isEmpty))
-    assert.equal((await refusal(fileOf(name), name)).code, 'decode/header', name);
+    assert.equal((await refusal(fileOf(name), name)).code, 'decode/empty', name);
 });
 
 /** Records with their places: opcode, 64 bits of length, content. */
@@ -178,6 +178,27 @@ function recordsIn(bytes: Uint8Array): { opcode: number; start: number; end: num
   }
   return found;
 }
+
+test('a file whose last state has no end is played up to a second after its last change', async () => {
+  const source = fileOf('keyframe/KeyframeDeltaChurn-UseChunkIndex-UseCrc-UseStatistics');
+  const ended = await FourDgsClip.open(source, 'ended');
+  const records = recordsIn(source);
+  const bytes = source.slice();
+  const view = new DataView(bytes.buffer);
+  const header = records.find(({ opcode }) => opcode === 0x01)!;
+  let at = header.start + 9;
+  for (let text = 0; text < 2; text++) at += 4 + view.getUint32(at, true);
+  const last = records.findLast(({ opcode }) => opcode === 0x05 || opcode === 0x10)!;
+  const begin = view.getFloat64(last.start + 9, true);
+  view.setFloat64(at, Infinity, true);
+  view.setFloat64(last.start + 17, Infinity, true);
+  const endless = await FourDgsClip.open(bytes, 'endless');
+  assert.ok(Math.abs(endless.index.durationSeconds - begin - 1) < 0.1, `${endless.index.durationSeconds} s`);
+  for (const seconds of [0, begin - 0.01, begin + 0.01])
+    assertNear(sums(await endless.at(seconds)), { t: 0, ...sums(await ended.at(seconds)) }, `${seconds} s`, 1e-6);
+  const { count } = await endless.group(endless.index.groups.length - 1).then(({ cloud }) => cloud);
+  assert.equal(count, (await ended.group(ended.index.groups.length - 1)).cloud.count);
+});
 
 test('records that come too late, and an index that says something else, are refused', async () => {
   const source = fileOf('keyframe/KeyframeDeltaChurn-UseChunkIndex-UseCrc-UseStatistics');

@@ -78,7 +78,12 @@ test('splats are followed though no frame says which they were, and are gone whe
   assert.ok(all < 2 * 1.5 * sources[0].count, `${all} splats in two groups`);
   for (const frame of [0, 5, 11, 12, 20, 23]) {
     const group = clipGroupAt(index, frame);
-    const found = clipFrame([...still, ...(await partsOf(group))], frame - index.groups[group].first, 'a.gsv', new LoadBudget(1 << 24));
+    const found = clipFrame(
+      [...still, ...(await partsOf(group))],
+      frame - index.groups[group].first,
+      'a.gsv',
+      new LoadBudget(1 << 24),
+    );
     const alive = found.opacities.filter((opacity) => opacity > 0).length;
     assert.ok(Math.abs(alive - sources[frame].count) <= 0.02 * sources[frame].count, `frame ${frame}: ${alive} splats`);
     const [lost, added] = [farthest(sources[frame], found), farthest(found, sources[frame])];

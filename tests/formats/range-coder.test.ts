@@ -24,7 +24,7 @@ test('bits return, likely ones cost almost nothing, and no byte is left or missi
       if (i % 1000 === 0) encoder.plain(i, 20);
     });
     const bytes = encoder.finish();
-    assert.ok(bytes.length < maxBytes, `${bytes.length} bytes for a share of ${share}`);
+    assert.ok(bytes.length < maxBytes, `${bytes.length} bytes for a probability of ${share}`);
     const decoder = new BitDecoder(bytes);
     const own = new Contexts(1);
     bits.forEach((bit, i) => {
@@ -75,7 +75,13 @@ test('codes return, also the largest; those of a rigid motion are predicted from
 
 test('harmonics turn by a quaternion as by its matrix', () => {
   const random = seededRandom(6);
-  const quaternions = [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1], [Math.SQRT1_2, 0, 0, Math.SQRT1_2]];
+  const quaternions = [
+    [1, 0, 0, 0],
+    [0, 1, 0, 0],
+    [0, 0, 1, 0],
+    [0, 0, 0, 1],
+    [Math.SQRT1_2, 0, 0, Math.SQRT1_2],
+  ];
   for (let k = 0; k < 20; k++) quaternions.push([...random.rotation()]);
   for (const [w, x, y, z] of quaternions) {
     const turn: Matrix3 = [
@@ -87,7 +93,11 @@ test('harmonics turn by a quaternion as by its matrix', () => {
     const turned = sh.slice();
     new HarmonicsTurner(3).turn(turned, 0, [w, x, y, z]);
     assert.deepEqual([...turned.subarray(0, 3)], [...sh.subarray(0, 3)]);
-    for (const [band, first] of [[1, 1], [2, 4], [3, 9]] as const) {
+    for (const [band, first] of [
+      [1, 1],
+      [2, 4],
+      [3, 9],
+    ] as const) {
       const matrix = shRotation(band, turn);
       const size = 2 * band + 1;
       for (let row = 0; row < size; row++)

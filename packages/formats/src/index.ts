@@ -35,21 +35,18 @@ export {
   type AnimatedAttributeName,
   type AnimatedAttribute,
 } from './motion.js';
+export { clipFrame, clipPartBytes, readClipPart, type ClipPartContent } from './clip/clip-parts.js';
 export {
-  clipFrame,
   CLIP_HEAD_BYTES,
   clipGroupAt,
   clipIndexBytes,
-  clipPartBytes,
   MAX_CLIP_INDEX_BYTES,
   parseClip,
-  readClipPart,
   writeClipHead,
   type ClipGroup,
   type ClipHead,
   type ClipIndex,
   type ClipPart,
-  type ClipPartContent,
 } from './clip.js';
 export type { OpenFile, SceneFormat, SceneFormatName, SceneReader, SceneSource, SplatRange } from './scene-format.js';
 export { readSplats, splatRanges, type SplatRanges } from './splat-ranges.js';

@@ -99,7 +99,11 @@ export function applyMotion(
  * Returns the splats of a frame of the motion, as a new cloud with the same rows. Splats that are absent have opacity 0.
  * @param frame Index of the frame in the motion, from 0.
  */
-export function movedCloud(first: GaussianCloud, { parts, lives, turnsHarmonics }: Motion, frame: number): GaussianCloud {
+export function movedCloud(
+  first: GaussianCloud,
+  { parts, lives, turnsHarmonics }: Motion,
+  frame: number,
+): GaussianCloud {
   const cloud = {
     ...first,
     positions: first.positions.slice(),

@@ -20,7 +20,10 @@ export const reasonsOf = (faults: readonly number[]): string =>
   FAULTS.flatMap((fault, k) => (faults[k] > 0 ? [`${grouped(faults[k])} with ${fault}`] : [])).join(', ');
 
 /** Returns the error for a scene without drawable splats. */
-export function noSplats(name: string, { droppedCount, faults = [] }: GaussianCloud): GaussianSplatError {
+export function noSplats(
+  name: string,
+  { droppedCount, faults = [] }: Pick<GaussianCloud, 'droppedCount' | 'faults'>,
+): GaussianSplatError {
   return new GaussianSplatError('decode/empty', {
     where: name,
     expected: '1 splat or more that can be drawn',

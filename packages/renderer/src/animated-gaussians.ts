@@ -200,12 +200,7 @@ export class AnimatedGaussians extends SceneBuffers {
     this.#stage.record(pass, part.bindings, part.rowRoom);
   }
 
-  #slotPart(
-    { shDegree }: AnimatedRoom,
-    { rows, planes, frames }: PartRoom,
-    ownRoom: number,
-    first: number,
-  ): SlotPart {
+  #slotPart({ shDegree }: AnimatedRoom, { rows, planes, frames }: PartRoom, ownRoom: number, first: number): SlotPart {
     const { storage, uniform, copyDestination } = BUFFER_USAGE;
     const sizes = animationBytes({ rows, planes, frames, shDegree });
     const buffer = (name: (typeof PIECES)[number]): GPUBuffer =>

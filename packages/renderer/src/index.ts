@@ -41,5 +41,4 @@ export { SequenceGaussians } from './sequence-gaussians.js';
 export type { FrameStats } from './frame-stats.js';
 export type { Variants } from './variants.js';
 export { MemoryLedger } from './memory-ledger.js';
-export { ANIMATION_SLOTS,
-  STILL_SLOT, AnimatedGaussians, type AnimatedRoom } from './animated-gaussians.js';
+export { ANIMATION_SLOTS, STILL_SLOT, AnimatedGaussians, type AnimatedRoom } from './animated-gaussians.js';

@@ -25,7 +25,8 @@ export function openClipStore(out, options, frames) {
     writeWhole(keyFile, key);
   }
   return {
-    read: async (name) => (existsSync(join(folder, name)) ? new Uint8Array(readFileSync(join(folder, name))) : undefined),
+    read: async (name) =>
+      existsSync(join(folder, name)) ? new Uint8Array(readFileSync(join(folder, name))) : undefined,
     write: async (name, bytes) => writeWhole(join(folder, name), bytes),
     remove: () => rmSync(folder, { recursive: true, force: true }),
   };

@@ -66,7 +66,8 @@ export interface FoundGroup extends CodedGroup {
  */
 export async function codeGroup(coding: GroupCoding): Promise<FoundGroup> {
   const { target, maxBytes } = coding;
-  const first = coding.steps ?? (await stepsFor(coding, await partsOf(coding, coding.encoding, usualSteps(coding.whole))));
+  const first =
+    coding.steps ?? (await stepsFor(coding, await partsOf(coding, coding.encoding, usualSteps(coding.whole))));
   const tried = new Map<number, FoundGroup>();
   const isWanted = ({ parts }: FoundGroup): boolean => sizeOf(parts) <= maxBytes;
   await fitSteps({
@@ -99,7 +100,11 @@ async function attempt(coding: GroupCoding, encoding: Encoding, steps: MotionSte
   if (worstOf(errors) <= target) {
     errors = await judges.errorsInAll(tracks.frames.length, shown);
     const worst = [...errors].sort((a, b) => b.error - a.error).slice(0, REMEMBERED);
-    if (worstOf(worst) > target) await judges.errorsIn(worst.map(({ frame }) => frame), shown);
+    if (worstOf(worst) > target)
+      await judges.errorsIn(
+        worst.map(({ frame }) => frame),
+        shown,
+      );
   }
   const written = parts.map((part) => part.write(steps));
   return { frames: tracks.frames.length, parts: written, errors, contents, encoding, steps };

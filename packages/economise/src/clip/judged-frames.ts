@@ -56,7 +56,8 @@ function imageError(cloud: GaussianCloud, place: number, frame: GaussianCloud, i
     light += (SH_C0 * frame.sh[to * i + k]) ** 2 / 3;
   }
   // The mean square of each basis function over all directions is that of the constant one.
-  for (let k = 0; k < Math.min(from, to); k++) color += (SH_C0 * (cloud.sh[from * place + k] - frame.sh[to * i + k])) ** 2;
+  for (let k = 0; k < Math.min(from, to); k++)
+    color += (SH_C0 * (cloud.sh[from * place + k] - frame.sh[to * i + k])) ** 2;
   for (let k = 0; k < 4; k++) cosine += cloud.rotations[4 * place + k] * frame.rotations[4 * i + k];
   const turned = Math.max(0, 4 * (1 - cosine * cosine));
   const faded = (cloud.opacities[place] - opacity) ** 2;

@@ -46,7 +46,9 @@ export function roundMotion(found: Followed, step: number, importance: Float32Ar
     0,
   );
   const factor = Math.max(1, overflow / MAX_CODE);
-  const shrinking = Float32Array.from(importance, (weight) => Math.min(MAX_SHRINKING, SHRINKING / Math.max(weight, 1e-9)));
+  const shrinking = Float32Array.from(importance, (weight) =>
+    Math.min(MAX_SHRINKING, SHRINKING / Math.max(weight, 1e-9)),
+  );
   const codes = shares.map((own, k) => {
     if (!isNeeded[k]) return undefined;
     const rounded = new Int16Array(rows);

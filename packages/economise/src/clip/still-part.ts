@@ -11,7 +11,11 @@ export interface StillPart {
 }
 
 /** Encodes splats that never change. @param chosen Indices of the splats of the part. */
-export async function writeStillPart(cloud: GaussianCloud, chosen: Uint32Array, encoding: Encoding): Promise<StillPart> {
+export async function writeStillPart(
+  cloud: GaussianCloud,
+  chosen: Uint32Array,
+  encoding: Encoding,
+): Promise<StillPart> {
   const own = splatsOf(cloud, chosen);
   const degrees = new Uint8Array(own.count).fill(own.shDegree);
   const bytes = new Uint8Array(await encoding.write({ cloud: own, degrees }));

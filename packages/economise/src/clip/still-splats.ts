@@ -43,11 +43,11 @@ export class StillSplats {
   ): Promise<StillSplats | undefined> {
     const first = await openFrame(0);
     let still = new StillSplats(first, minPsnr);
-    let [fewest, most] = [first.count, first.count];
-    const min = (): number => Math.max(1, MIN_SHARE * most);
+    let [fewest, largest] = [first.count, first.count];
+    const min = (): number => Math.max(1, MIN_SHARE * largest);
     for (let frame = 1; frame < frameCount; frame++) {
       const cloud = await openFrame(frame);
-      [fewest, most] = [Math.min(fewest, cloud.count), Math.max(most, cloud.count)];
+      [fewest, largest] = [Math.min(fewest, cloud.count), Math.max(largest, cloud.count)];
       const matches = still.#match(cloud);
       if (matches.some((i) => i < 0)) still = still.#only(matches);
       if (still.cloud.count < min()) return undefined;

@@ -94,8 +94,7 @@ function turnsOf({ cloud }: TrackedSplats): Read {
     const size = Math.hypot(turn[1], turn[2], turn[3]);
     const lastSize = Math.hypot(before[0], before[1], before[2]);
     // Near whole turns, the axis is that of the last vector.
-    const axisOf = (k: number): number =>
-      size > 1e-6 ? turn[k + 1] / size : lastSize > 0 ? before[k] / lastSize : 0;
+    const axisOf = (k: number): number => (size > 1e-6 ? turn[k + 1] / size : lastSize > 0 ? before[k] / lastSize : 0);
     const axis = [axisOf(0), axisOf(1), axisOf(2)];
     const angle = 2 * Math.atan2(size, turn[0]);
     const along = axis[0] * before[0] + axis[1] * before[1] + axis[2] * before[2];

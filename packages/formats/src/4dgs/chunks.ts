@@ -67,7 +67,7 @@ function wholeChunk(content: Uint8Array, offset: number, keyframe: number, name:
 }
 
 function span(from: number, until: number, name: string): Pick<Chunk, 'from' | 'until'> {
-  if (from <= until && Math.abs(from) < 1e9 && Math.abs(until) < 1e9) return { from, until };
+  if (from <= until && Math.abs(from) < 1e9 && (Math.abs(until) < 1e9 || until === Infinity)) return { from, until };
   throw damaged(name, 'chunks that begin before they end', `${from} to ${until} s`, 'decode/header');
 }
 

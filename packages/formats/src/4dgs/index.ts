@@ -1,8 +1,10 @@
 /** Conversion of `.4dgs` files to clips: https://github.com/avala-ai/4dgs. */
 import { boundsOf, shCoefficientCount, type GaussianCloud, type ShDegree } from '@gaussian-splat/core';
 import { LoadBudget, type LoadLimits } from '../budget.js';
-import { clipPartBytes, type ClipGroup, type ClipIndex, type ClipPartContent } from '../clip.js';
+import type { ClipGroup, ClipIndex } from '../clip.js';
+import { clipPartBytes, type ClipPartContent } from '../clip/clip-parts.js';
 import { damaged } from '../faults.js';
+import { noSplats } from '../scene-errors.js';
 import { ANIMATED_ATTRIBUTES, ANIMATED_ATTRIBUTE_NAMES } from '../motion.js';
 import { FourDgs, type Population } from './four-dgs.js';
 import { sampledMotion, type Moments } from './sampled-motion.js';
@@ -42,9 +44,10 @@ export class FourDgsClip {
   static async open(bytes: Uint8Array, name: string, limits?: LoadLimits): Promise<FourDgsClip> {
     const file = new FourDgs(bytes, name, limits);
     const { header } = file.scene;
-    if (header.splats === 0 || file.chunks.length === 0) throw damaged(name, 'splats', 'none', 'decode/header');
+    if (header.splats === 0) throw noSplats(name, { droppedCount: 0 });
+    if (file.chunks.length === 0) throw damaged(name, 'splats', 'none', 'decode/header');
     const framesPerSecond = rateOf(file);
-    const frameCount = Math.max(1, Math.ceil(header.durationSeconds * framesPerSecond - 1e-6));
+    const frameCount = Math.max(1, Math.ceil(playedSeconds(file) * framesPerSecond - 1e-6));
     const searched = file.isKeyed ? 0 : SEARCH_BYTES * file.chunks.length;
     new LoadBudget(bytes.length, limits).take(frameCount * (FRAME_BYTES + searched), name);
     const groups = groupsOf(file, framesPerSecond, frameCount);
@@ -143,6 +146,18 @@ async function firstSplats(file: FourDgs): Promise<GaussianCloud> {
     file.chunks[Math.max(0, first)].from,
   );
   return { ...cloud, opacities: splats.opacities };
+}
+
+/** Seconds for which the last state of a file without an end is played. */
+const LAST_SECONDS = 1;
+
+/** Returns the duration of a clip in seconds: that of the file, or up to its last change and a second more. */
+function playedSeconds({ scene, chunks, isKeyed }: FourDgs): number {
+  const { durationSeconds } = scene.header;
+  if (durationSeconds < Infinity) return durationSeconds;
+  const spans = chunks.map(({ from, until }) => [from, until]);
+  const edges = isKeyed ? spans.flat() : [...spans, ...scene.windows].flat();
+  return LAST_SECONDS + edges.reduce((last, edge) => (edge < 1e6 ? Math.max(last, edge) : last), 0);
 }
 
 /**

@@ -1,6 +1,6 @@
 /** Converts the splats of several frames to a base cloud and motion curves, as a part of a clip has them. */
 import { shCoefficientCount, type GaussianCloud } from '@gaussian-splat/core';
-import type { ClipPartContent } from '../clip.js';
+import type { ClipPartContent } from '../clip/clip-parts.js';
 import {
   ANIMATED_ATTRIBUTES,
   ANIMATED_ATTRIBUTE_NAMES,
@@ -44,7 +44,10 @@ export function sampledMotion({ clouds, isThere }: Moments): ClipPartContent {
       return [name, partOf(name, changes, base, first, end, frames)];
     }),
   ) as Record<AnimatedAttributeName, AnimatedAttribute>;
-  return { cloud: { ...base, shDegree }, motion: { splats: count, frames, parts, lives: { first, end }, turnsHarmonics: false } };
+  return {
+    cloud: { ...base, shDegree },
+    motion: { splats: count, frames, parts, lives: { first, end }, turnsHarmonics: false },
+  };
 }
 
 /** Returns a cloud whose row i is copied from the frame `moments[i]`. */

@@ -108,6 +108,7 @@ export type TemporalModel = 'gaussian-birth' | 'keyframe-delta';
 const MODELS: readonly string[] = ['gaussian-birth', 'keyframe-delta'] satisfies TemporalModel[];
 
 export interface Header {
+  /** Infinity if the last state has no end. */
   readonly durationSeconds: number;
   readonly splats: number;
   /** Minimum fraction of its opacity, 0..1, at which a splat that fades is drawn. */
@@ -125,7 +126,7 @@ export function readHeader(cursor: Cursor): Header {
   const degree = cursor.u8();
   if (!MODELS.includes(model))
     throw damaged(name, `a temporal model of ${MODELS.join(' and ')}`, quote(model), 'decode/unsupported');
-  if (!(durationSeconds >= 0 && durationSeconds < 1e6))
+  if (!(durationSeconds >= 0 && (durationSeconds < 1e6 || durationSeconds === Infinity)))
     throw damaged(name, 'a duration of 0 to a million seconds', String(durationSeconds), 'decode/header');
   if (!(cutoff > 0 && cutoff <= 1)) throw damaged(name, 'a cutoff of 0 to 1', String(cutoff), 'decode/header');
   if (degree > 3) throw damaged(name, 'spherical harmonics of degree 0 to 3', `degree ${degree}`, 'decode/unsupported');

@@ -23,7 +23,12 @@ export const roundedCurveValue = (value: number, bits: number): number =>
   Math.max(-MAX_VALUE, Math.min(MAX_VALUE, Math.round(value * 2 ** bits))) / 2 ** bits;
 
 /** Codes the curves of an attribute. A decoder fills `curves`. @param bits For a decoder, undefined. */
-export function codeCurves(coder: BitCoder, part: AnimatedAttribute, frames: number, bits: CurveBits | undefined): void {
+export function codeCurves(
+  coder: BitCoder,
+  part: AnimatedAttribute,
+  frames: number,
+  bits: CurveBits | undefined,
+): void {
   const { rank, curves } = part;
   const numbers = new NumberModel();
   for (let k = 0; k < rank; k++) {

@@ -48,7 +48,11 @@ export function codeLives(coder: BitCoder, { first, end, fades }: Lives, frames:
       const [place, slope] = [fades[FADE_NAMES[k]], fades[FADE_NAMES[k + 1]]];
       const kind = k + (k === 0 ? Number(first[i] === 0) : Number(end[i] === frames));
       place[i] = ends.code(coder, place[i], kind);
-      slope[i] = slopes.code(coder, slope[i], ENDS * kind + (place[i] === 255 ? 0 : 1 + ((place[i] * (ENDS - 1)) >> 8)));
+      slope[i] = slopes.code(
+        coder,
+        slope[i],
+        ENDS * kind + (place[i] === 255 ? 0 : 1 + ((place[i] * (ENDS - 1)) >> 8)),
+      );
     }
   }
 }

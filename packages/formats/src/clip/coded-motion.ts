@@ -129,7 +129,8 @@ function codePlanes(coder: BitCoder, { rank, codes }: AnimatedAttribute, known: 
       number: at >= rank ? codes[at - rank] : NO_PLANES.number,
       curve: at % rank > 0 ? codes[at - 1] : NO_PLANES.curve,
     };
-    const isPredicted = coder.plain(coder instanceof BitEncoder && isPredictable(plane, earlier, known) ? 1 : 0, 1) === 1;
+    const isPredicted =
+      coder.plain(coder instanceof BitEncoder && isPredictable(plane, earlier, known) ? 1 : 0, 1) === 1;
     model.code(coder, plane, earlier, isPredicted);
   });
 }

@@ -2,7 +2,7 @@
 import { shCoefficientCount, type ShDegree } from '@gaussian-splat/core';
 import { shRotation } from '../transform/sh-rotation.js';
 
-/** The reflection that exchanges y and z, of which rotations about y consist. */
+/** The reflection that exchanges y and z, that makes rotations about y. */
 const EXCHANGE = [1, 0, 0, 0, 0, 1, 0, 1, 0] as const;
 /** Coefficients of {@link EXCHANGE} in bands 1 to 3, row-major, computed at the first use. */
 let exchanges: readonly Float64Array[] | undefined;

@@ -106,7 +106,9 @@ export class GroupCache {
       this.#wanted = this.#wantedFrom(group, loops, direction);
       // A seek to a group that is not loaded does not wait for a part that is needed later.
       const isUrgent = !this.get(group, 0) && !this.isMissing(group, 0);
-      const needed = isUrgent ? this.#wanted.filter(([own, part]) => part === 0 && (own === group || own === STILL)) : this.#wanted;
+      const needed = isUrgent
+        ? this.#wanted.filter(([own, part]) => part === 0 && (own === group || own === STILL))
+        : this.#wanted;
       for (const entry of this.#entries.values()) {
         if (!entry.abort || includes(needed, entry)) continue;
         entry.abort.abort();
@@ -137,7 +139,9 @@ export class GroupCache {
       seconds += groups[next].frames / framesPerSecond;
     }
     const fine = (own: number): (readonly [number, number])[] =>
-      partsIn(this.#index, own).slice(1).map((_, k) => [own, k + 1] as const);
+      partsIn(this.#index, own)
+        .slice(1)
+        .map((_, k) => [own, k + 1] as const);
     const [next, ...later] = ahead;
     return [
       ...(this.#index.still.length > 0 ? [[STILL, 0] as const] : []),
