@@ -75,6 +75,7 @@ test('a PSNR that nothing reaches is returned as it is', async () => {
   const blind: DrawFrame = async () => ({ compare: async () => [0.01], destroy: () => undefined });
   const clip = await codeClip({ ...options(flashing, 45), frameCount: 4, draw: blind });
   assert.ok(Math.abs(clip.worstPsnr - 20) < 1e-9);
+  assert.equal(clip.measured, 4);
 });
 
 /** Files in memory that can be written a number of times. */

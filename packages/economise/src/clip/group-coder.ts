@@ -82,7 +82,11 @@ export async function codeGroup(coding: GroupCoding): Promise<FoundGroup> {
       return { error: isWanted(found) ? error : (0.5 * target * maxBytes) / sizeOf(found.parts) };
     },
   });
-  return [...tried.values()].reduce((best, next) => betterOf(best, next, coding));
+  const best = [...tried.values()].reduce((one, next) => betterOf(one, next, coding));
+  const { frames, contents, errors } = best;
+  if (new Set(errors.map(({ frame }) => frame)).size === frames) return best;
+  // A group that misses the target is measured in all frames, too, so that its printed error is that of the worst one.
+  return { ...best, errors: await coding.judges.errorsInAll(frames, [...coding.still, ...contents]) };
 }
 
 /** Codes a group with some steps, and measures it. */
