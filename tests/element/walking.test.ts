@@ -15,15 +15,26 @@ const map = {
   start: [0.5, 0, 0.5] as const,
 };
 
-test('a body is put on the highest floor below a point, and stays where there is none', () => {
+test('a body is put on the highest floor below a point, and stays where there is none', async () => {
   const walker = new FloorBody(map, [-1, 1.6, -1]);
   assert.deepEqual([walker.at, walker.eyeFloor], [[-1, 0, -1], 0]);
-  assert.equal(walker.goTo([-1, 0, 1]), true);
+  assert.equal(await walker.goTo([-1, 0, 1]), true);
+  assert.equal(walker.isMoving, true);
   walker.land([1, 3.6, 1]);
   assert.deepEqual([walker.at, walker.eyeFloor, walker.isMoving], [[1, 2, 1], 2, false]);
   walker.land([9, 1.6, 0]);
   assert.deepEqual(walker.at, [1, 2, 1]);
   assert.deepEqual(new FloorBody(map, [9, 1.6, 0]).at, map.start);
+});
+
+test('another motion ends the search for a path', async () => {
+  const walker = new FloorBody(map, [-1, 1.6, -1]);
+  const going = walker.goTo([-1, 0, 1]);
+  walker.step(0.1, 1, 0);
+  assert.equal(await going, false);
+  const { at } = walker;
+  walker.step(0.1, 0, 0);
+  assert.deepEqual(walker.at, at);
 });
 
 interface Pad {

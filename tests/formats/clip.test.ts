@@ -5,6 +5,7 @@
 import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
 import { test } from 'node:test';
+import { serialize } from 'node:v8';
 import { constants, deflateRawSync, inflateRawSync } from 'node:zlib';
 import type { GaussianCloud } from '@gaussian-splat/core';
 import {
@@ -12,9 +13,12 @@ import {
   clipFrame,
   clipGroupAt,
   LoadBudget,
+  packClipIndex,
   parseClip,
   readClipPart,
   readScene,
+  unpackClipIndex,
+  writeClipHead,
   type ClipIndex,
   type ClipPart,
   type ClipPartContent,
@@ -70,6 +74,19 @@ test('the index says where groups and parts are', () => {
   );
   const [coarse, rest] = index.groups[0].parts;
   assert.ok(coarse.splats * 6 < rest.splats, `${coarse.splats} of ${rest.splats} splats are coarse`);
+});
+
+test('between threads, an index is a table of 20 bytes a part, and the same afterwards', () => {
+  assert.deepEqual(unpackClipIndex(structuredClone(packClipIndex(index))), index);
+  const frames = 32_768;
+  const groups = Array.from({ length: frames }, () => ({
+    frames: 1,
+    parts: [{ ...index.groups[0].parts[0], planes: 3 }],
+  }));
+  const large = parseClip(writeClipHead({ ...index, groups }), 'a.gsv');
+  assert.equal(large.frameCount, frames);
+  assert.ok(serialize(packClipIndex(large)).length < 20 * frames);
+  assert.deepEqual(unpackClipIndex(packClipIndex(large)), large);
 });
 
 test('splats are followed though no frame says which they were, and are gone when they are gone', async () => {

@@ -246,6 +246,46 @@ for (const name of someOf(names, Math.ceil(names.length / 2))) {
   });
 }
 
+/** Asks a server for a range of bytes. The answer is a function of the number of the request. */
+async function rangeFrom(
+  answer: (response: ServerResponse, request: number) => void,
+  tag?: string,
+): Promise<{ found: string; requests: number; tag?: string | undefined }> {
+  let asked = 0;
+  const server = createServer((_, response) => answer(response, ++asked)).listen(0);
+  const { port } = server.address() as AddressInfo;
+  const found = await fetchRange(`http://localhost:${port}/a`, 0, 9, { tag }).then(
+    (range) => ({ found: `${range.bytes.length} bytes`, tag: range.tag }),
+    (error: GaussianSplatError) => ({ found: `${error.code}: ${error.found}` }),
+  );
+  server.closeAllConnections();
+  server.close();
+  return { ...found, requests: asked };
+}
+const nine = (response: ServerResponse, headers: object): void =>
+  void response.writeHead(206, { 'Content-Range': 'bytes 0-8/20', ...headers }).end(CONTENT.subarray(0, 9));
+
+test('ranges of two versions of a file are not mixed', async () => {
+  const known = await rangeFrom((response) => nine(response, { ETag: '"a"', 'Last-Modified': 'Monday' }));
+  assert.deepEqual(known, { found: '9 bytes', tag: '"a"', requests: 1 });
+  assert.equal((await rangeFrom((response) => nine(response, { 'Last-Modified': 'Monday' }))).tag, 'Monday');
+  const [same, other, none] = await Promise.all(
+    ['"a"', '"b"', undefined].map((tag) => rangeFrom((response) => nine(response, tag ? { ETag: tag } : {}), '"a"')),
+  );
+  assert.equal(same.found, '9 bytes');
+  assert.deepEqual(other, { found: 'network/interrupted: another version ("b")', requests: 1 });
+  assert.equal(none.found, '9 bytes', 'a header that pages cannot read is no other version');
+});
+
+test('a short answer that does not say its range is asked for again', async () => {
+  const { found, requests: asked } = await rangeFrom((response, request) => {
+    response.writeHead(206, { 'Content-Length': 9 });
+    if (request > 1) response.end(CONTENT.subarray(0, 9));
+    else response.write(CONTENT.subarray(0, 5), () => setImmediate(() => response.destroy()));
+  });
+  assert.deepEqual([found, asked], ['9 bytes', 2]);
+});
+
 test('a time limit ends what is slow', async () => {
   const silent = address(names.indexOf('headers, then silence'));
   const limits = { maxSeconds: 0.2 };

@@ -60,6 +60,38 @@ test('tiles that are added are drawn beside those below them', async () => {
   assert.equal((await readTiles({ ...TREE, 'tileset.json': tileset(root) })).count, 30);
 });
 
+/** Counts the files that are opened; each has the bytes of `answer`. */
+async function opened(root: object, answer: (path: string) => Uint8Array): Promise<{ code: string; paths: string[] }> {
+  const paths: string[] = [];
+  const openFile = (path: string): Promise<Uint8Array> => Promise.resolve(answer(paths[paths.push(path) - 1]));
+  const code = await readScene(tileset(root), { name: 'tileset.json', openFile }).then(
+    ({ count }) => `${count} splats`,
+    (error: { code?: string }) => error.code ?? `unnamed: ${String(error)}`,
+  );
+  return { code, paths };
+}
+
+test('a chain of added tiles is drawn from the top to the bottom, each tile once', async () => {
+  const chain = Array.from({ length: 400 }).reduce<object>(
+    (below, _, k) => tile(`${399 - k}.glb`, { refine: 'ADD', children: [below] }),
+    tile('last.glb'),
+  );
+  const { code, paths } = await opened(chain, () => TREE['root.glb']);
+  assert.equal(code, `${401 * 10} splats`);
+  assert.deepEqual(
+    paths,
+    [...Array(400).keys(), 'last'].map((name) => `${name}.glb`),
+  );
+});
+
+test('the bytes that arrive bound the requests', async () => {
+  const many = tile(undefined, { children: Array.from({ length: 4000 }, (_, k) => tile(`${k}.glb`)) });
+  const small = await opened(many, () => new TextEncoder().encode('b3dm'));
+  assert.equal(small.code, 'out-of-memory/budget');
+  const bytes = tileset(many).length + 4 * small.paths.length;
+  assert.ok(small.paths.length <= 1000 + bytes / 1024, `${small.paths.length} requests`);
+});
+
 test('transforms of tiles are those of a frame whose third axis points up', async () => {
   // A quarter turn about the vertical, then 5 to the east, 7 to the north and 2 up.
   const transform = [0, 1, 0, 0, -1, 0, 0, 0, 0, 0, 1, 0, 5, 7, 2, 1];
@@ -165,6 +197,17 @@ test('implicit tiles are found by the bits of their subtrees', async () => {
   }
 });
 
+test('the buffer of a subtree is opened once, however many views it has', async () => {
+  const files = quadtree('bits.bin');
+  const paths: string[] = [];
+  const openFile = (path: string): Promise<Uint8Array> => Promise.resolve(files[paths[paths.push(path) - 1]]);
+  await readScene(files['tileset.json'], { name: 'tileset.json', openFile });
+  assert.deepEqual(
+    paths.filter((path) => path.endsWith('.bin')),
+    ['s/0/0/bits.bin'],
+  );
+});
+
 test('implicit tiles may be an octree, have several contents, be those of version 1.0, and be within another tileset', async () => {
   const tiling = { subdivisionScheme: 'OCTREE', subtreeLevels: 2, subtrees: { uri: '{level}/{x}/{y}/{z}.json' } };
   const bits = subtree({ tiles: [0, 8], contents: [1, [8]] });
@@ -204,15 +247,18 @@ test('subtrees that are damaged, or have no end, are refused by name', async () 
   const beyond = { buffers: [{}], bufferViews: [{ buffer: 0, byteLength: 99 }], tileAvailability: { bitstream: 0 } };
   assert.match(await said({ 's/0/0/0.subtree': json(beyond) }), /^decode\/corrupt.*tileAvailability/);
   const all = { constant: 1 };
-  const endless = json({ tileAvailability: all, contentAvailability: [all], childSubtreeAvailability: all });
-  const implicitTiling = {
-    ...{ subdivisionScheme: 'OCTREE', subtreeLevels: 16, availableLevels: 50 },
-    subtrees: { uri: '{level}{x}{y}{z}' },
+  const endless = (childSubtreeAvailability: object): Uint8Array =>
+    json({ tileAvailability: all, contentAvailability: [all], childSubtreeAvailability });
+  const read = (levels: number, answer: Uint8Array, code: string, message: RegExp): Promise<unknown> => {
+    const implicitTiling = {
+      ...{ subdivisionScheme: 'OCTREE', subtreeLevels: levels, availableLevels: 50 },
+      subtrees: { uri: '{level}{x}{y}{z}' },
+    };
+    const root = tileset(tile('a{x}.glb', { implicitTiling }));
+    return expectRefusal(root, code, message, { name: 'tileset.json', openFile: () => Promise.resolve(answer) });
   };
-  await expectRefusal(tileset(tile('a{x}.glb', { implicitTiling })), 'decode/header', /at most 100,000 tiles/, {
-    name: 'tileset.json',
-    openFile: () => Promise.resolve(endless),
-  });
+  await read(16, endless({ constant: 0 }), 'decode/header', /at most 100,000 tiles/);
+  await read(1, endless(all), 'out-of-memory/budget', /at most 1,\d+ requests/);
 });
 
 test('tiles without splats are left out with a warning, and a tileset of them is refused', async () => {

@@ -143,7 +143,7 @@ function wander(
   return { out, levels };
 }
 
-test('a room of boxes: the floor, the gallery above it and the stairs between are one map', () => {
+test('a room of boxes: the floor, the gallery above it and the stairs between are one map', async () => {
   const map = makeWalkMap(cloudOf(ROOM), { frame: FRAME, near: [0, 1.5, 2] });
   const ground = floorAt(map, 0, 2, 0);
   assert.ok(ground !== undefined && Math.abs(ground) < 0.02, `the floor is at ${ground} m`);
@@ -153,7 +153,7 @@ test('a room of boxes: the floor, the gallery above it and the stairs between ar
   assert.equal(floorAt(map, 0, -2.5, 0), undefined, 'a walker never stands in the table');
   assert.equal(floorAt(map, 3.95, 2, 0), undefined, 'a walker never stands in the wall');
   assert.equal(wander(map, isOutside).out, 0);
-  const up = wayTo(map, [0, ground!, 2], [0, gallery!, -3.7]);
+  const up = await wayTo(map, [0, ground!, 2], [0, gallery!, -3.7]);
   assert.ok(up.length > 40, `the way up goes through the door and over the stairs: ${up.length} cells`);
   assert.ok(
     up.every((place, i) => i === 0 || Math.abs(place[1] - up[i - 1][1]) <= map.step),
@@ -167,7 +167,7 @@ test('the spoilt room: jitter, faint splats and floaters let no one out', () => 
   assert.equal(wander(map, isOutside).out, 0);
 });
 
-test('a path does not leave one side of the map to enter it at the other', () => {
+test('a path does not leave one side of the map to enter it at the other', async () => {
   // Two arms at the left and the right edge, which meet only at the far end.
   const [width, depth, cell] = [10, 12, 0.05];
   const layer = Float32Array.from({ length: width * depth }, (_, i) => {
@@ -181,7 +181,7 @@ test('a path does not leave one side of the map to enter it at the other', () =>
     [0.475, 0.025],
     [0.025, 0.475],
   ]) {
-    const way = wayTo(map, [from, 0, 0.125], [to, 0, 0.125]);
+    const way = await wayTo(map, [from, 0, 0.125], [to, 0, 0.125]);
     assert.ok(way.length >= 24, `${way.length} cells, 24 lead around`);
     way.reduce(
       (before, place) => {
@@ -193,17 +193,62 @@ test('a path does not leave one side of the map to enter it at the other', () =>
   }
 });
 
-test('a path over a floor of 1,000 m² is found in the time of a few frames', () => {
+test('a path over a floor of 1,000 m² is found in the time of a few frames', async () => {
   const side = 640;
   const map: WalkMap = {
     ...{ cell: 0.05, corner: [0, 0], width: side, depth: side, step: 0.3, start: [0, 0, 0], area: 1024 },
     layers: [new Float32Array(side * side)],
   };
   const before = process.cpuUsage();
-  assert.equal(wayTo(map, [0, 0, 0], [31.99, 0, 31.99]).length, side - 1);
+  assert.equal((await wayTo(map, [0, 0, 0], [31.99, 0, 31.99])).length, side - 1);
   const { user, system } = process.cpuUsage(before);
   assert.ok(user + system < 0.5e6, `${(user + system) / 1e6} s of CPU`);
-  assert.deepEqual(wayTo(map, [1.01, 0, 1.01], [1.02, 0, 1.03]), [[1.02, 0, 1.03]], 'within a cell');
+  assert.deepEqual(await wayTo(map, [1.01, 0, 1.01], [1.02, 0, 1.03]), [[1.02, 0, 1.03]], 'within a cell');
+});
+
+/** Counts the tasks of work, with its longest by the places that a proxy of the layers saw read. */
+async function tasksOf(map: WalkMap, work: (map: WalkMap) => Promise<unknown>): Promise<{ max: number; all: number }> {
+  let [max, all, own] = [0, 0, 0];
+  const counting = map.layers.map(
+    (layer) =>
+      new Proxy(layer, {
+        get(target, key) {
+          own++;
+          return Reflect.get(target, key, target) as unknown;
+        },
+      }),
+  );
+  let isOver = false;
+  const turn = (): void => {
+    [max, all, own] = [Math.max(max, own), all + own, 0];
+    if (!isOver) setImmediate(turn);
+  };
+  turn();
+  await work({ ...map, layers: counting });
+  isOver = true;
+  turn();
+  return { max, all };
+}
+
+test('a search over many floors is divided into short tasks, and ends', async () => {
+  const [side, floors] = [30, 256];
+  const map: WalkMap = {
+    ...{ cell: 0.05, corner: [0, 0], width: side, depth: side, step: 1e3, start: [0, 0, 0], area: 1 },
+    layers: Array.from({ length: floors }, (_, k) => new Float32Array(side * side).fill(k)),
+  };
+  const { max, all } = await tasksOf(map, (counted) => wayTo(counted, [0, 0, 0], [1.49, 0, 1.49]));
+  assert.ok(all > 1e6 && max < 2e6, `${all} heights are compared, ${max} in one task`);
+  const aborted = AbortSignal.abort(new Error('another motion'));
+  await assert.rejects(wayTo(map, [0, 0, 0], [1.49, 0, 1.49], aborted), /another motion/);
+});
+
+test('a step over cells of a millimeter is bounded', async () => {
+  const map: WalkMap = {
+    ...{ cell: 1e-3, corner: [0, 0], width: 2000, depth: 2, step: 1, start: [0, 0, 0], area: 1 },
+    layers: [new Float32Array(4000)],
+  };
+  const { all } = await tasksOf(map, async (counted) => stepOn(counted, [0, 0, 0], 1e12, 0));
+  assert.ok(all < 20_000, `${all} heights`);
 });
 
 test('a walk map is stored in centimeters and read again', () => {
@@ -244,18 +289,36 @@ test('walk maps whose first line claims more than there is are refused by name',
     { corner: [0, 0, 0], start: [0, 0] },
     { start: 'abc' },
     { width: 0, depth: 0, layers: 10_000_000 },
+    { cell: 1e-300 },
+    { cell: 1e9 },
+    { step: 1e300 },
+    { format: { toString: 1 } },
   ]) {
     const file = gzipSync(new TextEncoder().encode(`${JSON.stringify({ ...head, ...claim })}\n`));
     assert.throws(() => decodeWalkMap(file), { code: 'decode/corrupt' }, JSON.stringify(claim));
   }
 });
 
-test('what is no room has no floor, and no exception', () => {
+test('a walk map costs what it weighs', () => {
+  const map = { cell: 0.1, corner: [0, 0], width: 4096, depth: 4000, step: 0.3, start: [0, 0, 0], area: 1 } as const;
+  const file = encodeWalkMap({ ...map, layers: [new Float32Array(4096 * 4000)] });
+  assert.ok(file.length < 100_000, `${file.length} bytes`);
+  assert.throws(() => decodeWalkMap(file), { code: 'out-of-memory/budget' });
+  const small = { ...map, width: 400 };
+  assert.throws(
+    () => decodeWalkMap(encodeWalkMap({ ...small, layers: [new Float32Array(1.6e6)] }), 'a', { maxBytes: 1e6 }),
+    {
+      code: 'out-of-memory/budget',
+    },
+  );
+});
+
+test('what is no room has no floor, and no exception', async () => {
   const single = cloudOf([{ min: [0, 0, 0], max: [0.1, 0.1, 0.1] }]);
   const map = makeWalkMap(single, { frame: FRAME });
   assert.equal(map.area < 4, true);
   assert.equal(floorAt(map, 100, 100, 0), undefined);
-  assert.deepEqual(wayTo(map, [0, 0, 0], [50, 0, 50]), []);
+  assert.deepEqual(await wayTo(map, [0, 0, 0], [50, 0, 50]), []);
   assert.throws(() => makeWalkMap(single, { frame: FRAME, metersPerUnit: 0 }), { code: 'argument/value' });
 });
 
@@ -453,6 +516,24 @@ function edited(changes: object): Uint8Array {
   const head: object = JSON.parse(new TextDecoder().decode(VOXELS.head));
   return new TextEncoder().encode(JSON.stringify({ ...head, ...changes }));
 }
+
+test('voxels cost what they weigh, and the page limits their memory and seconds', () => {
+  // A tree of one solid node.
+  const tree = new Uint8Array(Uint32Array.of(0xff000000).buffer);
+  const voxel = { min: [-8, -4, -8], max: [8, 4, 8] };
+  const large = edited({ gridBounds: voxel, treeDepth: 8, nodeCount: 1, leafDataCount: 0 });
+  const read = (limits?: VoxelFiles['limits'], frame = FRAME): unknown =>
+    readVoxels({ ...VOXELS, head: large, tree, limits }, frame, 1);
+  const half = Math.SQRT1_2;
+  const turned: FloorOptions['frame'] = [
+    [half, 0, half],
+    [0, 1, 0],
+    [-half, 0, half],
+  ];
+  assert.throws(() => read({}, turned), { code: 'out-of-memory/budget' });
+  assert.throws(() => read({ maxBytes: 1e6 }), { code: 'out-of-memory/budget' });
+  assert.throws(() => read({ maxSeconds: 0 }), { code: 'out-of-memory/budget' });
+});
 
 test('voxels that contradict themselves are refused by name', () => {
   const words = new Uint32Array(VOXELS.tree.slice().buffer);

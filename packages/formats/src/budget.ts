@@ -21,17 +21,20 @@ const FREE_BYTES = 2 ** 26;
  * more in its file, and takes up to 500 bytes during decoding.
  */
 const BYTES_PER_BYTE = 256;
+/** Requests that every load may make in addition to one for each downloaded KiB. */
+const FREE_REQUESTS = 1000;
 
 /**
- * Account of the bytes of one load, with its limits. Readers charge each allocation before they make it, if its size
- * depends on the file. Charges are never refunded, so that they bound work as well as memory. Loops without allocations
- * charge each step as a byte.
+ * Account of the bytes and requests of one load, with its limits. Readers charge each allocation before they make it, if
+ * its size depends on the file. Charges are never refunded, so that they bound work as well as memory. Loops without
+ * allocations charge each step as a byte.
  */
 export class LoadBudget {
   readonly #limits: LoadLimits;
   readonly #start = performance.now();
   #arrived: number;
   #taken = 0;
+  #requests = 0;
 
   /** @param arrived Size of the scene's own file in bytes. */
   constructor(arrived: number, limits: LoadLimits = {}) {
@@ -53,6 +56,17 @@ export class LoadBudget {
   get allowed(): number {
     const left = (this.#limits.maxBytes ?? Infinity) - this.#arrived;
     return Math.max(0, Math.min(FREE_BYTES + BYTES_PER_BYTE * this.#arrived, left));
+  }
+
+  /**
+   * Charges a request for another file of the scene, before it is made.
+   * @param where Name of the file in error messages.
+   * @throws GaussianSplatError `out-of-memory/budget` for more than 1,000 requests, plus one for each downloaded KiB.
+   */
+  request(where: string): void {
+    const allowed = FREE_REQUESTS + Math.floor(this.#arrived / 1024);
+    if (++this.#requests > allowed)
+      refuse(where, `at most ${grouped(allowed)} requests for ${grouped(this.#arrived)} bytes that arrived`, 'more');
   }
 
   /** Adds the size of another downloaded file of the scene, in bytes, which raises {@link allowed}. */

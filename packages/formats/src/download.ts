@@ -1,6 +1,7 @@
 import { chunksOf, fetchPatiently, SilenceError } from '@gaussian-splat/core/fetch';
 import { refuse } from './budget.js';
 import { grouped, GrowingBytes } from './bytes.js';
+import { lengthOf, tagOf } from './headers.js';
 import { badStatus, forbidden, interrupted, label, unreachable } from './network-errors.js';
 import type { FetchSceneOptions } from './fetch-scene.js';
 
@@ -173,16 +174,4 @@ async function answersUnread(address: URL, signal: AbortSignal | undefined): Pro
 
 function discard({ body }: Response): Promise<void> {
   return body?.cancel().catch(() => {}) ?? Promise.resolve();
-}
-
-/** Returns the length of the body in bytes, if the headers declare it and no encoding; otherwise undefined. */
-function lengthOf({ headers }: Response): number | undefined {
-  const encoding = headers.get('Content-Encoding');
-  const length = headers.get('Content-Length');
-  const isPlain = encoding === null || /^\s*(identity)?\s*$/i.test(encoding);
-  return isPlain && length !== null && /^\d+$/.test(length) ? Number(length) : undefined;
-}
-
-function tagOf({ headers }: Response): string | undefined {
-  return headers.get('ETag') ?? headers.get('Last-Modified') ?? undefined;
 }

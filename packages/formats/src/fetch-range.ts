@@ -1,7 +1,8 @@
 import { fetchPatiently, chunksOf } from '@gaussian-splat/core/fetch';
 import { refuse } from './budget.js';
+import { lengthOf, tagOf } from './headers.js';
 import { grouped, GrowingBytes } from './bytes.js';
-import { badStatus, interrupted, label, unreachable } from './network-errors.js';
+import { badStatus, changed, interrupted, label, unreachable } from './network-errors.js';
 import type { FetchSceneOptions } from './fetch-scene.js';
 
 /** Result of {@link fetchRange}. */
@@ -9,26 +10,45 @@ export interface FetchedRange {
   readonly bytes: Uint8Array<ArrayBuffer>;
   /** Whether the server supports range requests. If false, it sent the file from its beginning. */
   readonly isPartial: boolean;
+  /** Validator of the file's version: its ETag, else its date; undefined if the server sends none that can be read. */
+  readonly tag?: string | undefined;
 }
 
 const RETRY_DELAY_MS = 250;
+
+export interface FetchRangeOptions extends Pick<
+  FetchSceneOptions,
+  'credentials' | 'signal' | 'retries' | 'maxBytes' | 'maxSeconds'
+> {
+  /** Validator of the version that earlier ranges are from: see {@link FetchedRange.tag}. Others are refused. */
+  readonly tag?: string | undefined;
+}
 
 /**
  * Downloads bytes `start` to `end`, excluding `end`, of a file by a range request. If the server sends the whole file,
  * the other bytes are discarded. Interrupted connections and temporarily unavailable servers are retried.
  * @param url Absolute URL.
  * @returns The bytes of the range; fewer if the file ends before `end`.
- * @throws GaussianSplatError `network/unreachable`, `network/status`, `network/interrupted`, `out-of-memory/budget`;
- * the reason of `signal`.
+ * @throws GaussianSplatError `network/unreachable`, `network/status`, `network/interrupted` (also for another version of
+ * the file), `out-of-memory/budget`; the reason of `signal`.
  */
 export async function fetchRange(
   url: string,
   start: number,
   end: number,
-  options: Pick<FetchSceneOptions, 'credentials' | 'signal' | 'retries' | 'maxBytes' | 'maxSeconds'> = {},
+  { tag, ...options }: FetchRangeOptions = {},
 ): Promise<FetchedRange> {
-  const { credentials, retries = 3, signal, maxBytes = Infinity, maxSeconds = Infinity } = options;
-  const address = new URL(url);
+  const range = await retried(new URL(url), start, end, options);
+  if (tag === undefined || range.tag === undefined || range.tag === tag) return range;
+  throw changed(new URL(url), tag, range.tag);
+}
+
+async function retried(
+  address: URL,
+  start: number,
+  end: number,
+  { credentials, retries = 3, signal, maxBytes = Infinity, maxSeconds = Infinity }: FetchRangeOptions,
+): Promise<FetchedRange> {
   if (end - start > maxBytes) refuse(label(address), `at most ${grouped(maxBytes)} bytes`, grouped(end - start));
   // Timers are limited to 2^31 ms.
   const limit = maxSeconds < 2e6 ? AbortSignal.timeout(1000 * Math.max(0, maxSeconds)) : undefined;
@@ -80,7 +100,8 @@ async function attempt(
     at += chunk.length;
     if (at >= end) break;
   }
-  const expected = range ? Number(range[2]) + 1 - start : 0;
-  if (bytes.length < Math.min(expected, end - start)) throw broken(undefined);
-  return { bytes: bytes.view(), isPartial };
+  // Cross-origin, scripts cannot read Content-Range, but Content-Length.
+  const sent = range ? Number(range[2]) + 1 - start : isPartial ? (lengthOf(response) ?? 0) : 0;
+  if (bytes.length < Math.min(sent, end - start)) throw broken(undefined);
+  return { bytes: bytes.view(), isPartial, tag: tagOf(response) };
 }

@@ -160,10 +160,17 @@ async function readSubtree(
   const { text, binary } = chunksOf(bytes, where);
   const json = parseJson({ bytes: text, name: where, budget }, MAX_SUBTREE_BYTES);
   const folder = uri.slice(0, uri.lastIndexOf('/') + 1);
+  /** Files of buffers. Each is opened once, because a subtree has a view of them for each content of a tile. */
+  const files = new Map<string, Promise<Uint8Array>>();
+  const openOnce = (file: string): Promise<Uint8Array> => {
+    const opened = files.get(file) ?? open(folder + file);
+    files.set(file, opened);
+    return opened;
+  };
   const availability = async (own: unknown, key: string): Promise<Availability> => {
     const { constant, bitstream, bufferView = bitstream } = isObject(own) ? own : {};
     if (bufferView === undefined) return () => constant === 1;
-    const bits = await viewIn(json, bufferView, binary, `${where}, ${key}`, (file) => open(folder + file));
+    const bits = await viewIn(json, bufferView, binary, `${where}, ${key}`, openOnce);
     // Indices may exceed 32 bits.
     return (index) => (((bits[Math.floor(index / 8)] ?? 0) >> (index % 8)) & 1) === 1;
   };

@@ -58,6 +58,16 @@ export function interrupted(
   });
 }
 
+/** @param before Validator of the version that was requested first. @param now Validator of the current version. */
+export function changed(address: URL, before: string, now: string): GaussianSplatError {
+  return new GaussianSplatError('network/interrupted', {
+    where: label(address),
+    expected: `the version of the file that began to load (${before.slice(0, 80)})`,
+    found: `another version (${now.slice(0, 80)})`,
+    remedy: 'load the scene again; the file has been replaced on its server',
+  });
+}
+
 /** Returns the first 200 characters of a URL for error messages; data URLs may have millions. */
 export function label({ href }: URL): string {
   return href.length > 200 ? `${href.slice(0, 200)}...` : href;

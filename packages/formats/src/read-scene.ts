@@ -93,6 +93,7 @@ export async function readScene(file: FileBytes, options: ReadSceneOptions = {})
   const openPlain =
     openFile &&
     (async (path: string, query = '') => {
+      budget.request(name);
       const part = plainBytes(await openFile(path, query || undefined), path);
       // A file that is opened again does not raise the limit of the budget again, and a reader may keep each copy.
       if (known.has(path + query)) budget.take(part.length, name);

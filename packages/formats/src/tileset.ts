@@ -59,17 +59,34 @@ export async function contentsAt(
   };
   const tree = open(root, toParent, false, 'root', 0);
   for (const complete of implicit) await complete();
-  return drawnOf(tree, level).contents;
+  return drawnOf(tree, level);
 }
 
-/** Returns the contents that are drawn for a tile at a level, and the height of its subtree; a leaf has height 0. */
-function drawnOf(tile: Tile, level: number): { contents: TileContent[]; height: number } {
-  const below = tile.children.map((child) => drawnOf(child, level));
-  const height = below.reduce((max, child) => Math.max(max, child.height + 1), 0);
-  const inner = below.flatMap(({ contents }) => contents);
-  const isLowest = height <= level || inner.length === 0;
-  if (isLowest && tile.contents.length > 0) return { contents: [...tile.contents], height };
-  return { contents: tile.isAdded ? [...tile.contents, ...inner] : inner, height };
+/**
+ * Returns the contents that are drawn for a tree at a level. Each is listed once, because lists of all tiles of a chain
+ * would take memory by the square of its length.
+ */
+function drawnOf(tree: Tile, level: number): TileContent[] {
+  const drawn: TileContent[] = [];
+  const draw = (contents: readonly TileContent[]): void => {
+    for (const content of contents) drawn.push(content);
+  };
+  /** Lists the contents of a tile and those below it. Returns the height of its subtree; a leaf has height 0. */
+  const visit = ({ contents, children, isAdded }: Tile): number => {
+    const start = drawn.length;
+    if (isAdded) draw(contents);
+    const inner = drawn.length;
+    let height = 0;
+    for (const child of children) height = Math.max(height, visit(child) + 1);
+    const isLowest = height <= level || drawn.length === inner;
+    if (isLowest && contents.length > 0) {
+      drawn.length = start;
+      draw(contents);
+    }
+    return height;
+  };
+  visit(tree);
+  return drawn;
 }
 
 /** Returns an extension of a tile, with which version 1.0 has what version 1.1 has as a property. */

@@ -18,6 +18,10 @@ export class FloorBody {
   /** Height of the floor under the eyes, smoothed over time, meters. */
   #eyeFloor: number;
   #path: readonly Place[] = [];
+  /** Index in the path of the next waypoint. */
+  #next = 0;
+  /** The search for a path. */
+  #searching: AbortController | undefined;
   #isBlocked = false;
 
   constructor(map: WalkMap, near: Vector3) {
@@ -44,29 +48,45 @@ export class FloorBody {
 
   /** Whether the motion needs more steps: the body follows a path, or the eyes have not reached their height. */
   get isMoving(): boolean {
-    return this.#path.length > 0 || this.#eyeFloor !== this.#at[1];
+    return this.#next < this.#path.length || this.#eyeFloor !== this.#at[1];
   }
 
   /** Moves the body at once to the floor below a point. It stays where it is if there is no floor. */
   land(near: Vector3): void {
     const below = floorBelow(this.map, near);
     if (below === undefined) return;
-    this.#path = [];
+    this.#leave();
     this.#at = [near[0], below, near[2]];
     this.#eyeFloor = below;
   }
 
-  /** Starts to walk to a point on the floor. @returns whether there is a path to it */
-  goTo(to: Vector3): boolean {
+  /**
+   * Starts to walk to a point on the floor. Another motion ends the search for a path.
+   * @returns whether there is a path to it
+   */
+  async goTo(to: Vector3): Promise<boolean> {
+    this.#leave();
+    const { signal } = (this.#searching = new AbortController());
     const height = floorAt(this.map, to[0], to[2], to[1]);
-    this.#path = height === undefined ? [] : wayTo(this.map, this.#at, [to[0], height, to[2]]);
-    return this.#path.length > 0;
+    if (height === undefined) return false;
+    const path = await wayTo(this.map, this.#at, [to[0], height, to[2]], signal).catch(() => []);
+    if (signal.aborted) return false;
+    this.#path = path;
+    return path.length > 0;
+  }
+
+  /** Leaves the path, and ends the search for one. */
+  #leave(): void {
+    this.#searching?.abort();
+    this.#searching = undefined;
+    this.#path = [];
+    this.#next = 0;
   }
 
   /** Moves the body to the end of its path at once. */
   jump(): void {
     const end = this.#path.at(-1);
-    this.#path = [];
+    this.#leave();
     if (end) this.#at = end;
     this.#eyeFloor = this.#at[1];
   }
@@ -79,7 +99,7 @@ export class FloorBody {
     const way = SPEED * (isFast ? FAST : 1) * seconds;
     const length = Math.max(1, Math.hypot(x, z));
     if (x !== 0 || z !== 0) {
-      this.#path = [];
+      this.#leave();
       this.#go((way * x) / length, (way * z) / length);
     } else this.#follow(way);
     const share = 1 - Math.exp(-seconds / EYE_SECONDS);
@@ -88,14 +108,14 @@ export class FloorBody {
   }
 
   #follow(way: number): void {
-    for (let left = way; left > 0 && this.#path.length > 0;) {
-      const [next] = this.#path;
+    for (let left = way; left > 0 && this.#next < this.#path.length;) {
+      const next = this.#path[this.#next];
       const [dx, dz] = [next[0] - this.#at[0], next[2] - this.#at[2]];
       const distance = Math.hypot(dx, dz);
       const share = Math.min(1, left / Math.max(distance, 1e-9));
       left -= distance;
-      if (distance > 0 && !this.#go(share * dx, share * dz)) this.#path = [];
-      if (distance <= Math.max(REACHED, way)) this.#path = this.#path.slice(1);
+      if (distance > 0 && !this.#go(share * dx, share * dz)) return this.#leave();
+      if (distance <= Math.max(REACHED, way)) this.#next++;
     }
   }
 

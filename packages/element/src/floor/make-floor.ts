@@ -21,8 +21,8 @@ export async function makeFloor(request: FloorRequest, signal: AbortSignal): Pro
   const url = voxelUrl ?? request.url;
   const name = fileName(url);
   try {
-    if (map !== undefined) return decodeWalkMap(new Uint8Array(map));
     const limits = limitsFrom(request);
+    if (map !== undefined) return decodeWalkMap(new Uint8Array(map), undefined, limits());
     const fetchOptions = (): FetchSceneOptions => ({ mode: 'cors', credentials, signal, ...fileLimits(limits()) });
     const bytes = await fetchScene(url, fetchOptions());
     if (voxelUrl !== undefined) {

@@ -1,13 +1,15 @@
 /** Reads clips by byte ranges. The worker loads this module for the first clip. */
-import type { ClipIndex, ClipPart, LoadLimits } from '@gaussian-splat/formats';
+import type { ClipPart, LoadLimits, PackedClipIndex } from '@gaussian-splat/formats';
 import {
   CLIP_HEAD_BYTES,
   clipIndexBytes,
   fetchRange,
   fetchScene,
+  packClipIndex,
   parseClip,
   readClipPart,
   type ClipPartContent,
+  type FetchedRange,
 } from '@gaussian-splat/formats';
 import { loadModule } from '@gaussian-splat/core';
 import type { FourDgsClip } from '@gaussian-splat/formats/4dgs';
@@ -20,9 +22,11 @@ const HEAD_BYTES = 8_192;
 
 /** A clip whose index has been parsed. */
 export interface OpenedClip {
-  readonly index: ClipIndex;
+  readonly index: PackedClipIndex;
   /** Whether the server sends byte ranges; false if it sends only whole files. */
   readonly isPartial: boolean;
+  /** Validator of the file's version, if the server sends one: see `FetchedRange.tag`. */
+  readonly tag?: string | undefined;
   /** The whole file; absent for formats that are read by byte ranges. */
   readonly file?: Blob;
 }
@@ -40,10 +44,11 @@ async function openClip(request: ClipRequest, signal: AbortSignal): Promise<Open
   const limits = limitsFrom(request);
   try {
     if (isFourDgs(request)) return await openFourDgs(request, signal);
-    const { bytes, isPartial } = await bytesAt(request, 0, HEAD_BYTES, signal, limits());
+    const { bytes, isPartial, tag } = await bytesAt(request, 0, HEAD_BYTES, signal, limits());
     const length = CLIP_HEAD_BYTES + clipIndexBytes(bytes, name);
-    const whole = length <= bytes.length ? bytes : (await bytesAt(request, 0, length, signal, limits())).bytes;
-    return { index: parseClip(whole, name, limits()), isPartial };
+    const whole =
+      length <= bytes.length ? bytes : (await bytesAt({ ...request, tag }, 0, length, signal, limits())).bytes;
+    return { index: packClipIndex(parseClip(whole, name, limits())), isPartial, tag };
   } catch (error) {
     signal.throwIfAborted();
     throw named(error, name);
@@ -85,7 +90,11 @@ async function openFourDgs(request: ClipRequest, signal: AbortSignal): Promise<O
     ? new Uint8Array(await whole.arrayBuffer())
     : await fetchScene(url, { mode: 'cors', credentials, signal, ...fileLimits(limitsFrom(request)()) });
   const clip = await fourDgsClip(request, bytes);
-  return { index: clip.index, isPartial: true, file: whole ?? new Blob([bytes as Uint8Array<ArrayBuffer>]) };
+  return {
+    index: packClipIndex(clip.index),
+    isPartial: true,
+    file: whole ?? new Blob([bytes as Uint8Array<ArrayBuffer>]),
+  };
 }
 
 async function fourDgsClip(request: ClipRequest, bytes: Uint8Array): Promise<FourDgsClip> {
@@ -106,12 +115,12 @@ async function groupOfFourDgs(request: ClipRequest): Promise<ClipPartContent> {
 const endOf = ({ start, sceneBytes, motionBytes }: ClipPart): number => start + sceneBytes + motionBytes;
 
 async function bytesAt(
-  { url, credentials, whole }: ClipRequest,
+  { url, credentials, whole, tag }: ClipRequest,
   start: number,
   end: number,
   signal: AbortSignal,
   { maxBytes, maxSeconds }: LoadLimits,
-): Promise<{ bytes: Uint8Array; isPartial: boolean }> {
+): Promise<FetchedRange> {
   if (whole) return { bytes: new Uint8Array(await whole.slice(start, end).arrayBuffer()), isPartial: true };
-  return fetchRange(url, start, end, { credentials, signal, maxBytes, maxSeconds });
+  return fetchRange(url, start, end, { credentials, signal, maxBytes, maxSeconds, tag });
 }

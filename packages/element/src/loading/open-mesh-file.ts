@@ -35,6 +35,7 @@ export async function openMeshFile(
     const bytes = await fetch({ url, credentials });
     const budget = new LoadBudget(bytes.length, limits());
     const openUri = async (uri: string): Promise<Uint8Array> => {
+      budget.request(name);
       const part = await fetch(fileRequest(uri, { url, credentials }, request.limits?.origins));
       budget.arrive(part.length);
       return part;

@@ -128,6 +128,8 @@ export interface ClipRequest extends FileRequest {
   readonly isClip: true;
   /** Content of the whole file, if the page already has it. */
   readonly whole?: Blob | undefined;
+  /** Validator of the version of the file that the index is from: see `FetchedRange.tag`. */
+  readonly tag?: string | undefined;
   /** The requested part; absent to request the index. */
   readonly part?: {
     readonly part: ClipPart;

@@ -75,18 +75,17 @@ export class SogFiles {
     const leave = await this.#gate.enter();
     try {
       signal.throwIfAborted();
-      const bytes = await checkedPart(await fetch(url, signal), name);
       const budget = shared ?? new LoadBudget(0);
       let arrived = 0;
-      const arrive = (part: Uint8Array): Uint8Array => {
+      const open = async (address: string): Promise<Uint8Array> => {
+        budget.request(name);
+        const part = await fetch(address, signal);
         arrived += part.length;
         budget.arrive(part.length);
         return part;
       };
-      arrive(bytes);
-      const open = async (path: string): Promise<Uint8Array> =>
-        arrive(await fetch(partAddress(url, path).href, signal));
-      const cloud = await readSogPart({ bytes, name, budget, signal }, open);
+      const bytes = await checkedPart(await open(url), name);
+      const cloud = await readSogPart({ bytes, name, budget, signal }, (path) => open(partAddress(url, path).href));
       this.#arrived.set(cloud, arrived);
       return cloud;
     } finally {

@@ -21,8 +21,6 @@ const TO_CLOUD: Affine = [-1, 0, 0, 0, 0, 0, -1, 0, 0, -1, 0, 0];
 const MAX_NESTED = 16;
 /** Bytes charged for each reference to a file, besides its address. */
 const CONTENT_BYTES = 256;
-/** Bytes charged for each request, to bound their number: those of a file of 64 bytes, and 4,096 without any. */
-const REQUEST_BYTES = 2 ** 14;
 /** Minimum distance from the Earth's center, in meters, of a georeferenced tileset. */
 const ON_EARTH = 1e6;
 
@@ -123,10 +121,8 @@ async function* filesOf(source: SceneSource, level: number): AsyncGenerator<Tile
   }
 }
 
-const opened = ({ openFile, name, budget }: SceneSource, path: string, query?: string): Promise<Uint8Array> => {
-  budget.take(REQUEST_BYTES, name);
-  return (openFile ?? noParts(name, 'scene.zip'))(path, query);
-};
+const opened = ({ openFile, name }: SceneSource, path: string, query?: string): Promise<Uint8Array> =>
+  (openFile ?? noParts(name, 'scene.zip'))(path, query);
 
 /** Whether a tile is of a kind of 3D Tiles 1.0, which cannot have splats. */
 const isOtherTile = (bytes: Uint8Array): boolean => /^(b3dm|i3dm|pnts|cmpt)$/.test(asciiOf(bytes, 0, 4));

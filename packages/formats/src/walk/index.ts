@@ -3,4 +3,5 @@ export { extinctionOf, type ExtinctionGrid, type GridOptions, type UpFrame, type
 export { floorOf, makeWalkMap, type FloorOptions } from './floor.js';
 export { solidsOf } from './solids.js';
 export { isVoxelPath, readVoxels, voxelTreePath, type SolidGrid, type VoxelFiles } from './voxels.js';
-export { decodeWalkMap, encodeWalkMap, floorAt, stepOn, wayTo, type WalkMap } from './walk-map.js';
+export { decodeWalkMap, encodeWalkMap, floorAt, stepOn, type WalkMap } from './walk-map.js';
+export { wayTo } from './way.js';

@@ -48,16 +48,20 @@ export const voxelTreePath = (path: string): string => path.replace(SUFFIX, '.vo
  */
 export function readVoxels(files: VoxelFiles, frame: UpFrame, metersPerUnit: number): SolidGrid {
   const { name, tree } = files;
-  const head = readHead(files);
+  const budget = new LoadBudget(files.head.length + tree.length, files.limits);
+  const head = readHead(files, budget);
   const { nodes: nodeCount, words, blocks } = head;
   if (tree.length !== 4 * (nodeCount + words))
     throw damaged(name, `${grouped(4 * (nodeCount + words))} bytes of nodes and masks`, grouped(tree.length));
+  budget.take(tree.length, name);
   const view = new DataView(tree.buffer, tree.byteOffset, tree.byteLength);
   const numbers = Uint32Array.from({ length: nodeCount + words }, (_, i) => view.getUint32(4 * i, true));
   const octree = { nodes: numbers.subarray(0, nodeCount), masks: numbers.subarray(nodeCount) };
   const size = blocks.map((count) => BLOCK * count) as unknown as VoxelGrid['size'];
+  budget.take(size[0] * size[1] * size[2], name);
   const solid = new Octree(octree, head.depth, size, name).solids();
-  return upright({ corner: head.corner, size, voxel: head.voxel }, solid, head.isTurned, frame, metersPerUnit, name);
+  const grid = { corner: head.corner, size, voxel: head.voxel };
+  return upright({ grid, solid }, turnedRows(frame, head.isTurned), metersPerUnit, { name, budget });
 }
 
 interface VoxelHead {
@@ -71,8 +75,7 @@ interface VoxelHead {
   readonly isTurned: boolean;
 }
 
-function readHead({ head, name, limits }: VoxelFiles): VoxelHead {
-  const budget = new LoadBudget(head.length, limits);
+function readHead({ head, name }: VoxelFiles, budget: LoadBudget): VoxelHead {
   const { version, gridBounds, voxelResolution, leafSize, treeDepth, nodeCount, leafDataCount } = parseJson(
     { bytes: head, name, budget },
     MAX_HEAD_BYTES,
@@ -186,42 +189,49 @@ class Octree {
   }
 }
 
+/** Returns the rows of a rotation from the coordinates of voxels to those with y up. */
+function turnedRows(frame: UpFrame, isTurned: boolean): readonly (readonly number[])[] {
+  const sign = isTurned ? [-1, -1, 1] : [1, 1, 1];
+  return frame.map((row) => row.map((value, k) => value * sign[k]));
+}
+
 /** Resamples voxels on a rotated grid with y up. Each new voxel has the value of the old voxel at its center. */
 function upright(
-  grid: VoxelGrid,
-  solid: Uint8Array,
-  isTurned: boolean,
-  frame: UpFrame,
+  { grid, solid }: SolidGrid,
+  rows: readonly (readonly number[])[],
   unit: number,
-  name: string,
+  { name, budget }: { readonly name: string; readonly budget: LoadBudget },
 ): SolidGrid {
-  const sign = isTurned ? [-1, -1, 1] : [1, 1, 1];
-  const rows = frame.map((row) => row.map((value, k) => value * sign[k]));
-  const ends = grid.corner.map((low, k) => [low, low + grid.size[k] * grid.voxel]);
+  const { size: old, voxel } = grid;
+  const ends = grid.corner.map((low, k) => [low, low + old[k] * voxel]);
   const ranges = rows.map((row) =>
     [Math.min, Math.max].map((pick) => sum(row.map((v, k) => pick(...ends[k].map((end) => v * end))))),
   );
-  const size = ranges.map(([low, high]) =>
-    Math.max(1, Math.round((high - low) / grid.voxel)),
-  ) as unknown as VoxelGrid['size'];
+  const size = ranges.map(([low, high]) => Math.max(1, Math.round((high - low) / voxel))) as unknown as Vector3;
   const corner = ranges.map(([low]) => low) as unknown as Vector3;
   const voxels = size[0] * size[1] * size[2];
   if (voxels > MAX_UPRIGHT)
     throw damaged(name, `at most ${grouped(MAX_UPRIGHT)} voxels with y up`, grouped(voxels), 'decode/unsupported');
+  budget.take(voxels, name);
   const turned = new Uint8Array(voxels);
-  // The transpose of `rows` is its inverse.
-  const from = (axis: number, p: readonly number[]): number =>
-    Math.floor((sum(rows.map((row, k) => row[axis] * p[k])) - grid.corner[axis]) / grid.voxel);
+  // The transpose of `rows` is its inverse. Along x, the old coordinate of each axis grows by a constant.
+  const axes = [0, 1, 2];
+  const steps = axes.map((axis) => rows[0][axis]);
   for (let z = 0, at = 0; z < size[2]; z++)
-    for (let y = 0; y < size[1]; y++)
+    for (let y = 0; y < size[1]; y++) {
+      budget.take(size[0], name);
+      const center = [corner[0], corner[1] + (y + 0.5) * voxel, corner[2] + (z + 0.5) * voxel];
+      const starts = axes.map((axis) => (sum(rows.map((row, k) => row[axis] * center[k])) - grid.corner[axis]) / voxel);
       for (let x = 0; x < size[0]; x++, at++) {
-        const p = [x, y, z].map((value, k) => corner[k] + (value + 0.5) * grid.voxel);
-        const [i, j, k] = [from(0, p), from(1, p), from(2, p)];
-        const isInside = i >= 0 && j >= 0 && k >= 0 && i < grid.size[0] && j < grid.size[1] && k < grid.size[2];
-        if (isInside) turned[at] = solid[i + grid.size[0] * (j + grid.size[1] * k)];
+        const i = Math.floor(starts[0] + (x + 0.5) * steps[0]);
+        const j = Math.floor(starts[1] + (x + 0.5) * steps[1]);
+        const k = Math.floor(starts[2] + (x + 0.5) * steps[2]);
+        const isInside = i >= 0 && j >= 0 && k >= 0 && i < old[0] && j < old[1] && k < old[2];
+        if (isInside) turned[at] = solid[i + old[0] * (j + old[1] * k)];
       }
+    }
   const scaled = corner.map((value) => unit * value) as unknown as Vector3;
-  return { grid: { corner: scaled, size, voxel: unit * grid.voxel }, solid: turned };
+  return { grid: { corner: scaled, size, voxel: unit * voxel }, solid: turned };
 }
 
 const sum = (values: readonly number[]): number => values.reduce((total, value) => total + value, 0);

@@ -1,5 +1,6 @@
 import { GaussianSplatError } from '@gaussian-splat/core';
 import { gzipSync } from 'fflate';
+import { LoadBudget, type LoadLimits } from '../budget.js';
 import { inflateUpTo } from '../inflate.js';
 
 /**
@@ -34,14 +35,14 @@ export function floorAt(map: WalkMap, x: number, z: number, near: number): numbe
   return place < 0 ? undefined : heightOf(map, place);
 }
 
-const columnOf = ({ corner, cell }: WalkMap, x: number): number => Math.floor((x - corner[0]) / cell);
-const rowOf = ({ corner, cell }: WalkMap, z: number): number => Math.floor((z - corner[1]) / cell);
+export const columnOf = ({ corner, cell }: WalkMap, x: number): number => Math.floor((x - corner[0]) / cell);
+export const rowOf = ({ corner, cell }: WalkMap, z: number): number => Math.floor((z - corner[1]) / cell);
 
 /**
  * Returns the place in a cell whose height is nearest to `near`: its layer, times the number of cells, plus the index of
  * the cell. Returns -1 if there is no floor within `map.step` of `near`.
  */
-function placeAt({ width, depth, layers, step }: WalkMap, column: number, row: number, near: number): number {
+export function placeAt({ width, depth, layers, step }: WalkMap, column: number, row: number, near: number): number {
   if (!(column >= 0 && row >= 0 && column < width && row < depth)) return -1;
   const index = column + width * row;
   let best = -1;
@@ -55,7 +56,7 @@ function placeAt({ width, depth, layers, step }: WalkMap, column: number, row: n
   return best;
 }
 
-const heightOf = ({ width, depth, layers }: WalkMap, place: number): number =>
+export const heightOf = ({ width, depth, layers }: WalkMap, place: number): number =>
   layers[Math.floor(place / (width * depth))][place % (width * depth)];
 
 /**
@@ -82,79 +83,17 @@ export function stepOn(
   return from;
 }
 
+/** Maximum number of pieces of a movement. Longer ones skip cells. */
+const MAX_PIECES = 4096;
+
 /** Returns the height of the floor at the end of a straight movement; undefined if the floor ends before. */
 function walkTo(map: WalkMap, x: number, y: number, z: number, toX: number, toZ: number): number | undefined {
-  const pieces = Math.max(1, Math.ceil(Math.max(Math.abs(toX - x), Math.abs(toZ - z)) / map.cell));
+  const cells = Math.ceil(Math.max(Math.abs(toX - x), Math.abs(toZ - z)) / map.cell);
+  const pieces = Math.min(MAX_PIECES, Math.max(1, cells));
   let height: number | undefined = y;
   for (let k = 1; k <= pieces && height !== undefined; k++)
     height = floorAt(map, x + ((toX - x) * k) / pieces, z + ((toZ - z) * k) / pieces, height);
   return height;
-}
-
-/**
- * Finds the path over the floor with the fewest cells between two positions, by breadth-first search over cells with
- * eight neighbors.
- * @param from Position (x, height of the floor, z) in meters, as `to`.
- * @returns Positions from cell to cell without `from`; the last is `to`. Empty if there is no path.
- */
-export function wayTo(
-  map: WalkMap,
-  from: readonly [number, number, number],
-  to: readonly [number, number, number],
-): readonly (readonly [number, number, number])[] {
-  const start = placeAt(map, columnOf(map, from[0]), rowOf(map, from[2]), from[1]);
-  const goal = placeAt(map, columnOf(map, to[0]), rowOf(map, to[2]), to[1]);
-  if (start < 0 || goal < 0) return [];
-  const { width, depth, layers } = map;
-  // For each visited place, the place before it. Typed arrays, because a floor may have 100,000 cells.
-  const before = new Int32Array(layers.length * width * depth).fill(-1);
-  const queue = new Int32Array(before.length);
-  [before[start], queue[0]] = [start, start];
-  for (let head = 0, tail = 1; head < tail; head++) {
-    const place = queue[head];
-    if (place === goal) return back(map, before, goal, to);
-    const height = heightOf(map, place);
-    const column = place % width;
-    const row = Math.floor(place / width) % depth;
-    for (const [i, j] of NEIGHBORS) {
-      const next = placeAt(map, column + i, row + j, height);
-      if (next < 0 || before[next] >= 0) continue;
-      // A diagonal step requires a floor in both cells beside it, because a body does not cut corners.
-      const isCorner = i !== 0 && j !== 0;
-      if (isCorner && (placeAt(map, column + i, row, height) < 0 || placeAt(map, column, row + j, height) < 0))
-        continue;
-      before[next] = place;
-      queue[tail++] = next;
-    }
-  }
-  return [];
-}
-
-const NEIGHBORS = [
-  [1, 0],
-  [-1, 0],
-  [0, 1],
-  [0, -1],
-  [1, 1],
-  [1, -1],
-  [-1, 1],
-  [-1, -1],
-] as const;
-
-/** Returns the positions on the way to a place, without the first; the last is `to`. */
-function back(
-  map: WalkMap,
-  before: Int32Array,
-  goal: number,
-  to: readonly [number, number, number],
-): readonly (readonly [number, number, number])[] {
-  const { cell, corner, width, depth } = map;
-  const way = [to];
-  for (let place = before[goal]; place !== before[place]; place = before[place]) {
-    const [column, row] = [place % width, Math.floor(place / width) % depth];
-    way.push([corner[0] + (column + 0.5) * cell, heightOf(map, place), corner[1] + (row + 0.5) * cell]);
-  }
-  return way.reverse();
 }
 
 const FORMAT = 'gaussian-splat-walk-map';
@@ -169,10 +108,10 @@ const MAX_BYTES = 2 ** 26;
 const MAX_HEAD_BYTES = 1024;
 /** Maximum number of layers of a file. Layers of few cells would take much more memory than their bytes. */
 const MAX_LAYERS = 1024;
-/** Minimum edge of a cell, and maximum of the edge and of a step, in meters: a body visits every cell on its way. */
+/** Minimum edge of a cell, and maximum of the edge and of a step, in meters. */
 const [MIN_CELL, MAX_CELL] = [1e-3, 1e3];
-/** Maximum number of heights that a search for a path compares for one neighbor of every height. */
-const MAX_SEARCH = 2 ** 25;
+/** Bytes of memory for each height: in the file, in its layer, and in the search for a path. */
+const BYTES_PER_HEIGHT = 10;
 
 /**
  * Returns the bytes of a `.floor` file: gzip of one line of JSON, followed by the heights of all layers. Heights are int16
@@ -218,9 +157,10 @@ const numbersOf = (value: unknown, count: number): readonly unknown[] =>
 /**
  * Reads a `.floor` file.
  * @param name Name of the file in error messages.
- * @throws GaussianSplatError `decode/corrupt`
+ * @throws GaussianSplatError `decode/corrupt`, `out-of-memory/budget`
  */
-export function decodeWalkMap(file: Uint8Array, name = 'walk map'): WalkMap {
+export function decodeWalkMap(file: Uint8Array, name = 'walk map', limits: LoadLimits = {}): WalkMap {
+  const budget = new LoadBudget(file.length, limits);
   const fail = (expected: string, found: string): never => {
     throw new GaussianSplatError('decode/corrupt', {
       where: name,
@@ -233,6 +173,7 @@ export function decodeWalkMap(file: Uint8Array, name = 'walk map'): WalkMap {
   try {
     const length = new DataView(file.buffer, file.byteOffset + file.length - 4, 4).getUint32(0, true);
     if (length > MAX_BYTES) fail(`at most ${MAX_BYTES} bytes`, String(length));
+    budget.take((BYTES_PER_HEIGHT / 2) * length, name);
     bytes = inflateUpTo(file, length);
   } catch (error) {
     if (error instanceof GaussianSplatError) throw error;
@@ -273,17 +214,14 @@ export function decodeWalkMap(file: Uint8Array, name = 'walk map'): WalkMap {
   // Layers without cells take no bytes, so that their number would be unlimited.
   if (bytes.length - end - 1 !== expected || layers! > expected)
     fail(`${expected} bytes of heights`, String(bytes.length - end - 1));
-  if (layers! ** 2 * cells > MAX_SEARCH)
-    fail(`at most ${MAX_SEARCH} heights, multiplied by the number of layers`, String(layers! ** 2 * cells));
   const view = new DataView(bytes.buffer, bytes.byteOffset + end + 1);
   const read = (layer: number): Float32Array => {
-    let before = 0;
-    return Float32Array.from({ length: cells }, (_, i) => {
-      const value = view.getInt16(2 * (layer * cells + i), true);
-      if (value === NO_FLOOR) return NaN;
-      before += value;
-      return before * heightUnit!;
-    });
+    const heights = new Float32Array(cells).fill(NaN);
+    for (let i = 0, height = 0; i < cells; i++) {
+      const difference = view.getInt16(2 * (layer * cells + i), true);
+      if (difference !== NO_FLOOR) heights[i] = (height += difference) * heightUnit!;
+    }
+    return heights;
   };
   return {
     cell: cell!,

@@ -261,10 +261,11 @@ export class WalkController implements ReactiveController, Feature {
     if (walker === undefined) return;
     const { unit = 1 } = this.#settings();
     this.#viewer.positionFromPoint(clientX, clientY).then(
-      (point) => {
+      async (point) => {
         if (point === null || this.#walker !== walker) return;
         this.#land();
-        if (!walker.goTo(inMeters([point.x, point.y, point.z], unit))) return;
+        const isFound = await walker.goTo(inMeters([point.x, point.y, point.z], unit));
+        if (!isFound || this.#walker !== walker) return;
         if (prefersReducedMotion()) {
           walker.jump();
           this.#follow();

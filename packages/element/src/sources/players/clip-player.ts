@@ -1,5 +1,5 @@
 /** Plays clips of moving splats. The module is loaded only for clips. */
-import { clipGroupAt, frameAt, type ClipIndex } from '@gaussian-splat/formats';
+import { clipGroupAt, frameAt, unpackClipIndex, type ClipIndex } from '@gaussian-splat/formats';
 import { AnimatedGaussians } from '@gaussian-splat/renderer';
 import type { PackedAnimation } from '@gaussian-splat/renderer/tools';
 import type { SceneBounds } from '../../viewer/camera/settings.js';
@@ -57,7 +57,7 @@ export class ClipPlayer implements Timeline {
    */
   static async open(options: ClipOptions): Promise<ClipPlayer> {
     const { device, loader, request, signal, onProgress, memoryBudget, startSeconds, listeners } = options;
-    const ask = async <T>(own: Pick<ClipRequest, 'whole' | 'part'>, aborted: AbortSignal): Promise<T> => {
+    const ask = async <T>(own: Pick<ClipRequest, 'whole' | 'part' | 'tag'>, aborted: AbortSignal): Promise<T> => {
       const { url, credentials, limits } = request;
       const asked: ClipRequest = { isClip: true, url, credentials, limits, ...own };
       const here = ({ openBoxes }: SceneWorker): Promise<ClipAnswer<T>> =>
@@ -66,14 +66,14 @@ export class ClipPlayer implements Timeline {
     };
     const whole = await localFile(request.url);
     const opened = await ask<OpenedClip>({ whole }, signal);
-    const { index } = opened;
+    const index = unpackClipIndex(opened.index);
     const file = opened.file ?? (opened.isPartial ? whole : new Blob([await loader.fetchFile(request, signal)]));
     const cache = new GroupCache(index, {
       fetchPart: (group, part, aborted) => {
         const { groups, shDegree, origin } = index;
         const frames = group === STILL ? 1 : groups[group].frames;
         const own = { part: partsIn(index, group)[part], group, frames, shDegree, origin };
-        return ask<PackedAnimation>({ whole: file, part: own }, aborted);
+        return ask<PackedAnimation>({ whole: file, tag: opened.tag, part: own }, aborted);
       },
       onArrival: () => {
         onProgress(file ? index.byteLength : cache.loadedBytes, index.byteLength);
@@ -103,8 +103,9 @@ export class ClipPlayer implements Timeline {
   get buffered(): readonly (readonly [number, number])[] {
     const { framesPerSecond, groups } = this.#index;
     const spans: [number, number][] = [];
-    for (const [k, { first, frames }] of groups.entries()) {
+    for (const k of this.#cache.loaded) {
       if (!this.#cache.canShow(k)) continue;
+      const { first, frames } = groups[k];
       const [start, end] = [first / framesPerSecond, (first + frames) / framesPerSecond];
       const last = spans.at(-1);
       if (last && last[1] === start) last[1] = end;

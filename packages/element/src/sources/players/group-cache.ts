@@ -63,6 +63,13 @@ export class GroupCache {
     return new Set(held.map(({ group }) => group).filter((group) => group !== STILL)).size;
   }
 
+  /** Indices of the groups whose coarse part is in memory, in ascending order. */
+  get loaded(): number[] {
+    const coarse = [...this.#entries.values()].filter(({ part, content }) => part === 0 && content);
+    const groups = coarse.map(({ group }) => group).filter((group) => group !== STILL);
+    return groups.sort((a, b) => a - b);
+  }
+
   /** Number of bytes of the clip file whose content is in memory. */
   get loadedBytes(): number {
     let sum = 0;
