@@ -12,12 +12,14 @@ import {
   symlinkSync,
   writeFileSync,
 } from 'node:fs';
+import type { AddressInfo } from 'node:net';
 import { tmpdir } from 'node:os';
 import { dirname, join } from 'node:path';
 import { after, test } from 'node:test';
 import { fileURLToPath } from 'node:url';
 import type { GaussianCloud } from '@gaussian-splat/core';
 import { PNG } from 'pngjs';
+import { serve } from '../../packages/cli/src/lib/server.mjs';
 import { gpuEnvironment } from '../../scripts/lib/gpu-environment.mjs';
 import { buildGltf } from '../formats/support/gltf-writer.js';
 import { smallCloud } from '../formats/support/small-cloud.js';
@@ -159,6 +161,33 @@ test('gaussian-splat page copies no page and no script that a scene names', () =
   }
   rmSync(inFolder('page'), { recursive: true });
   assert.deepEqual(filesOfPage('evil/a.gltf'), ['evil/CDN/x.bin', 'evil/a.bin', 'evil/a.gltf']);
+});
+
+test('gaussian-splat page copies no file that servers give a meaning to', () => {
+  const names = ['.htaccess', '.user.ini', 'web.config', 'a.phtml', 'a.shtml', '_headers', 'a.php8', 'x/.env', 'a.ply'];
+  mkdirSync(inFolder('names', 'x'), { recursive: true });
+  for (const name of names) writeFileSync(inFolder('names', name), 'of the scene');
+  const tiles = names.map((uri) => ({ content: { uri } }));
+  writeFileSync(inFolder('names', 's.json'), JSON.stringify({ root: { children: tiles } }));
+  assert.deepEqual(filesOfPage('names/s.json'), ['names/a.ply', 'names/s.json']);
+});
+
+test('the server of pages serves its folders, and no link out of them', async () => {
+  mkdirSync(inFolder('served', 'in'), { recursive: true });
+  writeFileSync(inFolder('served', 'in', 'a.txt'), 'inside');
+  writeFileSync(inFolder('secret.txt'), 'outside');
+  symlinkSync('in/a.txt', inFolder('served', 'near.txt'));
+  symlinkSync('../secret.txt', inFolder('served', 'far.txt'));
+  symlinkSync('..', inFolder('served', 'up'));
+  symlinkSync('served', inFolder('mount'));
+  const server = await serve({ '/': inFolder('mount') });
+  const { port } = server.address() as AddressInfo;
+  const statusOf = async (path: string): Promise<number> => (await fetch(`http://localhost:${port}/${path}`)).status;
+  const found = await Promise.all(
+    ['in/a.txt', 'near.txt', 'far.txt', 'up/secret.txt', '%2e%2e/secret.txt'].map(statusOf),
+  );
+  server.close();
+  assert.deepEqual(found, [200, 200, 404, 404, 404]);
 });
 
 test('gaussian-splat page takes a scene of several files from the folder of the page itself', () => {

@@ -258,6 +258,8 @@ describe('AR', () => {
       await until(() => link() !== null, 'the link', LIMIT_MS);
       assert(link()!.href.endsWith('/compass.usdz'), link()!.href);
       assertEqual(link()!.querySelector('img')!.alt, 'View a simplified model in AR', 'its name');
+      element.setAttribute('ios-src', 'javascript:alert(1)');
+      await until(() => link() === null, 'no link to code', LIMIT_MS);
       const other = await showLoaded({ src: COMPASS, ar: '', ...STILL });
       await frames(4);
       assertEqual(other.shadowRoot!.querySelector('a[rel=ar], [part=ar-button]'), null, 'without a model');
@@ -265,6 +267,7 @@ describe('AR', () => {
       other.requestUpdate();
       await until(() => other.firstElementChild!.assignedSlot?.name === 'ar-fallback', 'the fallback', LIMIT_MS);
       assert((other.firstElementChild as HTMLElement).offsetHeight > 0, 'the fallback is visible');
+      element.setAttribute('ios-src', 'compass.usdz');
       element.innerHTML = other.innerHTML;
       element.requestUpdate();
       await frames(4);

@@ -1,10 +1,10 @@
 /**
  * Static file server for the command `page`, the demo and the tests. It supports byte ranges, does not allow caching, and
- * serves no file outside its folders.
+ * serves no file outside its folders, also not by links within them.
  */
-import { createReadStream, statSync } from 'node:fs';
+import { createReadStream, realpathSync, statSync } from 'node:fs';
 import { createServer } from 'node:http';
-import { extname, join, normalize, sep } from 'node:path';
+import { extname, join, sep } from 'node:path';
 import { pipeline } from 'node:stream';
 
 const TYPES = {
@@ -37,8 +37,7 @@ export function serve(mounts, { port = 0, host = '127.0.0.1', headers = {} } = {
       return send(response, 400, 'Bad request');
     }
     const prefix = prefixes.find((p) => path.startsWith(p));
-    const file = prefix && resolveInside(mounts[prefix], path.slice(prefix.length));
-    const found = file && findFile(file);
+    const found = prefix && findFile(mounts[prefix], path.slice(prefix.length));
     if (!found) return send(response, 404, `Not found: ${path}`);
     sendFile(request, response, found, headers);
   });
@@ -48,16 +47,14 @@ export function serve(mounts, { port = 0, host = '127.0.0.1', headers = {} } = {
   });
 }
 
-function resolveInside(folder, path) {
-  const file = normalize(join(folder, path));
-  return file === normalize(folder) || file.startsWith(normalize(folder + sep)) ? file : undefined;
-}
-
-function findFile(path) {
+function findFile(folder, path) {
   try {
-    const status = statSync(path);
-    if (status.isDirectory()) return findFile(join(path, 'index.html'));
-    return { path, size: status.size };
+    const root = realpathSync(folder);
+    const file = realpathSync(join(folder, path));
+    if (file !== root && !file.startsWith(root + sep) && root !== sep) return undefined;
+    const status = statSync(file);
+    if (status.isDirectory()) return findFile(folder, join(path, 'index.html'));
+    return { path: file, size: status.size };
   } catch {
     return undefined;
   }

@@ -12,6 +12,16 @@ const opensModels = (page: Document): boolean =>
   page.createElement('a').relList.supports('ar') || /iPhone|iPad/.test(page.defaultView?.navigator.userAgent ?? '');
 
 /**
+ * Returns the address of the model for the link; null for an address of code, because sites fill attributes with texts of
+ * others.
+ */
+function modelUrl(address: string | null, base: string): string | null {
+  if (!address || !URL.canParse(address, base)) return null;
+  const { protocol, href } = new URL(address, base);
+  return /^(https?|blob|file):$/.test(protocol) ? href : null;
+}
+
+/**
  * Replacements of AR on devices without WebXR: a link to the author's own mesh for iPhones, if the page names one;
  * otherwise the author's content in the slot `ar-fallback`.
  */
@@ -39,9 +49,10 @@ export class SimplifiedModel implements ReactiveController {
   hostUpdated(): void {
     const { attributes, strings } = this.#core;
     const modes = attributes.arModes?.trim() || 'webxr quick-look';
+    const model = modelUrl(attributes.iosSrc, this.#element.baseURI);
     const isOffered =
       attributes.ar &&
-      attributes.iosSrc &&
+      model !== null &&
       !this.#offer.canActivate &&
       /(^|\s)quick-look(\s|$)/.test(modes) &&
       opensModels(this.#element.ownerDocument);
@@ -54,7 +65,7 @@ export class SimplifiedModel implements ReactiveController {
     const image = this.#link.querySelector('img')!;
     image.alt = text;
     this.#link.lang = languageOf(strings) ?? '';
-    this.#link.href = attributes.iosSrc!;
+    this.#link.href = model;
     if (!this.#link.isConnected) this.#place.append(this.#link);
   }
 }
