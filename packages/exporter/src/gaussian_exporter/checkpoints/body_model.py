@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import zipfile
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -13,7 +12,7 @@ from ..errors import ExportError, listed
 from ..families.avatar import Avatar
 from ..families.classic import Cloud, usable
 from .clouds import read_cloud
-from .files import existing
+from .untrusted import read_arrays
 
 # Arrays of a model that place its vertices. Files of SMPL-X also hold pickled objects, which are not opened.
 _NEEDED = ("v_template", "shapedirs", "posedirs", "J_regressor", "weights", "kintree_table")
@@ -91,15 +90,9 @@ def read_body(path: Path) -> dict[str, Doubles]:
     """Arrays of a body model that determine its vertices: v_template (V,3), shapedirs (V,3,B), posedirs (V,3,9(J-1)),
     J_regressor (J,V), weights (V,J), kintree_table (2,J).
     """
-    try:
-        with np.load(existing(path, "a body model (.npz)"), allow_pickle=False) as archive:
-            found = {name: np.asarray(archive[name], np.float64) for name in _NEEDED if name in archive.files}
-            names = list(archive.files)
-    except (zipfile.BadZipFile, ValueError, EOFError, AttributeError) as error:
-        remedy = "take the .npz of the model's site; a .pkl is converted by smplx/tools/clean_ch.py and numpy.savez"
-        raise ExportError(
-            "checkpoint/unreadable", where=str(path), expected="a .npz file", found=str(error), remedy=remedy
-        ) from error
+    remedy = "take the .npz of the model's site; a .pkl is converted by smplx/tools/clean_ch.py and numpy.savez"
+    arrays = read_arrays(path, "a body model (.npz)", remedy, _NEEDED)
+    found = {name: np.asarray(array, np.float64) for name, array in arrays.items()}
     missing = [name for name in _NEEDED if name not in found]
     vertices, joints = len(found.get("v_template", ())), len(found.get("J_regressor", ()))
     shapes: dict[str, tuple[int, ...]] = {
@@ -116,7 +109,7 @@ def read_body(path: Path) -> dict[str, Doubles]:
             "checkpoint/mismatch",
             where=str(path),
             expected=f"a body model of the SMPL family: arrays {', '.join(_NEEDED)}",
-            found=f"no {listed(missing)} among {listed(names)}" if missing else ", ".join(wrong),
+            found=f"no {listed(missing)} among {listed(list(found))}" if missing else ", ".join(wrong),
             remedy="give the model's own file, for example SMPLX_NEUTRAL.npz",
         )
     return found

@@ -4,6 +4,7 @@ import ast
 from pathlib import Path
 
 from ..errors import ExportError
+from .untrusted import read_text
 
 
 def find_cfg_args(folder: Path) -> Path | None:
@@ -30,10 +31,11 @@ def read_cfg_args(path: Path) -> dict[str, object]:
     """Names and literal values. An absent file gives no names; values that are not literals are left out."""
     if not path.exists():
         return {}
-    text = path.read_text(errors="replace")
+    text = ""
     try:
+        text = read_text(path)
         call = ast.parse(text.strip(), mode="eval").body
-    except (SyntaxError, ValueError) as error:
+    except (SyntaxError, ValueError, MemoryError, RecursionError) as error:
         raise _unreadable(path, text) from error
     if not isinstance(call, ast.Call):
         raise _unreadable(path, text)

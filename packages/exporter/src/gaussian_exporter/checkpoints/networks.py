@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, cast
@@ -14,6 +13,7 @@ from ..pieces.convolution import Convolution
 from .avatar_file import read_npz
 from .files import existing
 from .torch_file import Weights, read_weights
+from .untrusted import read_json
 
 
 def read_feed_forward(folder: Path, ignored: Sequence[str] = ()) -> FeedForward:
@@ -73,7 +73,7 @@ def read_network(folder: Path, kind: str, keys: tuple[str, ...]) -> tuple[dict[s
     """The two files of a network."""
     path = existing(folder / "config.json", f"the config.json of a {kind} network")
     try:
-        config = json.loads(path.read_text(encoding="utf-8"))
+        config = read_json(path)
     except ValueError as error:
         raise _broken(path, "JSON", str(error)) from error
     missing = [key for key in keys if key not in config] if isinstance(config, dict) else list(keys)

@@ -90,13 +90,15 @@ def _header(path: Path, lines: list[list[str]]) -> tuple[str, int, np.dtype[np.v
                 if name == "vertex" and element:
                     raise _unreadable(path, "vertex as the first element", f"element {element} before it")
                 element = name
-                count = int(number) if name == "vertex" else count
+                count = int(number) if name == "vertex" and number.isdigit() else count
             case ["property", kind, name] if element == "vertex" and kind in _TYPES:
                 fields.append((name, _TYPES[kind]))
             case ["property", *rest] if element == "vertex":
                 raise _unreadable(path, "scalar properties of vertices", " ".join(rest))
     if encoding not in ("ascii", "binary_little_endian", "binary_big_endian") or count < 1 or not fields:
         raise _unreadable(path, "a format, and an element vertex with properties", f"{encoding}, {count} vertices")
+    if len({name for name, _ in fields}) < len(fields):
+        raise _unreadable(path, "properties with different names", "one name twice")
     return encoding, count, np.dtype(fields)
 
 

@@ -7,11 +7,8 @@ files can be read, and exporting needs no PyTorch, which takes gigabytes.
 
 from __future__ import annotations
 
-import math
-import pickle
 import zipfile
-from collections import OrderedDict
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -22,145 +19,58 @@ from ..arrays import AnyArray, Floats
 from ..errors import ExportError, listed
 from ..pieces.mlp import Linear
 from .files import existing
+from .torch_pickle import Record, TorchUnpickler, part_of_name
 from .unread import refuse_unread
+from .untrusted import Budget
 
-_STORAGES = {
-    "FloatStorage": "f4",
-    "DoubleStorage": "f8",
-    "HalfStorage": "f2",
-    "BFloat16Storage": "bf16",
-    "LongStorage": "i8",
-    "IntStorage": "i4",
-    "ShortStorage": "i2",
-    "CharStorage": "i1",
-    "ByteStorage": "u1",
-    "BoolStorage": "?",
-}
-
-
-# Numbers of a tensor that repeats those of its storage, at most.
-_REPEATED = 1 << 20
-# Items of all nested dicts and lists of a file, at most, and their depth.
-_ITEMS = 1_000_000
+# Items of all nested dicts and lists of a file, their depth, and the letters of all names, at most.
+_ITEMS = 200_000
 _DEPTH = 64
-
-
-class Record:
-    """An object of an unknown class: its state, or the arguments of its constructor."""
-
-    def __init__(self, *arguments: object):
-        """Keeps the arguments of the constructor that the pickle calls."""
-        self.arguments = arguments
-        self.state: dict[str, object] = {}
-
-    def __setstate__(self, state: object) -> None:
-        """The pickle's BUILD: keeps a state that is a mapping."""
-        if isinstance(state, Mapping):
-            self.state = {str(key): value for key, value in state.items()}
-
-    def __setitem__(self, key: object, value: object) -> None:
-        """The pickle's SETITEM on unknown mappings."""
-        self.state[str(key)] = value
-
-    def append(self, value: object) -> None:
-        """The pickle's APPEND on unknown lists."""
-        self.state[str(len(self.state))] = value
-
-
-def _rebuild_tensor(storage: AnyArray, offset: int, size: Sequence[int], stride: Sequence[int], *_: object) -> AnyArray:
-    last = offset + sum((n - 1) * step for n, step in zip(size, stride, strict=True))
-    if 0 in size:
-        return np.zeros(tuple(size), storage.dtype)
-    # Strides of 0 repeat numbers. A copy of them could take any memory.
-    if math.prod(size) > max(storage.size, _REPEATED):
-        raise ValueError(f"a tensor {tuple(size)} of {storage.size} numbers, repeated")
-    if min(stride, default=0) < 0 or offset < 0 or last >= storage.size:
-        raise ValueError(f"a tensor {tuple(size)} that reaches beyond its {storage.size} numbers")
-    steps = tuple(step * storage.itemsize for step in stride)
-    return np.lib.stride_tricks.as_strided(storage[offset:], tuple(size), steps, writeable=False).copy()
-
-
-_KNOWN: dict[tuple[str, str], Callable[..., Any]] = {
-    ("torch._utils", "_rebuild_tensor_v2"): _rebuild_tensor,
-    ("torch._utils", "_rebuild_tensor"): _rebuild_tensor,
-    ("torch._utils", "_rebuild_parameter"): lambda data, *_: data,
-    ("collections", "OrderedDict"): OrderedDict,
-    ("torch", "Size"): tuple,
-}
-
-
-class _Reader(pickle.Unpickler):
-    def __init__(self, archive: zipfile.ZipFile, prefix: str):
-        super().__init__(archive.open(f"{prefix}data.pkl"))
-        self._archive = archive
-        self._prefix = prefix
-
-    def find_class(self, module: str, name: str) -> Any:
-        if (module, name) in _KNOWN:
-            return _KNOWN[module, name]
-        if module == "torch" and name in _STORAGES:
-            return _STORAGES[name]
-        # A separate class for each name: NEWOBJ needs a class, REDUCE anything callable.
-        return type(name, (Record,), {})
-
-    def persistent_load(self, pid: Any) -> AnyArray:
-        _, kind, key, *_rest = pid
-        entry = self._archive.getinfo(f"{self._prefix}data/{key}")
-        # torch.save does not compress.
-        if entry.file_size > entry.compress_size + (1 << 26):
-            raise ValueError(f"a compressed storage of {entry.file_size} bytes")
-        data = self._archive.read(entry)
-        if kind == "bf16":
-            return (np.frombuffer(data, "<u2").astype(np.uint32) << 16).view(np.float32)
-        if not isinstance(kind, str):
-            raise ValueError(f"storage of an unknown type {kind!r}")
-        return np.frombuffer(data, np.dtype(kind).newbyteorder("<"))
+_LETTERS = 1 << 24
 
 
 def read_torch(path: Path) -> object:
     """Reads all content of the file: tensors as arrays, dicts and lists as such, other objects as Record."""
     try:
-        with zipfile.ZipFile(existing(path, "a file of torch.save or torch.jit.save")) as archive:
+        budget = Budget(existing(path, "a file of torch.save or torch.jit.save"))
+        with zipfile.ZipFile(path) as archive:
             prefix = next((name[: -len("data.pkl")] for name in archive.namelist() if name.endswith("data.pkl")), None)
             if prefix is None:
                 raise ValueError(f"a zip archive of {listed(archive.namelist())}")
-            return _Reader(archive, prefix).load()
-    except (
-        *(zipfile.BadZipFile, pickle.UnpicklingError, ValueError, KeyError, EOFError, TypeError, IndexError),
-        *(RecursionError, MemoryError, OverflowError, AttributeError),
-    ) as error:
-        raise _unreadable(path, str(error) or type(error).__name__) from error
+            return TorchUnpickler(archive, prefix, budget).load()
+    except ExportError:
+        raise
+    # The program of a stranger may cause any error.
+    except Exception as error:
+        raise _unreadable(path, str(error)[:300] or type(error).__name__) from error
 
 
 def read_tensors(path: Path) -> dict[str, AnyArray]:
     """All tensors of a file by their dotted names, as in a state_dict."""
-    content = read_torch(path)
     found: dict[str, AnyArray] = {}
     # A stack instead of recursion, because a pickle may be nested to any depth, and contain itself.
-    left: list[tuple[object, str, int]] = [(content, "", 0)]
-    visited = 0
+    left: list[tuple[object, tuple[str, ...]]] = [(read_torch(path), ())]
+    visited = letters = 0
     while left:
-        value, name, depth = left.pop()
+        value, keys = left.pop()
         visited += 1
-        if visited > _ITEMS or depth > _DEPTH:
-            raise _unreadable(path, f"more than {_ITEMS} items, or lists deeper than {_DEPTH}")
         if isinstance(value, np.ndarray):
-            found[name] = value
-            continue
-        dot = f"{name}." if name else ""
-        children = [(child, f"{dot}{key}", depth + 1) for key, child in _children(value)]
-        if len(left) + len(children) > _ITEMS:
-            raise _unreadable(path, f"more than {_ITEMS} items")
-        left.extend(reversed(children))
+            letters += sum(map(len, keys))
+            if letters <= _LETTERS:
+                found[".".join(keys)] = value
+        children = _children(value)
+        if len(keys) > _DEPTH or letters > _LETTERS or visited + len(left) + len(children) > _ITEMS:
+            raise _unreadable(path, f"more than {_ITEMS} items, {_DEPTH} lists within each other, or endless names")
+        left.extend((child, (*keys, part_of_name(key))) for key, child in reversed([*children.items()]))
     return found
 
 
-def _children(value: object) -> Iterable[tuple[object, object]]:
+def _children(value: object) -> Mapping[Any, object]:
     if isinstance(value, Record):
-        return value.state.items()
-    if isinstance(value, Mapping):
-        return value.items()
-    return enumerate(value) if isinstance(value, (list, tuple)) else ()
+        return value.state
+    if isinstance(value, dict):
+        return value
+    return dict(enumerate(value)) if isinstance(value, (list, tuple)) else {}
 
 
 def _unreadable(path: Path, found: str) -> ExportError:
