@@ -1,4 +1,4 @@
-"""Files of strangers: a named error, and no more steps and bytes than a file weighs."""
+"""Untrusted files: a named error, and no more steps and bytes than a file weighs."""
 
 import io
 import pickle
@@ -116,7 +116,7 @@ def read(path: Path) -> object:
 
 
 def outcome(path: Path) -> str:
-    """What reading ends with, and by how many bytes the peak of the process grew, measured in a process of its own."""
+    """The end of reading a file in a process of its own: code, bytes by which its peak grew, seconds of CPU."""
     run = subprocess.run(
         [sys.executable, __file__, str(path)], capture_output=True, text=True, timeout=120, check=False
     )

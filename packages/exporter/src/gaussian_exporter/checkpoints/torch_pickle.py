@@ -107,7 +107,7 @@ class TorchUnpickler(_Unpickler):  # type: ignore[misc]
         return self._classes[module, name]
 
     def persistent_load(self, pid: Any) -> AnyArray:
-        """A storage, which the pickle refers to by its key. Tensors that share one get the same."""
+        """A storage, which the pickle refers to by its key. Tensors of the same storage get the same array."""
         _, kind, key, *_rest = pid
         if not isinstance(kind, str):
             raise ValueError(f"storage of an unknown type {kind!r:.80}")
