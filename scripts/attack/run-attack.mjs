@@ -23,12 +23,13 @@ import { root } from '../lib/run.mjs';
 import { serve } from '../../packages/cli/src/lib/server.mjs';
 import { peakBytes } from './peak.mjs';
 
-const USAGE = `usage: npm run lab -- attack [FOLDER (default ../shared/cases/attack)] [--only PATTERN] [--renderer webgl] [--seconds N (default 40)]
+const USAGE = `usage: npm run lab -- attack [FOLDER (default ../shared/cases/attack)] [--only PATTERN] [--renderer webgl] [--seconds N (default 40)] [--copies N (default 1)]
 
 Reads every scene file of a folder in Node, and shows each in Chromium, files named mesh-* and csp-* as meshes, with an honest scene of 400 splats (honest.ply of the folder, or of
-../attack) half a second later, and again when it is removed; both with a heap of 300 MB. A folder within the folder is a streamed scene. Prints the result, the time, the maximum memory of
-the page's process and of the GPU's (on Linux) above an empty page, and the requests to another origin. Ends with an error if one crashes, ends without a named error, takes more than
-400 MB of a process, blocks the main thread for more than 100 ms at once, asks another origin, or delays the honest scene by more than a second.`;
+../attack) half a second later, and again when it is removed; both with a heap of 300 MB. With --copies 9, nine elements show the file at once. A folder within the folder is a streamed
+scene or a tileset, a .floor is walked on. Prints the result, the time, the maximum memory of
+the page's process and of the GPU's (on Linux) above an empty page, the requests for the file and those to another origin. Ends with an error if one crashes, ends without a named error, takes more than
+400 MB of a process, requests more than 1,000 files and one for each KiB, blocks the main thread for more than 100 ms at once, asks another origin, or delays the honest scene by more than a second.`;
 const HEAP = '--max-old-space-size=300';
 const MAX_PEAK = 400e6;
 const MAX_WAIT_MS = 1_000;
@@ -42,6 +43,7 @@ const { values, positionals } = parseArgs({
     only: { type: 'string', default: '' },
     renderer: { type: 'string', default: '' },
     seconds: { type: 'string', default: '40' },
+    copies: { type: 'string', default: '1' },
     help: { type: 'boolean' },
   },
 });
@@ -57,7 +59,9 @@ if (honestFolder === undefined) {
 }
 const limitMs = 1000 * Number(values.seconds);
 const served = mkdtempSync(join(tmpdir(), 'attack-'));
-const files = readdirSync(folder).filter((file) => !/README|NOT-RUN/.test(file) && new RegExp(values.only).test(file));
+const files = readdirSync(folder).filter(
+  (file) => !/README|NOT-RUN|\.pt$|^page-names$/.test(file) && new RegExp(values.only).test(file),
+);
 const faults = [];
 
 /** The address of a file for the page: the name of the manifest identifies streamed scenes. */
@@ -65,7 +69,8 @@ function placed(file) {
   if (statSync(join(folder, file)).isDirectory()) {
     cpSync(join(folder, file), join(served, file), { recursive: true });
     if (file === 'lod-many') writeManyParts(join(served, file));
-    return `/files/${encodeURIComponent(file)}/lod-meta.json`;
+    const name = ['tileset.json', 'lod-meta.json'].find((each) => existsSync(join(served, file, each)));
+    return `/files/${encodeURIComponent(file)}/${name}`;
   }
   mkdirSync(join(served, file));
   const name =
@@ -87,11 +92,18 @@ function writeManyParts(to) {
   );
 }
 
+/** Bytes of a file, or of all files of a folder. */
+const sizeOf = (path) =>
+  statSync(path).isFile()
+    ? statSync(path).size
+    : readdirSync(path).reduce((sum, name) => sum + sizeOf(join(path, name)), 0);
+
 const isMesh = (file) => /^(mesh|csp)-/.test(file);
 
 function inNode(file) {
   // Manifests, models, views and meshes are opened by the element alone.
-  if (/detail|views|\.onnx$/.test(file) || isMesh(file) || statSync(join(folder, file)).isDirectory()) return undefined;
+  if (/detail|views|\.onnx$|\.4dgs$|\.floor$/.test(file) || isMesh(file) || statSync(join(folder, file)).isDirectory())
+    return undefined;
   const script = join(root, 'tests/formats/support/read-measured.ts');
   const { stdout, stderr } = spawnSync(process.execPath, [HEAP, '--import', 'tsx', script, join(folder, file), ''], {
     encoding: 'utf8',
@@ -114,7 +126,7 @@ async function inChromium(file, port) {
     const empty = [peakBytes(), peakBytes('gpu-process')];
     const run = page.evaluate(
       ([...args]) => window.attack(...args),
-      [placed(file), '/honest/honest.ply', limitMs, isMesh(file)],
+      [placed(file), '/honest/honest.ply', limitMs, isMesh(file), Number(values.copies)],
     );
     const found = await Promise.race([run, crash]);
     return { ...found, peak: peakBytes() - empty[0], gpuPeak: peakBytes('gpu-process') - empty[1] };
@@ -130,6 +142,8 @@ const server = await serve({
   '/files/': served,
 });
 const { port } = server.address();
+let requests = 0;
+server.on('request', ({ url }) => (requests += url.startsWith('/files/') ? 1 : 0));
 let foreignRequests = 0;
 const foreign = createServer((_, response) => {
   foreignRequests++;
@@ -137,17 +151,17 @@ const foreign = createServer((_, response) => {
 }).listen(FOREIGN_PORT);
 const megabytes = (bytes) => (bytes === undefined || Number.isNaN(bytes) ? '?' : `${Math.round(bytes / 1e6)} MB`);
 console.log(
-  'file | Node: result, CPU, memory | Chromium: result, time, memory of page and GPU process, longest standstill, longest task of the page | honest scene beside it, later (alone) | foreign requests',
+  'file | Node: result, CPU, memory | Chromium: result, time, memory of page and GPU process, longest standstill, longest task of the page | honest scene beside it, later (alone) | requests, and foreign ones',
 );
 for (const file of files) {
   const node = inNode(file);
-  foreignRequests = 0;
+  foreignRequests = requests = 0;
   const found = await inChromium(file, port);
   const { result, ms, peak, gpuPeak, standstill, task, beside, alone, besideResult, later, laterResult } = found;
   const first = node ? `${node.result}, ${Math.round(node.cpuMs)} ms, ${megabytes(node.peak)}` : 'not read there';
   console.log(
     `${file} | ${first} | ${result}, ${ms} ms, ${megabytes(peak)} + ${megabytes(gpuPeak)}, ${standstill} ms, ${task} ms | ` +
-      `${beside} ms, ${later} ms (${alone} ms) | ${foreignRequests}`,
+      `${beside} ms, ${later} ms (${alone} ms) | ${requests} and ${foreignRequests}`,
   );
   const isNamed = !/unnamed|undefined|nothing for/.test(`${node?.result} ${result}`.replace(/^undefined /, ''));
   if (!isNamed) faults.push(`${file}: no named error (${result})`);
@@ -160,6 +174,8 @@ for (const file of files) {
   ])
     if (came !== 'shown' || took > alone + MAX_WAIT_MS)
       faults.push(`${file}: the honest scene ${when} came after ${took} ms, alone ${alone}`);
+  const maxRequests = Number(values.copies) * (1_000 + sizeOf(join(folder, file)) / 1024);
+  if (requests > maxRequests) faults.push(`${file}: ${requests} requests`);
   if (foreignRequests > 0) faults.push(`${file}: ${foreignRequests} requests to another origin`);
 }
 foreign.closeAllConnections();

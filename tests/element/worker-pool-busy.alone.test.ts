@@ -100,3 +100,47 @@ test('a download of 8 s is not given up for another scene that is read for one s
   await pass(10_000);
   assert(workers.length >= 2, 'the other scene has another worker');
 });
+
+const load = (url: string): WorkerRequest => ({ type: 'load', request: { url } }) as unknown as WorkerRequest;
+
+/** Requests of different scenes that workers read without an end. */
+async function occupy({ pool, workers, pass }: ReturnType<typeof poolOf>, count: number): Promise<AbortController> {
+  const abort = new AbortController();
+  for (let k = 0; k < count; k++) {
+    void pool.run(load(`hostile-${k}`), abort.signal, never).catch(() => undefined);
+    await settle();
+    workers.at(-1)!.say({ type: 'reading', id: k });
+    await pass(300);
+  }
+  return abort;
+}
+
+test('nine scenes that are read without an end do not delay a tenth', async (context) => {
+  const own = poolOf(context);
+  await occupy(own, 9);
+  assert.equal(own.workers.length, 9);
+  const answer = own.pool.run(load('honest'), new AbortController().signal, never);
+  await settle();
+  assert.equal(own.workers.length, 10, 'it has a worker at once');
+  own.workers.at(-1)!.say({ type: 'answer', id: 9, answer: 'scene' });
+  assert.equal(await answer, 'scene');
+});
+
+test('a scene that has had its time waits for those that have had none', async (context) => {
+  const own = poolOf(context);
+  await occupy(own, 16);
+  await own.pass(500);
+  const outcomes: string[] = [];
+  const ask = (url: string): void =>
+    void own.pool.run(load(url), new AbortController().signal, never).then((answer) => outcomes.push(String(answer)));
+  ask('hostile-0');
+  ask('honest');
+  await settle();
+  assert.equal(own.workers.length, 16, 'all workers are occupied');
+  await own.pass(200);
+  const ended = own.workers.filter(({ isEnded }) => isEnded);
+  assert.equal(ended.length, 1, 'one has had its turn');
+  own.workers[16].say({ type: 'answer', id: 17, answer: 'honest' });
+  await settle();
+  assert.deepEqual(outcomes, ['honest']);
+});

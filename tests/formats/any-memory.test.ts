@@ -4,7 +4,7 @@ import { test } from 'node:test';
 import vm from 'node:vm';
 import { readPrefix, readScene, type OpenFile } from '@gaussian-splat/formats';
 import { assertSameCloud } from './support/expect.js';
-import { fuzzScenes } from './support/fuzz.js';
+import { fuzzScenes } from './support/fuzz-scenes.js';
 
 /** The bytes as a part of a larger Buffer. */
 function bufferAt(offset: number, bytes: Uint8Array): Uint8Array {

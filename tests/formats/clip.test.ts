@@ -12,11 +12,14 @@ import {
   CLIP_HEAD_BYTES,
   clipFrame,
   clipGroupAt,
+  clipPartBytes,
+  clipRoomBytes,
   LoadBudget,
   packClipIndex,
   parseClip,
   readClipPart,
   readScene,
+  takeClipRoom,
   unpackClipIndex,
   writeClipHead,
   type ClipIndex,
@@ -87,6 +90,16 @@ test('between threads, an index is a table of 20 bytes a part, and the same afte
   assert.equal(large.frameCount, frames);
   assert.ok(serialize(packClipIndex(large)).length < 20 * frames);
   assert.deepEqual(unpackClipIndex(packClipIndex(large)), large);
+});
+
+test('the memory on the GPU that an index asks for is charged to the whole file', () => {
+  takeClipRoom(index, 'a.gsv');
+  const [group] = index.groups;
+  const part = { ...group.parts[0], splats: 4_000_000 };
+  const large = { ...index, groups: [{ ...group, parts: [part] }] };
+  assert.equal(clipRoomBytes(large), clipPartBytes(part));
+  assert.throws(() => takeClipRoom({ ...large, byteLength: 1000 }, 'a.gsv'), { code: 'out-of-memory/budget' });
+  takeClipRoom({ ...large, byteLength: 20_000_000 }, 'a.gsv');
 });
 
 test('splats are followed though no frame says which they were, and are gone when they are gone', async () => {

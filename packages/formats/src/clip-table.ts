@@ -1,4 +1,5 @@
-import type { ClipGroup, ClipIndex, ClipPart } from './clip.js';
+import { LoadBudget, type LoadLimits } from './budget.js';
+import { clipPartBytes, type ClipGroup, type ClipIndex, type ClipPart } from './clip.js';
 
 /** Number of values of a part in {@link ClipTable.parts}. */
 const STRIDE = 4;
@@ -48,4 +49,44 @@ export function unpackClipIndex({ groups: table, ...facts }: PackedClipIndex): C
     return group;
   });
   return { ...facts, groups };
+}
+
+/** Maximum sizes of a part over all groups of a clip, for which GPU buffers are allocated. */
+export interface ClipRoom {
+  readonly rows: number;
+  readonly planes: number;
+  readonly frames: number;
+}
+
+/** Returns the room of each part of the groups. */
+export function clipRooms({ groups }: Pick<ClipIndex, 'groups'>): ClipRoom[] {
+  const rooms: ClipRoom[] = [];
+  for (const { frames, parts } of groups)
+    for (const [k, { splats, planes }] of parts.entries()) {
+      const { rows, ...own } = rooms[k] ?? { rows: 0, planes: 0, frames: 0 };
+      rooms[k] = {
+        rows: Math.max(rows, splats),
+        planes: Math.max(own.planes, planes),
+        frames: Math.max(own.frames, frames),
+      };
+    }
+  return rooms;
+}
+
+/**
+ * Returns the bytes on the GPU of one group of the largest size and of the parts that never change, without coefficients
+ * above degree 0.
+ */
+export const clipRoomBytes = (index: Pick<ClipIndex, 'groups' | 'still'>): number =>
+  [...index.still, ...clipRooms(index).map(({ rows: splats, planes }) => ({ splats, planes }))].reduce(
+    (sum, part) => sum + clipPartBytes(part),
+    0,
+  );
+
+/**
+ * Charges the memory of a clip's largest groups on the GPU to an account of the whole file.
+ * @throws GaussianSplatError `out-of-memory/budget`
+ */
+export function takeClipRoom(index: ClipIndex, name: string, limits: LoadLimits = {}): void {
+  new LoadBudget(index.byteLength, limits).take(clipRoomBytes(index), name);
 }

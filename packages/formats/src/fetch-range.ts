@@ -10,6 +10,8 @@ export interface FetchedRange {
   readonly bytes: Uint8Array<ArrayBuffer>;
   /** Whether the server supports range requests. If false, it sent the file from its beginning. */
   readonly isPartial: boolean;
+  /** Size of the whole file in bytes; undefined if the server does not send it, or it cannot be read. */
+  readonly totalBytes?: number | undefined;
   /** Validator of the file's version: its ETag, else its date; undefined if the server sends none that can be read. */
   readonly tag?: string | undefined;
 }
@@ -88,7 +90,7 @@ async function attempt(
     await response.body?.cancel().catch(() => undefined);
     throw badStatus(address, response);
   }
-  const range = /^bytes (\d+)-(\d+)\//.exec(response.headers.get('Content-Range') ?? '');
+  const range = /^bytes (\d+)-(\d+)\/(\d+)?/.exec(response.headers.get('Content-Range') ?? '');
   const bytes = new GrowingBytes(end - start);
   const broken = (cause: unknown): unknown =>
     signal?.aborted ? signal.reason : interrupted(address, bytes.length, end - start, cause);
@@ -103,5 +105,6 @@ async function attempt(
   // Cross-origin, scripts cannot read Content-Range, but Content-Length.
   const sent = range ? Number(range[2]) + 1 - start : isPartial ? (lengthOf(response) ?? 0) : 0;
   if (bytes.length < Math.min(sent, end - start)) throw broken(undefined);
-  return { bytes: bytes.view(), isPartial, tag: tagOf(response) };
+  const totalBytes = range?.[3] === undefined ? undefined : Number(range[3]);
+  return { bytes: bytes.view(), isPartial, tag: tagOf(response), totalBytes };
 }

@@ -2,7 +2,14 @@ export { LoadBudget, type LoadLimits } from './budget.js';
 export { detectFormat } from './detect.js';
 export { fetchScene, fileOpenerFor, type FetchSceneOptions } from './fetch-scene.js';
 export { sceneFormats } from './late-formats.js';
-export { packClipIndex, unpackClipIndex, type PackedClipIndex } from './clip-table.js';
+export {
+  clipRoomBytes,
+  clipRooms,
+  packClipIndex,
+  takeClipRoom,
+  unpackClipIndex,
+  type PackedClipIndex,
+} from './clip-table.js';
 export { fetchRange, type FetchedRange } from './fetch-range.js';
 export { outOfMemory } from './scene-errors.js';
 export { readLodScene, sogAddress, type LodBox, type LodScene, type SogAddress, type SogRun } from './lod/boxes.js';

@@ -6,12 +6,13 @@ import {
   fetchRange,
   fetchScene,
   packClipIndex,
+  takeClipRoom,
   parseClip,
   readClipPart,
   type ClipPartContent,
   type FetchedRange,
 } from '@gaussian-splat/formats';
-import { loadModule } from '@gaussian-splat/core';
+import { GaussianSplatError, loadModule } from '@gaussian-splat/core';
 import type { FourDgsClip } from '@gaussian-splat/formats/4dgs';
 import { packAnimation, type PackedAnimation } from '@gaussian-splat/renderer/tools';
 import { fileLimits, fileName, limitsFrom, named } from './load-scene.js';
@@ -44,11 +45,14 @@ async function openClip(request: ClipRequest, signal: AbortSignal): Promise<Open
   const limits = limitsFrom(request);
   try {
     if (isFourDgs(request)) return await openFourDgs(request, signal);
-    const { bytes, isPartial, tag } = await bytesAt(request, 0, HEAD_BYTES, signal, limits());
+    const { bytes, isPartial, tag, totalBytes } = await bytesAt(request, 0, HEAD_BYTES, signal, limits());
     const length = CLIP_HEAD_BYTES + clipIndexBytes(bytes, name);
     const whole =
       length <= bytes.length ? bytes : (await bytesAt({ ...request, tag }, 0, length, signal, limits())).bytes;
-    return { index: packClipIndex(parseClip(whole, name, limits())), isPartial, tag };
+    const index = parseClip(whole, name, limits());
+    if (totalBytes !== undefined && totalBytes < index.byteLength) throw tooShort(name, index.byteLength, totalBytes);
+    takeClipRoom(index, name, limits());
+    return { index: packClipIndex(index), isPartial, tag };
   } catch (error) {
     signal.throwIfAborted();
     throw named(error, name);
@@ -90,6 +94,7 @@ async function openFourDgs(request: ClipRequest, signal: AbortSignal): Promise<O
     ? new Uint8Array(await whole.arrayBuffer())
     : await fetchScene(url, { mode: 'cors', credentials, signal, ...fileLimits(limitsFrom(request)()) });
   const clip = await fourDgsClip(request, bytes);
+  takeClipRoom(clip.index, fileName(url), limitsFrom(request)());
   return {
     index: packClipIndex(clip.index),
     isPartial: true,
@@ -111,6 +116,14 @@ async function groupOfFourDgs(request: ClipRequest): Promise<ClipPartContent> {
     opened?.url === url ? opened.clip : await fourDgsClip(request, new Uint8Array(await whole!.arrayBuffer()));
   return clip.group(part!.group);
 }
+
+const tooShort = (where: string, expected: number, found: number): GaussianSplatError =>
+  new GaussianSplatError('decode/truncated', {
+    where,
+    expected: `${expected} bytes, as its index says`,
+    found: String(found),
+    remedy: 'copy the file again; its end is missing',
+  });
 
 const endOf = ({ start, sceneBytes, motionBytes }: ClipPart): number => start + sceneBytes + motionBytes;
 

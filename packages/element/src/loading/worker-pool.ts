@@ -1,4 +1,5 @@
 import { GaussianSplatError, Lazy } from '@gaussian-splat/core';
+import { FairTurns } from './fair-turns.js';
 import { buffersOf, type PartListener, type WorkerMessage, type WorkerRequest } from './protocol.js';
 import { WorkerSlot, type Job } from './worker-slot.js';
 
@@ -34,10 +35,11 @@ const RESTART_MS = 15_000;
 /** Time that a late worker gets after the code for the main thread is loaded, ms. */
 const GRACE_MS = 500;
 /**
- * Maximum number of workers of a page. Each untrusted scene that never finishes occupies one. If all are occupied,
- * later loads wait.
+ * Maximum number of workers of a page, and of those that start only for scenes that have had little worker time. Each
+ * scene that is read for long occupies one. If all are occupied, later loads wait.
  */
 const MAX_WORKERS = 8;
+const MAX_NEW_WORKERS = 8;
 /**
  * Maximum number of restarts of a load. Several restarts are allowed, because a load may share workers with scenes that
  * never finish.
@@ -66,6 +68,7 @@ export class WorkerPool {
   readonly #another: () => boolean;
   readonly #slots = new Set<WorkerSlot>();
   readonly #queue: Job[] = [];
+  readonly #turns = new FairTurns();
   #isRefused = false;
   #hasWarned = false;
   /** Whether a worker has started before. If a later one starts slowly, the machine is busy, so it gets more time. */
@@ -138,7 +141,8 @@ export class WorkerPool {
     const late = slots.find(({ isLate }) => isLate);
     if (late) return void this.#doWithout(late, job);
     const free = slots.find((slot) => slot.missed < BUSY && slot.mayTake(job));
-    const slot = free ?? (slots.length < MAX_WORKERS ? this.#start() : undefined);
+    const max = MAX_WORKERS + (this.#turns.isNew(job) ? MAX_NEW_WORKERS : 0);
+    const slot = free ?? (slots.length < max ? this.#start() : undefined);
     // No worker could be created, which `#start` has reported.
     if (this.#isRefused) return job.resolve(job.here());
     if (!slot) return void this.#queue.push(job);
@@ -162,7 +166,7 @@ export class WorkerPool {
   }
 
   #placeQueued(): void {
-    for (const job of this.#queue.splice(0)) this.#place(job);
+    for (const job of this.#turns.sort(this.#queue.splice(0))) this.#place(job);
   }
 
   /** Ends a worker after `idleMs` milliseconds, if it has no requests and gets none until then. */
@@ -283,13 +287,29 @@ export class WorkerPool {
     for (const slot of this.#slots) {
       if (!slot.isAsked) continue;
       isIdle = false;
+      if (slot.missed > 0 && slot.reader) this.#turns.count(slot.reader, TICK_MS);
       if (slot.missed >= SILENT) this.#reassignJobs(slot);
       if (slot.missed++ === 0) slot.post({ type: 'ping' });
     }
+    this.#yieldTurn();
     if (!isIdle) return;
     clearInterval(this.#clock);
     this.#clock = undefined;
   };
+
+  /** Ends a worker that has read for longer than its turn, if a new scene waits. Its requests wait for another turn. */
+  #yieldTurn(): void {
+    const [next] = this.#turns.sort(this.#queue);
+    const slot = next && this.#turns.slotFor(next, this.#slots, ({ missed }) => missed * TICK_MS);
+    if (!slot) return;
+    const { reader } = slot;
+    const jobs = [...slot.jobs.values()];
+    this.#end(slot);
+    for (const job of jobs) slot.drop(job);
+    if (reader) reader.turns = (reader.turns ?? 0) + 1;
+    this.#queue.push(...jobs);
+    this.#placeQueued();
+  }
 
   /**
    * Restarts the requests of an unresponsive worker in other workers, except the load that it reads. The worker is

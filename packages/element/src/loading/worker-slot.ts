@@ -23,6 +23,8 @@ export interface Job {
   /** Time when the request was sent to its worker, in milliseconds of `performance.now()`. */
   sentAt: number;
   slot?: WorkerSlot | undefined;
+  /** Number of workers that the request has yielded to others: see `FairTurns`. */
+  turns?: number;
 }
 
 /** A worker, and the requests that it has been assigned. */

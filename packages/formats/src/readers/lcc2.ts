@@ -1,7 +1,7 @@
 import type { GaussianCloud } from '@gaussian-splat/core';
 import { checkedPart } from '../foreign-signatures.js';
 import { damaged, warn } from '../faults.js';
-import { isObject, parseJson, show, type Json, type JsonSource } from '../json.js';
+import { isObject, parseJson, show, type Json, type JsonSource, type ParseJson } from '../json.js';
 import { MAX_INDEX_BYTES, MAX_PATH } from '../lod/meta.js';
 import { mergeClouds } from '../merge-clouds.js';
 import type { SceneSource } from '../scene-format.js';
@@ -99,16 +99,16 @@ function parseLcc2Meta(source: JsonSource): Lcc2Meta {
 }
 
 /** Parses JSON that may have commas before closing brackets, which some exporters of LCC2 write. */
-function parseWithTrailingCommas(text: string): unknown {
+const parseWithTrailingCommas: ParseJson = (text, reviver) => {
   try {
-    return JSON.parse(text);
+    return JSON.parse(text, reviver);
   } catch (error) {
     // Strings are matched as a whole, with an optional end, so that the time is linear.
     const plain = text.replace(/("(?:[^"\\]|\\.)*"?)|,(?=\s*[}\]])/gs, (_, string: string | undefined) => string ?? '');
     if (plain === text) throw error;
-    return JSON.parse(plain);
+    return JSON.parse(plain, reviver);
   }
-}
+};
 
 /** Returns the paths of the bundles; undefined if they are no list of texts. */
 function pathsOf({ splatFiles, files }: Json): string[] | undefined {

@@ -1,5 +1,5 @@
 /** Plays clips of moving splats. The module is loaded only for clips. */
-import { clipGroupAt, frameAt, unpackClipIndex, type ClipIndex } from '@gaussian-splat/formats';
+import { clipGroupAt, clipRooms, frameAt, unpackClipIndex, type ClipIndex } from '@gaussian-splat/formats';
 import { AnimatedGaussians } from '@gaussian-splat/renderer';
 import type { PackedAnimation } from '@gaussian-splat/renderer/tools';
 import type { SceneBounds } from '../../viewer/camera/settings.js';
@@ -87,7 +87,7 @@ export class ClipPlayer implements Timeline {
       const arriving = cache.first(first, signal);
       arriving.catch(() => undefined);
       const still = index.still.map(({ splats, planes }) => ({ rows: splats, planes, frames: 1 }));
-      gaussians = await AnimatedGaussians.create(device, { ...index, parts: roomOf(index), still, memoryBudget });
+      gaussians = await AnimatedGaussians.create(device, { ...index, parts: clipRooms(index), still, memoryBudget });
       await arriving;
       signal.throwIfAborted();
       const player = new ClipPlayer(options, index, gaussians, cache);
@@ -136,20 +136,6 @@ export class ClipPlayer implements Timeline {
     this.#isClosed = true;
     this.#cache.close();
   }
-}
-
-/** Returns the largest sizes of each part over all groups, for which GPU buffers are allocated. */
-function roomOf({ groups }: ClipIndex): { rows: number; planes: number; frames: number }[] {
-  const room: { rows: number; planes: number; frames: number }[] = [];
-  for (const { frames, parts } of groups) {
-    parts.forEach(({ splats, planes }, k) => {
-      const own = (room[k] ??= { rows: 0, planes: 0, frames: 0 });
-      own.rows = Math.max(own.rows, splats);
-      own.planes = Math.max(own.planes, planes);
-      own.frames = Math.max(own.frames, frames);
-    });
-  }
-  return room;
 }
 
 /** Returns the content of a `blob:` address; undefined for other addresses. */
