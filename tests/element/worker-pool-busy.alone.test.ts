@@ -61,6 +61,15 @@ test('on a machine that gives no worker time for 30 s, a load fails not, and the
   assert(workers.length <= 4, `${workers.length} workers`);
 });
 
+test('a load that no worker begins to read in minutes ends in an error that does not speak of memory', async (context) => {
+  const { pool, workers, pass } = poolOf(context);
+  const answer = pool.run({ type: 'load' } as WorkerRequest, new AbortController().signal, never);
+  const outcome = answer.catch((error: unknown) => error);
+  await pass(150_000);
+  assert.equal(((await outcome) as { code: string }).code, 'network/interrupted');
+  assert(workers.length <= 5, `${workers.length} workers`);
+});
+
 test('a load whose buffers are transferred waits for its worker', async (context) => {
   const { pool, workers, pass } = poolOf(context);
   const transfer = [new ArrayBuffer(8)];

@@ -4,10 +4,12 @@
  * SECURITY.md: "The size of a file bounds its cost".
  */
 import assert from 'node:assert/strict';
+import { existsSync, readdirSync, readFileSync, statSync } from 'node:fs';
+import { join } from 'node:path';
 import { test } from 'node:test';
 import { detectFormat, sceneFormats } from '@gaussian-splat/formats';
 import { allReaders, fuzzReader, type Reader } from './support/fuzz.js';
-import { fuzzScenes } from './support/fuzz-scenes.js';
+import { fuzzScenes, type FuzzScene, type ReaderKind } from './support/fuzz-scenes.js';
 import { BOUNDS, excesses, measuredReading } from './support/reading.js';
 
 const COUNT = 80;
@@ -44,3 +46,35 @@ for (const [reader, own] of Object.entries(readers))
     assert.equal(files, COUNT);
     assert.ok(read > 0 && refused > 0, `${read} read, ${refused} refused`);
   });
+
+const CASES = '../shared/cases/attack-4';
+const KINDS: Readonly<Record<string, ReaderKind>> = {
+  'floor-cell.floor': 'floor',
+  'clip-many-780k.4dgs': 'clip',
+  'clip-groups-258k.4dgs': 'clip',
+  'tiles-implicit': 'load',
+  'tiles-nested': 'load',
+};
+/** A file, or a folder with a tileset. */
+function caseOf(name: string): FuzzScene {
+  const path = join(CASES, name);
+  if (statSync(path).isFile()) return { name, files: { [name]: new Uint8Array(readFileSync(path)) } };
+  const within = readdirSync(path, { recursive: true }).map(String);
+  const files = within.filter((file) => statSync(join(path, file)).isFile());
+  return {
+    name: 'tileset.json',
+    files: Object.fromEntries(files.map((file) => [file, new Uint8Array(readFileSync(join(path, file)))])),
+  };
+}
+
+for (const [name, kind] of Object.entries(KINDS))
+  test(
+    `${name}, which cost far more than it weighs`,
+    { skip: !existsSync(CASES) && 'no shared cases' },
+    async (context) => {
+      const reading = await measuredReading(kind, caseOf(name));
+      context.diagnostic(JSON.stringify(reading));
+      assert.deepEqual(excesses(reading), []);
+      assert.notEqual(reading.outcome, 'read');
+    },
+  );

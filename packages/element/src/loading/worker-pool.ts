@@ -325,7 +325,9 @@ export class WorkerPool {
     const isEmpty = jobs.length === slot.jobs.size;
     const stuckWorker = slot.reader;
     if (!reader && isEmpty) this.#end(slot);
-    for (const job of jobs) this.#move(slot, job, job === stuckWorker ? AFTER_DEATH : 1);
+    for (const job of jobs)
+      if (job === stuckWorker) this.#move(slot, job, AFTER_DEATH, stopped('a worker that did not respond'));
+      else this.#move(slot, job, 1, starved());
     this.#placeQueued();
   }
 
@@ -333,11 +335,11 @@ export class WorkerPool {
    * Restarts a load in another worker. A load that has been restarted does not share its worker, because it may have
    * blocked the previous one. Rejects the load if it cannot restart.
    */
-  #move(slot: WorkerSlot, job: Job, moves: number, found = 'a worker that did not respond'): void {
+  #move(slot: WorkerSlot, job: Job, moves: number, error: GaussianSplatError): void {
     slot.drop(job);
     job.moves += moves;
     // Transferred buffers cannot be sent again.
-    if (job.transfer || job.moves > MAX_MOVES) return job.reject(stopped(found));
+    if (job.transfer || job.moves > MAX_MOVES) return job.reject(error);
     this.#place(job);
   }
 
@@ -350,7 +352,7 @@ export class WorkerPool {
     const stuckWorker = slot.reader ?? (jobs.length === 1 ? jobs[0] : undefined);
     this.#end(slot);
     for (const job of jobs)
-      this.#move(slot, job, job === stuckWorker ? MAX_MOVES + 1 : 1, message || 'a worker that stopped');
+      this.#move(slot, job, job === stuckWorker ? MAX_MOVES + 1 : 1, stopped(message || 'a worker that stopped'));
     this.#placeQueued();
   }
 
@@ -363,12 +365,22 @@ export class WorkerPool {
 /**
  * Returns whether a job may leave a silent worker that is perhaps only late, because the machine is busy. It loses what
  * it has downloaded, so the silence must have lasted as long as the job before it. The time quadruples with each
- * restart. A job that cannot restart waits until its worker counts as dead.
+ * restart. A job that cannot restart, or not again, waits until its worker counts as dead.
  */
 function hasWaited({ sentAt, moves, transfer }: Job, silentMs: number): boolean {
   const workedMs = performance.now() - sentAt - silentMs;
   const minMs = TICK_MS * SILENT * 4 ** moves;
-  return !transfer && silentMs >= Math.max(minMs, Math.min(MAX_WAIT_MS, workedMs));
+  return !transfer && moves < MAX_MOVES && silentMs >= Math.max(minMs, Math.min(MAX_WAIT_MS, workedMs));
+}
+
+/** Returns the error for a request that no worker began to read, because the machine gave workers no time. */
+function starved(): GaussianSplatError {
+  return new GaussianSplatError('network/interrupted', {
+    where: 'scene worker',
+    expected: 'a worker that responds within a minute',
+    found: 'none, and no scene that it was reading',
+    remedy: 'load the scene again when the machine is less busy',
+  });
 }
 
 function stopped(found: string): GaussianSplatError {
