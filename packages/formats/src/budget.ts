@@ -34,7 +34,8 @@ export class LoadBudget {
   readonly #start = performance.now();
   #arrived: number;
   #taken = 0;
-  #requests = 0;
+  /** Number of requests; the first is that of the scene's own file. */
+  #requests = 1;
 
   /** @param arrived Size of the scene's own file in bytes. */
   constructor(arrived: number, limits: LoadLimits = {}) {
