@@ -51,7 +51,7 @@ export function unpackClipIndex({ groups: table, ...facts }: PackedClipIndex): C
   return { ...facts, groups };
 }
 
-/** Maximum sizes of a part over all groups of a clip, for which GPU buffers are allocated. */
+/** Maximum sizes of a part over all groups of a clip: those of its GPU buffers. */
 export interface ClipRoom {
   readonly rows: number;
   readonly planes: number;

@@ -3,7 +3,7 @@ import type { Job, WorkerSlot } from './worker-slot.js';
 
 /** Worker time that a source gets before those that have had less come first, ms. */
 const FIRST_MS = 1_000;
-/** Time for which a request is read before it may lose its worker to a source that has had none, ms; doubled each time. */
+/** Minimum reading time before a request may lose its worker to a source without any, in ms. It doubles each time. */
 const TURN_MS = 2_000;
 
 /**
@@ -11,7 +11,7 @@ const TURN_MS = 2_000;
  * the addresses of scenes: parts of a clip, and boxes of a streamed scene, belong to the same one.
  */
 export class FairTurns {
-  /** Time for which workers have read each source, ms. */
+  /** Reading time of each source, ms. */
   readonly #spent = new Map<string, number>();
 
   /** Call at intervals of `ms` for a worker that does not respond while it reads a request. */
