@@ -92,12 +92,6 @@ function writeManyParts(to) {
   );
 }
 
-/** Bytes of a file, or of all files of a folder. */
-const sizeOf = (path) =>
-  statSync(path).isFile()
-    ? statSync(path).size
-    : readdirSync(path).reduce((sum, name) => sum + sizeOf(join(path, name)), 0);
-
 const isMesh = (file) => /^(mesh|csp)-/.test(file);
 
 function inNode(file) {
@@ -142,8 +136,12 @@ const server = await serve({
   '/files/': served,
 });
 const { port } = server.address();
-let requests = 0;
-server.on('request', ({ url }) => (requests += url.startsWith('/files/') ? 1 : 0));
+let [requests, sentBytes] = [0, 0];
+server.on('request', ({ url }, response) => {
+  if (!url.startsWith('/files/')) return;
+  requests++;
+  response.on('finish', () => (sentBytes += Number(response.getHeader('content-length') ?? 0)));
+});
 let foreignRequests = 0;
 const foreign = createServer((_, response) => {
   foreignRequests++;
@@ -155,7 +153,7 @@ console.log(
 );
 for (const file of files) {
   const node = inNode(file);
-  foreignRequests = requests = 0;
+  foreignRequests = requests = sentBytes = 0;
   const found = await inChromium(file, port);
   const { result, ms, peak, gpuPeak, standstill, task, beside, alone, besideResult, later, laterResult } = found;
   const first = node ? `${node.result}, ${Math.round(node.cpuMs)} ms, ${megabytes(node.peak)}` : 'not read there';
@@ -174,7 +172,7 @@ for (const file of files) {
   ])
     if (came !== 'shown' || took > alone + MAX_WAIT_MS)
       faults.push(`${file}: the honest scene ${when} came after ${took} ms, alone ${alone}`);
-  const maxRequests = Number(values.copies) * (1_000 + sizeOf(join(folder, file)) / 1024);
+  const maxRequests = 1_000 * Number(values.copies) + sentBytes / 1024;
   if (requests > maxRequests) faults.push(`${file}: ${requests} requests`);
   if (foreignRequests > 0) faults.push(`${file}: ${foreignRequests} requests to another origin`);
 }

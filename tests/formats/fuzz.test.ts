@@ -10,7 +10,7 @@ import { test } from 'node:test';
 import { detectFormat, sceneFormats } from '@gaussian-splat/formats';
 import { allReaders, fuzzReader, type Reader } from './support/fuzz.js';
 import { fuzzScenes, type FuzzScene, type ReaderKind } from './support/fuzz-scenes.js';
-import { BOUNDS, excesses, measuredReading } from './support/reading.js';
+import { BOUNDS, excesses, growthDuring, measuredReading } from './support/reading.js';
 
 const COUNT = 80;
 const readers = await allReaders();
@@ -31,7 +31,9 @@ test('each format of the registry has files to make hostile ones of, which are r
   }
 });
 
-test('the harness sees each cost', () => {
+test('the harness sees each cost', async () => {
+  const growth = await growthDuring(() => Promise.resolve(new Uint8Array(3e8).fill(1)));
+  assert.ok(growth > 2e8, `${growth} bytes`);
   const none = { heldBytes: 0, sentBytes: 0, requests: 0, gpuBytes: 0, cpuMs: 0 };
   assert.deepEqual(excesses({ outcome: 'read', bytes: 100, costs: none }), []);
   for (const cost of Object.keys(BOUNDS) as (keyof typeof BOUNDS)[]) {

@@ -153,29 +153,36 @@ function forgetPeak(): void {
   if (existsSync(STATUS)) writeFileSync('/proc/self/clear_refs', '5');
 }
 
+/** Returns the bytes by which the peak of this process grew during some work. */
+export async function growthDuring(work: () => Promise<unknown>): Promise<number> {
+  forgetPeak();
+  const memory = peakBytes();
+  await work();
+  return peakBytes() - memory;
+}
+
 /** Reads a scene, and returns what it cost. Errors without a code are thrown. */
 export async function measuredReading(kind: ReaderKind, scene: FuzzScene): Promise<Reading> {
   const server = new Server(scene.files);
   const before = { fetch: globalThis.fetch, createImageBitmap: globalThis.createImageBitmap };
   Object.assign(globalThis, { fetch: server.fetch, createImageBitmap: () => Promise.reject(new Error('no image')) });
-  forgetPeak();
-  const memory = peakBytes();
   const cpu = process.cpuUsage();
   clipBytes = 0;
   let outcome = 'read';
   let answers: unknown[] = [];
-  try {
-    answers = await ask(kind, scene);
-  } catch (error) {
-    if (!(error instanceof GaussianSplatError)) throw error;
-    // The element's own name for an error that a reader did not name.
-    if (/^(Type|Reference|Syntax|Range)?Error: /.test(error.found)) throw error;
-    outcome = error.code;
-  } finally {
-    Object.assign(globalThis, before);
-  }
+  const read = async (): Promise<void> => {
+    try {
+      answers = await ask(kind, scene);
+    } catch (error) {
+      if (!(error instanceof GaussianSplatError)) throw error;
+      // The element's own name for an error that a reader did not name.
+      if (/^(Type|Reference|Syntax|Range)?Error: /.test(error.found)) throw error;
+      outcome = error.code;
+    }
+  };
+  const growth = await growthDuring(read).finally(() => Object.assign(globalThis, before));
   const { user, system } = process.cpuUsage(cpu);
-  const heldBytes = Math.max(0, peakBytes() - memory - OWN_BYTES);
+  const heldBytes = Math.max(0, growth - OWN_BYTES);
   const { arrays, copied } = sizesOf(answers);
   const bytes = Math.max(server.bytes, scene.files[scene.name].length);
   const costs = {
