@@ -12,6 +12,7 @@ import {
   symlinkSync,
   writeFileSync,
 } from 'node:fs';
+import type { Server } from 'node:http';
 import type { AddressInfo } from 'node:net';
 import { tmpdir } from 'node:os';
 import { dirname, join } from 'node:path';
@@ -19,7 +20,6 @@ import { after, test } from 'node:test';
 import { fileURLToPath } from 'node:url';
 import type { GaussianCloud } from '@gaussian-splat/core';
 import { PNG } from 'pngjs';
-import { serve } from '../../packages/cli/src/lib/server.mjs';
 import { gpuEnvironment } from '../../scripts/lib/gpu-environment.mjs';
 import { buildGltf } from '../formats/support/gltf-writer.js';
 import { smallCloud } from '../formats/support/small-cloud.js';
@@ -180,6 +180,8 @@ test('the server of pages serves its folders, and no link out of them', async ()
   symlinkSync('../secret.txt', inFolder('served', 'far.txt'));
   symlinkSync('..', inFolder('served', 'up'));
   symlinkSync('served', inFolder('mount'));
+  const path = '../../packages/cli/src/lib/server.mjs';
+  const { serve } = (await import(path)) as { serve: (mounts: Record<string, string>) => Promise<Server> };
   const server = await serve({ '/': inFolder('mount') });
   const { port } = server.address() as AddressInfo;
   const statusOf = async (path: string): Promise<number> => (await fetch(`http://localhost:${port}/${path}`)).status;
