@@ -68,7 +68,9 @@ async function request(url: string, { credentials = 'same-origin', signal }: Fet
 
 /** Bytes of the initial allocation for a file of unknown length. */
 const FIRST_BYTES = 65_536;
+/** A declared length above the maximum is allocated only after some bytes have arrived, because a server may lie. */
 const MAX_AT_ONCE = 2 ** 28;
+const CAUTIOUS_BYTES = 2 ** 26;
 
 async function readBody(
   response: Response,
@@ -77,15 +79,12 @@ async function readBody(
   if (onProgress === undefined) return bytesOf(response, undefined, maxBytes);
   const length = Number(response.headers.get('Content-Length')) || undefined;
   const total = (response.headers.get('Content-Encoding') ? undefined : length) ?? expected;
-  let bytes = new Uint8Array(Math.min(total ?? FIRST_BYTES, MAX_AT_ONCE));
+  let bytes = new Uint8Array(total !== undefined && total > MAX_AT_ONCE ? CAUTIOUS_BYTES : (total ?? FIRST_BYTES));
   let loaded = 0;
   for await (const chunk of chunksOf(response)) {
     const end = loaded + chunk.length;
-    if (end > bytes.length) {
-      // A declared length is trusted further with each part that has arrived, so that a large file is copied once.
-      const next = total !== undefined && total >= end ? Math.min(4 * bytes.length, total) : 2 * bytes.length;
-      bytes = grown(bytes, Math.max(end, next));
-    }
+    if (end > bytes.length)
+      bytes = grown(bytes, Math.max(end, total !== undefined && end <= total ? total : 2 * bytes.length));
     bytes.set(chunk, loaded);
     loaded = end;
     // If the file is longer than declared, the total grows with the received bytes.
