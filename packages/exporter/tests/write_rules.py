@@ -96,6 +96,25 @@ def loop() -> onnx.ModelProto:
     return model(nodes, constants={"zero": np.zeros((), np.float32)})
 
 
+def dequantized(size: Sequence[int], scales: Sequence[int], axis: int) -> onnx.ModelProto:
+    rng = np.random.default_rng(0)
+    table = rng.integers(-128, 128, size).astype(np.int8)
+    block = int(size[axis]) // int(scales[axis])
+    nodes = [node("DequantizeLinear", "w", "s", to="d", axis=axis, block_size=block), node("Add", "d", "x")]
+    return model(nodes, size, size, 21, {"w": table, "s": rng.random(scales).astype(np.float32)})
+
+
+def microsoft(operator: str, x: Sequence[int] = (4, 4), y: Shape = (4, 4), **attributes: Any) -> onnx.ModelProto:
+    rng = np.random.default_rng(0)
+    constants: dict[str, np.ndarray] = {}
+    if operator == "MatMulNBits":
+        constants = {"w": rng.integers(0, 256, (8, 1, 16)).astype(np.uint8), "s": rng.random(8).astype(np.float32)}
+    elif operator in ("BiasGelu", "FusedMatMul"):
+        constants = {"w": rng.random(x[1:] if operator == "BiasGelu" else x).astype(np.float32)}
+    nodes = [node(operator, "x", *constants, domain="com.microsoft", **attributes)]
+    return model(nodes, x, y, constants=constants, domain="com.microsoft")
+
+
 def rules() -> dict[str, onnx.ModelProto]:
     """Names describe the fault, or are `kept-` and a valid value at its limit."""
     shape = {"shape": ints(16)}
@@ -142,6 +161,18 @@ def rules() -> dict[str, onnx.ModelProto]:
         "kept-conv-12-8": convolution(12, 8, 3),
         "kept-conv-3-8": convolution(3, 8, 3),
         "kept-conv-grouped": convolution(12, 8, 3, group=2),
+        "dequantize-blocks-of-a-vector": dequantized((32,), (4,), 0),
+        "kept-dequantize-blocks-of-a-row": dequantized((1, 32), (1, 4), 1),
+        "kept-dequantize-blocks": dequantized((32, 8), (4, 8), 0),
+        "kept-max": model([node("Sin", "x", to="s"), node("Max", "x", "s")]),
+        "kept-prelu": model([node("PRelu", "x", "s")], constants={"s": np.linspace(0, 1, 4, dtype=np.float32)}),
+        "sign": model([node("Sign", "x")]),
+        "sum": model([node("Sum", "x", "x")]),
+        "fused-product": microsoft("FusedMatMul", transB=1),
+        "kept-fast-gelu": microsoft("FastGelu"),
+        "kept-quick-gelu": microsoft("QuickGelu"),
+        "kept-bias-gelu": microsoft("BiasGelu"),
+        "kept-product-of-4-bits": microsoft("MatMulNBits", (4, 32), (4, 8), K=32, N=8, bits=4, block_size=32),
         "opset-27": model([node("Relu", "x")], opset=27),
     }
 

@@ -14,10 +14,9 @@ export {
   constantOutputs,
   gpuFindings,
   gpuNotes,
-  miscomputedConvolutions,
+  miscomputedNodes,
   misfusedProducts,
   uncastableTypes,
-  type Convolution,
   type GpuFinding,
 } from './webgpu-provider.js';
 export { WEBGPU_RULES } from './webgpu-rules.js';

@@ -23,7 +23,7 @@ export interface GpuFinding {
 }
 
 /** A convolution whose weights have a known shape. */
-export interface Convolution {
+interface Convolution {
   readonly inputs: number;
   readonly outputs: number;
   readonly kernel: readonly number[];
@@ -43,16 +43,26 @@ export function uncastableTypes(header: OnnxHeader): OnnxDtype[] {
 }
 
 /**
- * Returns the convolutions that ONNX Runtime's WebGPU provider computes wrongly without an error (onnxruntime-web
- * 1.30.0, onnxruntime-webgpu 1.27.0; tests/generator/browser/provider.lab.test.ts verifies the fault). The list only
- * saves the time of a failed check: outputs on the GPU are compared with those on the CPU in any case.
+ * Returns the nodes that ONNX Runtime's WebGPU provider computes wrongly without an error, for all inputs
+ * (onnxruntime-web 1.30.0; tests/generator/browser/placement.test.ts verifies the faults). Outputs on the GPU are compared
+ * with those on the CPU in any case, but later, and not those of large models.
  */
-export function miscomputedConvolutions(header: OnnxHeader): Convolution[] {
+export function miscomputedNodes(header: OnnxHeader): GpuFinding[] {
   const values = new GraphValues(header);
-  return header.nodes.flatMap((node) => {
-    const convolution = node.operator === 'Conv' ? convolutionOf(node, values) : undefined;
-    return convolution && isMiscomputed(convolution) ? [convolution] : [];
-  });
+  return header.nodes.flatMap((node) => miscomputed(node, values) ?? []);
+}
+
+function miscomputed(node: OnnxNode, values: GraphValues): GpuFinding | undefined {
+  if (node.operator === 'Conv') {
+    const convolution = convolutionOf(node, values);
+    if (convolution === undefined || !isMiscomputed(convolution)) return undefined;
+    const reason = `WebGPU computes ${convolution.inputs} channels to ${convolution.outputs} wrongly, so the whole model runs on the CPU`;
+    return of('wrong', node, reason, 'pad the channels going in to a multiple of 4');
+  }
+  const isBlocked = node.operator === 'DequantizeLinear' && (node.numbers?.block_size ?? 0) > 0;
+  if (!isBlocked || values.dimsOf(node.inputs[0])?.length !== 1) return undefined;
+  const reason = 'WebGPU computes blocks of one dimension wrongly, so the whole model runs on the CPU';
+  return of('wrong', node, reason, 'quantize a matrix of one row, and reshape it');
 }
 
 /**
@@ -111,8 +121,12 @@ export function gpuFindings(header: OnnxHeader): GpuFinding[] {
   const opset = header.opsets.get('ai.onnx') ?? 0;
   const found = [...ofFile(header, opset)];
   for (const node of header.nodes) {
+    if (node.isInner) continue;
+    // The runtime dequantizes constants in each run.
+    const wrong = miscomputed(node, values);
+    if (wrong) found.push(wrong);
     // Nodes that depend only on constants run once, when the session is created.
-    if (node.isInner || values.isFolded(node)) continue;
+    if (values.isFolded(node)) continue;
     for (const rule of NODE_RULES) found.push(...rule(node, opset, values, header));
   }
   return [...found, ...ofCopies(header, values)];
@@ -193,6 +207,8 @@ const of = (kind: GpuFinding['kind'], { operator, outputs }: OnnxNode, reason: s
   remedy,
 });
 
+const NO_KERNEL = 'WebGPU has no kernel for it: every run is interrupted by a wait for the GPU';
+
 const kernelRule: Rule = function* (node, opset, _, { functions }) {
   const { operator } = node;
   if (operator.includes(':')) {
@@ -204,12 +220,14 @@ const kernelRule: Rule = function* (node, opset, _, { functions }) {
       return;
     }
     const domain = operator.slice(0, operator.lastIndexOf(':'));
-    yield of('failure', node, `domain ${domain} is not part of ONNX`, 'write it in operators of ai.onnx');
+    const remedy = 'write it in operators of ai.onnx';
+    if (domain === 'com.microsoft') yield of('fallback', node, NO_KERNEL, remedy);
+    else yield of('failure', node, `domain ${domain} is not part of ONNX`, remedy);
   } else if ((RULES.controlFlow as readonly string[]).includes(operator)) {
     yield of('fallback', node, 'control flow ends the recording', 'unroll it');
   } else if (!RULES.kernels.includes(operator)) {
     const remedy = RULES.instead[operator] ?? 'write it in other operators';
-    yield of('fallback', node, 'WebGPU has no kernel for it: every run is interrupted by a wait for the GPU', remedy);
+    yield of('fallback', node, NO_KERNEL, remedy);
   } else if (operator === 'GridSample' && opset > RULES.gridSampleOpset) {
     const reason = `WebGPU has kernels for it up to opset ${RULES.gridSampleOpset}: every run is interrupted by a wait for the GPU`;
     yield of('fallback', node, reason, `export opset ${RULES.exportOpset}`);
@@ -235,13 +253,6 @@ const sizeRule: Rule = function* (node, _, values) {
   if (operator === 'Split' && outputs.length > RULES.maxSplitOutputs) {
     const reason = `a Split into ${outputs.length} binds more buffers than a shader may, and the whole model runs on the CPU`;
     yield of('failure', node, reason, `split into at most ${RULES.maxSplitOutputs}, or use Gather`);
-  }
-  if (operator === 'Conv') {
-    const convolution = convolutionOf(node, values);
-    if (convolution && isMiscomputed(convolution)) {
-      const reason = `WebGPU computes ${convolution.inputs} channels to ${convolution.outputs} wrongly, so the whole model runs on the CPU`;
-      yield of('wrong', node, reason, 'pad the channels going in to a multiple of 4');
-    }
   }
   if (isMisfused(node, values)) {
     const reason =

@@ -1,17 +1,17 @@
 /**
  * Capabilities of ONNX Runtime's WebGPU provider, for the rules of `gpuFindings` and of the Python exporter, which has a
- * copy (`node scripts/write-webgpu-rules.mjs`). Each operator was tested with onnxruntime-webgpu 1.27.0 and
- * onnxruntime-web 1.30.0.
+ * copy (`node scripts/write-webgpu-rules.mjs`). Each operator was tested with the runtime of pages, onnxruntime-web 1.30.0:
+ * tests/generator/browser/placement.test.ts.
  */
 export const WEBGPU_RULES = {
   /** Operators of ONNX's own domain that have a kernel for float32, or need none. */
   kernels:
-    `Abs Acos Acosh Add And ArgMax ArgMin Asin Asinh Atan Atanh AveragePool BatchNormalization Cast Ceil Clip Concat Constant Conv ConvTranspose Cos
-    Cosh CumSum DepthToSpace Div Einsum Elu Equal Erf Exp Expand Flatten Floor Gather GatherElements GatherND Gelu Gemm GlobalAveragePool
+    `Abs Acos Acosh Add And ArgMax ArgMin Asin Asinh Atan Atanh AveragePool BatchNormalization Cast CastLike Ceil Clip Concat Constant ConstantOfShape Conv ConvTranspose Cos
+    Cosh CumSum DepthToSpace DequantizeLinear Div Einsum Elu Equal Erf Exp Expand Flatten Floor Gather GatherElements GatherND Gelu Gemm GlobalAveragePool
     GlobalMaxPool Greater GreaterOrEqual GridSample HardSigmoid HardSwish Identity InstanceNormalization LayerNormalization LeakyRelu Less
-    LessOrEqual Log LpNormalization MatMul MaxPool Mul Neg Not Pad Pow RMSNormalization Range Reciprocal ReduceL1 ReduceL2 ReduceLogSum
+    LessOrEqual Log LpNormalization MatMul Max MaxPool Min Mish Mul Neg Not PRelu Pad Pow RMSNormalization Range Reciprocal ReduceL1 ReduceL2 ReduceLogSum
     ReduceLogSumExp ReduceMax ReduceMean ReduceMin ReduceProd ReduceSum ReduceSumSquare Relu Reshape Resize ScatterElements ScatterND Shape
-    Sigmoid Sin Sinh Slice Softmax Softplus Split Sqrt Squeeze Sub Tan Tanh ThresholdedRelu Tile TopK Transpose Trilu Unsqueeze Where`.split(
+    Sigmoid Sin Sinh Slice Softmax Softplus Split Sqrt Squeeze Sub Swish Tan Tanh ThresholdedRelu Tile TopK Transpose Trilu Unsqueeze Where`.split(
       /\s+/,
     ),
   /** Replacements of operators without a kernel that are common in generators. */
@@ -20,18 +20,17 @@ export const WEBGPU_RULES = {
     NonZero: 'keep every row and write opacity 0 into the unused ones',
     Round: 'Floor(x + 0.5), or compare with a shifted number',
     Sign: 'Where(x > 0, 1, -1)',
-    Min: 'Where(a < b, a, b), or Clip',
-    Max: 'Where(a > b, a, b), Relu or Clip',
     Or: 'add masks as floats',
     Sum: 'Add',
     Mean: 'Add and Mul',
-    PRelu: 'LeakyRelu, or Where',
     LogSoftmax: 'Log(Softmax(x))',
     SpaceToDepth: 'Reshape and Transpose',
     Det: 'write the determinant out in Mul and Sub',
   } as Readonly<Record<string, string>>,
   /** Operators of com.microsoft that have a kernel. */
-  contrib: ['MultiHeadAttention', 'SkipLayerNormalization', 'SkipSimplifiedLayerNormalization'],
+  contrib:
+    `Attention BiasAdd BiasGelu FastGelu FusedConv GatherBlockQuantized Gelu MatMulNBits MultiHeadAttention QuickGelu RotaryEmbedding
+    SkipLayerNormalization SkipSimplifiedLayerNormalization`.split(/\s+/),
   /** Operators whose kernel computes other numbers than the CPU. */
   miscomputed: {
     MultiHeadAttention: 'WebGPU computes it wrongly for more than one query, so the whole model runs on the CPU',

@@ -122,6 +122,8 @@ def gpu_findings(model: onnx.ModelProto) -> list[Finding]:
     opset = next((entry.version for entry in model.opset_import if entry.domain in ("", "ai.onnx")), 0)
     found = list(_of_file(model, opset, values))
     for node in model.graph.node:
+        # The runtime dequantizes constants in each run.
+        found += _miscomputed(node, values)
         # Nodes that depend on constants alone run once, when the session is created.
         if is_folded(node, values):
             values.constants.update(node.output)
@@ -206,20 +208,26 @@ def _of(kind: Kind, node: onnx.NodeProto, reason: str, remedy: str) -> Finding:
     return Finding(kind, node.name or node.output[0], node.op_type, reason, remedy, node.output[0])
 
 
+_NO_KERNEL = "WebGPU has no kernel for it: every run is interrupted by a wait for the GPU"
+
+
 def _kernel(node: onnx.NodeProto, opset: int, values: _Values) -> Iterator[Finding]:
     if node.domain == "com.microsoft" and node.op_type in RULES["contrib"]:
         if node.op_type in RULES["miscomputed"]:
             yield _of("wrong", node, RULES["miscomputed"][node.op_type], "write it in operators of ai.onnx")
     elif node.domain not in ("", "ai.onnx"):
-        if (node.domain, node.op_type) not in values.functions:
-            yield _of("failure", node, f"domain {node.domain} is not part of ONNX", "write it in operators of ai.onnx")
+        remedy = "write it in operators of ai.onnx"
+        if (node.domain, node.op_type) in values.functions:
+            return
+        if node.domain == "com.microsoft":
+            yield _of("fallback", node, _NO_KERNEL, remedy)
+        else:
+            yield _of("failure", node, f"domain {node.domain} is not part of ONNX", remedy)
     elif node.op_type in RULES["controlFlow"]:
         yield _of("fallback", node, "control flow ends the recording", "unroll it")
     elif node.op_type not in KERNELS:
         remedy = INSTEAD.get(node.op_type, "write it in other operators")
-        yield _of(
-            "fallback", node, "WebGPU has no kernel for it: every run is interrupted by a wait for the GPU", remedy
-        )
+        yield _of("fallback", node, _NO_KERNEL, remedy)
     elif node.op_type == "GridSample" and opset > RULES["gridSampleOpset"]:
         reason = f"WebGPU has kernels for it up to opset {RULES['gridSampleOpset']}"
         yield _of("fallback", node, f"{reason}: every run is interrupted by a wait for the GPU", _EXPORT)
@@ -259,9 +267,6 @@ def _sizes(node: onnx.NodeProto, opset: int, values: _Values) -> Iterator[Findin
         reason = f"a Split into {len(node.output)} binds more buffers than a shader may"
         reason += ", and the whole model runs on the CPU"
         yield _of("failure", node, reason, f"split into at most {maximum}, or use Gather")
-    if node.op_type == "Conv" and (channels := miscomputed_convolution(node, values.dims.get(node.input[1], []))):
-        reason = f"WebGPU computes {channels[0]} channels to {channels[1]} wrongly, so the whole model runs on the CPU"
-        yield _of("wrong", node, reason, "pad the channels going in to a multiple of 4")
     maker = values.makers.get(node.input[0]) if node.op_type == "MatMul" else None
     if maker is not None and maker.op_type == "Transpose" and len(values.dims.get(node.input[1], [0, 0])) == 1:
         reason = "ONNX Runtime's optimiser loses the transposition of a matrix times a vector"
@@ -272,6 +277,17 @@ def _sizes(node: onnx.NodeProto, opset: int, values: _Values) -> Iterator[Findin
         if longest > RULES["longestCumSum"]:
             reason = f"over {longest} elements it takes their square in steps"
             yield _of("slow", node, reason, "leave compaction to the renderer")
+
+
+def _miscomputed(node: onnx.NodeProto, values: _Values) -> Iterator[Finding]:
+    """A node that the WebGPU provider computes wrongly for all inputs."""
+    if node.op_type == "Conv" and (channels := miscomputed_convolution(node, values.dims.get(node.input[1], []))):
+        reason = f"WebGPU computes {channels[0]} channels to {channels[1]} wrongly, so the whole model runs on the CPU"
+        yield _of("wrong", node, reason, "pad the channels going in to a multiple of 4")
+    is_blocked = any(each.name == "block_size" and each.i > 0 for each in node.attribute)
+    if node.op_type == "DequantizeLinear" and is_blocked and len(values.dims.get(node.input[0], [])) == 1:
+        reason = "WebGPU computes blocks of one dimension wrongly, so the whole model runs on the CPU"
+        yield _of("wrong", node, reason, "quantize a matrix of one row, and reshape it")
 
 
 def miscomputed_convolution(node: onnx.NodeProto, dims: Sequence[int | None]) -> tuple[int, int] | None:

@@ -1,5 +1,5 @@
 import { ContractError, type ContractFault } from '@gaussian-splat/core/contract';
-import { constantOutputs, miscomputedConvolutions } from '@gaussian-splat/core/onnx';
+import { constantOutputs, miscomputedNodes } from '@gaussian-splat/core/onnx';
 import { elementsOf, isOnGpu, type GpuTensor, type Inputs, type InputValue } from '../input-value.js';
 import type { Evidence } from '../cpu-check/prove.js';
 import { cadenceOf } from './cadence.js';
@@ -62,8 +62,9 @@ async function startWith(options: StartOptions): Promise<StartedSession> {
     refusals.push(refusal);
   } else if (isHalfWithoutFeature(model, device)) {
     refusals.push('webgpu: its float16 tensors need the device feature shader-f16, which this device does not have');
-  } else if (miscomputedConvolutions(model.header).length > 0) {
-    refusals.push(convolutionReason(model));
+  } else if (miscomputedNodes(model.header).length > 0) {
+    const [{ operator, reason, remedy }] = miscomputedNodes(model.header);
+    refusals.push(`webgpu: ${operator}: ${reason}; ${remedy}`);
   } else {
     const started = await startOnGpu(options, refusals);
     if (started) return started;
@@ -146,11 +147,6 @@ export function runFault({ header }: GeneratorModel, found: string): ContractFau
     found: found.slice(0, 1000),
     remedy: 'run it in a shell (gaussian-splat check MODEL --run), and correct or simplify the refused nodes',
   };
-}
-
-function convolutionReason({ header }: GeneratorModel): string {
-  const [{ inputs, outputs }] = miscomputedConvolutions(header);
-  return `webgpu: ONNX Runtime computes a convolution of ${inputs} channels to ${outputs} wrongly there; pad the channels going in to a multiple of 4`;
 }
 
 function isHalfWithoutFeature({ header, outputs }: GeneratorModel, device: GPUDevice): boolean {

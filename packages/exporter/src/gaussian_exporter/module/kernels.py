@@ -8,25 +8,16 @@ from onnx import TensorProto, helper, numpy_helper
 
 from ..placement import gpu_findings
 
-_COMPARED = {"Max": "Greater", "Min": "Less"}
-
 
 def use_kernels(model: onnx.ModelProto) -> None:
-    """Rewrites Max and Min of two floats, Sign and PRelu, in place: Clip if one is a constant number, else Where."""
-    left = {found.tensor for found in gpu_findings(model) if found.kind == "fallback"}
-    graph, floats, nodes = model.graph, _floats(model), []
-    for node in graph.node:
-        is_pair = node.op_type in _COMPARED and len(node.input) == 2
-        if node.output[0] not in left & floats or not (is_pair or node.op_type in ("Sign", "PRelu")):
-            nodes.append(node)
-        elif is_pair:
-            nodes += _pair(graph, node)
-        elif node.op_type == "PRelu":
-            nodes += _prelu(graph, node)
-        else:
-            nodes += _sign(graph, node)
-    del graph.node[:]
-    graph.node.extend(nodes)
+    """Rewrites Sign of floats in place."""
+    floats = _floats(model)
+    nodes: list[onnx.NodeProto] = []
+    for node in model.graph.node:
+        is_sign = node.op_type == "Sign" and node.output[0] in floats
+        nodes += _sign(model.graph, node) if is_sign else [node]
+    del model.graph.node[:]
+    model.graph.node.extend(nodes)
 
 
 def pad_channels(model: onnx.ModelProto) -> None:
@@ -70,30 +61,6 @@ def _floats(model: onnx.ModelProto) -> set[str]:
     return {value.name for value in values if value.type.tensor_type.elem_type == TensorProto.FLOAT}
 
 
-def _pair(graph: onnx.GraphProto, node: onnx.NodeProto) -> list[onnx.NodeProto]:
-    (a, b), name = node.input, node.output[0]
-    for other, limit in ((a, b), (b, a)):
-        number = _number(graph, limit)
-        if number is not None:
-            bound = _constant(graph, f"{name}_limit", number)
-            return [helper.make_node("Clip", [other, bound] if node.op_type == "Max" else [other, "", bound], [name])]
-    chosen = f"{name}_first"
-    return [
-        helper.make_node(_COMPARED[node.op_type], [a, b], [chosen]),
-        helper.make_node("Where", [chosen, a, b], [name]),
-    ]
-
-
-def _prelu(graph: onnx.GraphProto, node: onnx.NodeProto) -> list[onnx.NodeProto]:
-    (x, slope), name = node.input, node.output[0]
-    zero = _constant(graph, f"{name}_0", 0)
-    return [
-        helper.make_node("Less", [x, zero], [f"{name}_below"]),
-        helper.make_node("Mul", [x, slope], [f"{name}_sloped"]),
-        helper.make_node("Where", [f"{name}_below", f"{name}_sloped", x], [name]),
-    ]
-
-
 def _sign(graph: onnx.GraphProto, node: onnx.NodeProto) -> list[onnx.NodeProto]:
     (x,), name = node.input, node.output[0]
     one, zero, minus = (_constant(graph, f"{name}_{i}", i) for i in (1, 0, -1))
@@ -103,17 +70,6 @@ def _sign(graph: onnx.GraphProto, node: onnx.NodeProto) -> list[onnx.NodeProto]:
         helper.make_node("Greater", [x, zero], [f"{name}_above"]),
         helper.make_node("Where", [f"{name}_above", one, f"{name}_low"], [name]),
     ]
-
-
-def _number(graph: onnx.GraphProto, name: str) -> float | None:
-    """The value of a constant of one element."""
-    tensors = {tensor.name: tensor for tensor in graph.initializer}
-    for node in graph.node:
-        if node.op_type == "Constant" and node.output[0] == name and node.attribute[0].name == "value":
-            tensors[name] = node.attribute[0].t
-    values = numpy_helper.to_array(tensors[name]) if name in tensors else np.empty(0)
-    # A constant of more dimensions would give the result these dimensions.
-    return float(values.reshape(-1)[0]) if values.size == 1 and values.ndim <= 1 else None
 
 
 def _constant(graph: onnx.GraphProto, name: str, value: float) -> str:
