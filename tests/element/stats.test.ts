@@ -60,3 +60,12 @@ test('a streamed scene says what it rests at', () => {
   assert.deepEqual(found.streamed, [progress]);
   assert.ok(found.reasons.includes(progress.reasons[0]));
 });
+
+test('unusable rows of a generator are part of its total, those of a file are not', () => {
+  const gaussians = { count: 64, droppedCount: 60, byteLength: 0 };
+  const totalOf = (live: object | undefined): number => {
+    const context = { dynamicQuality: { moving: 'whole' }, parts: [] } as unknown as StatsContext;
+    return statsOf([{ ...scene, gaussians, live } as unknown as LoadedGaussians], context).total;
+  };
+  assert.deepEqual([totalOf({ inputs: [] }), totalOf(undefined), totalOf({})], [64, 124, 124]);
+});

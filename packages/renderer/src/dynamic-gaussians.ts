@@ -32,6 +32,8 @@ export interface RowSample {
   readonly drawn: number;
   /** Number of sampled rows with unusable values: not finite, out of range, zero extent, or a zero rotation. */
   readonly unusable: number;
+  /** Count of valid rows that the last run wrote, and its number of rows; absent for a layout without a count. */
+  readonly counted?: { readonly count: number; readonly rows: number };
 }
 
 /** A block, and the resources that fill it. */
@@ -158,7 +160,24 @@ export class DynamicGaussians extends SceneBuffers {
       bounds: boundsOf({ ...places, origin: this.origin }),
       drawn: places.count,
       unusable: places.unusable,
+      ...(this.layout.count === undefined ? {} : { counted: await this.#readCount() }),
     };
+  }
+
+  /** Reads the count of valid rows of the last run, and its number of rows. */
+  async #readCount(): Promise<RowSample['counted']> {
+    const { mapRead, copyDestination } = BUFFER_USAGE;
+    const staging = this.#device.createBuffer({ label: 'gs.counted', size: 8, usage: mapRead | copyDestination });
+    try {
+      const encoder = this.#device.createCommandEncoder({ label: 'gs.counted' });
+      encoder.copyBufferToBuffer(this.blocks[0].uniform, layouts.Ingest.fields.count.offset, staging, 0, 8);
+      this.#device.queue.submit([encoder.finish()]);
+      await staging.mapAsync(0x1);
+      const [count, rows] = new Int32Array(staging.getMappedRange());
+      return { count, rows };
+    } finally {
+      staging.destroy();
+    }
   }
 
   /** Number of rows with unusable values in the last sample; 0 before the first sample. */
@@ -186,7 +205,7 @@ export class DynamicGaussians extends SceneBuffers {
         geometry: part('geometry', GEOMETRY_WORDS * count),
         sh: part('sh', shStride * count),
         chunks: part('chunks', CHUNK_NUMBERS * cullGroups(count)),
-        uniform: this.memory.buffer('gs.ingest.uniform', layouts.Ingest.size, uniform | copyDestination),
+        uniform: this.memory.buffer('gs.ingest.uniform', layouts.Ingest.size, uniform | copyDestination | copySource),
       };
       const bytes = new ArrayBuffer(layouts.Ingest.size);
       writeStruct(layouts.Ingest, ingestValues(this.layout, first, count, 0), bytes);

@@ -121,7 +121,7 @@ export function statsOf(
     renderer: scenes[0].renderer,
     isPreview,
     splats: sum((scene) => costOf(scene).splats),
-    total: sum(({ gaussians }) => gaussians.frameCount ?? gaussians.leafCount ?? gaussians.count) + dropped,
+    total: sum(totalOf),
     dropped,
     resident: sum(({ gaussians }) => gaussians.count) + merged,
     detail,
@@ -148,6 +148,12 @@ export function statsOf(
       ...faultsOf(scenes[0].place.context),
     ],
   };
+}
+
+/** Returns the number of splats of a file; the capacity of a generator, whose unusable rows are part of it. */
+function totalOf({ gaussians, live }: LoadedGaussians): number {
+  const { frameCount, leafCount, count, droppedCount = 0 } = gaussians;
+  return (frameCount ?? leafCount ?? count) + (live?.inputs ? 0 : droppedCount);
 }
 
 function whyFewPixels(share: number): string[] {

@@ -130,6 +130,8 @@ async function openDynamicModel(
       memoryBudget: request.memoryBudget,
     });
     generator.sink = gaussians;
+    // Another source may have replaced this one meanwhile.
+    signal.throwIfAborted();
     request.element.dispatchEvent(
       new CustomEvent('generator-memory', { detail: memoryOf(models, gaussians.byteLength) }),
     );
@@ -152,11 +154,16 @@ async function openDynamicModel(
     let bounds = declared ?? (await live.readBounds!());
     signal.throwIfAborted();
     isOpen = true;
-    watch = new RunWatch(gaussians, model.header.name, onError, (now, isFirst) => {
-      // Declared bounds contain the Gaussians of all times. A sample replaces them only if the previous one had no visible
-      // Gaussians.
-      if (declared === undefined || isFirst) bounds = { ...now, up: upOf(model.contract) };
-      if (isFirst) void (request.element as Framed).updateFraming?.();
+    watch = new RunWatch(gaussians, {
+      where: model.header.name,
+      idle: whenIdle,
+      onError,
+      onBounds: (now, isFirst) => {
+        // Declared bounds contain the Gaussians of all times. A sample replaces them only if the previous one had no
+        // visible Gaussians.
+        if (declared === undefined || isFirst) bounds = { ...now, up: upOf(model.contract) };
+        if (isFirst) void (request.element as Framed).updateFraming?.();
+      },
     });
     watch.frameMade();
     return {
