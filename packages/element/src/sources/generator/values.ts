@@ -1,9 +1,17 @@
 /** Poses and controls: values that are text in attributes, and numbers or images in properties. */
 
+/** A point, as trackers of hands and faces return it. */
+export interface Point {
+  readonly x: number;
+  readonly y: number;
+  readonly z: number;
+}
+
 /**
- * Numbers in any format that authors may use: a number, a list, nested lists, a typed array, or any of these as text.
+ * Numbers in any format that authors may use: a number, a point, a list of them, nested lists, a typed array, or any of
+ * these as text.
  */
-export type Numbers = string | number | ArrayLike<number> | readonly (ArrayLike<number> | number)[];
+export type Numbers = string | number | Point | ArrayLike<number> | readonly (ArrayLike<number> | Point | number)[];
 
 /**
  * Returns the flattened numbers of a value. Text is JSON, or numbers separated by spaces or commas.
@@ -32,7 +40,14 @@ function parseText(text: string): unknown {
 function flatten(value: unknown): number[] {
   if (typeof value === 'number') return [value];
   if (ArrayBuffer.isView(value)) return Array.from(value as unknown as ArrayLike<number>);
+  if (isPoint(value)) return [value.x, value.y, value.z];
   return Array.isArray(value) ? value.flatMap(flatten) : [NaN];
+}
+
+/** Whether a value has x, y and z, and no w, whose place in a quaternion is not known. */
+function isPoint(value: unknown): value is Point {
+  const { x, y, z, w } = (value ?? {}) as Partial<Record<string, unknown>>;
+  return [x, y, z].every((each) => typeof each === 'number') && w === undefined;
 }
 
 /** Prefix of the attributes that hold controls: `control-smile="0.5"`. */
@@ -83,7 +98,7 @@ export function readControls(
 const isPixels = (value: unknown): boolean =>
   Array.isArray(value)
     ? value.some((each) => typeof each === 'string' || isPixels(each))
-    : typeof value === 'object' && value !== null && !ArrayBuffer.isView(value);
+    : typeof value === 'object' && value !== null && !ArrayBuffer.isView(value) && !isPoint(value);
 
 /** Returns the value of a name, or of its lowercase form, because names of attributes have no capital letters. */
 export const valueOf = <T>(values: Readonly<Record<string, T>>, name: string): T | undefined =>
