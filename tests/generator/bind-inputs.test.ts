@@ -192,3 +192,34 @@ test('a missing camera, a wrong length and NaN are named', () => {
   refused(() => bind(angles, [2, 3], { pose: [1, 2, 3] }), /6 numbers for float32 \[2, 3\], found 3/);
   refused(() => bind(angles, [1, 3], { pose: [1, NaN, 3] }), /finite numbers, found NaN/);
 });
+
+test('several poses and shapes: one list in the order of the inputs, or each by its name', () => {
+  const header = headerWith(
+    [tensor('neck', [1, 3]), tensor('betas', [2]), tensor('jaw', [3]), tensor('expression', [1])],
+    [tensor('gaussians', [1, 13])],
+  );
+  const contract: Contract = {
+    ...PACKED,
+    inputs: {
+      neck: { role: 'pose', format: 'axis-angle' },
+      jaw: { role: 'pose', format: 'axis-angle', default: [0.1, 0, 0] },
+      betas: { role: 'shape' },
+      expression: { role: 'shape', default: [0.5] },
+    },
+  };
+  const at = (state: GeneratorState): number[][] =>
+    ['neck', 'jaw', 'betas', 'expression'].map((name) => numbers(bindInputs(header, contract, state)[name]));
+  const float = (...list: number[]): number[] => Array.from(Float32Array.from(list));
+  assert.deepEqual(at({}), [[0, 0, 0], float(0.1, 0, 0), [0, 0], [0.5]]);
+  assert.deepEqual(at({ pose: [1, 2, 3, 4, 5, 6], shape: [7, 8, 9] }), [[1, 2, 3], [4, 5, 6], [7, 8], [9]]);
+  assert.deepEqual(at({ controls: { jaw: [4, 5, 6], betas: 2 } }), [[0, 0, 0], [4, 5, 6], [2, 2], [0.5]]);
+  assert.deepEqual(at({ pose: [1, 2, 3, 4, 5, 6], controls: { neck: [9, 9, 9] } })[0], [9, 9, 9]);
+  assert.throws(() => at({ pose: [1, 2, 3] }), /neck, jaw.*6 numbers in all, found 3/);
+});
+
+test('a flat matrix holds the numbers of a square one', () => {
+  for (const order of ['row-major', 'column-major'] as const) {
+    const binding: InputBinding = { role: 'view', order, axes: 'LUF' };
+    assert.deepEqual(numbers(bind(binding, [1, 16], { camera })), numbers(bind(binding, [4, 4], { camera })));
+  }
+});

@@ -26,12 +26,39 @@ export function bindInputs(
   state: GeneratorState,
 ): Record<string, InputNumbers> {
   const values: Record<string, InputNumbers> = {};
+  const { pose, shape, controls } = state;
+  const chosen = {
+    ...partsOf('pose', header, contract, pose),
+    ...partsOf('shape', header, contract, shape),
+    ...controls,
+  };
   for (const input of header.inputs) {
-    const binding = contract.inputs[input.name];
+    const { name } = input;
+    const binding = contract.inputs[name];
     if (isGiven(binding)) continue;
-    values[input.name] = toTensor(input, numbersOf(input, binding, contract, state));
+    values[name] = toTensor(input, numbersOf(input, binding, contract, state, chosen[name]));
   }
   return values;
+}
+
+/**
+ * Returns the numbers of each pose or shape that `all` contains, in the order of the file's inputs; none without `all`.
+ */
+function partsOf(
+  role: 'pose' | 'shape',
+  { inputs }: OnnxHeader,
+  contract: Contract,
+  all: ArrayLike<number> | undefined,
+): Record<string, ArrayLike<number>> {
+  const own = inputs.filter(({ name }) => contract.inputs[name].role === role);
+  if (all === undefined) return {};
+  // The length of a single one is checked with its tensor.
+  if (own.length === 1) return { [own[0].name]: all };
+  const size = own.reduce((sum, input) => sum + sizeOf(input), 0);
+  if (all.length !== size)
+    throw wrong(own.map(({ name }) => name).join(', '), `${size} numbers in all`, `${all.length}`);
+  let start = 0;
+  return Object.fromEntries(own.map((input) => [input.name, Array.from(all).slice(start, (start += sizeOf(input)))]));
 }
 
 /** Bindings of inputs whose tensors are not made of a state's numbers. */
@@ -45,6 +72,7 @@ function numbersOf(
   binding: Exclude<InputBinding, GivenInput>,
   contract: Contract,
   state: GeneratorState,
+  chosen: number | ArrayLike<number> | undefined,
 ): ArrayLike<number> {
   const { timeSeconds = 0 } = state;
   const camera = (): Camera => requireCamera(state.camera, input.name, binding.role);
@@ -70,11 +98,11 @@ function numbersOf(
     case 'seed':
       return [state.seed ?? 0];
     case 'pose':
-      return state.pose ?? binding.default ?? restPose(input, binding);
+      return filled(input, chosen ?? binding.default ?? restPose(input, binding));
     case 'shape':
-      return state.shape ?? binding.default ?? new Array<number>(sizeOf(input)).fill(0);
+      return filled(input, chosen ?? binding.default ?? 0);
     case 'control':
-      return filled(input, state.controls?.[input.name] ?? binding.default);
+      return filled(input, chosen ?? binding.default);
   }
 }
 

@@ -17,13 +17,16 @@ export interface GeneratorState {
   readonly frame?: number;
   /** Seed for random numbers. Default 0. */
   readonly seed?: number;
-  /** Flattened pose, in the order and format of the contract. Default: that of the contract, else no rotation. */
+  /**
+   * Flattened pose, in the order and format of the contract; with several inputs of this role, their numbers in the order
+   * of the file's inputs. Default: that of the contract, else no rotation.
+   */
   readonly pose?: ArrayLike<number>;
-  /** Shape coefficients. Default: those of the contract, else zeros. */
+  /** Shape coefficients, with several inputs as for {@link pose}. Default: those of the contract, else zeros. */
   readonly shape?: ArrayLike<number>;
   /**
-   * Values of controls by input name: one number for all elements, or a number for each. Default: those of the
-   * contract.
+   * Values of controls, poses and shapes by input name: one number for all elements, or a number for each. They have
+   * priority over {@link pose} and {@link shape}. Default: those of the contract.
    */
   readonly controls?: Readonly<Record<string, number | ArrayLike<number>>>;
   /**

@@ -81,14 +81,14 @@ export type QuaternionOrder = 'wxyz' | 'xyzw';
 /** Order of harmonics: `coefficient-major` is [(d+1)², 3], `channel-major` is [3, (d+1)²] as in INRIA's PLY files. */
 export type ShOrder = 'coefficient-major' | 'channel-major';
 
-/** World-to-camera matrix: [4,4] float32. */
+/** World-to-camera matrix: [4,4] or flat [16], float32. */
 export interface ViewInput {
   readonly role: 'view';
   readonly order?: MatrixOrder;
   readonly axes?: CameraAxes;
 }
 
-/** Camera-to-world matrix, the inverse of `view`: [4,4] float32. Its last column is the position of the eye. */
+/** Camera-to-world matrix, the inverse of `view`: [4,4] or flat [16], float32. Its last column is the position of the eye. */
 export interface CameraToWorldInput {
   readonly role: 'camera_to_world';
   readonly order?: MatrixOrder;
@@ -102,7 +102,7 @@ export interface IntrinsicsInput {
   readonly unit: 'pixels' | 'normalized';
 }
 
-/** Matrix from camera to clip space: [4,4] float32. Clip space has x right, y up, and depth 0..1 as in WebGPU. */
+/** Matrix from camera to clip space: [4,4] or flat [16], float32. Clip space has x right, y up, and depth 0..1 as in WebGPU. */
 export interface ProjectionInput {
   readonly role: 'projection';
   readonly order?: MatrixOrder;
@@ -110,7 +110,7 @@ export interface ProjectionInput {
   readonly axes?: CameraAxes;
 }
 
-/** Matrix from world to clip space, projection · view: [4,4] float32. */
+/** Matrix from world to clip space, projection · view: [4,4] or flat [16], float32. */
 export interface ViewProjectionInput {
   readonly role: 'view_projection';
   readonly order?: MatrixOrder;

@@ -150,13 +150,13 @@ function columnConflicts(outputs: OutputBinding): Conflict[] {
 }
 
 /**
- * Returns the inputs that repeat a role, which is a fault. Controls, images and states may repeat, because their names
- * distinguish them; matrices may repeat in different conventions.
+ * Returns the inputs that repeat a role, which is a fault. Poses, shapes, controls, images and states may repeat, because
+ * their names distinguish them; matrices may repeat in different conventions.
  */
 function repeatedRoles({ inputs }: Contract): [place: string, expected: string, found: string][] {
   const seen = new Map<string, string>();
   return Object.entries(inputs).flatMap(([name, binding]) => {
-    if (['control', 'image', 'state'].includes(binding.role)) return [];
+    if (['pose', 'shape', 'control', 'image', 'state'].includes(binding.role)) return [];
     const role = binding.role === 'gaussians' ? `gaussians (${binding.attribute})` : binding.role;
     const first = seen.get(role);
     seen.set(role, name);

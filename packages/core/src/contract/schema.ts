@@ -91,8 +91,8 @@ function variant(
 const input: Schema = {
   description: 'Meaning of one input of the ONNX file',
   oneOf: [
-    variant('role', 'view', '[4,4] float32: world to camera', { order, axes }),
-    variant('role', 'camera_to_world', '[4,4] float32: camera to world, the inverse of view', { order, axes }),
+    variant('role', 'view', '[4,4] or [16], float32: world to camera', { order, axes }),
+    variant('role', 'camera_to_world', '[4,4] or [16], float32: camera to world, the inverse of view', { order, axes }),
     variant(
       'role',
       'intrinsics',
@@ -100,8 +100,8 @@ const input: Schema = {
       { unit: choice('Pixels, or fractions of width and height', 'pixels', 'normalized') },
       { required: ['unit'] },
     ),
-    variant('role', 'projection', '[4,4] float32: camera to clip, depth 0..1', { order, axes }),
-    variant('role', 'view_projection', '[4,4] float32: world to clip, depth 0..1', { order }),
+    variant('role', 'projection', '[4,4] or [16], float32: camera to clip, depth 0..1', { order, axes }),
+    variant('role', 'view_projection', '[4,4] or [16], float32: world to clip, depth 0..1', { order }),
     variant('role', 'camera_position', '[3] float32: the eye in world units'),
     variant('role', 'viewport', '[2] float32: width and height in pixels'),
     variant(

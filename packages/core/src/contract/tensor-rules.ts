@@ -42,7 +42,7 @@ export function inputRule(binding: InputBinding): TensorRule | undefined {
     case 'camera_to_world':
     case 'projection':
     case 'view_projection':
-      return fixed(['float32'], [4, 4]);
+      return fixed(['float32'], [4, 4], [16]);
     case 'intrinsics':
       return fixed(['float32'], [3, 3], [4]);
     case 'camera_position':

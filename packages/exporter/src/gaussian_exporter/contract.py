@@ -25,6 +25,10 @@ Filter = Literal["classic", "antialiased", "mip"]
 Up = Literal["+x", "-x", "+y", "-y", "+z", "-z"]
 Json = dict[str, object]
 
+MATRICES = ("view", "camera_to_world", "intrinsics", "projection", "view_projection")
+# Roles that several inputs may have: their names distinguish them, or their conventions.
+REPEATED = frozenset({"pose", "shape", "control", "image", "state", *MATRICES})
+
 
 @dataclass(frozen=True)
 class Input:
@@ -53,7 +57,7 @@ def pose(name: str, joints: Sequence[str], parents: Sequence[int], quaternions: 
 
 
 def shape(name: str, count: int) -> Input:
-    """[count]: coefficients of a body; default zeros. A contract has at most one input of this role."""
+    """[count]: coefficients of a body; default zeros."""
     return Input(name, {"role": "shape", "default": [0.0] * count})
 
 

@@ -18,6 +18,7 @@ from jsonschema import Draft202012Validator
 from jsonschema.exceptions import ValidationError, best_match
 from onnx import TensorProto, helper
 
+from .contract import REPEATED
 from .placement import RULES, gpu_findings, operators_of
 from .written import FIELDS, Fault, FaultCode, bare, degree_of, rules_of
 
@@ -27,7 +28,6 @@ _DOMAINS = ("", "ai.onnx", "com.microsoft", "ai.onnx.ml")
 _FLOATS, _INTEGERS = ("float32", "float16"), ("int32", "int64")
 # Roles of inputs that cannot have an axis of instances.
 _SHARED_ROLES = ("gaussians", "image", "depth", "state")
-_MATRICES = ("view", "camera_to_world", "intrinsics", "projection", "view_projection")
 _ONE: list[Sequence[int | str]] = [(1,), ()]
 _POSES: dict[str, tuple[int, list[Sequence[int | str]]]] = {
     "axis-angle": (3, [("J", 3), ("P",)]),
@@ -37,7 +37,7 @@ _POSES: dict[str, tuple[int, list[Sequence[int | str]]]] = {
 }
 _IMAGES: list[Sequence[int | str]] = [(1, 3, "H", "W"), (1, 4, "H", "W"), (3, "H", "W"), (4, "H", "W")]
 _INPUTS: dict[str, tuple[list[Sequence[int | str]], Sequence[str]]] = {
-    **dict.fromkeys(("view", "camera_to_world", "projection", "view_projection"), ([(4, 4)], ("float32",))),
+    **dict.fromkeys(("view", "camera_to_world", "projection", "view_projection"), ([(4, 4), (16,)], ("float32",))),
     "intrinsics": ([(3, 3), (4,)], ("float32",)),
     "camera_position": ([(3,)], ("float32",)),
     "viewport": ([(2,)], ("float32",)),
@@ -125,7 +125,7 @@ def _conflicts(contract: Mapping[str, Any]) -> Iterator[Fault]:
             elif parents and any(parent >= joint for joint, parent in enumerate(parents)):
                 yield conflict(f"{where}.parents", "parents before their children", str(parents), "reorder the joints")
         kind = f"gaussians ({binding['attribute']})" if role == "gaussians" else role
-        if role not in ("control", "image", "state", *_MATRICES) and seen.setdefault(kind, name) != name:
+        if role not in REPEATED and seen.setdefault(kind, name) != name:
             yield conflict(where, f"one input with the role {kind}", f"{seen[kind]} and {name}", "feed one of them")
     outputs = contract["outputs"]
     named: dict[str, str] = {}

@@ -226,26 +226,33 @@ export class ControlsPanel {
 
   /** Returns controls to select a joint and to rotate it about its three axes; none for poses in another format. */
   #pose(owner: Owner, input: GeneratorInput): HTMLElement[] {
-    const { format = 'parameters', joints, size } = input;
-    const perJoint = { 'axis-angle': 3, quaternion: 4, matrix: 9, parameters: 0 }[format];
+    const { name, label, joints, size } = input;
+    const perJoint = numbersPerJoint(input);
     if (perJoint === 0) return [];
     const count = size / perJoint;
-    const none = new Array<number>(3 * count).fill(0);
     const pose = this.#poses.get(owner) ?? { given: owner.pose, last: owner.pose };
     this.#poses.set(owner, pose);
-    const turnsNow = (): number[] => {
-      const numbers = readNumbers(owner.pose);
-      return numbers?.length === size ? turnsOf(numbers, input) : [...none];
+    // The property has the numbers of all poses of the model, in the order of its inputs.
+    const poses = owner.inputs.filter(({ role }) => role === 'pose');
+    const start = poses.slice(0, poses.indexOf(input)).reduce((sum, other) => sum + other.size, 0);
+    const whole = (): number[] => {
+      const [numbers, rest] = [readNumbers(owner.pose), poses.flatMap(restOf)];
+      return numbers?.length === rest.length ? numbers : rest;
     };
-    let turns = turnsNow();
+    const now = (): readonly number[] => valuesOf(owner, name) ?? whole().slice(start, start + size);
+    let turns = turnsOf(now(), input);
     /**
      * Returns the current rotations as axis-angle, radians. Rotations that a visitor has edited are not read from the
      * pose, which does not preserve full turns.
      */
     const read = (): number[] => {
-      if (owner.pose === pose.last) return turns;
-      pose.given = pose.last = owner.pose;
-      return (turns = turnsNow());
+      if (owner.pose !== pose.last) pose.given = pose.last = owner.pose;
+      if (String(now()) !== String(poseOf(turns, input))) turns = turnsOf(now(), input);
+      return turns;
+    };
+    const write = (numbers: readonly number[]): void => {
+      if (valuesOf(owner, name)) set(owner, name, numbers);
+      else owner.pose = pose.last = whole().toSpliced(start, size, ...numbers);
     };
     const choice = make('select', { part: 'control-input' });
     choice.append(
@@ -262,12 +269,12 @@ export class ControlsPanel {
         () => read()[place()],
         (value) => {
           read()[place()] = value;
-          owner.pose = pose.last = poseOf(turns, input);
+          write(poseOf(turns, input));
         },
       );
     });
     choice.addEventListener('change', () => this.#follow());
-    return [labeled(this.#word('controls-joint'), choice), ...axes];
+    return [labeled(poses.length > 1 ? label : this.#word('controls-joint'), choice), ...axes];
   }
 
   #time(): HTMLElement {
@@ -305,6 +312,17 @@ function valuesOf(owner: Owner, name: string): readonly number[] | undefined {
 
 function set(owner: Owner, name: string, value: ControlValues[string]): void {
   owner.inputValues = { ...owner.inputValues, [name]: value };
+}
+
+const numbersPerJoint = ({ format = 'parameters' }: GeneratorInput): number =>
+  ({ 'axis-angle': 3, quaternion: 4, matrix: 9, parameters: 0 })[format];
+
+/** Returns the pose of an input that no page sets: its default, else no rotation. */
+function restOf(input: GeneratorInput): readonly number[] {
+  if (Array.isArray(input.default)) return input.default as readonly number[];
+  const perJoint = numbersPerJoint(input);
+  if (perJoint === 0) return new Array<number>(input.size).fill(0);
+  return poseOf(new Array<number>((3 * input.size) / perJoint).fill(0), input);
 }
 
 /** Returns the default value of an input as a list. */

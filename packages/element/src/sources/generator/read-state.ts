@@ -7,6 +7,9 @@ import { valueOf } from './values.js';
 /** Allowed range of a seed, which models receive as int32 or int64. */
 const INT32 = [-(2 ** 31), 2 ** 31 - 1] as const;
 
+/** Roles of inputs whose numbers `control-NAME` sets. */
+const NUMBERS: readonly string[] = ['control', 'pose', 'shape', 'seed'];
+
 /**
  * Converts the state that the page sets to the state of a generator. Invalid values are corrected, and each is reported
  * once.
@@ -39,20 +42,18 @@ export class StateReader {
   ): GeneratorState {
     const { timeSeconds, pose } = state;
     const controls: Record<string, number | readonly number[]> = {};
-    let shape: readonly number[] | undefined;
     let seed: number | undefined;
     for (const [name, binding] of Object.entries(this.#inputs)) {
+      if (!NUMBERS.includes(binding.role)) continue;
       const value = valueOf(state.controls, name);
-      if (binding.role === 'shape') shape = value;
-      if (binding.role !== 'control' && binding.role !== 'seed') continue;
       const image = valueOf(state.images, name);
       if (image !== undefined) this.#notify(name, 'numbers', String(image).slice(0, 60), 'its default is used');
       if (value === undefined) continue;
       if (binding.role === 'seed') seed = this.#wholeNumber(name, value[0]);
-      else controls[name] = this.#inRange(name, binding, value);
+      else controls[name] = binding.role === 'control' ? this.#inRange(name, binding, value) : value;
     }
     if (others) this.#reportUnknown([...Object.keys(state.controls), ...Object.keys(state.images)], others);
-    return { timeSeconds, camera, pose, controls, shape, seed, images };
+    return { timeSeconds, camera, pose, controls, seed, images };
   }
 
   #inRange(name: string, { range: [min, max] }: ControlInput, values: readonly number[]): number | readonly number[] {
@@ -73,8 +74,7 @@ export class StateReader {
 
   /** Names of the inputs that `control-NAME` sets. */
   get settable(): readonly string[] {
-    const roles = ['control', 'shape', 'seed', 'image'];
-    return Object.keys(this.#inputs).filter((name) => roles.includes(this.#inputs[name].role));
+    return Object.keys(this.#inputs).filter((name) => [...NUMBERS, 'image'].includes(this.#inputs[name].role));
   }
 
   #reportUnknown(names: readonly string[], others: readonly string[]): void {

@@ -16,7 +16,7 @@ import onnx
 
 from ..arrays import AnyArray
 from ..conformance import SHARES, check_outputs
-from ..contract import Coordinates, Filter, Json, metadata
+from ..contract import REPEATED, Coordinates, Filter, Json, metadata
 from ..errors import ExportError, listed, require_package
 from ..outputs import refuse_place, save
 from ..placement import Finding, finding_lines, gpu_findings
@@ -208,25 +208,18 @@ def refuse_other_arguments(module: Any, inputs: Mapping[str, Role]) -> None:
         ) from error
 
 
-# Roles that a contract may give to several inputs.
-_REPEATED = {"control", "view", "camera_to_world", "intrinsics", "projection", "view_projection", "state", "image"}
-
-
 def _refuse_repeated(inputs: Mapping[str, Role]) -> None:
     """Raises contract/conflict, before the work, for a role that two inputs have and a contract allows once."""
     first: dict[str, str] = {}
     for name, role in inputs.items():
         kind = str(role.binding["role"])
-        if kind in first and kind not in _REPEATED:
-            both = "joints of both in one input, and slices of it in forward"
-            what = both if kind == "pose" else "one input for both"
-            extra = "; or control(low, high, shape=[n]) for one of them" if kind == "shape" else ""
+        if kind in first and kind not in REPEATED:
             raise ExportError(
                 "contract/conflict",
                 where=f"inputs {first[kind]} and {name}",
                 expected=f"one input with the role {kind}",
                 found="two",
-                remedy=f"give {what}{extra}",
+                remedy="give one input for both",
             )
         first.setdefault(kind, name)
 
