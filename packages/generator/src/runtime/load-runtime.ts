@@ -29,6 +29,9 @@ const FATAL = /\bAborted\(|unreachable|out of bounds|table index/;
  */
 export class RuntimeGone extends Error {}
 
+/** Error of a call that has exceeded the time limit. */
+class CallTimeout extends Error {}
+
 export interface RuntimeSource {
   /** Absolute URL of the script. */
   readonly script: string;
@@ -56,6 +59,11 @@ export class Runtime {
     return this.#breakage !== undefined;
   }
 
+  /** Whether this copy is unusable because a call has exceeded the time limit. */
+  get hasTimedOut(): boolean {
+    return this.#breakage instanceof CallTimeout;
+  }
+
   /**
    * Runs a task after all earlier ones have ended or failed.
    * @throws RuntimeGone if an earlier task has broken this copy; errors of the task.
@@ -71,7 +79,7 @@ export class Runtime {
     let timer: ReturnType<typeof setTimeout> | undefined;
     const limit = new Promise<never>((_, reject) => {
       const limit = callLimit;
-      timer = setTimeout(() => reject((this.#breakage = new Error(`no result within ${limit} ms`))), limit);
+      timer = setTimeout(() => reject((this.#breakage = new CallTimeout(`no result within ${limit} ms`))), limit);
     });
     try {
       return await Promise.race([task(), limit]);

@@ -62,6 +62,10 @@ async function startWith(options: StartOptions): Promise<StartedSession> {
     refusals.push(refusal);
   } else if (isHalfWithoutFeature(model, device)) {
     refusals.push('webgpu: its float16 tensors need the device feature shader-f16, which this device does not have');
+  } else if (isSlower(model, device)) {
+    refusals.push(
+      'webgpu: this browser has no hardware GPU, and its software GPU is slower than the CPU for this model',
+    );
   } else if (miscomputedNodes(model.header).length > 0) {
     const [{ operator, reason, remedy }] = miscomputedNodes(model.header);
     refusals.push(`webgpu: ${operator}: ${reason}; ${remedy}`);
@@ -153,6 +157,16 @@ function isHalfWithoutFeature({ header, outputs }: GeneratorModel, device: GPUDe
   const isHalf = [...outputs, ...header.inputs].some(({ dtype }) => dtype === 'float16');
   return isHalf && !device.features.has('shader-f16');
 }
+
+/**
+ * Whether the GPU of a device is software, which computes a large model more slowly than the runtime does on the CPU. A
+ * model that runs in each frame stays there, because runs on the CPU block the page.
+ */
+const isSlower = (model: GeneratorModel, { adapterInfo }: GPUDevice): boolean =>
+  (adapterInfo as GPUAdapterInfo | undefined)?.isFallbackAdapter === true && cadenceOf(model) === 'chosen';
+
+const hasLoop = ({ header }: GeneratorModel): boolean =>
+  ['Loop', 'Scan'].some((operator) => header.operators.has(operator));
 
 /**
  * Whether graph capture is possible: all shapes are fixed, and all inputs are on the GPU, which has no 64-bit integers.
@@ -259,8 +273,10 @@ async function start(
   const written = await attempt(session, options, refusals, onOutputs);
   if (written) return { session, written };
   await session.release();
-  // A model that has broken the runtime would break it again, and on the CPU a run without end would block the page.
-  if (runtime.isBroken) {
+  // A slow GPU does not make a model slow on the CPU, but a loop without end would block the page there.
+  const isOnlySlow = runtime.hasTimedOut && kind !== 'wasm' && !hasLoop(model);
+  // A model that has broken the runtime would break it again.
+  if (runtime.isBroken && !isOnlySlow) {
     options.onBreakage();
     throw new ContractError([runFault(model, refusals.join('; '))]);
   }
