@@ -372,6 +372,56 @@ def test_files_of_gsplat_and_nerfstudio(tmp_path: Path) -> None:
         read_cloud(file)
 
 
+@pytest.mark.parametrize("is_plain", [True, False])
+def test_settings_around_a_checkpoint_give_the_filter_and_the_up_axis(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], is_plain: bool
+) -> None:
+    torch: Any = pytest.importorskip("torch")
+    splats = gsplat_splats(torch)
+    names = {"sh0": "features_dc", "shN": "features_rest"}
+    state = {f"_model.module.gauss_params.{names.get(name, name)}": value for name, value in splats.items()}
+    turned, filter_ = ("none", "classic") if is_plain else ("vertical", "antialiased")
+    made: dict[str, tuple[str, Any, str]] = {
+        "cfg.yml": (
+            "ckpts/ckpt_7_rank0.pt",
+            {"splats": splats},
+            f"antialiased: {str(not is_plain).lower()}\nnormalize_world_space: {str(not is_plain).lower()}\n",
+        ),
+        "config.yml": (
+            "nerfstudio_models/step-000000007.ckpt",
+            {"pipeline": state},
+            f"dataparser: !!python/object:x\n  orientation_method: {turned}\nmodel:\n  rasterize_mode: {filter_}\n",
+        ),
+    }
+    for name, (file, content, settings) in made.items():
+        path = tmp_path / name / file
+        path.parent.mkdir(parents=True)
+        torch.save(content, path)
+        out = tmp_path / "x.onnx"
+        given = ["classic", str(path), str(out), "--license", "MIT", "--attribution", "A"]
+        assert main(given) == 0 and f"no {name} around" in capsys.readouterr().out
+        (path.parents[1] / name).write_text(settings)
+        same_cloud(path)
+        assert main(given) == 0 and "note" not in capsys.readouterr().out
+        contract = json.loads(onnx.load(out).metadata_props[0].value)
+        assert contract["coordinates"]["up"] == ("-y" if is_plain else "+z")
+        assert (contract["filter"], contract["antialiased"]) == (filter_, not is_plain)
+        # Options of the author count more.
+        assert main([*given, "--up", "+x", "--filter", "mip"]) == 0
+        contract = json.loads(onnx.load(out).metadata_props[0].value)
+        assert contract["coordinates"]["up"] == "+x" and contract["filter"] == "mip"
+
+
+@pytest.mark.parametrize(("neighbor", "family"), [("skin.glb", "LAM"), ("embedding.json", "SplattingAvatar")])
+def test_parts_of_avatars_are_refused_by_name(tmp_path: Path, neighbor: str, family: str) -> None:
+    write_cloud(tmp_path / "offset.ply", cloud(COUNT, 0))
+    same = read_cloud(tmp_path / "offset.ply")
+    (tmp_path / neighbor).write_text("")
+    with pytest.raises(ExportError, match=rf"{neighbor}.*a checkpoint of {family}"):
+        read_cloud(tmp_path / "offset.ply")
+    assert np.array_equal(read_cloud(tmp_path / "offset.ply", [neighbor]).positions, same.positions)
+
+
 def test_what_gsplat_saves_besides_is_refused_by_name(tmp_path: Path) -> None:
     torch: Any = pytest.importorskip("torch")
     splats = gsplat_splats(torch)
@@ -453,6 +503,13 @@ def test_files_of_a_deform_network(tmp_path: Path) -> None:
         ("state_dict", "encoder.depth_predictor.corr_refine_net.0.weight", "MVSplat"),
         ("model_state_dict", "network_with_offset.out.weight", "Splatter Image"),
         ("", "gs_tokens", "TokenGS"),
+        ("state_dict", "encoder.gaussian_regressor.0.weight", "DepthSplat"),
+        ("state_dict", "encoder.aggregator.patch_embed.weight", "AnySplat"),
+        ("", "unet.down_blocks.0.nets.0.conv1.weight", "LGM"),
+        ("", "deformation_dec", "HUGS"),
+        ("network", "module.human_gaussian.triplane", "ExAvatar"),
+        ("", "exp_color_mlp.layers.0.weight", "gaussian-head"),
+        ("converter", "deformer.non_rigid.mlp.weight", "3DGS-Avatar"),
     ],
 )
 def test_weights_of_networks_are_refused_by_name(tmp_path: Path, entry: str, name: str, network: str) -> None:

@@ -94,7 +94,7 @@ def add_common(family: Command) -> None:
         choices=get_args(Filter),
         help="trained with 0.3 px², 0.3 with compensation, or 0.1 with compensation; default: by --antialiased",
     )
-    facts.add_argument("--up", choices=get_args(Up), default="-y", help="the axis that points up; default -y")
+    facts.add_argument("--up", choices=get_args(Up), help="the axis that points up; default: by the settings, else -y")
     facts.add_argument("--left-handed", action="store_true")
     facts.add_argument("--meters-per-unit", type=float)
     facts.add_argument("--duration", type=float, help="seconds that time 0 to 1 plays")
@@ -241,7 +241,10 @@ def _no_options(family: Command) -> None:
 
 
 def _classic(given: argparse.Namespace, facts: Facts, options: Options) -> onnx.ModelProto:
-    return export_classic(read_cloud(given.checkpoint, given.ignore), facts, options, cast(Colors, given.colors))
+    cloud = read_cloud(given.checkpoint, given.ignore)
+    if cloud.note is not None:
+        print(f"note: {cloud.note}")
+    return export_classic(cloud, facts, options, cast(Colors, given.colors))
 
 
 def _scaffold(given: argparse.Namespace, facts: Facts, options: Options) -> onnx.ModelProto:

@@ -75,9 +75,11 @@ def image(name: str = "image") -> Input:
 
 @dataclass(frozen=True)
 class Coordinates:
-    """Coordinate system of the Gaussians: which axis points up, the handedness, meters in a unit if known."""
+    """Coordinate system of the Gaussians: which axis points up (-y if nothing declares it), the handedness, meters in a
+    unit if known.
+    """
 
-    up: Up = "-y"
+    up: Up | None = None
     handedness: Literal["right", "left"] = "right"
     meters_per_unit: float | None = None
 
@@ -89,7 +91,7 @@ class Coordinates:
         else:
             fields = dict(given) if isinstance(given, Mapping) else {"up": given}
         fields = {"meters_per_unit" if key == "metresPerUnit" else key: value for key, value in fields.items()}
-        up = fields.get("up", "-y")
+        up = fields.get("up") or "-y"
         fields["up"] = f"+{up}" if up in ("x", "y", "z") else up
         is_known = fields["up"] in get_args(Up) and fields.get("handedness", "right") in ("right", "left")
         if not is_known or fields.keys() - {"up", "handedness", "meters_per_unit"}:
@@ -105,7 +107,7 @@ class Coordinates:
     def json(self) -> Json:
         """Returns the form of the contract."""
         scale = {} if self.meters_per_unit is None else {"metresPerUnit": self.meters_per_unit}
-        return {"up": self.up, "handedness": self.handedness, **scale}
+        return {"up": self.up or "-y", "handedness": self.handedness, **scale}
 
 
 @dataclass(frozen=True)

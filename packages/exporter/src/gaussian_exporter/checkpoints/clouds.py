@@ -51,8 +51,7 @@ def read_cloud(path: Path, ignored: Sequence[str] = ()) -> Cloud:
         if kernel is not None:
             remedy = "give its point_cloud.ply, which has the 3D filter of each Gaussian (filter_3D)"
             raise other_family(path, "Mip-Splatting", "kernel_size in cfg_args, and no 3D filter", remedy)
-        cloud = cloud_of_checkpoint(path, ignored)
-        return replace(cloud, filter="antialiased") if is_antialiased(path) else cloud
+        return cloud_of_checkpoint(path, ignored)
     vertices = read_ply(path)
     refuse_other_properties(vertices.names, path, ignored)
     cloud = cloud_of_vertices(vertices)
@@ -75,15 +74,24 @@ def refused_settings(path: Path, ignored: Sequence[str]) -> float | None:
     return None if "kernel_size" in ignored else kernel  # type: ignore[return-value]
 
 
-# Settings of gsplat (cfg.yml) and nerfstudio (config.yml) of a training with opacity compensation.
-_ANTIALIASED = re.compile(r"^\s*(antialiased: true|rasterize_mode: antialiased)\s*$", re.MULTILINE)
+# Settings of gsplat and nerfstudio: lines of a training with opacity compensation, and of one whose cameras were turned
+# so that +z is up.
+_SETTINGS = {
+    "cfg.yml": (r"antialiased: true", r"normalize_world_space: true"),
+    "config.yml": (r"rasterize_mode: antialiased", r"orientation_method: (up|vertical|pca)"),
+}
 
 
-def is_antialiased(checkpoint: Path) -> bool:
-    """Whether the settings around a checkpoint of gsplat or nerfstudio say that it was trained with compensation."""
-    # OUT/ckpts/ckpt_N_rank0.pt and OUT/nerfstudio_models/step-N.ckpt; a copy may lie beside the file.
-    around = (folder / name for folder in checkpoint.resolve().parents[:2] for name in ("cfg.yml", "config.yml"))
-    return any(_ANTIALIASED.search(each.read_text(errors="replace")) for each in around if each.is_file())
+def with_settings(cloud: Cloud, checkpoint: Path, name: str) -> Cloud:
+    """The cloud with the filter and the up axis that the settings around its checkpoint declare."""
+    # OUT/ckpts/ckpt_N_rank0.pt and OUT/nerfstudio_models/step-N.ckpt; a copy may be beside the file.
+    around = [folder / name for folder in checkpoint.resolve().parents[:2] if (folder / name).is_file()]
+    if not around:
+        note = f"no {name} around {checkpoint.name}, so filter and up axis are those of --filter and --up"
+        return replace(cloud, note=note)
+    text = around[0].read_text(errors="replace")
+    compensates, is_turned = (re.search(rf"^\s*{line}\s*$", text, re.MULTILINE) for line in _SETTINGS[name])
+    return replace(cloud, filter="antialiased" if compensates else "classic", up="+z" if is_turned else None)
 
 
 def newest_in(path: Path) -> Path:
@@ -125,32 +133,45 @@ def captured_of(content: object) -> Sequence[Any] | None:
     return content[0] if is_pair else None  # type: ignore[index]
 
 
-# Parameters that only one network has. Such a file contains the weights of a network from images to Gaussians, and no
-# Gaussians.
-_NETWORKS = {
+# Parameters that only one network has: from images to Gaussians, or of an avatar. Its file contains weights.
+_FROM_IMAGES = {
     "encoder.epipolar_transformer.": "pixelSplat",
     "encoder.depth_predictor.corr_refine_net.": "MVSplat",
+    "encoder.gaussian_regressor.": "DepthSplat",
+    "encoder.aggregator.": "AnySplat",
     "network_with_offset.": "Splatter Image",
     "network_wo_offset.": "Splatter Image",
+    "unet.down_blocks.0.nets.": "LGM",
     "gs_tokens": "TokenGS",
+}
+_AVATARS = {
+    "deformer.non_rigid.": "3DGS-Avatar",
+    "deformation_dec": "HUGS",
+    "human_gaussian.": "ExAvatar",
+    "exp_color_mlp.": "gaussian-head",
 }
 
 
-def network_of(content: object) -> str | None:
-    """Name of the published network of a state_dict, alone or as an entry of the file."""
-    entries = content if isinstance(content, Mapping) else {}
-    states = [entries, *(value for value in entries.values() if isinstance(value, Mapping))]
-    names = [str(name) for state in states for name in state]
-    found = (network for mark, network in _NETWORKS.items() if any(name.startswith(mark) for name in names))
-    return next(found, None)
+def network_of(content: object) -> tuple[str, bool] | None:
+    """Name of the published network of a state_dict, alone or as an entry of the file, and whether it is an avatar."""
+    parts = list(content) if isinstance(content, (list, tuple)) else [content]
+    entries = [part for part in parts if isinstance(part, Mapping)]
+    states = [*entries, *(value for each in entries for value in each.values() if isinstance(value, Mapping))]
+    names = [str(name).removeprefix("module.") for state in states for name in state]
+    for mark, network in (_FROM_IMAGES | _AVATARS).items():
+        if any(name.startswith(mark) for name in names):
+            return network, mark in _AVATARS
+    return None
 
 
 def unknown(path: Path, content: object) -> ExportError:
     """The error of a file that no known trainer writes."""
-    network = network_of(content)
-    if network is not None:
-        remedy = "load it into its class, and export that: gaussian_exporter.export_module, inputs image(views=2)"
-        return other_family(path, network, "weights of a network that turns images into Gaussians", remedy)
+    if (found := network_of(content)) is not None:
+        network, is_avatar = found
+        inputs = "pose(...), shape(...)" if is_avatar else "image(views=2)"
+        remedy = f"load it into its class, and export that: gaussian_exporter.export_module, inputs {inputs}"
+        what = "moves the Gaussians of an avatar" if is_avatar else "turns images into Gaussians"
+        return other_family(path, network, f"weights of a network that {what}", remedy)
     names = [str(key) for key in content] if isinstance(content, Mapping) else [type(content).__name__]
     return ExportError(
         "checkpoint/other-family",
@@ -184,11 +205,14 @@ def gsplat(path: Path, content: Mapping[str, Any], ignored: Sequence[str] = ()) 
         raise other_family(path, "2D Gaussian Splatting", found, remedy)
     parts = {name: np.concatenate([table(path, file, name) for file in files]) for name in _GSPLAT}
     sh = np.concatenate([parts["sh0"], parts["shN"]], 1)
-    return Cloud(parts["means"], parts["scales"], parts["quats"], parts["opacities"].reshape(-1, 1), degrees(path, sh))
+    own = Cloud(parts["means"], parts["scales"], parts["quats"], parts["opacities"].reshape(-1, 1), degrees(path, sh))
+    return with_settings(own, path, "cfg.yml")
 
 
 def nerfstudio(path: Path, pipeline: Mapping[str, Any], ignored: Sequence[str] = ()) -> Cloud:
     """nerfstudio's splatfacto: the state of its pipeline. Without harmonics its colors go through a sigmoid."""
+    # Trainings on several GPUs wrap the model.
+    pipeline = {re.sub(r"(^|\.)module\.", r"\1", name): value for name, value in pipeline.items()}
     prefix = next((p for p in ("_model.gauss_params.", "_model.") if f"{p}means" in pipeline), None)
     if prefix is None:
         raise unknown(path, pipeline)
@@ -199,7 +223,8 @@ def nerfstudio(path: Path, pipeline: Mapping[str, Any], ignored: Sequence[str] =
     if own["features_rest"].shape[1] == 0:
         dc = ((sigmoid(dc) - 0.5) / _C0).astype(np.float32)
     sh = np.concatenate([dc, own["features_rest"].reshape(len(dc), -1, 3)], 1)
-    return Cloud(own["means"], own["scales"], own["quats"], own["opacities"].reshape(-1, 1), degrees(path, sh))
+    cloud = Cloud(own["means"], own["scales"], own["quats"], own["opacities"].reshape(-1, 1), degrees(path, sh))
+    return with_settings(cloud, path, "config.yml")
 
 
 def inria(path: Path, captured: Sequence[Any]) -> Cloud:

@@ -54,7 +54,7 @@ def refuse_other_properties(names: Sequence[str], where: Path, ignored: Sequence
 
 def unfiltered(cloud: Cloud, where: Path) -> Cloud:
     """The cloud, refused if it has Mip-Splatting's 3D filter: a network that changes scales expects them without."""
-    if cloud.filter is not None:
+    if cloud.filter == "mip":
         raise other_family(where, "an unknown family", "the property filter_3D beside a network", "train without it")
     return cloud
 

@@ -13,7 +13,7 @@ import onnx
 
 from ..arrays import Floats, covariances, sigmoid
 from ..checkpoints.ply import Vertices
-from ..contract import Facts, Filter, camera_position
+from ..contract import Facts, Filter, Up, camera_position
 from ..errors import ExportError
 from ..graph import Graph
 from ..outputs import Gaussians, Options, finish
@@ -26,7 +26,7 @@ Colors = Literal["sh", "view"]
 @dataclass(frozen=True)
 class Cloud:
     """Gaussians of a PLY file: positions (N,3), log_scales (N,3), rotations (N,4) w x y z, opacity_logits (N,1), sh
-    (N,(degree+1)^2,3). filter: that of the training, if the checkpoint declares it.
+    (N,(degree+1)^2,3). filter, up: those of the training, if its settings declare them. note: what they do not declare.
     """
 
     positions: Floats
@@ -35,6 +35,8 @@ class Cloud:
     opacity_logits: Floats
     sh: Floats
     filter: Filter | None = field(default=None, kw_only=True)
+    up: Up | None = field(default=None, kw_only=True)
+    note: str | None = field(default=None, kw_only=True)
 
 
 def cloud_of_vertices(vertices: Vertices) -> Cloud:
@@ -92,8 +94,8 @@ def usable(cloud: Cloud) -> Cloud:
             found=f"{len(kept)} with numbers that are not finite",
             remedy="training diverged; export an earlier checkpoint",
         )
-    parts = (cloud.positions, cloud.log_scales, cloud.rotations, cloud.opacity_logits, cloud.sh)
-    return Cloud(*(part[kept] for part in parts), filter=cloud.filter)
+    names = ("positions", "log_scales", "rotations", "opacity_logits", "sh")
+    return replace(cloud, **{name: getattr(cloud, name)[kept] for name in names})
 
 
 def export_classic(
@@ -104,6 +106,8 @@ def export_classic(
     cloud = usable(cloud)
     if facts.filter is None and not facts.antialiased:
         facts = replace(facts, filter=cloud.filter)
+    if facts.coordinates.up is None:
+        facts = replace(facts, coordinates=replace(facts.coordinates, up=cloud.up))
     graph = Graph("classic", options.weights)
     positions = graph.constant(cloud.positions, "positions", errors="even")
     sh = graph.constant(cloud.sh, "sh")
