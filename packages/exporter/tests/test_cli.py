@@ -13,7 +13,7 @@ import pytest
 from onnx import TensorProto, helper, numpy_helper
 
 from gaussian_exporter.cli import main
-from gaussian_exporter.conformance import clocks_at, default_feeds
+from gaussian_exporter.conformance import check_outputs, clocks_at, default_feeds
 from gaussian_exporter.errors import ExportError
 from gaussian_exporter.families.classic import export_classic
 from gaussian_exporter.outputs import Options, save
@@ -171,3 +171,38 @@ def test_a_wrong_degree_is_named(layout: Any, tmp_path: Path, capsys: pytest.Cap
         onnx.save(model, tmp_path / "a.onnx")
         assert main(["check", str(tmp_path / "a.onnx")]) == status
     assert "[contract/sh-degree]" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("content", "code"),
+    [
+        (b"<!doctype html><html>", "decode/html"),
+        (b"version https://git-lfs.github.com/spec/v1\noid sha256:0", "decode/lfs-pointer"),
+        (b"ply\nformat ascii 1.0\n", "decode/unknown-format"),
+        (b"\x08\x08\x3a\xff\xff", "graph/invalid"),
+    ],
+)
+def test_files_of_another_kind_have_the_codes_of_pages(
+    content: bytes, code: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "x.onnx").write_bytes(content)
+    assert main(["check", str(tmp_path / "x.onnx")]) == 1
+    assert f"[{code}]" in capsys.readouterr().err
+
+
+def test_a_tensor_that_no_page_can_hold_is_refused_before_it_is_made(tmp_path: Path) -> None:
+    nodes = [
+        helper.make_node("ConstantOfShape", ["size"], ["large"]),
+        helper.make_node("Slice", ["large", "start", "end"], ["zero"]),
+        helper.make_node("Add", ["zero", "row"], ["gaussians"]),
+    ]
+    row = np.array([[0, 0, 0, 1, 0, 0, 1, 0, 1, 0.5, 0.5, 0.5, 1]], np.float32)
+    constants = {"size": np.array([1_600_000_000]), "start": np.array([0]), "end": np.array([1]), "row": row}
+    output = helper.make_tensor_value_info("gaussians", TensorProto.FLOAT, [1, 13])
+    given = [numpy_helper.from_array(value, name) for name, value in constants.items()]
+    graph = helper.make_graph(nodes, "large", [], [output], given)
+    model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 17)], ir_version=8)
+    contract = '{"version":1,"inputs":{},"outputs":{"layout":"packed","gaussians":"gaussians","color":"rgb",'
+    helper.set_model_props(model, {"gaussian_contract": contract + '"opacityActivation":"linear"}}'})
+    with pytest.raises(ExportError, match=r"large: expected less than 4 GiB in a tensor, found 6,400,000,000 bytes"):
+        check_outputs(model)

@@ -17,6 +17,7 @@ from gaussian_exporter.arrays import rotation_matrices
 from gaussian_exporter.conformance import check_outputs
 from gaussian_exporter.contract import Coordinates
 from gaussian_exporter.errors import ExportError
+from gaussian_exporter.header import header_faults
 from gaussian_exporter.module.capture import widened
 
 from .running import run
@@ -635,3 +636,107 @@ def test_the_diffusion_of_the_guide_converges_in_steps(tmp_path: Path, monkeypat
     arcs = set(distances.argmin(1)[close] // 16)
     assert distances.min(1).mean() < 0.06 and len(arcs) == 64, (distances.min(1).mean(), len(arcs))
     assert np.abs(ends[0] - ends[1]).max() > 0.5
+
+
+def flat_colors(places: Any) -> Any:
+    """Covariances, colors and opacities for positions (N,3)."""
+    covariances = 0.01 * torch.tensor([1.0, 0, 0, 1, 0, 1]).repeat(len(places), 1)
+    return places, covariances, places.sigmoid(), torch.ones(len(places), 1)
+
+
+COVARIANCES = gs.split("positions", "covariances", "colors", "opacities")
+
+
+def test_convolutions_of_nine_channels_are_padded_and_stay_on_the_gpu(tmp_path: Path) -> None:
+    class Rays(torch.nn.Module):  # type: ignore[misc]
+        def __init__(self) -> None:
+            super().__init__()
+            torch.manual_seed(0)
+            self.first = torch.nn.Conv2d(9, 8, 3, padding=1)
+            self.last = torch.nn.Conv2d(8, 3, 1)
+
+        def forward(self, image: Any) -> Any:
+            x = self.last(self.first(torch.cat([image, image**2, image.flip(-1)], 1)).relu())
+            return flat_colors(x[0].flatten(1).T)
+
+    report = gs.export_module(Rays(), {"image": gs.image(8, 8)}, COVARIANCES, out=tmp_path / "x.onnx", quiet=True)
+    assert max(report.errors.values()) < 1e-5 and report.findings == []
+    weights = {tensor.name: list(tensor.dims) for tensor in onnx.load(report.path).graph.initializer}
+    assert [8, 12, 3, 3] in weights.values() and [8, 9, 3, 3] not in weights.values()
+
+
+class Detector(torch.nn.Module):  # type: ignore[misc]
+    """Tells pixels above 0.9 from others: at 0.9 it decides by less than float32 holds."""
+
+    def forward(self, image: Any) -> Any:
+        return flat_colors(torch.sigmoid(1e7 * (image[0] - 0.9)).flatten(1).T)
+
+
+def test_a_network_is_compared_at_examples_and_not_where_it_jumps(tmp_path: Path) -> None:
+    image = np.eye(8, dtype=np.float32).reshape(1, 1, 8, 8).repeat(3, 1)
+    close = np.full((1, 3, 8, 8), 0.9, np.float32)
+    with pytest.raises(ExportError, match=r"change by a millionth.*image\(\.\.\., examples=\[photo\]\)"):
+        gs.export_module(
+            Detector(), {"image": gs.image(8, 8, examples=[close])}, COVARIANCES, out=tmp_path / "x.onnx", quiet=True
+        )
+    report = gs.export_module(
+        Detector(), {"image": gs.image(8, 8, examples=[image])}, COVARIANCES, out=tmp_path / "x.onnx", quiet=True
+    )
+    assert max(report.errors.values()) < 1e-5
+    mixed = gs.export_module(
+        Detector(), {"image": gs.image(8, 8, examples=[image, close])}, COVARIANCES, out=tmp_path / "x.onnx", quiet=True
+    )
+    assert any("1 of 3 sets of inputs prove nothing" in note for note in mixed.notes), mixed.notes
+
+
+def test_a_wrong_file_is_refused_at_an_example(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from gaussian_exporter.module import export
+
+    monkeypatch.setattr(export, "finish_graph", lambda model, *_: _doubled(model))
+    with pytest.raises(ExportError, match=r"computes other numbers than PyTorch"):
+        gs.export_module(Ball(), INPUTS, out=tmp_path / "x.onnx", quiet=True)
+
+
+def _doubled(model: onnx.ModelProto) -> None:
+    """Doubles the first stored table of the model, as a wrong exporter may."""
+    table = next(t for t in model.graph.initializer if list(t.dims) == [COUNT, 3])
+    table.CopyFrom(onnx.numpy_helper.from_array(2 * onnx.numpy_helper.to_array(table), table.name))
+
+
+def test_columns_in_an_order_of_their_own(tmp_path: Path) -> None:
+    class Rows(torch.nn.Module):  # type: ignore[misc]
+        def forward(self, t: Any) -> Any:
+            x = torch.linspace(0.1, 1, COUNT)[:, None] * t.clamp(min=0.1)
+            return torch.cat([x.repeat(1, 3), x, x.repeat(1, 3), torch.ones(COUNT, 4), x.repeat(1, 3)], 1)[None]
+
+    columns = ["positions", "opacities", "scales", "rotations", "colors"]
+    report = gs.export_module(
+        Rows(), {"t": gs.time(1)}, gs.packed(columns=columns, scales="log"), out=tmp_path / "x.onnx", quiet=True
+    )
+    outputs: Any = report.contract["outputs"]
+    assert outputs["columns"] == columns and outputs["scaleActivation"] == "log"
+    assert check_outputs(onnx.load(report.path))["gaussians"].shape == (COUNT, 14)
+
+
+def test_several_poses_and_shapes_as_body_models_take_them(tmp_path: Path) -> None:
+    class Head(torch.nn.Module):  # type: ignore[misc]
+        def forward(self, betas: Any, expression: Any, global_orient: Any, neck: Any, jaw: Any) -> Any:
+            turns = torch.cat([global_orient, neck, jaw]).reshape(3, 3)
+            places = torch.linspace(-1, 1, COUNT)[:, None] * (1 + turns.sum(0)) + betas.sum() * 0.1
+            return flat_colors(places + expression.mean())
+
+    roles = {"betas": gs.shape(10), "expression": gs.shape(5), "global_orient": gs.pose(["global"], flat=True)}
+    roles |= {"neck": gs.pose(["neck"], flat=True), "jaw": gs.pose(["jaw"], flat=True)}
+    report = gs.export_module(Head(), roles, COVARIANCES, out=tmp_path / "x.onnx", quiet=True)
+    contract = contract_of(report.path)
+    assert [contract["inputs"][name]["role"] for name in roles] == ["shape"] * 2 + ["pose"] * 3
+    assert header_faults(onnx.load(report.path), contract, tmp_path) == []
+
+
+def test_a_role_of_which_a_page_has_one_is_refused_before_the_work(tmp_path: Path) -> None:
+    class Clocks(torch.nn.Module):  # type: ignore[misc]
+        def forward(self, a: Any, b: Any) -> Any:
+            raise AssertionError("the module ran")
+
+    with pytest.raises(ExportError, match=r"inputs a and b: expected one input with the role time"):
+        gs.export_module(Clocks(), {"a": gs.time(1), "b": gs.time(1)}, out=tmp_path / "x.onnx")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import re
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -194,13 +195,25 @@ def loaded(path: Path) -> onnx.ModelProto:
     try:
         return onnx.load(existing(path, "an .onnx file"), load_external_data=False)
     except DecodeError as error:
+        with path.open("rb") as file:
+            head = file.read(512)
+        code, found = next((kind for start, kind in _FOREIGN.items() if re.match(start, head)), (None, str(error)))
         raise ExportError(
-            "graph/invalid",
+            code or "graph/invalid",
             where=str(path),
             expected="an ONNX file",
-            found=str(error),
+            found=found,
             remedy="check that it was downloaded or written completely",
         ) from error
+
+
+# Beginnings of files of other kinds, with the codes of the checker of pages and shells.
+_FOREIGN: dict[bytes, tuple[str, str]] = {
+    rb"(?i)\s*(<!--.*?-->\s*)*<(!doctype\s+html|html|head|body|script|title)\b": ("decode/html", "a web page (HTML)"),
+    rb"version https://git-lfs": ("decode/lfs-pointer", "a git-LFS pointer, which only names the real file"),
+    rb"....ORTM": ("decode/unsupported", "a model in the format ORT"),
+    rb"PK|....TFL3|GGUF|ply\r?\n|\x1f\x8b|\s*[{<]|$": ("decode/unknown-format", "a file of another kind"),
+}
 
 
 def raise_faults(faults: Sequence[Fault]) -> None:

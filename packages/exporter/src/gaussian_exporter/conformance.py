@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -126,6 +127,7 @@ def check_outputs(
     given = default_feeds(model, contract) | (feeds or {})
     options = ort.SessionOptions()
     options.log_severity_level = 4
+    _refuse_beyond_pages(model)
     with running("loading"):
         given_model = model.SerializeToString() if path is None else str(path)
         session = ort.InferenceSession(given_model, options, providers=["CPUExecutionProvider"])
@@ -144,6 +146,26 @@ def check_outputs(
     for label, is_default, state in _states(contract, given):
         _raise_first(contract, run(state), label, is_default)
     return first
+
+
+# Bytes of a tensor that the 32-bit memory of a page cannot hold.
+_MAX_BYTES = 1 << 32
+
+
+def _refuse_beyond_pages(model: onnx.ModelProto) -> None:
+    """Raises contract/run for a tensor of a known size that no page can hold, although this machine may."""
+    try:
+        graph = onnx.shape_inference.infer_shapes(model).graph
+    except onnx.shape_inference.InferenceError:
+        return
+    for value in [*graph.value_info, *graph.output]:
+        tensor = value.type.tensor_type
+        size = math.prod(dim.dim_value for dim in tensor.shape.dim if dim.HasField("dim_value"))
+        found = size * helper.tensor_dtype_to_np_dtype(tensor.elem_type).itemsize if tensor.elem_type else 0
+        if found >= _MAX_BYTES:
+            raise _violation(
+                "run", value.name, "less than 4 GiB in a tensor", f"{found:,} bytes", "compute it in parts"
+            )
 
 
 def _raise_first(contract: Json, results: dict[str, AnyArray], label: str, is_default: bool) -> None:

@@ -214,7 +214,8 @@ def of_metadata(props: dict[str, str], where: str) -> Json:
         found = json.loads(props[METADATA_KEY].removeprefix("\ufeff"))
     except (KeyError, ValueError, RecursionError) as error:
         raise ExportError(
-            "contract/json",
+            # Pages infer a contract from canonical names; the exporter does not.
+            "contract/inference" if isinstance(error, KeyError) else "contract/json",
             where=where,
             expected=f"metadata '{METADATA_KEY}' with JSON in it",
             found="none" if isinstance(error, KeyError) else str(error),
