@@ -666,7 +666,7 @@ def test_convolutions_of_nine_channels_are_padded_and_stay_on_the_gpu(tmp_path: 
 
 
 class Detector(torch.nn.Module):  # type: ignore[misc]
-    """Tells pixels above 0.9 from others: at 0.9 it decides by less than float32 holds."""
+    """Separates pixels above 0.9 from others: at 0.9 it decides by less than float32 holds."""
 
     def forward(self, image: Any) -> Any:
         return flat_colors(torch.sigmoid(1e7 * (image[0] - 0.9)).flatten(1).T)

@@ -23,6 +23,10 @@ export function setRunLimit(milliseconds: number): void {
 /** Pattern of WebAssembly error messages after which the memory of the module is invalid. */
 const FATAL = /\bAborted\(|unreachable|out of bounds|table index/;
 
+/** Whether an error leaves the memory of the WebAssembly module invalid. */
+export const isFatal = (error: unknown): boolean =>
+  error instanceof WebAssembly.RuntimeError || FATAL.test(String(error));
+
 /**
  * Error of a call that never started, because an earlier call has broken this copy of the runtime. Another copy could
  * run it.
@@ -84,7 +88,7 @@ export class Runtime {
     try {
       return await Promise.race([task(), limit]);
     } catch (error) {
-      if (error instanceof WebAssembly.RuntimeError || FATAL.test(String(error))) this.#breakage = error;
+      if (isFatal(error)) this.#breakage = error;
       throw error;
     } finally {
       clearTimeout(timer);

@@ -5,7 +5,7 @@ import type { Evidence } from '../cpu-check/prove.js';
 import { cadenceOf } from './cadence.js';
 import { copyOf, evidenceOf, isEqual, readRun, type WrittenRun } from './first-run.js';
 import { OrtSession, type FixedOutputs, type RunOutputs, type SessionKind } from './ort-session.js';
-import { loadRuntime, RuntimeGone } from './load-runtime.js';
+import { isFatal, loadRuntime, RuntimeGone } from './load-runtime.js';
 import type { GeneratorModel } from './open-model.js';
 import { ELEMENT_BYTES, TENSOR_USAGE } from './tensor-buffers.js';
 
@@ -310,4 +310,10 @@ async function attempt(
   }
 }
 
-const messageOf = (error: unknown): string => (error instanceof Error ? error.message : String(error));
+/** Returns the message of an error for people, without the places in the runtime's source code. */
+function messageOf(error: unknown): string {
+  const message = (error instanceof Error ? error.message : String(error)).replace(/ ?\/\S*onnxruntime\/\S+/g, '');
+  return isFatal(error)
+    ? `ONNX Runtime has stopped in this browser (${message}); a newer version of the browser or of its system may run the model`
+    : message;
+}

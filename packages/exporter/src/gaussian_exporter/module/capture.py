@@ -27,7 +27,7 @@ _INSTEAD = {
     "linalg_inv|inverse": "matrices of up to 4 rows are inverted by torch.linalg.inv; larger ones need a closed form",
     "linalg_svd|_svd": "leave the decomposition away: write covariances instead of scales and rotations",
     "linalg_solve": "multiply by torch.linalg.inv of the matrix, of up to 4 rows",
-    "nonzero|masked_select|index.Tensor": "choose by torch.gather; keep every row, and write opacity 0 into unwanted ones",
+    "nonzero|masked_select|index.Tensor": "choose by torch.gather; keep every row, with opacity 0 in unwanted ones",
     "aten_am(ax|in)": "write x.max() or x.min() in place of x.amax() and x.amin() without a dimension",
     "GuardOnDataDependent|data-dependent": "do not branch on numbers: use torch.where",
     "complex|fft": "write real and imaginary parts as tensors of their own",

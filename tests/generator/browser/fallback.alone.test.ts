@@ -62,3 +62,11 @@ it('a model whose first run on the GPU takes too long runs on the CPU', async ()
   assertEqual([kind, reasons.length, errors.length].join(), 'wasm,1,0', String(errors[0]));
   assert(/no result within 3000 ms/.test(reasons[0]), reasons[0]);
 });
+
+it('a crash of the runtime is a reason that people can read, and the model runs on the CPU', async () => {
+  const { ort } = await ((await import(BUILT)) as typeof LoadRuntime).loadRuntime();
+  ort.InferenceSession.create = () => Promise.reject(new WebAssembly.RuntimeError('unreachable'));
+  const { kind, reasons } = await runOf('packed.onnx', await deviceOf(false));
+  assertEqual([kind, reasons.length].join(), 'wasm,1', 'the next copy of the runtime');
+  assert(/has stopped in this browser \(unreachable\); a newer version of the browser/.test(reasons[0]), reasons[0]);
+});
