@@ -666,7 +666,7 @@ def test_convolutions_of_nine_channels_are_padded_and_stay_on_the_gpu(tmp_path: 
 
 
 class Detector(torch.nn.Module):  # type: ignore[misc]
-    """Separates pixels above 0.9 from others: at 0.9 it decides by less than float32 holds."""
+    """Splits pixels above 0.9 from others: at 0.9 it decides by less than float32 holds."""
 
     def forward(self, image: Any) -> Any:
         return flat_colors(torch.sigmoid(1e7 * (image[0] - 0.9)).flatten(1).T)
@@ -740,3 +740,35 @@ def test_a_role_of_which_a_page_has_one_is_refused_before_the_work(tmp_path: Pat
 
     with pytest.raises(ExportError, match=r"inputs a and b: expected one input with the role time"):
         gs.export_module(Clocks(), {"a": gs.time(1), "b": gs.time(1)}, out=tmp_path / "x.onnx")
+
+
+def test_weights_in_eight_bits_have_their_measured_loss(tmp_path: Path) -> None:
+    class Network(torch.nn.Module):  # type: ignore[misc]
+        def __init__(self) -> None:
+            super().__init__()
+            torch.manual_seed(0)
+            self.first = torch.nn.Conv2d(3, 64, 3, padding=1)
+            self.second = torch.nn.Conv2d(64, 64, 3, padding=1)
+            self.last = torch.nn.Linear(64, 64)
+            self.head = torch.nn.Linear(64, 3)
+
+        def forward(self, image: Any) -> Any:
+            x = self.second(self.first(image).relu()).relu()[0].flatten(1).T
+            return flat_colors(self.head(self.last(x).relu()))
+
+    inputs, reports = {"image": gs.image(8, 8)}, []
+    for weights in ("float32", "int8"):
+        reports.append(
+            gs.export_module(
+                Network(), inputs, COVARIANCES, out=tmp_path / f"{weights}.onnx", weights=weights, quiet=True
+            )
+        )
+    plain, small = reports
+    assert small.path.stat().st_size < 0.4 * plain.path.stat().st_size
+    assert [finding.kind for finding in small.findings] == []
+    note = next(note for note in small.notes if "in 8 bits" in note)
+    loss = re.search(r"(\d+) tables .* positions ([\d.]+) dB", note)
+    assert loss is not None and int(loss[1]) == 3 and 30 < float(loss[2]) < 70, note
+    image = np.random.default_rng(0).random((1, 3, 8, 8)).astype(np.float32)
+    first, second = (run(onnx.load(report.path), {"image": image})["positions"] for report in reports)
+    assert 0 < np.abs(first - second).max() < 0.03 * np.abs(first).max()

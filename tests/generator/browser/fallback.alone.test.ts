@@ -41,9 +41,9 @@ async function deviceOf(isFallbackAdapter: boolean): Promise<GPUDevice> {
 
 it('a software GPU leaves models of images to the CPU, and keeps those that run in each frame', async () => {
   const software = await deviceOf(true);
-  const picture = await runOf('picture.onnx', software);
-  assertEqual([picture.kind, picture.reasons.length].join(), 'wasm,1', 'a model of images');
-  assert(/no hardware GPU/.test(picture.reasons[0]), picture.reasons[0]);
+  const still = await runOf('picture.onnx', software);
+  assertEqual([still.kind, still.reasons.length].join(), 'wasm,1', 'a model of images');
+  assert(/no hardware GPU/.test(still.reasons[0]), still.reasons[0]);
   assertEqual((await runOf('packed.onnx', software)).kind, 'captured', 'a model of the time');
   assertEqual((await runOf('picture.onnx', await deviceOf(false))).kind, 'webgpu', 'a model of images on hardware');
 });

@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from html import escape
 from pathlib import Path
-from typing import Any, cast
+from typing import Any, Literal, cast
 
 import numpy as np
 import onnx
@@ -24,6 +24,7 @@ from ..written import box_of, read
 from .capture import OPSETS, captured, cause, keeping_modes, widened
 from .finish import finish_graph
 from .layouts import Layout, split, with_state
+from .quantize import decibels, quantize_weights
 from .roles import Role
 from .trial import (
     describe_difference,
@@ -100,6 +101,7 @@ def export_module(
     filter: Filter | None = None,
     fps: float | None = None,
     batched: bool = False,
+    weights: Literal["float32", "int8"] = "float32",
     quiet: bool = False,
 ) -> ExportReport:
     """Writes a torch.nn.Module as a generator with its contract, compares it with PyTorch, and prints the result.
@@ -108,8 +110,9 @@ def export_module(
     `outputs`: the tensors that it returns, split() by default: positions, scales, rotations, colors, opacities.
     Both of PyTorch's exporters are tried, and the first whose file computes the same as the module is kept.
     `batched`: the module takes a batch before every input, [1,72] if the role has [72], and [1,1] for a time or a
-    control; images always have one. `coordinates`: which axis is up, {"up": "+y"}; -y without it. Raises
-    graph/invalid if neither exporter succeeds, and contract/violation if its outputs have another shape than
+    control; images always have one. `weights="int8"`: tables of convolutions and products in 8 bits, a quarter of the
+    file; the printed dB of each output compare it with PyTorch. `coordinates`: which axis is up, {"up": "+y"}; -y
+    without it. Raises graph/invalid if neither exporter succeeds, and contract/violation if its outputs have another shape than
     split() declares, or numbers out of range.
     """
     require_package("onnxruntime", "module")
@@ -140,13 +143,21 @@ def export_module(
             contract["inputs"] = _bindings(model, inputs, layout)
             complete = contract | bounds | _rows(model, layout, n_max, expected)
             onnx.helper.set_model_props(model, metadata(complete))
-            errors, worst = _errors(model, tries, expected, layout, allowed)
+            errors, worst = _errors(_outputs(model, tries, layout), tries, expected, layout, allowed)
         except Exception as error:  # an exporter may fail in any way of its own
             refusals.append(f"{exporter}: {cause(error)}")
             continue
         if worst:
             refusals.append(f"{exporter}: computes other numbers than PyTorch: {worst}")
             continue
+        rounded: list[str] = []
+        if weights == "int8":
+            count = quantize_weights(model)
+            written = _outputs(model, tries, layout)
+            errors, _ = _errors(written, tries, expected, layout, allowed)
+            rounded = [
+                f"{count} tables of weights in 8 bits; {_fidelity(written, expected, layout, allowed)} to PyTorch"
+            ]
         findings = gpu_findings(model)
         for finding in findings:
             if finding.is_refused:
@@ -165,7 +176,7 @@ def export_module(
         vague = sum(max(row) > _MOST for row in allowed)
         if vague:
             narrowed.append(f"{vague} of {len(tries)} sets of inputs prove nothing: the module itself jumps at them")
-        notes = [*(f"not taken: {refusal}" for refusal in refusals), *unused, *narrowed]
+        notes = [*(f"not taken: {refusal}" for refusal in refusals), *unused, *narrowed, *rounded]
         report = ExportReport(path, exporter, model.opset_import[0].version, complete, errors, findings, notes)
         if not quiet:
             print(report)
@@ -291,8 +302,32 @@ def _rows(model: onnx.ModelProto, layout: Layout, n_max: int | None, expected: S
     return {"nMax": n_max}
 
 
+def _outputs(model: onnx.ModelProto, tries: Sequence[Mapping[str, AnyArray]], layout: Layout) -> list[list[AnyArray]]:
+    """Runs the file on the CPU, and returns its outputs for each set of inputs."""
+    import onnxruntime as ort
+
+    options = ort.SessionOptions()
+    options.log_severity_level = 4
+    session = ort.InferenceSession(model.SerializeToString(), options, providers=["CPUExecutionProvider"])
+    there = {value.name for value in session.get_inputs()}
+    feeds = ({name: value for name, value in values.items() if name in there} for values in tries)
+    return [session.run(list(layout.outputs), each) for each in feeds]
+
+
+def _fidelity(
+    written: Sequence[Sequence[AnyArray]],
+    expected: Sequence[Sequence[AnyArray]],
+    layout: Layout,
+    allowed: Sequence[Sequence[float]],
+) -> str:
+    """The lowest dB of each output, over the sets of inputs at which the module itself does not jump."""
+    kept = [rows for *rows, limits in zip(written, expected, allowed, strict=True) if max(limits) <= _MOST]
+    lowest = (min(decibels(mine[i], theirs[i]) for mine, theirs in kept) for i in range(len(layout.outputs)))
+    return ", ".join(f"{name} {value:.1f} dB" for name, value in zip(layout.outputs, lowest, strict=True))
+
+
 def _errors(
-    model: onnx.ModelProto,
+    written: Sequence[Sequence[AnyArray]],
     tries: Sequence[Mapping[str, AnyArray]],
     expected: Sequence[Sequence[AnyArray]],
     layout: Layout,
@@ -300,19 +335,11 @@ def _errors(
 ) -> tuple[dict[str, float], str]:
     """Largest difference of each output to PyTorch's, as a fraction of the largest number in it, and a sentence on the
     output that exceeds what is allowed the most; sets at which the module itself jumps are left out."""
-    import onnxruntime as ort
-
-    options = ort.SessionOptions()
-    options.log_severity_level = 4
-    session = ort.InferenceSession(model.SerializeToString(), options, providers=["CPUExecutionProvider"])
-    there = {value.name for value in session.get_inputs()}
     errors, worst, excess = dict.fromkeys(layout.outputs, 0.0), "", 1.0
-    for values, wanted, limits in zip(tries, expected, allowed, strict=True):
-        feeds = {name: value for name, value in values.items() if name in there}
-        written = session.run(list(layout.outputs), feeds)
+    for found, values, wanted, limits in zip(written, tries, expected, allowed, strict=True):
         if max(limits, default=0.0) > _MOST:
             continue
-        for name, mine, theirs, limit in zip(layout.outputs, written, wanted, limits, strict=True):
+        for name, mine, theirs, limit in zip(layout.outputs, found, wanted, limits, strict=True):
             error = difference(mine, theirs)
             if not error <= excess * limit:
                 excess, worst = error / limit, f"{name} {describe_difference(mine, theirs)}, {said(values, tries)}"
