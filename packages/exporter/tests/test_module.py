@@ -772,3 +772,25 @@ def test_weights_in_eight_bits_have_their_measured_loss(tmp_path: Path) -> None:
     image = np.random.default_rng(0).random((1, 3, 8, 8)).astype(np.float32)
     first, second = (run(onnx.load(report.path), {"image": image})["positions"] for report in reports)
     assert 0 < np.abs(first - second).max() < 0.03 * np.abs(first).max()
+
+
+def test_a_module_that_goes_on_from_another_generator(tmp_path: Path) -> None:
+    class Turn(torch.nn.Module):  # type: ignore[misc]
+        def forward(self, places: Any, shapes: Any, tints: Any, alphas: Any, angle: Any) -> Any:
+            x, y, z = places.split(1, -1)
+            turned = torch.cat([angle.cos() * x + angle.sin() * z, y, angle.cos() * z - angle.sin() * x], -1)
+            return turned, shapes, tints, alphas
+
+    names = {"places": "positions", "shapes": "covariances", "tints": "colors", "alphas": "opacities"}
+    inputs: dict[str, Any] = {name: gs.gaussians(attribute, COUNT) for name, attribute in names.items()}  # type: ignore[arg-type]
+    inputs["angle"] = gs.control(-1, 1)
+    report = gs.export_module(Turn(), inputs, COVARIANCES, out=tmp_path / "x.onnx", quiet=True)
+    contract = contract_of(report.path)
+    assert contract["inputs"]["alphas"] == {
+        "role": "gaussians",
+        "attribute": "opacities",
+        "opacityActivation": "linear",
+    }
+    model = onnx.load(report.path)
+    assert header_faults(model, contract, tmp_path) == [] and len(check_outputs(model)["positions"]) == COUNT
+    assert max(report.errors.values()) < 1e-6

@@ -3,8 +3,8 @@
 npm pack @mediapipe/face_mesh@0.4.1657299874 && tar xzf mediapipe-face_mesh-*.tgz
 python portrait.py package PHOTO.png OUT.onnx
 
-The photograph finds its face, is cut out twice around it, and becomes a soft surface through the 468 points of the mesh.
-Hair, shoulders and the wall are a guess. Needs PyTorch, Pillow, tflite and this package with the extra `module`.
+The face is found, cut out twice, and becomes a soft surface through the 468 points of the mesh. Hair, shoulders and the
+wall are a guess. Needs PyTorch, Pillow, tflite and this package with the extra `module`.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ import numpy as np
 import torch
 from PIL import Image
 from torch import Tensor
-from torch.nn import functional as F
+from torch.nn import functional
 
 import gaussian_exporter as gs
 from tflite_module import TfliteModule
@@ -65,7 +65,7 @@ class Portrait(torch.nn.Module):
     def sample(self, image: Tensor, places: Tensor) -> Tensor:
         """The image at places (H,W,2) in 0..1."""
         grid = (places * 2 - 1)[None]
-        return F.grid_sample(image, grid, mode="bilinear", padding_mode="border", align_corners=False)
+        return functional.grid_sample(image, grid, mode="bilinear", padding_mode="border", align_corners=False)
 
     def found_face(self, image: Tensor) -> tuple[Tensor, Tensor]:
         """Center (2) of the face, and the x axis (2) of a square around it, times its size."""

@@ -10,7 +10,7 @@ import numpy as np
 import tflite
 import torch
 from torch import Tensor
-from torch.nn import functional as F
+from torch.nn import functional
 
 _TYPES = {0: np.float32, 1: np.float16, 2: np.int32}
 
@@ -93,15 +93,16 @@ class TfliteModule(torch.nn.Module):
         if name in ("CONV_2D", "DEPTHWISE_CONV_2D"):
             weight, bias = getattr(self, said["weight"]), getattr(self, said["bias"])
             x = _padded(x, weight.shape[-1], said["stride"]) if said["is_same"] else x
-            x = F.conv2d(x, weight, bias, stride=said["stride"], groups=1 if name == "CONV_2D" else x.shape[1])
+            groups = 1 if name == "CONV_2D" else x.shape[1]
+            x = functional.conv2d(x, weight, bias, stride=said["stride"], groups=groups)
         elif name == "PRELU":
-            x = F.prelu(x, getattr(self, said["slope"]))
+            x = functional.prelu(x, getattr(self, said["slope"]))
         elif name == "MAX_POOL_2D":
             x = _padded(x, said["kernel"], said["stride"], -1e9) if said["is_same"] else x
-            x = F.max_pool2d(x, said["kernel"], said["stride"])
+            x = functional.max_pool2d(x, said["kernel"], said["stride"])
         elif name == "PAD":
             _, (top, bottom), (left, right), (before, after) = said["sides"]
-            x = F.pad(x, (left, right, top, bottom, before, after))
+            x = functional.pad(x, (left, right, top, bottom, before, after))
         elif name == "ADD":
             x = x + given[1]
         elif name == "RESHAPE":
@@ -109,11 +110,11 @@ class TfliteModule(torch.nn.Module):
             x = (x.permute(0, 2, 3, 1) if x.dim() == 4 else x).reshape(said["size"])
         elif name == "CONCATENATION":
             x = torch.cat(given, said["axis"])
-        return F.relu(x) if name == "RELU" or said.get("is_rectified") else x
+        return functional.relu(x) if name == "RELU" or said.get("is_rectified") else x
 
 
 def _padded(x: Tensor, kernel: int, stride: int, value: float = 0.0) -> Tensor:
     """Padding "same" of TensorFlow, the larger half behind."""
     high, wide = (max((-(-size // stride) - 1) * stride + kernel - size, 0) for size in x.shape[-2:])
     sides = (wide // 2, wide - wide // 2, high // 2, high - high // 2)
-    return F.pad(x, sides, value=value) if high or wide else x
+    return functional.pad(x, sides, value=value) if high or wide else x

@@ -111,8 +111,8 @@ def export_module(
     Both of PyTorch's exporters are tried, and the first whose file computes the same as the module is kept.
     `batched`: the module takes a batch before every input, [1,72] if the role has [72], and [1,1] for a time or a
     control; images always have one. `weights="int8"`: tables of convolutions and products in 8 bits, a quarter of the
-    file; the printed dB of each output compare it with PyTorch. `coordinates`: which axis is up, {"up": "+y"}; -y
-    without it. Raises graph/invalid if neither exporter succeeds, and contract/violation if its outputs have another shape than
+    file, compared with PyTorch in dB. `coordinates`: which axis is up, {"up": "+y"}; -y without it.
+    Raises graph/invalid if neither exporter succeeds, and contract/violation if its outputs have another shape than
     split() declares, or numbers out of range.
     """
     require_package("onnxruntime", "module")
@@ -155,9 +155,8 @@ def export_module(
             count = quantize_weights(model)
             written = _outputs(model, tries, layout)
             errors, _ = _errors(written, tries, expected, layout, allowed)
-            rounded = [
-                f"{count} tables of weights in 8 bits; {_fidelity(written, expected, layout, allowed)} to PyTorch"
-            ]
+            fidelity = _fidelity(written, expected, layout, allowed)
+            rounded = [f"{count} tables of weights in 8 bits; {fidelity} to PyTorch"]
         findings = gpu_findings(model)
         for finding in findings:
             if finding.is_refused:
@@ -223,7 +222,7 @@ def _refuse_repeated(inputs: Mapping[str, Role]) -> None:
     """Raises contract/conflict, before the work, for a role that two inputs have and a contract allows once."""
     first: dict[str, str] = {}
     for name, role in inputs.items():
-        kind = str(role.binding["role"])
+        kind = " ".join(str(role.binding[key]) for key in ("role", "attribute") if key in role.binding)
         if kind in first and kind not in REPEATED:
             raise ExportError(
                 "contract/conflict",
@@ -320,7 +319,7 @@ def _fidelity(
     layout: Layout,
     allowed: Sequence[Sequence[float]],
 ) -> str:
-    """The lowest dB of each output, over the sets of inputs at which the module itself does not jump."""
+    """For each output its lowest ratio to the noise in dB, over the sets of inputs at which the module does not jump."""
     kept = [rows for *rows, limits in zip(written, expected, allowed, strict=True) if max(limits) <= _MOST]
     lowest = (min(decibels(mine[i], theirs[i]) for mine, theirs in kept) for i in range(len(layout.outputs)))
     return ", ".join(f"{name} {value:.1f} dB" for name, value in zip(layout.outputs, lowest, strict=True))

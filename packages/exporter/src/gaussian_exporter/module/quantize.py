@@ -15,8 +15,8 @@ _FEWEST = 1024
 
 
 def quantize_weights(model: onnx.ModelProto) -> int:
-    """Replaces float32 weights by int8, symmetric, with a scale for each output channel, in place. Returns the number of
-    tables. Tables that another operator reads, too, stay as they are.
+    """Replaces float32 weights by int8, symmetric, with a scale for each output channel, in place. Returns the number
+    of tables. Tables that another operator reads, too, stay as they are.
     """
     graph = model.graph
     readers: dict[str, list[onnx.NodeProto]] = {}

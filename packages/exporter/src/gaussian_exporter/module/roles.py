@@ -193,6 +193,41 @@ def image(width: int, height: int, views: int = 1, examples: Sequence[object] | 
     return Role({"role": "image"}, sizes, images, np.zeros(sizes, np.float32))
 
 
+# Numbers of a row of each tensor of Gaussians, and a row at rest.
+_ROWS: dict[str, list[float]] = {
+    "positions": [0, 0, 0],
+    "covariances": [0.01, 0, 0, 0.01, 0, 0.01],
+    "scales": [0.1, 0.1, 0.1],
+    "rotations": [1, 0, 0, 0],
+    "colors": [0.5, 0.5, 0.5],
+    "opacities": [1],
+}
+
+
+def gaussians(
+    attribute: Literal["positions", "covariances", "scales", "rotations", "colors", "opacities"],
+    rows: int,
+    *,
+    scales: Literal["linear", "log"] = "linear",
+    opacities: Literal["linear", "logit"] = "linear",
+    rotations: Literal["wxyz", "xyzw"] = "wxyz",
+) -> Role:
+    """[rows,K]: a tensor of the generator before this one in a chain, as that one writes it. The one before runs only
+    when its own inputs change: an encoder of a photograph once, and this module in each frame.
+    """
+    binding: Json = {"role": "gaussians", "attribute": attribute}
+    said: dict[str, tuple[str, str]] = {
+        "scales": ("scaleActivation", scales),
+        "rotations": ("rotationOrder", rotations),
+    }
+    said["opacities"] = ("opacityActivation", opacities)
+    if attribute in said:
+        binding |= dict([said[attribute]])
+    rest, rng = np.array(_ROWS[attribute], np.float32), np.random.default_rng(0)
+    sizes = (rows, len(rest))
+    return Role(binding, sizes, [*_floats(sizes, rest), (rest * rng.uniform(0.5, 1, sizes)).astype(np.float32)])
+
+
 def depth(width: int, height: int) -> Role:
     """[1,1,H,W], for a post-processor: depth of the frame along the axis of the camera, in world units, of the splat
     that halves the transmittance; 0 if none does.
