@@ -319,7 +319,7 @@ def _fidelity(
     layout: Layout,
     allowed: Sequence[Sequence[float]],
 ) -> str:
-    """For each output its lowest ratio to the noise in dB, over the sets of inputs at which the module does not jump."""
+    """For each output its lowest ratio to the noise in dB, over the inputs at which the module does not jump."""
     kept = [rows for *rows, limits in zip(written, expected, allowed, strict=True) if max(limits) <= _MOST]
     lowest = (min(decibels(mine[i], theirs[i]) for mine, theirs in kept) for i in range(len(layout.outputs)))
     return ", ".join(f"{name} {value:.1f} dB" for name, value in zip(layout.outputs, lowest, strict=True))
