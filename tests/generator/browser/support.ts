@@ -33,6 +33,10 @@ export async function makeDevice(optional: readonly GPUFeatureName[] = []): Prom
   const { maxStorageBuffersPerShaderStage } = adapter.limits;
   const requiredFeatures = optional.filter((feature) => adapter.features.has(feature));
   const device = await adapter.requestDevice({ requiredFeatures, requiredLimits: { maxStorageBuffersPerShaderStage } });
+  // Models run on the software GPU of tests as on hardware.
+  const { vendor, architecture, device: model, description, subgroupMinSize, subgroupMaxSize } = device.adapterInfo;
+  const info = { vendor, architecture, device: model, description, subgroupMinSize, subgroupMaxSize };
+  Object.defineProperty(device, 'adapterInfo', { value: { ...info, isFallbackAdapter: false }, configurable: true });
   // Variants that the element finds on SwiftShader, which takes seconds to compile the rest.
   const choice = JSON.stringify({
     rasterizer: 'quads',
