@@ -3,6 +3,7 @@ import assert from 'node:assert/strict';
 import { spawnSync } from 'node:child_process';
 import {
   copyFileSync,
+  existsSync,
   lstatSync,
   mkdirSync,
   mkdtempSync,
@@ -54,9 +55,17 @@ function refused(status: number, sentence: RegExp, ...args: string[]): void {
   assert.doesNotMatch(found.text, /\n\s+at /, 'no stack');
 }
 
+const fixtures = join(root, 'tests/element/browser/fixtures');
+const GLTF = buildGltf([[{ cloud: smallCloud(6, 1) }]], [{ mesh: 0 }], [0]);
+/** The buffer of that glTF within its JSON. */
+const OWN_BUFFER = {
+  uri: `data:application/octet-stream;base64,${Buffer.from(GLTF.buffer).toString('base64')}`,
+  byteLength: GLTF.buffer.length,
+};
+
 /** A glTF with its buffer beside it. */
 function writeGltf(): void {
-  const { json, buffer } = buildGltf([[{ cloud: smallCloud(6, 1) }]], [{ mesh: 0 }], [0]);
+  const { json, buffer } = GLTF;
   mkdirSync(inFolder('gltf', 'parts'), { recursive: true });
   const buffers = [{ uri: 'parts/a%20b.bin', byteLength: buffer.length }];
   writeFileSync(inFolder('gltf', 'scene.gltf'), JSON.stringify({ ...json, buffers }));
@@ -129,12 +138,12 @@ test('gaussian-splat page brings what descriptions in JSON name, and what these 
 
 test('gaussian-splat page copies files, not links to them, none from outside of the folder, and says what it cannot copy', () => {
   mkdirSync(inFolder('links', 'scene'), { recursive: true });
-  writeFileSync(inFolder('links', 'real.ply'), 'ply');
+  copyFileSync(join(fixtures, 'compass.ply'), inFolder('links', 'real.ply'));
   symlinkSync('../real.ply', inFolder('links', 'scene', 'a.ply'));
   assert.deepEqual(filesOfPage('links/scene/a.ply'), ['a.ply']);
-  const buffers = [{ uri: '../real.ply' }, { uri: 'a.ply?version=1#here' }, { uri: 'missing.bin' }];
+  const buffers = [OWN_BUFFER, { uri: '../real.ply' }, { uri: 'a.ply?version=1#here' }, { uri: 'missing.bin' }];
   const images = [{ uri: 'c.ply' }];
-  writeFileSync(inFolder('links', 'scene', 'a.gltf'), JSON.stringify({ asset: { version: '2.0' }, buffers, images }));
+  writeFileSync(inFolder('links', 'scene', 'a.gltf'), JSON.stringify({ ...GLTF.json, buffers, images }));
   writeFileSync(inFolder('links', 'scene', 'b.ply'), 'ply');
   symlinkSync('b.ply', inFolder('links', 'scene', 'c.ply'));
   assert.deepEqual(filesOfPage('links/scene/a.gltf'), ['scene/a.gltf', 'scene/c.ply']);
@@ -151,8 +160,8 @@ test('gaussian-splat page copies no page and no script that a scene names', () =
   mkdirSync(inFolder('evil', 'cdn'), { recursive: true });
   mkdirSync(inFolder('evil', 'CDN'), { recursive: true });
   for (const name of names) writeFileSync(inFolder('evil', name), 'of the scene');
-  const buffers = names.map((uri) => ({ uri }));
-  writeFileSync(inFolder('evil', 'a.gltf'), JSON.stringify({ asset: { version: '2.0' }, buffers }));
+  const buffers = [OWN_BUFFER, ...names.map((uri) => ({ uri }))];
+  writeFileSync(inFolder('evil', 'a.gltf'), JSON.stringify({ ...GLTF.json, buffers }));
   const { status, text } = command('page', 'evil/a.gltf', 'page', '--no-serve');
   assert.equal(status, 0, text);
   for (const name of names.slice(0, 2)) {
@@ -194,16 +203,73 @@ test('the server of pages serves its folders, and no link out of them', async ()
 
 test('gaussian-splat page takes a scene of several files from the folder of the page itself', () => {
   mkdirSync(inFolder('mine'));
-  writeFileSync(inFolder('mine', 'meta.json'), '{}');
+  writeFileSync(inFolder('mine', 'meta.json'), '{ "means": { "files": ["means.webp"] } }');
+  writeFileSync(inFolder('mine', 'means.webp'), 'pixels');
   const { status, text } = command('page', 'mine/meta.json', 'mine', '--no-serve');
   assert.equal(status, 0, text);
   assert.match(readFileSync(inFolder('mine', 'index.html'), 'utf8'), /<gaussian-splat src="meta.json" alt="mine"/);
 });
 
+test('gaussian-splat page reads what it publishes: meshes have their tag, and what no page can show is refused', () => {
+  const mesh = { vertices: [[0, 0, 0], [1, 0, 0], [0, 1, 0]], faces: [[3, 0, 1, 2]] }; // prettier-ignore
+  const header = [
+    'ply',
+    'format ascii 1.0',
+    'element vertex 3',
+    ...['x', 'y', 'z'].map((axis) => `property float ${axis}`),
+  ];
+  const faces = ['element face 1', 'property list uchar int vertex_indices'];
+  const rows = (lists: number[][]): string[] => lists.map((row) => row.join(' '));
+  const text = (lines: string[]): string => `${lines.join('\n')}\n`;
+  const compass = readFileSync(join(fixtures, 'compass.ply'));
+  const files: Record<string, string | Buffer> = {
+    'mesh.ply': text([...header, ...faces, 'end_header', ...rows(mesh.vertices), ...rows(mesh.faces)]),
+    'points.ply': text([...header, 'end_header', ...rows(mesh.vertices)]),
+    'empty.spz': '',
+    'login.spz': '<!doctype html><title>Log in</title>',
+    'photo.spz': Buffer.concat([Buffer.from('\x89PNG\r\n\x1a\n', 'latin1'), Buffer.alloc(64)]),
+    'cut.ply': compass.subarray(0, compass.length - 30),
+    'cut.onnx': readFileSync(fixturePath('packed.onnx')).subarray(0, 40),
+    'empty.json': '{}',
+    'mine.gsv': 'text',
+  };
+  mkdirSync(inFolder('read'));
+  for (const [name, content] of Object.entries(files)) writeFileSync(inFolder('read', name), content);
+  for (const name of ['textured.glb', 'lfs-pointer.ply', 'compass.splat'])
+    copyFileSync(join(fixtures, name), inFolder('read', name));
+  const shown = ['textured.glb', 'mesh.ply', 'compass.splat'].map((name) => `read/${name}`);
+  const { status, text: said } = command('page', ...shown, 'several', '--no-serve');
+  assert.equal(status, 0, said);
+  const page = readFileSync(inFolder('several', 'index.html'), 'utf8');
+  assert.deepEqual(page.match(/<(gaussian-splat|splat-mesh)[^>]*>/g), [
+    '<gaussian-splat alt="textured" camera-controls>',
+    '<splat-mesh src="textured.glb">',
+    '<gaussian-splat alt="mesh" camera-controls>',
+    '<splat-mesh src="mesh.ply">',
+    '<gaussian-splat src="compass.splat" alt="compass" camera-controls>',
+  ]);
+  for (const [name, code] of [
+    ['points.ply', /decode\/not-splats/],
+    ['empty.spz', /decode\/empty/],
+    ['login.spz', /decode\/html/],
+    ['photo.spz', /a PNG image/],
+    ['cut.ply', /decode\/truncated/],
+    ['cut.onnx', /contract|decode/],
+    ['empty.json', /decode\/unknown-format/],
+    ['mine.gsv', /decode\/unknown-format/],
+    ['lfs-pointer.ply', /git lfs pull/],
+  ] as const) {
+    refused(1, code, 'page', `read/${name}`, 'refused', '--no-serve');
+    assert.equal(existsSync(inFolder('refused')), false, name);
+  }
+});
+
 test('gaussian-splat page says in a sentence what it was asked wrongly', () => {
   const wrong: readonly [RegExp, ...string[]][] = [
     [/scene and a folder are needed/, 'gltf/scene.gltf'],
-    [/scene and a folder are needed/, 'gltf/scene.gltf', 'page', 'more'],
+    [/There is no file .*missing\.ply/, 'gltf/scene.gltf', 'missing.ply', 'page'],
+    [/--single takes one scene/, 'gltf/scene.gltf', 'LOUD.ONNX', 'page', '--single'],
+    [/two files scene\.gltf/, 'gltf/scene.gltf', '../commands/gltf/scene.gltf', 'page'],
     [/'--prot'/, 'gltf/scene.gltf', 'page', '--prot', '80'],
     [/--port: expected .* found "abc"/, 'gltf/scene.gltf', 'page', '--port', 'abc'],
     [/gltf is a folder/, 'gltf', 'page'],

@@ -1,7 +1,7 @@
 /**
- * Implementation of `gaussian-splat page SCENE FOLDER [--single] [--port 8000] [--no-serve]`. Copies the element and a
- * scene to FOLDER, writes an index.html unless one exists, and serves the folder. Any static host can serve the result.
- * With `--single`, the index.html contains the element and the scene, and can be opened from a disk.
+ * Implementation of `gaussian-splat page SCENE... FOLDER [--single] [--port 8000] [--no-serve]`. Reads the scenes, copies
+ * the element and them to FOLDER, writes an index.html unless one exists, and serves the folder. Any static host can
+ * serve the result. With `--single`, the index.html contains the element and the scene, and can be opened from a disk.
  */
 import { cpSync, existsSync, mkdirSync, readFileSync, statSync } from 'node:fs';
 import { createRequire } from 'node:module';
@@ -11,10 +11,12 @@ import { CommandError, parseCommandLine, runCommand, UsageError } from './lib/co
 import { filesBeside } from './lib/files-beside.mjs';
 import { obstacleToFolder, writeWhole } from './lib/output-file.mjs';
 import { serve } from './lib/server.mjs';
+import { tagShowing } from './lib/shown-as.mjs';
 
-const USAGE = `usage: gaussian-splat page SCENE FOLDER [options]
+const USAGE = `usage: gaussian-splat page SCENE... FOLDER [options]
 
-  FOLDER        gets the element, the scene with the files that it names, and an index.html unless there is one
+  SCENE         scene, clip, generator or mesh; several are shown one below the other
+  FOLDER        gets the element, the scenes with the files that they name, and an index.html unless there is one
   --single      an index.html that contains the element and the scene, and can be opened from a disk
   --port N      port of the server that shows the page (default 8000, or a free one if it is taken)
   --no-serve    ends when the page is written
@@ -25,20 +27,30 @@ const CDN = elementFile('cdn');
 const ELEMENT = new URL('../dist/single.js', import.meta.url);
 const SCRIPT = '<script type="module" src="cdn/gaussian-splat.min.js"></script>';
 
-async function makePage({ scene, folder, port, isServed, isSingle }) {
+async function makePage({ scenes, folder, port, isServed, isSingle }) {
   const page = join(folder, 'index.html');
+  const tags = [];
+  for (const scene of scenes) tags.push(await tagShowing(scene));
   mkdirSync(folder, { recursive: true });
-  if (isSingle) await writeSingle(scene, page);
-  else await writeFolder(scene, folder, page);
+  if (isSingle) await writeSingle(scenes[0], tags[0], page);
+  else await writeFolder(scenes, tags, folder, page);
   console.log(`\nThe page is ${isSingle ? page : `in ${folder}`}`);
   if (isServed) await show(folder, port);
 }
 
-async function writeFolder(scene, folder, page) {
-  await copyElement(scene, join(folder, 'cdn'));
-  const tag = tagOf(await copyScene(scene, folder), titleOf(scene));
-  if (existsSync(page)) console.log(`\n${page} exists and was not changed. Paste into it:\n\n${SCRIPT}\n${tag}`);
-  else writeWhole(page, htmlOf(SCRIPT, tag, titleOf(scene)));
+async function writeFolder(scenes, tags, folder, page) {
+  copyElement(join(folder, 'cdn'), scenes.some(isModel));
+  if (scenes.some(isModel)) await copyRuntime(join(folder, 'cdn/onnxruntime'));
+  const elements = [];
+  for (const [i, scene] of scenes.entries()) {
+    const source = await copyScene(scene, folder);
+    elements.push((attributes) => elementOf(tags[i], titleOf(scene), ` src="${addressOf(source)}"`, attributes));
+  }
+  const markup = (attributes) => elements.map((element) => element(attributes)).join('\n  ');
+  const size = ' style="display: block; width: 100%; height: 80vh"';
+  if (existsSync(page))
+    console.log(`\n${page} exists and was not changed. Paste into it:\n\n${SCRIPT}\n${markup(size)}`);
+  else writeWhole(page, htmlOf(`${markup('')}\n  ${SCRIPT}\n${FROM_DISK}`, titleOf(scenes[0])));
 }
 
 /** Maximum bytes of a scene in a page of one file: its text must fit into a string of JavaScript. */
@@ -48,7 +60,7 @@ const MAX_SINGLE = 384e6;
  * Writes an index.html that contains the element and the scene as text. The page converts the scene to a file with its
  * name, because the name identifies some formats.
  */
-async function writeSingle(scene, page) {
+async function writeSingle(scene, tag, page) {
   if (existsSync(page)) throw new CommandError(`${page} exists. With --single name a folder without an index.html.`);
   const { found, missing } = await filesBeside(scene);
   if (isJson(scene) || found.length + missing.length > 0 || isModel(scene))
@@ -68,9 +80,10 @@ async function writeSingle(scene, page) {
   <script type="module">${readFileSync(ELEMENT, 'utf8').replaceAll(/<(?=\/script|!--)/gi, '\\x3c')}</script>
   <script type="module">
     const data = await fetch('data:application/octet-stream;base64,' + document.getElementById('scene').textContent);
-    document.querySelector('gaussian-splat').src = new File([await data.blob()], ${name});
+    await customElements.whenDefined('${tag}');
+    document.querySelector('${tag}').src = new File([await data.blob()], ${name});
   </script>`;
-  writeWhole(page, htmlOf(script, `<gaussian-splat alt="${title}" camera-controls></gaussian-splat>`, title));
+  writeWhole(page, htmlOf(`${elementOf(tag, title)}\n  ${script}`, title));
 }
 
 function parseOptions(args) {
@@ -79,10 +92,18 @@ function parseOptions(args) {
   const parsed = parseCommandLine(args, options);
   if (parsed === undefined) return undefined;
   const { values, positionals } = parsed;
-  if (positionals.length !== 2) throw new UsageError('A scene and a folder are needed');
-  const [scene, folder] = positionals.map((path) => resolve(path));
-  if (!existsSync(scene)) throw new UsageError(`There is no file ${scene}`);
-  if (!statSync(scene).isFile()) throw new UsageError(`${scene} is a folder: name the scene's file in it`);
+  if (positionals.length < 2) throw new UsageError('A scene and a folder are needed');
+  const paths = positionals.map((path) => resolve(path));
+  const [folder, scenes] = [paths.pop(), paths];
+  for (const scene of scenes) {
+    if (!existsSync(scene)) throw new UsageError(`There is no file ${scene}`);
+    if (!statSync(scene).isFile()) throw new UsageError(`${scene} is a folder: name the scene's file in it`);
+  }
+  // Scenes of several files are copied with their folders.
+  const nameOf = (scene) => (/\.(json|gltf)$/i.test(scene) ? basename(dirname(scene)) : '') + basename(scene);
+  const twin = scenes.find((scene, i) => scenes.findIndex((other) => nameOf(other) === nameOf(scene)) !== i);
+  if (twin) throw new UsageError(`There are two files ${basename(twin)}: rename one`);
+  if (values.single && scenes.length > 1) throw new UsageError('--single takes one scene');
   if (existsSync(folder) && !statSync(folder).isDirectory())
     throw new UsageError(`${folder} is a file: a folder is needed`);
   const obstacle = obstacleToFolder(folder);
@@ -90,24 +111,23 @@ function parseOptions(args) {
   const port = Number(values.port);
   if (!(Number.isInteger(port) && port >= 0 && port < 65536))
     throw new UsageError(`--port: expected a number from 0 to 65535, found "${values.port}"`);
-  return { scene, folder, port, isServed: !values['no-serve'] && !values.single, isSingle: values.single };
+  return { scenes, folder, port, isServed: !values['no-serve'] && !values.single, isSingle: values.single };
 }
 
-/** Copies the element without source maps, and ONNX Runtime (43 MB) if the scene is a generator. */
-async function copyElement(scene, target) {
+/** Copies the element without source maps, and without ONNX Runtime (43 MB) unless a scene is a generator. */
+function copyElement(target, withRuntime) {
   const isNeeded = (path) => {
     const inside = relative(CDN, path);
-    return !inside.endsWith('.map') && (isModel(scene) || !inside.startsWith('onnxruntime'));
+    return !inside.endsWith('.map') && (withRuntime || !inside.startsWith('onnxruntime'));
   };
   cpSync(CDN, target, { recursive: true, filter: isNeeded });
-  if (!isModel(scene)) return;
+}
+
+/** Copies ONNX Runtime, which the published element does not contain: it is a dependency of the checker. */
+async function copyRuntime(target) {
   const { RUNTIME_FILES } = await import('@gaussian-splat/generator');
-  // The published element does not contain the runtime, which is a dependency of the checker.
   const dist = dirname(createRequire(import.meta.resolve('@gaussian-splat/check')).resolve('onnxruntime-web'));
-  for (const name of RUNTIME_FILES) {
-    const file = join(target, 'onnxruntime', name);
-    if (!existsSync(file)) cpSync(join(dist, name), file);
-  }
+  for (const name of RUNTIME_FILES) if (!existsSync(join(target, name))) cpSync(join(dist, name), join(target, name));
 }
 
 /**
@@ -164,12 +184,22 @@ function titleOf(scene) {
   return file.replaceAll('&', '&amp;').replaceAll('"', '&quot;').replaceAll('<', '&lt;');
 }
 
-function tagOf(source, title) {
-  const address = source.split('/').map(encodeURIComponent).join('/');
-  return `<gaussian-splat src="${address}" alt="${title}" camera-controls></gaussian-splat>`;
+const addressOf = (source) => source.split('/').map(encodeURIComponent).join('/');
+
+/** Returns the HTML that shows a scene, or a mesh, which is a child of the element. */
+function elementOf(tag, title, src = '', attributes = '') {
+  const [own, child] = tag === 'splat-mesh' ? ['', `\n    <splat-mesh${src}></splat-mesh>\n  `] : [src, ''];
+  return `<gaussian-splat${own} alt="${title}" camera-controls${attributes}>${child}</gaussian-splat>`;
 }
 
-function htmlOf(script, tag, title) {
+/** Browsers load modules by http only, so that the page of a folder stays empty when it is opened from a disk. */
+const FROM_DISK = `  <script>
+    if (location.protocol === 'file:')
+      for (const element of document.querySelectorAll('gaussian-splat'))
+        element.textContent = 'This page needs a web server: run "npx http-server" in its folder, and open the address that it prints.';
+  </script>`;
+
+function htmlOf(body, title) {
   return `<!doctype html>
 <html lang="en">
   <meta charset="utf-8" />
@@ -178,14 +208,7 @@ function htmlOf(script, tag, title) {
   <style>
     gaussian-splat { display: block; width: 100%; height: 80vh; background: #ddd; }
   </style>
-  ${tag}
-  ${script}
-  <script>
-    // Browsers load modules by http only.
-    const element = document.querySelector('gaussian-splat');
-    if (location.protocol === 'file:' && element.hasAttribute('src'))
-      element.textContent = 'This page needs a web server: run "npx http-server" in its folder, and open the address that it prints.';
-  </script>
+  ${body}
 </html>
 `;
 }
