@@ -251,6 +251,9 @@ async function serveScenes(tab: Page, origin: string): Promise<void> {
   await tab.route('**/fountain.gsv', (route) => route.fulfill({ body: Buffer.from(clip.bytes) }));
   await tab.route('**/fountain.mp3', (route) => route.fulfill({ contentType: 'audio/wav', body: silence() }));
   await tab.route('**/fountain.vtt', (route) => route.fulfill({ contentType: 'text/vtt', body: 'WEBVTT\n' }));
+  const dancer = { gaussianSplatSequence: 1, framesPerSecond: 2, frames: 'dancer-{1}.splat', count: 2 };
+  await tab.route('**/dancer.json', (route) => route.fulfill({ body: JSON.stringify(dancer) }));
+  await tab.route('**/dancer-*.splat', (route) => route.fulfill({ body: fixture('element/browser/fixtures/compass.splat') })); // prettier-ignore
   await tab.route('**/style.onnx', (route) => route.fulfill({ body: fixture('fixtures/generators/post-fixed.onnx') }));
   await tab.route(/\/(walker|ball)\.onnx$/, (route) => route.fulfill({ body: fixture('fixtures/generators/packed.onnx') })); // prettier-ignore
 }
