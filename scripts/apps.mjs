@@ -1,6 +1,6 @@
 /**
  * `npm run test:apps [-- NAME… [--newest]]`: the apps of tests/apps, each as a user would make it, with the versions that the list names or, with `--newest`, the latest ones. Installs our packages from a registry that has just the release, builds, opens the
- * app in Chromium, and starts the development server if the list has one. Each has to show its scene, with a worker and a clean console; the bytes received until then are printed. Apps stay in .cache/apps, so that a second run installs our packages alone.
+ * app in Chromium, and starts the development server if the list has one. Each has to be built without a warning, and to show its scene and a generator, with a worker and a clean console; the bytes received until the scene is visible are printed. Apps stay in .cache/apps, so that a second run installs our packages alone.
  */
 import { spawn, spawnSync } from 'node:child_process';
 import { cpSync, existsSync, mkdirSync, readdirSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
@@ -19,6 +19,13 @@ const SCENE = join(root, 'demo/scenes/skull.spz');
 const BUILD_SECONDS = 400;
 /** `--newest` leaves Node, and versions that other packages of the app pin. */
 const NOT_NEWEST = new Set(['node', 'typescript', 'rxjs']);
+/** A line of a build's output that warns, with the lines below it. */
+const WARNING = /.*\bwarn(ing|ings)?\b(.*\n?){0,12}/i;
+/** Advice about the sizes of chunks that pages fetch late, such as three.js for meshes, and about slow plugins. */
+const ADVICE = [
+  /\(!\) Some chunks are larger than 500 kB[^]*?chunkSizeWarningLimit\.?/g,
+  /WARNING in (asset size limit|entrypoint size limit|webpack performance recommendations)[^]*?(?=\n\n|$)/g,
+];
 /** Messages of Lit and the tools in development mode. */
 const DEVELOPMENT = /Lit is in dev mode|\[vite\]|Download the React DevTools/;
 
@@ -59,11 +66,15 @@ async function tryApp(name, app) {
   await install(folder, name, app);
   console.log(`${name}: ${versionsIn(folder, app)}`);
   if (options.install) return;
-  command(app.build, folder);
+  const complaint = WARNING.exec(
+    ADVICE.reduce((text, advice) => text.replaceAll(advice, ''), command(app.build, folder)),
+  );
+  if (complaint) throw new Error(`the build warns: ${complaint[0]}`);
   if (!app.output) return console.log(`${name}: passes`);
   const output = join(folder, app.output);
   const place = extname(output) === '.html' ? { address: pathToFileURL(output).href } : { folder: output };
-  print(name, await visitApp({ ...place, elsewhere: join(folder, 'elsewhere'), faults: app.faults }), app);
+  const { faults, hasGenerator = extname(output) !== '.html' } = app;
+  print(name, await visitApp({ ...place, elsewhere: join(folder, 'elsewhere'), faults, hasGenerator }), app);
   if (!app.dev) return;
   const port = await freePort();
   const [program, ...args] = app.dev.map((word) => (word === 'PORT' ? String(port) : word));
@@ -75,9 +86,11 @@ async function tryApp(name, app) {
   }
 }
 
-function print(name, { weight, files, workers, painted }, { most: max }) {
+function print(name, { weight, files, workers, painted, generated }, { most: max }) {
+  const percent = (share) => `${(share * 100).toFixed(0)} %`;
+  const also = generated === undefined ? '' : ` and ${percent(generated)} by a generator`;
   console.log(
-    `${name}: ${(painted * 100).toFixed(0)} % painted, ${workers} worker(s), ${weight} bytes of gzip in ${files} scripts`,
+    `${name}: ${percent(painted)} painted${also}, ${workers} worker(s), ${weight} bytes of gzip in ${files} scripts`,
   );
   if (max !== undefined && weight > max) throw new Error(`${weight} bytes: expected at most ${max}`);
 }
@@ -144,6 +157,7 @@ function command([program, ...args], cwd) {
   const { status, stdout, stderr } = spawnSync(program, words, options);
   if (status !== 0)
     throw new Error(`${program} ${args.join(' ')}: status ${status}\n${(stdout + stderr).slice(-4000)}`);
+  return stdout + stderr;
 }
 
 function environment() {

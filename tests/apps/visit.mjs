@@ -1,27 +1,31 @@
-/** Opens an app in Chromium as a visitor: is its scene visible, with a worker and a clean console, and how many bytes were received until then? */
-import { existsSync, readFileSync, writeFileSync } from 'node:fs';
-import { join } from 'node:path';
+/** Opens an app in Chromium as a visitor: are its scene and a generator visible, with a worker and a clean console, and how many bytes were received until the scene was? */
+import { cpSync, existsSync, readFileSync, writeFileSync } from 'node:fs';
+import { createRequire } from 'node:module';
+import { dirname, join } from 'node:path';
 import { gzipSync } from 'node:zlib';
 import { chromium } from 'playwright-core';
+import { RUNTIME_FILES } from '@gaussian-splat/generator';
 import { findChromium, gpuFlags } from '../../scripts/lib/chromium.mjs';
 import { serve } from '../../packages/cli/src/lib/server.mjs';
 
+const root = new URL('../../', import.meta.url);
 const CORS = { 'access-control-allow-origin': '*' };
 /** A development server may have to bundle first. */
 const MAX_MS = 120_000;
 
 /**
- * @param {{ folder?: string, elsewhere?: string, address?: string, faults?: RegExp }} app a folder to serve, with another one at another origin, whose address takes the
- *   place of `ELSEWHERE` in the page; or the address of a page; and its allowed console messages
- * @returns {Promise<{ weight: number, files: number, workers: number, painted: number }>} bytes of gzip of scripts and styles, their number, the workers, and the fraction of the element's pixels that the scene paints
+ * @param {{ folder?: string, elsewhere?: string, address?: string, faults?: RegExp, hasGenerator?: boolean }} app a folder to serve, with another one at another origin, whose address takes the
+ *   place of `ELSEWHERE` in the page; or the address of a page; its allowed console messages; and whether the folder's code also shows a generator
+ * @returns {Promise<{ weight: number, files: number, workers: number, painted: number, generated?: number }>} bytes of gzip of scripts and styles, their number, the workers, and the fraction of the element's pixels that the scene and the generator paint
  */
-export async function visitApp({ folder, elsewhere, address, faults }) {
+export async function visitApp({ folder, elsewhere, address, faults, hasGenerator }) {
   const other = elsewhere && existsSync(elsewhere) ? await serve({ '/': elsewhere }, { headers: CORS }) : undefined;
-  const own = folder ? await serve({ '/': folder }) : undefined;
+  const own = folder ? await serve({ '/': folder, '/generator/': writeGenerator(folder) }) : undefined;
   const browser = await chromium.launch({ executablePath: findChromium(), args: gpuFlags() });
   try {
     if (other) replaceElsewhere(folder, `http://127.0.0.1:${other.address().port}`);
-    return await visit(await browser.newPage(), faults, address ?? `http://127.0.0.1:${own.address().port}/`);
+    const at = address ?? `http://127.0.0.1:${own.address().port}/`;
+    return await visit(await browser.newPage(), faults, at, hasGenerator);
   } finally {
     await browser.close();
     for (const server of [own, other]) {
@@ -36,7 +40,16 @@ function replaceElsewhere(folder, address) {
   writeFileSync(page, readFileSync(page, 'utf8').replaceAll('ELSEWHERE', address));
 }
 
-async function visit(page, faults, address) {
+/** A model and ONNX Runtime, as the guide tells authors to copy them to their static files. Returns the folder. */
+function writeGenerator(folder) {
+  const target = join(folder, '../generator-of-app');
+  const runtime = dirname(createRequire(import.meta.url).resolve('onnxruntime-web'));
+  for (const file of RUNTIME_FILES) cpSync(join(runtime, file), join(target, file));
+  cpSync(new URL('tests/fixtures/generators/packed.onnx', root), join(target, 'packed.onnx'));
+  return target;
+}
+
+async function visit(page, faults, address, hasGenerator) {
   const complaints = [];
   const bodies = [];
   page.on('pageerror', (error) => complaints.push(`error: ${error.message}`));
@@ -51,7 +64,35 @@ async function visit(page, faults, address) {
   let max = 0;
   page.on('worker', () => (max = Math.max(max, page.workers().length)));
   await open(page, address);
-  const found = await page
+  const found = await loading(page);
+  if (found !== true) throw new Error([`no scene: ${found}`, ...complaints].join('\n'));
+  const scripts = await Promise.all(bodies);
+  const painted = await page.evaluate(shareOfPaint);
+  if (!(painted > 0.05)) throw new Error(`${painted} of the element is painted`);
+  const generated = hasGenerator ? await showGenerator(page, complaints) : undefined;
+  if (max === 0) complaints.push('there is no worker');
+  if (complaints.length > 0) throw new Error(complaints.join('\n'));
+  const weight = scripts.reduce((sum, body) => sum + gzipSync(body, { level: 6 }).length, 0);
+  return { weight, files: scripts.length, workers: max, painted, generated };
+}
+
+/** Replaces the scene by a generator, with the code of the app. Returns the fraction of the pixels that it paints. */
+async function showGenerator(page, complaints) {
+  await page.evaluate(() => {
+    const element = document.querySelector('gaussian-splat');
+    element.constructor.runtimeLocation = '/generator/';
+    element.src = '/generator/packed.onnx';
+  });
+  const found = await loading(page);
+  if (found !== true) throw new Error([`no generator: ${found}`, ...complaints].join('\n'));
+  const generated = await page.evaluate(shareOfPaint);
+  if (!(generated > 0.05)) throw new Error(`${generated} of the element is painted by the generator`);
+  return generated;
+}
+
+/** Waits for the scene of the page's element. Returns true, or the error. */
+const loading = (page) =>
+  page
     .waitForFunction(
       () => {
         const { loaded, error } = document.querySelector('gaussian-splat') ?? {};
@@ -64,15 +105,6 @@ async function visit(page, faults, address) {
       (handle) => handle.jsonValue(),
       (error) => error.message.split('\n')[0],
     );
-  if (found !== true) throw new Error([`no scene: ${found}`, ...complaints].join('\n'));
-  const scripts = await Promise.all(bodies);
-  const painted = await page.evaluate(shareOfPaint);
-  if (!(painted > 0.05)) throw new Error(`${painted} of the element is painted`);
-  if (max === 0) complaints.push('there is no worker');
-  if (complaints.length > 0) throw new Error(complaints.join('\n'));
-  const weight = scripts.reduce((sum, body) => sum + gzipSync(body, { level: 6 }).length, 0);
-  return { weight, files: scripts.length, workers: max, painted };
-}
 
 /** A development server takes a while to listen. */
 async function open(page, address) {
