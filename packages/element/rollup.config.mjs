@@ -89,7 +89,8 @@ const plugins = [
   terser({
     module: true,
     ecma: 2022,
-    compress: { passes: 4, sequences: false, inline: 1, keep_fargs: false, pure_getters: true },
+    // More passes save 3 bytes of gzip, and take a quarter of the time of a build.
+    compress: { passes: 2, sequences: false, inline: 1, keep_fargs: false, pure_getters: true },
     // A bundler of an app replaces an import whose address it does not know by one that throws, unless a comment in it says otherwise.
     format: { comments: /@vite-ignore|webpackIgnore/ },
   }),

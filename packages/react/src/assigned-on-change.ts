@@ -3,6 +3,12 @@ import * as React from 'react';
 /** Effect that runs before the browser paints. Servers run none, and React 18 warns of layout effects there. */
 const useBeforePaint = 'document' in globalThis ? React.useLayoutEffect : React.useEffect;
 
+/** Common attributes that are texts in React, and booleans as properties, which `@lit/react` sets: the text for true. */
+const TRUE: ReadonlyMap<string, string> = new Map([
+  ['translate', 'yes'],
+  ['draggable', 'true'],
+]);
+
 /**
  * Wraps a component so that some props are assigned to its element only when they change. `@lit/react` assigns every
  * prop in every render, but an equal value counts for these: the camera returns to its orbit, the clock seeks.
@@ -33,7 +39,9 @@ export function assignedOnChange<E extends HTMLElement, P extends React.RefAttri
         Object.assign(element.current, { [name]: value });
       }
     });
-    const others = Object.entries(props).filter(([name]) => !(names as readonly string[]).includes(name));
+    const others = Object.entries(props)
+      .filter(([name]) => !(names as readonly string[]).includes(name))
+      .map(([name, value]) => [name, TRUE.has(name) && typeof value === 'string' ? value === TRUE.get(name) : value]);
     return React.createElement(Component, { ...Object.fromEntries(others), ref: keep } as unknown as P);
   });
   Wrapped.displayName = Component.displayName;

@@ -117,6 +117,15 @@ describe('the interaction prompt', () => {
     await until(() => partOf(element, '[part=interaction-prompt]') !== null, 'the prompt after a reset');
   });
 
+  it('comes once in a gallery', async () => {
+    const elements = await Promise.all([1, 2, 3].map(() => showLoaded({ ...prompted, loading: 'eager' })));
+    const prompts = (): number =>
+      elements.filter((element) => partOf(element, '[part=interaction-prompt]') !== null).length;
+    await until(() => prompts() > 0, 'a prompt');
+    await delay(600);
+    assertEqual(prompts(), 1);
+  });
+
   it('does not come without controls, nor with interaction-prompt="none"', async () => {
     const [plain, none] = [
       await showLoaded({ 'interaction-prompt-threshold': '50' }),

@@ -86,6 +86,30 @@ describe('several scenes in one element', () => {
     assertEqual(alone.stats?.splats, 6, 'splats');
   });
 
+  it('are upgraded in a shadow tree with a registry of its own', async function () {
+    // Some browsers have one registry only.
+    let registry;
+    try {
+      registry = new CustomElementRegistry();
+    } catch {
+      return this.skip();
+    }
+    registry.define('gaussian-splat', class extends GaussianSplatElement {});
+    const host = document.createElement('div');
+    document.body.append(host);
+    const options: ShadowRootInit & { customElementRegistry?: unknown } = {
+      mode: 'open',
+      customElementRegistry: registry,
+    };
+    const root = host.attachShadow(options);
+    root.innerHTML = `<gaussian-splat ${VIEW} loading="eager"><splat-scene src="${COMPASS}"></splat-scene></gaussian-splat>`;
+    const element = root.firstElementChild as GaussianSplatElement;
+    await element.ready;
+    const child = element.firstElementChild as SplatSceneElement;
+    assertEqual([element.loaded, child.loaded, child.error], [true, true, null]);
+    host.remove();
+  });
+
   itInLab('hide one another, whichever comes first', async () => {
     for (const [first, second] of [
       [`src="${COMPASS}"`, `src="${GREEN}" position="0 0 2m"`],

@@ -32,7 +32,14 @@ export function describeScenes(name: string, script: string, toAttributes: (prop
       const place = document.createElement('div');
       document.body.append(place);
       const reported: string[] = [];
-      const view = { cameraOrbit: '0deg 90deg 10m', cameraTarget: '0 0 0', fieldOfView: '45deg', loading: 'eager' };
+      const common = { translate: 'no', draggable: 'false' };
+      const view = {
+        ...common,
+        cameraOrbit: '0deg 90deg 10m',
+        cameraTarget: '0 0 0',
+        fieldOfView: '45deg',
+        loading: 'eager',
+      };
       const attributes = toAttributes({ ...view, style: { display: 'block', width: '120px', height: '100px' } });
       const app = mount(place, attributes, (child, what) => reported.push(`${child} ${what}`));
       const green: Child = { name: 'green', kind: 'scene', src: GREEN, position: [-2, 0, 0] };
@@ -40,6 +47,8 @@ export function describeScenes(name: string, script: string, toAttributes: (prop
       await app.render([green, box]);
       await until(() => reported.length === 2, 'both');
       assertEqual([...reported].sort(), ['box load', 'green load'], 'events');
+      const element = place.firstElementChild as HTMLElement;
+      assertEqual([element.translate, element.draggable], [false, false], 'common attributes');
       const at = async (isPicked: typeof isRed): Promise<number | null> => {
         await frames(3);
         const middle = (await screenOf(place.firstElementChild!)).middleOf(isPicked);

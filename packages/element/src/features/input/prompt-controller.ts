@@ -21,6 +21,8 @@ export function wiggleAt(elapsedMs: number): number {
 
 /** Shows a prompt to visitors who have not moved the camera yet: that they can move it. */
 export class PromptController implements ReactiveController {
+  /** The controller whose element has shown the page's prompt: other elements of the page need none. */
+  static #prompter: PromptController | undefined;
   readonly #viewer: Viewer;
   #state: 'idle' | 'waiting' | 'shown' | 'done' = 'idle';
   #timer: ReturnType<typeof setTimeout> | undefined;
@@ -51,6 +53,7 @@ export class PromptController implements ReactiveController {
   }
 
   hostDisconnected(): void {
+    if (PromptController.#prompter === this) PromptController.#prompter = undefined;
     if (this.#state !== 'done') this.#set('idle');
   }
 
@@ -78,6 +81,8 @@ export class PromptController implements ReactiveController {
   #wait(): void {
     this.#state = 'waiting';
     this.#timer = setTimeout(() => {
+      PromptController.#prompter ??= this;
+      if (PromptController.#prompter !== this) return this.#set('done');
       this.#start = undefined;
       this.#turned = 0;
       this.#set('shown');
