@@ -1,5 +1,5 @@
 /**
- * `npm run test:apps [-- NAME… [--newest]]`: the apps of tests/apps, each as a user would make it, with the versions that the list names or, with `--newest`, the latest ones. Installs our packages from a registry that has just the release, builds, opens the
+ * `npm run test:apps [-- NAME… [--newest]]`: the apps of tests/apps, each as a user would make it, with the versions that the list names or, with `--newest`, the latest ones. Installs our packages from the files of the release, builds, opens the
  * app in Chromium, and starts the development server if the list has one. Each has to be built without a warning, and to show its scene and a generator, with a worker and a clean console; the bytes received until the scene is visible are printed. Apps stay in .cache/apps, so that a second run installs our packages alone.
  */
 import { spawn, spawnSync } from 'node:child_process';
@@ -43,11 +43,9 @@ if (unknown.length > 0) {
 ensureDependencies();
 ensureBuilt();
 process.env.CHROMIUM = ensureChromium();
-const { manifests, packPackages, serveRegistry } = await import('./lib/release.mjs');
+const { packPackages, withOwn } = await import('./lib/release.mjs');
 rmSync(join(CACHE, 'packed'), { recursive: true, force: true });
 const tarballs = packPackages(join(CACHE, 'packed'));
-const { version } = manifests().get('@gaussian-splat/element');
-const registry = await serveRegistry(tarballs);
 let failures = 0;
 for (const name of names) {
   try {
@@ -57,7 +55,6 @@ for (const name of names) {
     console.log(`${name}: FAILED\n${error.message}\n`);
   }
 }
-registry.close();
 console.log(`${names.length - failures} of ${names.length} apps are as they should be`);
 process.exit(failures > 0 ? 1 : 0);
 
@@ -108,14 +105,13 @@ async function install(folder, name, { folder: template = name, dependencies }) 
     mkdirSync(join(folder, place), { recursive: true });
     cpSync(SCENE, join(folder, place, 'scene.spz'));
   }
-  const entries = Object.entries(dependencies).map(([each, wanted]) => [
-    each,
-    wanted === 'release' ? version : options.newest && !NOT_NEWEST.has(each) ? 'latest' : wanted,
-  ]);
+  const entries = Object.entries(dependencies).flatMap(([each, wanted]) =>
+    wanted === 'release'
+      ? withOwn(each).map((name) => [name, `file:${tarballs.get(name)}`])
+      : [[each, options.newest && !NOT_NEWEST.has(each) ? 'latest' : wanted]],
+  );
   const manifest = { name: 'app', private: true, type: 'module', dependencies: Object.fromEntries(entries) };
   writeFileSync(join(folder, 'package.json'), JSON.stringify(manifest, null, 2));
-  const address = `http://127.0.0.1:${registry.address().port}/`;
-  writeFileSync(join(folder, '.npmrc'), `@gaussian-splat:registry=${address}\n`);
   rmSync(join(folder, 'node_modules/@gaussian-splat'), { recursive: true, force: true });
   // It has the digests of our packages of the last time.
   rmSync(join(folder, 'node_modules/.package-lock.json'), { force: true });
@@ -142,7 +138,6 @@ function versionsIn(folder, { dependencies }) {
     .join(', ');
 }
 
-/** The registry answers in this process, so it must not be kept busy meanwhile. */
 async function soon([program, ...args], cwd) {
   const child = spawn(program, args, { cwd, env: environment() });
   let output = '';

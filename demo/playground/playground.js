@@ -214,10 +214,30 @@ async function savePoster() {
     width: wide,
     height: Math.round((wide * height) / width),
   });
-  download(image, POSTER);
+  const square = await squareOf(image);
+  download(square ?? image, POSTER);
   savedPoster = POSTER;
   show();
-  byId('copied').textContent = `Put ${POSTER} beside your page.`;
+  const fits = square ? ' It fits every shape with the style --poster-fit: contain.' : '';
+  byId('copied').textContent = `Put ${POSTER} beside your page.${fits}`;
+}
+
+/** The square in the middle of an image, in which scenes are framed; undefined if there is something beside it. */
+async function squareOf(image) {
+  const bitmap = await createImageBitmap(image);
+  const side = Math.min(bitmap.width, bitmap.height);
+  const [x, y] = [bitmap.width, bitmap.height].map((length) => Math.floor((length - side) / 2));
+  const context = new OffscreenCanvas(bitmap.width, bitmap.height).getContext('2d');
+  context.drawImage(bitmap, 0, 0);
+  const { data } = context.getImageData(0, 0, bitmap.width, bitmap.height);
+  const isInside = (i) => {
+    const [column, row] = [i % bitmap.width, Math.floor(i / bitmap.width)];
+    return column >= x && column < x + side && row >= y && row < y + side;
+  };
+  for (let i = 0; 4 * i < data.length; i++) if (data[4 * i + 3] > 8 && !isInside(i)) return undefined;
+  const canvas = new OffscreenCanvas(side, side);
+  canvas.getContext('2d').drawImage(bitmap, -x, -y);
+  return canvas.convertToBlob({ type: 'image/webp', quality: 0.9 });
 }
 
 /** A page to open, with the same scene in it. */

@@ -134,13 +134,24 @@ export async function checkParts(tab, renderer) {
       `x ${points.join(', ')}, expected 1`,
     );
   });
-  await check('a scene without a size is loaded when it is shown', async () => {
-    await found(`${shown({ hidden: '', loading: 'eager' })};
-      element.hidden = false;
-      await delay(3000);
-      return true;`);
-    assert(paintedShare(await tab.screenshot(SIZE)) > 0.001, 'the screen stays blank');
-  });
+  const covered = { ...still, poster: '/scenes/skull-poster.webp', reveal: 'manual', loading: 'eager' };
+  const ways = {
+    'dismissPoster()': [covered, 'element.dismissPoster();'],
+    'a click on the poster': [covered, `element.shadowRoot.querySelector('[part=poster-button]').click();`],
+    'showPoster() and back': [
+      { ...still, poster: covered.poster },
+      'element.showPoster(); await delay(1000); element.dismissPoster();',
+    ],
+    'being shown after it was hidden': [{ ...still, hidden: '', loading: 'eager' }, 'element.hidden = false;'],
+  };
+  for (const [name, [attributes, act]] of Object.entries(ways)) {
+    await check(`the screen has the scene after ${name}`, async () => {
+      await found(`await show(${JSON.stringify(attributes)}); ${act} await delay(3000); return true;`);
+      const share = paintedShare(await tab.screenshot(SIZE));
+      assert(share > 0.001, 'the screen stays blank');
+      return `${(100 * share).toFixed(1)} % painted`;
+    });
+  }
 }
 
 /** Mouse, wheel, keys and fingers, as the browser makes them. */

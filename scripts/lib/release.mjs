@@ -2,8 +2,7 @@
 import { spawnSync } from 'node:child_process';
 import { createHash } from 'node:crypto';
 import { existsSync, mkdirSync, readdirSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
-import { createServer } from 'node:http';
-import { join, sep } from 'node:path';
+import { basename, join, sep } from 'node:path';
 import { zipSync } from 'fflate';
 import { root } from './run.mjs';
 
@@ -68,8 +67,30 @@ export function zipOfCdn({ withRuntime }) {
   return zipSync(Object.fromEntries(content.map(([name, bytes]) => [`gaussian-splat/${name}`, [bytes, { mtime }]])));
 }
 
+/** Names of a package and of the workspace packages that it needs. */
+export function withOwn(name, packages = manifests()) {
+  const own = Object.keys(packages.get(name).dependencies ?? {}).filter((each) => packages.has(each));
+  return [...new Set([name, ...own.flatMap((each) => withOwn(each, packages))])];
+}
+
 /**
- * Everything that a maintainer publishes, in a folder that is emptied first: `npm/*.tgz`, ZIP archives of the CDN build, and `SHA256SUMS`.
+ * The packages for apps as a ZIP archive, to be unpacked in an app: `vendor/*.tgz` are the element and what it needs, and
+ * `vendor/react/*.tgz` and `vendor/three/*.tgz` are more for these.
+ * @param tarballs {Map<string, string>} paths by name
+ */
+function zipOfPackages(tarballs) {
+  const ofElement = withOwn('@gaussian-splat/element');
+  const places = [
+    ...ofElement.map((name) => ['vendor', name]),
+    ...['react', 'three'].map((name) => [`vendor/${name}`, `@gaussian-splat/${name}`]),
+  ];
+  const entryOf = ([place, name]) => [`${place}/${basename(tarballs.get(name))}`, readFileSync(tarballs.get(name))];
+  // They are compressed already.
+  return zipSync(Object.fromEntries(places.map(entryOf)), { level: 0, mtime: new Date(1980, 0, 1) });
+}
+
+/**
+ * Everything that a maintainer publishes, in a folder that is emptied first: `npm/*.tgz`, ZIP archives of the CDN build and of the packages for apps, and `SHA256SUMS`.
  * @returns {{ files: string[], tarballs: Map<string, string> }} the files, relative to the folder; paths of the tarballs by name
  */
 export function writeRelease(folder) {
@@ -81,6 +102,7 @@ export function writeRelease(folder) {
   const { version } = packages.get('@gaussian-splat/element');
   writeFileSync(join(folder, `gaussian-splat-${version}.zip`), zipOfCdn({ withRuntime: false }));
   writeFileSync(join(folder, `gaussian-splat-${version}-onnxruntime.zip`), zipOfCdn({ withRuntime: true }));
+  writeFileSync(join(folder, `gaussian-splat-${version}-packages.zip`), zipOfPackages(tarballs));
   const files = readdirSync(folder, { recursive: true }).filter((file) => /\.(tgz|zip)$/.test(file));
   const digest = (file) =>
     createHash('sha256')
@@ -88,33 +110,4 @@ export function writeRelease(folder) {
       .digest('hex');
   writeFileSync(join(folder, 'SHA256SUMS'), files.map((file) => `${digest(file)}  ${file}\n`).join(''));
   return { files, tarballs };
-}
-
-/**
- * A registry of npm with our packages alone, for `@gaussian-splat:registry=` in an .npmrc: users will install the same files.
- * @param tarballs {Map<string, string>} paths by name
- */
-export async function serveRegistry(tarballs, port = 0) {
-  const packages = manifests();
-  const server = createServer((request, response) => {
-    const path = decodeURIComponent(request.url.slice(1));
-    if (path.endsWith('.tgz')) {
-      const found = [...tarballs.values()].find((file) => file.endsWith(sep + path));
-      return response.writeHead(found ? 200 : 404).end(found && readFileSync(found));
-    }
-    const file = tarballs.get(path);
-    if (file === undefined) return response.writeHead(404).end('{}');
-    const manifest = packages.get(path);
-    const bytes = readFileSync(file);
-    const dist = {
-      tarball: `http://${request.headers.host}/${file.split(sep).pop()}`,
-      integrity: `sha512-${createHash('sha512').update(bytes).digest('base64')}`,
-    };
-    const { version } = manifest;
-    const versions = { [version]: { ...manifest, dist } };
-    response.writeHead(200, { 'content-type': 'application/json' });
-    response.end(JSON.stringify({ name: path, 'dist-tags': { latest: version }, versions }));
-  });
-  await new Promise((resolve) => server.listen(port, '127.0.0.1', resolve));
-  return server;
 }

@@ -72,10 +72,21 @@ export const APPS = {
     dev: ['npx', 'vite', '--port', 'PORT', '--strictPort'],
   },
   preact: {
-    dependencies: { ...ELEMENT, preact: '11.2.0', vite: '8.3.8', '@preact/preset-vite': '2.10.6' },
-    build: ['npx', 'vite', 'build'],
+    dependencies: {
+      ...{ ...ELEMENT, preact: '11.2.0', vite: '8.3.8', '@preact/preset-vite': '2.10.6' },
+      ...{ typescript: '6.0.3', '@webgpu/types': '0.1.74' },
+    },
+    build: ['sh', '-c', 'npx tsc --noEmit && npx vite build'],
     output: 'dist',
     dev: ['npx', 'vite', '--port', 'PORT', '--strictPort'],
+  },
+  solid: {
+    dependencies: {
+      ...{ ...ELEMENT, 'solid-js': '1.9.20', vite: '8.3.8', 'vite-plugin-solid': '2.11.14' },
+      ...{ typescript: '6.0.3', '@webgpu/types': '0.1.74' },
+    },
+    build: ['sh', '-c', 'npx tsc --noEmit && npx vite build'],
+    output: 'dist',
   },
   'react-router': {
     dependencies: {
@@ -93,6 +104,12 @@ export const APPS = {
   webpack: {
     dependencies: { ...ELEMENT, webpack: '5.112.2', 'webpack-cli': '7.3.1' },
     build: ['npx', 'webpack', '--mode', 'production', '--output-public-path', 'auto'],
+    output: '.',
+  },
+  rspack: {
+    folder: 'webpack',
+    dependencies: { ...ELEMENT, '@rspack/core': '2.3.4', '@rspack/cli': '2.2.8' },
+    build: ['npx', 'rspack', 'build', '--mode', 'production'],
     output: '.',
   },
   parcel: {

@@ -40,7 +40,7 @@ function replaceElsewhere(folder, address) {
   writeFileSync(page, readFileSync(page, 'utf8').replaceAll('ELSEWHERE', address));
 }
 
-/** A model and ONNX Runtime, as the guide tells authors to copy them to their static files. Returns the folder. */
+/** A model and ONNX Runtime, as authors copy them by the guide to their static files. Returns the folder. */
 function writeGenerator(folder) {
   const target = join(folder, '../generator-of-app');
   const runtime = dirname(createRequire(import.meta.url).resolve('onnxruntime-web'));

@@ -4,7 +4,7 @@ import type { FeatureRow } from '../../viewer/features.js';
 
 export const AUTO_ROTATE_ATTRIBUTES = {
   /**
-   * Turns the camera around the scene until a visitor touches it. It does not start for visitors who ask for less motion, nor while the scene has the
+   * Turns the camera around the scene. It rests while a visitor uses the scene, and continues after `auto-rotate-delay`. It does not start for visitors who ask for less motion, nor while the scene has the
    * keyboard. A button stops it.
    * @example auto-rotate
    */
