@@ -24,7 +24,8 @@ const WARNING = /.*\bwarn(ing|ings)?\b(.*\n?){0,12}/i;
 /** Advice about the sizes of chunks that pages fetch late, such as three.js for meshes, and about slow plugins. */
 const ADVICE = [
   /\(!\) Some chunks are larger than 500 kB[^]*?chunkSizeWarningLimit\.?/g,
-  /WARNING in (asset size limit|entrypoint size limit|webpack performance recommendations)[^]*?(?=\n\n|$)/g,
+  /WARNING in (⚠ )?(asset size limit|entrypoint size limit|webpack performance recommendations)[^]*?(?=\n\n|$)/g,
+  /compiled with \d+ warnings?/g,
 ];
 /** Messages of Lit and the tools in development mode. */
 const DEVELOPMENT = /Lit is in dev mode|\[vite\]|Download the React DevTools/;

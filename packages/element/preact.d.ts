@@ -3,7 +3,7 @@
  * '@gaussian-splat/element/preact'`. Props are properties, such as `cameraControls`, or attributes with a hyphen.
  * Listeners have the name of the event: `onload`, `oncamera-change`.
  */
-import type { JSX } from 'preact';
+import type { HTMLAttributes } from 'preact';
 import type { GaussianSplatElement, GaussianSplatEventMap, SettableProperties } from './dist/index.js';
 import type {
   ChildEventMap,
@@ -21,7 +21,7 @@ type Listeners<Events> = {
 };
 
 type Tag<E extends HTMLElement, Settable, Events = object> = Omit<
-  JSX.HTMLAttributes<E>,
+  HTMLAttributes<E>,
   keyof Settable | keyof Listeners<Events>
 > &
   Settable &

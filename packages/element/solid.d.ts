@@ -15,12 +15,15 @@ import type {
   SplatSceneElement,
 } from './dist/scenes.js';
 
+type Listeners<Events> = { [Type in string & keyof Events as `on:${Type}`]?: (event: Events[Type]) => void };
+
 /** Solid sets props of custom elements as properties if they have `prop:`, and as attributes otherwise. */
-type Tag<E extends HTMLElement, Settable, Events = object> = Omit<JSX.HTMLAttributes<E>, keyof Settable> & {
-  [Name in string & keyof Settable as `prop:${Name}`]?: Settable[Name];
-} & { [Name in string & keyof Settable as Lowercase<Name>]?: string | boolean | undefined } & {
-  [Type in string & keyof Events as `on:${Type}`]?: (event: Events[Type]) => void;
-};
+type Tag<E extends HTMLElement, Settable, Events = object> = Omit<
+  JSX.HTMLAttributes<E>,
+  keyof Settable | keyof Listeners<Events>
+> & { [Name in string & keyof Settable as `prop:${Name}`]?: Settable[Name] } & {
+  [Name in string & keyof Settable as Lowercase<Name>]?: string | boolean | undefined;
+} & Listeners<Events>;
 
 declare module 'solid-js' {
   namespace JSX {

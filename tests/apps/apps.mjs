@@ -74,7 +74,7 @@ export const APPS = {
   preact: {
     dependencies: {
       ...{ ...ELEMENT, preact: '11.2.0', vite: '8.3.8', '@preact/preset-vite': '2.10.6' },
-      ...{ typescript: '6.0.3', '@webgpu/types': '0.1.74' },
+      typescript: '6.0.3',
     },
     build: ['sh', '-c', 'npx tsc --noEmit && npx vite build'],
     output: 'dist',
@@ -83,7 +83,7 @@ export const APPS = {
   solid: {
     dependencies: {
       ...{ ...ELEMENT, 'solid-js': '1.9.20', vite: '8.3.8', 'vite-plugin-solid': '2.11.14' },
-      ...{ typescript: '6.0.3', '@webgpu/types': '0.1.74' },
+      typescript: '6.0.3',
     },
     build: ['sh', '-c', 'npx tsc --noEmit && npx vite build'],
     output: 'dist',
