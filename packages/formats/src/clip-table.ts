@@ -1,5 +1,6 @@
 import { LoadBudget, type LoadLimits } from './budget.js';
-import { clipPartBytes, type ClipGroup, type ClipIndex, type ClipPart } from './clip.js';
+import type { ClipGroup, ClipIndex, ClipPart } from './clip.js';
+import { clipPartBytes } from './clip/clip-parts.js';
 
 /** Number of values of a part in {@link ClipTable.parts}. */
 const STRIDE = 4;
