@@ -238,7 +238,7 @@ test('copies are bounded, and what is in the file once is not', async () => {
   assert.equal((await readScene(file, { name: 'a.gltf', openFile })).count, count);
 });
 
-test('what the extension allows and we do not draw is refused by name', async () => {
+test('what the extension allows and we do not draw falls back with a warning, or is refused by name', async () => {
   const { json, buffer } = buildGltf([[{ cloud: smallCloud(2, 0) }]], [{ mesh: 0 }], [0]);
   type Splats = { extensions: { KHR_gaussian_splatting: Record<string, unknown> } };
   const changed = (change: (splats: Splats['extensions']['KHR_gaussian_splatting']) => void): Uint8Array => {
@@ -259,7 +259,16 @@ test('what the extension allows and we do not draw is refused by name', async ()
     assert.deepEqual([unknown.count, unknown.warnings?.length], [2, 1]);
     assert.match(unknown.warnings![0], new RegExp(`${property} "${value}"`));
   }
-  const other = changed((splats) => (splats.extensions = { EXT_other: {} }));
+  const nested = changed((splats) => Object.assign(splats, { kernel: 'cone', extensions: { EXT_kernel_cone: {} } }));
+  const asEllipses = await readScene(nested, { name: 'a.glb' });
+  assertSameCloud({ ...asEllipses, warnings: undefined }, await readScene(writeGlb(json, buffer), { name: 'a.glb' }));
+  assert.deepEqual(asEllipses.warnings, ['The kernel "cone" of splats is not known; "ellipse" is drawn in its place.']);
+  // An extension without plain attributes is a compression, whose splats cannot be read.
+  const packed = structuredClone(json) as { meshes: { primitives: (Splats & { attributes: object })[] }[] };
+  const [primitive] = packed.meshes[0].primitives;
+  primitive.extensions.KHR_gaussian_splatting.extensions = { EXT_other: {} };
+  primitive.attributes = {};
+  const other = writeGlb(packed as unknown as Record<string, unknown>, buffer);
   await expectRefusal(other, 'decode/unsupported', /EXT_other/, { name: 'a.glb' });
   const accessors = json.accessors as { bufferView?: number }[];
   const without = accessors.map(({ bufferView, ...rest }, k) => (k === 3 ? rest : { ...rest, bufferView }));

@@ -5,6 +5,7 @@ import { encodingsFor } from '@gaussian-splat/economise';
 import { readScene } from '@gaussian-splat/formats';
 import type { GaussianCloud, ShDegree } from '@gaussian-splat/core';
 import { transformCloud } from '../../packages/formats/src/transform/transform-cloud.js';
+import { needsSharedData, sharedFile } from '../support/data.js';
 import { assertAtMost, expectRefusal, largestDifference } from './support/expect.js';
 import { extensionRecord, spzBody, writeSpz, type SpzWriterOptions } from './support/spz-writer.js';
 import { writePly } from './support/ply-writer.js';
@@ -61,21 +62,37 @@ test('systems whose third axis is vertical turn positions, rotations and harmoni
   const raw = rawSplats(20, 3);
   // Turned harmonics are larger, and have to stay within -1..1.
   const splats = { ...raw, sh: raw.sh.map((s) => s.map((c) => c.map((value) => Math.fround(0.3 * value)))) };
-  // Second axis forward or back, third axis down or up, and the frame that a quarter turn about x makes of right, down, forward.
-  const turn = (cloud: GaussianCloud): GaussianCloud => {
-    transformCloud(cloud, [1, 0, 0, 0, 0, 0, 1, 0, 0, -1, 0, 0]);
-    return cloud;
-  };
-  // (x, z, -y): right, forward, up is system 12 in SPZ's splat-types.h.
   const source = await readScene(writePly([{ name: 'vertex', columns: inriaColumns(splats) }]));
-  const inFile = turn(source);
   const [encoding] = encodingsFor('a.spz').slice(-1);
-  const written = await encoding.write({ cloud: inFile, degrees: new Uint8Array(20).fill(3) });
-  const body = new Uint8Array(gunzipSync(written));
-  const system = body.length - 4;
-  assert.equal(body[system], 6, 'the writer names right, down, forward');
-  body[system] = 12;
-  assertHolds(await readScene(body), splats, 3);
+  // Axes of the files of Niantic's library for systems 9 to 16, from those of PLY. It mirrors axes before it turns them.
+  const files = [
+    ...['-x -z -y', '+x -z -y', '-x +z -y', '+x +z -y'],
+    ...['-x -z +y', '+x -z +y', '-x +z +y', '+x +z +y'],
+  ];
+  for (const [k, axes] of files.entries()) {
+    const rows = axes
+      .split(' ')
+      .map(([sign, axis]) => [...'xyz'].map((own) => (own === axis ? Number(`${sign}1`) : 0)));
+    const inFile = structuredClone(source);
+    transformCloud(
+      inFile,
+      rows.flatMap((row) => [...row, 0]),
+    );
+    const written = await encoding.write({ cloud: inFile, degrees: new Uint8Array(20).fill(3) });
+    const body = new Uint8Array(gunzipSync(written));
+    const system = body.length - 4;
+    assert.equal(body[system], 6, 'the writer names right, down, forward');
+    body[system] = 9 + k;
+    assertHolds(await readScene(body), splats, 3);
+  }
+});
+
+test('system 16 of the library of Niantic stands upright', { skip: needsSharedData }, async () => {
+  const { count, positions, sh } = await readScene(sharedFile('../cases/files-4/spz-system-16.spz'));
+  const stride = sh.length / count;
+  const brightness = Array.from({ length: count }, (_, i) => sh[stride * i] + sh[stride * i + 1] + sh[stride * i + 2]);
+  const white = brightness.indexOf(Math.max(...brightness));
+  assert.ok(Math.abs(positions[3 * white + 1] + 1) < 1e-3, `y = ${positions[3 * white + 1]}`);
 });
 
 test('the marks of writers decide the frame of files that name none, which the cloud reports', async () => {
