@@ -90,8 +90,6 @@ const NAMED: readonly [name: string, bytes: Uint8Array, kind: RegExp, remedy: Re
   ['blob', archive('ckpt_29999/data.pkl', 'ckpt_29999/version'), /checkpoint of PyTorch/, /as PLY/],
   ['old.pth', TWELVE, /checkpoint of PyTorch/, /as PLY/],
   ['scene.npz', archive('means.npy', 'scales.npy'), /arrays of NumPy/, /as PLY/],
-  ['scene.usdz', archive('default.usda', 'gauss.usda'), /OpenUSD/, /PLY or SPZ/],
-  ['any', text('PXR-USDC\0\0\0\0'), /OpenUSD/, /PLY or SPZ/],
   ['scene.slpk', archive('3dSceneLayer.json.gz', 'nodes/0'), /I3S/, /convert/i],
   ['0.b3dm', TWELVE, /3D Tiles/, /\.glb/],
   ['reply', text('{"geometricError": 1, "root": {"children": []}, "x": 1}'), /3D Tiles/, /\.glb/],

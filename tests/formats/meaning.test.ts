@@ -236,7 +236,6 @@ test('the color space of SHARP is obeyed', async () => {
 const named: readonly [string, string, RegExp][] = [
   ['tileset.json', '{"asset": {"version": "1.1"}, "geometricError": 1, "root": {}}', /3D Tiles/],
   ['meta.json', '{"means": {"shape": [4, 3], "dtype": "float32", "mins": [0, 0, 0], "maxs": [1, 1, 1]}}', /gsplat/],
-  ['scene.usda', '#usda 1.0\n(\n)\n', /OpenUSD/],
 ];
 for (const [name, content, kind] of named) {
   test(`${name} is named`, async () => {

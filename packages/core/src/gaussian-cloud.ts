@@ -44,6 +44,12 @@ export interface LevelRun {
   readonly level: number;
 }
 
+/**
+ * Sort order of splats in training, other than by the depth of their centers. `pixel`: per-pixel order, as in StopThePop;
+ * `distance`: by the distance of their centers from the camera.
+ */
+export type TrainedOrder = 'pixel' | 'distance';
+
 /** Metadata that a file declares, beside its Gaussians. */
 export interface CloudHints {
   /** Unit vector that points up, in the coordinates of the cloud. */
@@ -55,8 +61,10 @@ export interface CloudHints {
   readonly isUpAssumed?: boolean;
   /** Name of the program that wrote the file, as stated in the file. */
   readonly generator?: string;
-  /** Sort order of splats in training. `pixel`: per-pixel order, as in StopThePop. */
-  readonly order?: 'pixel';
+  /** Sort order of splats in training, if it is not that of their centers by depth. */
+  readonly order?: TrainedOrder | undefined;
+  /** Meters of a world unit, if the file declares it. */
+  readonly metersPerUnit?: number | undefined;
   /** Whether the file also contains triangles, which are not part of a cloud. */
   readonly meshes?: boolean;
   /**

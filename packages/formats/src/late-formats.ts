@@ -1,4 +1,5 @@
 /** Rare formats, and extensions and media types of all formats. Loaded for files without a common signature. */
+import { startsWith } from './bytes.js';
 import { usualFormats } from './formats.js';
 import type { SceneFormat } from './scene-format.js';
 import { isJsonWith, isRad, looksLikeKsplat } from './signatures.js';
@@ -29,6 +30,14 @@ const lateFormats: readonly SceneFormat[] = [
     load: async () => (await import('./readers/lcc2.js')).readLcc2,
   },
   {
+    name: 'usd',
+    title: 'OpenUSD (.usda, .usdc)',
+    extensions: ['.usd', '.usda', '.usdc'],
+    mimeTypes: ['model/vnd.usda'],
+    hasSignature: (bytes) => startsWith(bytes, 'PXR-USDC') || startsWith(bytes, '#usda '),
+    load: async () => (await import('./readers/usd.js')).readUsd,
+  },
+  {
     name: 'ksplat',
     readsPrefix: true,
     title: '.ksplat (GaussianSplats3D)',
@@ -53,7 +62,10 @@ const NAMES: Partial<Record<SceneFormat['name'], Pick<SceneFormat, 'extensions' 
   'compressed-ply': { extensions: ['.compressed.ply', '.ply'], mimeTypes: [] },
   ply: { extensions: ['.ply'], mimeTypes: ['model/ply', 'application/ply', 'application/x-ply'] },
   spz: { extensions: ['.spz'], mimeTypes: ['model/spz', 'application/spz', 'application/x-spz'] },
-  zip: { extensions: ['.sog', '.zip'], mimeTypes: ['application/zip', 'application/x-zip-compressed'] },
+  zip: {
+    extensions: ['.sog', '.zip', '.usdz'],
+    mimeTypes: ['application/zip', 'application/x-zip-compressed', 'model/vnd.usdz+zip'],
+  },
   lod: { extensions: ['.json'], mimeTypes: ['application/json'] },
   sog: { extensions: ['.json'], mimeTypes: ['application/json'] },
   gltf: { extensions: ['.glb', '.gltf'], mimeTypes: ['model/gltf-binary', 'model/gltf+json'] },

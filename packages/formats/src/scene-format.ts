@@ -58,7 +58,19 @@ export type OpenFile = (path: string, query?: string) => Promise<Uint8Array>;
 export type SceneReader = (source: SceneSource) => GaussianCloud | Promise<GaussianCloud>;
 
 export type SceneFormatName =
-  'ply' | 'compressed-ply' | 'spz' | 'splat' | 'ksplat' | 'sog' | 'lod' | 'gltf' | 'zip' | 'rad' | 'lcc' | 'lcc2';
+  | 'ply'
+  | 'compressed-ply'
+  | 'spz'
+  | 'splat'
+  | 'ksplat'
+  | 'sog'
+  | 'lod'
+  | 'gltf'
+  | 'zip'
+  | 'rad'
+  | 'lcc'
+  | 'lcc2'
+  | 'usd';
 
 /** A file format that `readScene` supports. */
 export interface SceneFormat {

@@ -39,13 +39,6 @@ export const UNREAD_KINDS: readonly UnreadKind[] = [
     within: /(^|\/)offset\.ply$/i,
   },
   {
-    found: 'a scene of OpenUSD (USD, USDZ)',
-    remedy: 'save its splats (ParticleField3DGaussianSplat) as PLY or SPZ with the tool that wrote it',
-    extensions: /^usd[acz]?$/,
-    fits: (bytes, text) => startsWith(bytes, 'PXR-USDC') || text.startsWith('#usda'),
-    within: /\.usd[ac]?$/i,
-  },
-  {
     found: 'a checkpoint of PyTorch',
     remedy: EXPORT,
     extensions: /^(pt|pth|ckpt)$/,

@@ -19,7 +19,9 @@ const DESCRIPTIONS = [
 ] as const;
 /** Maximum number of files with the same name of {@link DESCRIPTIONS} that are opened to find a scene. */
 const MAX_DESCRIPTIONS = 16;
-const SCENE_FILE = /\.(gltf|glb|ply|spz|splat|ksplat|sog|rad|lcc2?)$/i;
+const SCENE_FILE = /\.(gltf|glb|ply|spz|splat|ksplat|sog|rad|lcc2?|usd[ac]?)$/i;
+/** Matches the layers of OpenUSD. The first file of a USDZ is its root layer. */
+const LAYER = /\.usd[ac]?$/i;
 /** Matches PLY files that are not the result of training: initial points in 3DGS, COLMAP and nerfstudio, and cameras. */
 const FIRST_POINTS = /(^|\/)(input|sparse(_pc)?|points?(3d)?|cameras?)\.ply$/i;
 /** Matches the splats after a number of iterations in the output of 3DGS. Group 1 is the folder, group 2 the number. */
@@ -53,6 +55,7 @@ const WITHIN = async (): Promise<Uint8Array> => new Uint8Array(0);
 /** Returns the path of the scene in an archive; undefined if there is none. Throws if several scenes are equally likely. */
 async function mainFile(archive: Archive, name: string): Promise<string | undefined> {
   const paths = relevant(archive.paths);
+  if (LAYER.test(paths[0] ?? '')) return paths[0];
   for (const [description, max] of DESCRIPTIONS) {
     // Files named meta.json may be of another program.
     const named = namedLike(description, paths)
@@ -111,7 +114,7 @@ function noScene(name: string, path: string | undefined, found: string): Gaussia
     where: path === undefined ? name : `${name}, ${path}`,
     expected: 'a ZIP archive with a Gaussian splat scene in it',
     found,
-    remedy: 'give the address of a scene file, or of an archive of one: .ply, .spz, .splat, .ksplat, .sog, .glb',
+    remedy: 'give the address of a scene file, or of an archive of one: .ply, .spz, .splat, .ksplat, .sog, .glb, .usdz',
   });
 }
 

@@ -1,0 +1,147 @@
+/** OpenUSD against usd-core of PyPI, by the Python of `npm run test:exporter` or of `USD_PYTHON`: 200 random stages, and files that `economise` writes. */
+import assert from 'node:assert/strict';
+import { execFileSync, spawnSync } from 'node:child_process';
+import { existsSync, mkdtempSync, readFileSync, rmSync } from 'node:fs';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
+import { test } from 'node:test';
+import { fileURLToPath } from 'node:url';
+import {
+  matrixOfQuaternion,
+  orthogonalFactor,
+  type GaussianCloud,
+  type ShDegree,
+  type Vector3,
+} from '@gaussian-splat/core';
+import { readScene } from '@gaussian-splat/formats';
+import { shBasis } from '../oracle/sh.js';
+import { assertAtMost } from './support/expect.js';
+
+const script = fileURLToPath(new URL('support/usd_stages.py', import.meta.url));
+const root = fileURLToPath(new URL('../../', import.meta.url));
+const python = [process.env.USD_PYTHON ?? '', join(root, '.cache/exporter/cpu/bin/python')].find(
+  (path) => existsSync(path) && spawnSync(path, ['-c', 'import pxr.UsdValidation']).status === 0,
+);
+const skip =
+  python === undefined && 'usd-core not found: npm run test:exporter installs it, or USD_PYTHON names a Python';
+
+/** Splats of a prim as usd-core evaluates them. `matrix`: [4, 4] for row vectors, to the coordinates of the stage. */
+interface Field {
+  readonly count: number;
+  readonly degree: ShDegree;
+  readonly matrix: readonly number[];
+  readonly positions: readonly number[];
+  readonly scales: readonly number[];
+  readonly rotations: readonly number[];
+  readonly opacities: readonly number[];
+  readonly sh: readonly number[];
+  readonly order: string;
+}
+
+interface Stage {
+  readonly file: string;
+  readonly up: 'Y' | 'Z';
+  readonly meters: number | null;
+  readonly fields: readonly Field[];
+}
+
+const DIRECTIONS: readonly Vector3[] = [
+  [0.36, 0.48, 0.8],
+  [-0.6, 0, 0.8],
+  [0, -0.8, -0.6],
+];
+const ORDERS: Readonly<Record<string, string>> = { cameraDistance: 'distance', rayHitDistance: 'pixel' };
+
+/** Covariance of a splat, [3, 3]: R·S²·Rᵀ of its axes, the columns of a matrix. */
+const covarianceOf = (axes: readonly number[]): number[] =>
+  Array.from({ length: 9 }, (_, k) => {
+    const [row, column] = [3 * Math.floor(k / 3), 3 * (k % 3)];
+    return [0, 1, 2].reduce((sum, n) => sum + axes[row + n] * axes[column + n], 0);
+  });
+
+function axesOf(quaternion: ArrayLike<number>, scales: ArrayLike<number>): number[] {
+  const norm = Math.hypot(quaternion[0], quaternion[1], quaternion[2], quaternion[3]);
+  const [w, x, y, z] = Array.from(quaternion, (value) => value / norm);
+  return matrixOfQuaternion(w, x, y, z).map((value, k) => value * scales[k % 3]);
+}
+
+function colorOf(sh: ArrayLike<number>, at: number, degree: ShDegree, direction: Vector3): number[] {
+  const basis = shBasis(degree, direction);
+  return [0, 1, 2].map((c) => basis.reduce((sum, value, k) => sum + value * sh[at + 3 * k + c], 0));
+}
+
+/** Asserts that splats from `first` of a cloud are those of a field, each number within 1e-6 of the largest one of its splat. */
+function assertField(cloud: GaussianCloud, first: number, field: Field, where: string): void {
+  const m = field.matrix;
+  // For column vectors.
+  const linear = [0, 1, 2].flatMap((row) => [0, 1, 2].map((column) => m[4 * column + row]));
+  const scale = Math.cbrt(Math.abs(determinantOf(linear)));
+  const turn = orthogonalFactor(linear);
+  const isSimilar = linear.every((value, k) => Math.abs(value - scale * turn[k]) <= 1e-9 * scale);
+  const near = (found: readonly number[], expected: readonly number[], floor: number, what: string): void => {
+    const size = Math.max(floor, ...expected.map(Math.abs));
+    found.forEach((value, k) => assertAtMost(Math.abs(value - expected[k]), 1e-6 * size, `${where}, ${what} ${k}`));
+  };
+  const own = 3 * (field.degree + 1) ** 2;
+  const stride = 3 * (cloud.shDegree + 1) ** 2;
+  for (let i = 0; i < field.count; i++) {
+    const n = first + i;
+    const [x, y, z] = field.positions.slice(3 * i, 3 * i + 3);
+    const place = [0, 1, 2].map((c) => x * m[c] + y * m[4 + c] + z * m[8 + c] + m[12 + c]);
+    const found = [0, 1, 2].map((c) => cloud.origin[c] + cloud.positions[3 * n + c]);
+    near(found, place, 9, `splat ${i}, position`);
+    const axes = axesOf(field.rotations.slice(4 * i, 4 * i + 4), field.scales.slice(3 * i, 3 * i + 3));
+    const moved = Array.from({ length: 9 }, (_, k) => {
+      const [row, column] = [3 * Math.floor(k / 3), k % 3];
+      return linear[row] * axes[column] + linear[row + 1] * axes[3 + column] + linear[row + 2] * axes[6 + column];
+    });
+    const ours = axesOf(cloud.rotations.subarray(4 * n, 4 * n + 4), cloud.scales.subarray(3 * n, 3 * n + 3));
+    near(covarianceOf(ours), covarianceOf(moved), 0, `splat ${i}, covariance`);
+    near([cloud.opacities[n]], [field.opacities[i]], 1, `splat ${i}, opacity`);
+    if (!isSimilar) continue;
+    for (const d of DIRECTIONS) {
+      const local = [0, 1, 2].map((c) => turn[c] * d[0] + turn[3 + c] * d[1] + turn[6 + c] * d[2]);
+      const expected = colorOf(field.sh, own * i, field.degree, local as unknown as Vector3);
+      near(colorOf(cloud.sh, stride * n, cloud.shDegree, d), expected, 4, `splat ${i}, color`);
+    }
+  }
+}
+
+const determinantOf = (m: readonly number[]): number =>
+  m[0] * (m[4] * m[8] - m[5] * m[7]) - m[1] * (m[3] * m[8] - m[5] * m[6]) + m[2] * (m[3] * m[7] - m[4] * m[6]);
+
+async function assertStage(folder: string, { file, up, meters, fields }: Stage): Promise<number> {
+  const bytes = readFileSync(join(folder, file));
+  const count = fields.reduce((sum, field) => sum + field.count, 0);
+  if (count === 0) {
+    const error: unknown = await readScene(bytes, { name: file }).catch((found: unknown) => found);
+    assert.match(String(error), /0 splats|ParticleField3DGaussianSplat/, file);
+    return 0;
+  }
+  const cloud = await readScene(bytes, { name: file });
+  assert.equal(cloud.count, count, file);
+  assert.deepEqual(cloud.hints?.up, up === 'Y' ? [0, 1, 0] : [0, 0, 1], file);
+  assert.equal(cloud.hints?.metersPerUnit ?? null, meters, file);
+  const largest = fields.reduce((max, field) => (field.count > max.count ? field : max));
+  assert.equal(cloud.hints?.order, ORDERS[largest.order], file);
+  let first = 0;
+  for (const field of fields) {
+    assertField(cloud, first, field, file);
+    first += field.count;
+  }
+  return count;
+}
+
+test('200 random stages are as usd-core reads them, within 1e-6', { skip }, async (context) => {
+  const folder = mkdtempSync(join(tmpdir(), 'usd-'));
+  try {
+    execFileSync(python!, [script, 'write', folder, '200', String(process.env.SEED ?? 1)], { stdio: 'pipe' });
+    const stages = JSON.parse(readFileSync(join(folder, 'expected.json'), 'utf8')) as Stage[];
+    let splats = 0;
+    for (const stage of stages) splats += await assertStage(folder, stage);
+    context.diagnostic(`${stages.length} stages, ${splats} splats`);
+    assert.ok(splats > 5_000, `${splats} splats`);
+  } finally {
+    rmSync(folder, { recursive: true });
+  }
+});
