@@ -1,7 +1,7 @@
 /** OpenUSD against usd-core of PyPI, by the Python of `npm run test:exporter` or of `USD_PYTHON`: 200 random stages, and files that `economise` writes. */
 import assert from 'node:assert/strict';
 import { execFileSync, spawnSync } from 'node:child_process';
-import { existsSync, mkdtempSync, readFileSync, rmSync } from 'node:fs';
+import { existsSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { test } from 'node:test';
@@ -13,9 +13,11 @@ import {
   type ShDegree,
   type Vector3,
 } from '@gaussian-splat/core';
+import { encodingsFor } from '@gaussian-splat/economise';
 import { readScene } from '@gaussian-splat/formats';
 import { shBasis } from '../oracle/sh.js';
-import { assertAtMost } from './support/expect.js';
+import { needsSharedData, sharedFile } from '../support/data.js';
+import { assertAtMost, largestDifference } from './support/expect.js';
 
 const script = fileURLToPath(new URL('support/usd_stages.py', import.meta.url));
 const root = fileURLToPath(new URL('../../', import.meta.url));
@@ -145,3 +147,67 @@ test('200 random stages are as usd-core reads them, within 1e-6', { skip }, asyn
     rmSync(folder, { recursive: true });
   }
 });
+
+/** Scenes of the shared data. The test takes a few thousand splats of each. */
+const SCENES = ['skull.ply', 'angel.compressed.ply', 'massa.sog', 'st-peter.sog', 'plant.splat'];
+const MAX_SPLATS = 3_000;
+
+test(
+  'five scenes are written as usd-core accepts them, and return from its layers',
+  { skip: skip || needsSharedData },
+  async (context) => {
+    const folder = mkdtempSync(join(tmpdir(), 'usd-'));
+    try {
+      const clouds = new Map<string, GaussianCloud>();
+      for (const scene of SCENES) {
+        const whole = await readScene(sharedFile(`scenes/${scene}`), { name: scene });
+        const cloud = sampled(whole, MAX_SPLATS);
+        const degrees = new Uint8Array(cloud.count).fill(cloud.shDegree);
+        for (const suffix of ['.usdz', '.usdc']) {
+          for (const [k, encoding] of encodingsFor(`a${suffix}`).entries()) {
+            const file = `${scene.replace(/\..*/, '')}${k}${suffix}`;
+            writeFileSync(join(folder, file), await encoding.write({ cloud, degrees }));
+            clouds.set(file, cloud);
+          }
+        }
+      }
+      const files = [...clouds.keys()].map((file) => join(folder, file));
+      const output = execFileSync(python!, [script, 'read', ...files], { maxBuffer: 2 ** 30, encoding: 'utf8' });
+      for (const stage of JSON.parse(output) as (Stage & { readonly faults: readonly string[] })[]) {
+        const cloud = clouds.get(stage.file)!;
+        assert.deepEqual(stage.faults, [], stage.file);
+        assert.equal(stage.fields[0].count, cloud.count, stage.file);
+        await assertStage(folder, stage);
+        // The values of float32 are those of the scene, which is turned by half a turn about x.
+        if (stage.file.includes('1.usd')) {
+          const places = cloud.positions.map((value, k) => (k % 3 === 0 ? value : -value));
+          assertAtMost(largestDifference(stage.fields[0].positions, places), 0, `${stage.file}, positions`);
+          assertAtMost(largestDifference(stage.fields[0].opacities, cloud.opacities), 0, `${stage.file}, opacities`);
+        }
+        for (const suffix of ['.usda', '.usdc'])
+          await assertStage(folder, { ...stage, file: `again-${stage.file.replace(/\.\w+$/, suffix)}` });
+      }
+      context.diagnostic(`${files.length} files of ${SCENES.length} scenes`);
+    } finally {
+      rmSync(folder, { recursive: true });
+    }
+  },
+);
+
+/** Every n-th splat of a cloud, at most `max`. */
+function sampled(cloud: GaussianCloud, max: number): GaussianCloud {
+  const step = Math.ceil(cloud.count / max);
+  const count = Math.floor(cloud.count / step);
+  const rows = (values: Float32Array): Float32Array => {
+    const width = values.length / cloud.count;
+    return Float32Array.from(
+      { length: width * count },
+      (_, k) => values[width * step * Math.floor(k / width) + (k % width)],
+    );
+  };
+  const { positions, scales, rotations, opacities, sh } = cloud;
+  return {
+    ...{ ...cloud, count, hints: undefined, positions: rows(positions), scales: rows(scales) },
+    ...{ rotations: rows(rotations), opacities: rows(opacities), sh: rows(sh) },
+  };
+}

@@ -1,4 +1,4 @@
-import { GaussianSplatError, transposed, type GaussianCloud } from '@gaussian-splat/core';
+import { GaussianSplatError, multiply3, transposed, type GaussianCloud } from '@gaussian-splat/core';
 import { readScene, turned, uprightRotation } from '@gaussian-splat/formats';
 import type { Evaluator } from './evaluator.js';
 import { findTrades, numbersOf, scaleToFit } from './fit.js';
@@ -154,11 +154,15 @@ export async function economise(cloud: GaussianCloud, options: EconomiseOptions)
 }
 
 /**
- * Returns a written scene in the coordinates of its source `cloud`. Formats without a direction up store rotated scenes.
+ * Returns a written scene in the coordinates of its source `cloud`. Formats without a direction up store rotated scenes,
+ * and others have another one.
  */
 export function asGiven(written: GaussianCloud, cloud: GaussianCloud): GaussianCloud {
-  const rotation = written.hints?.up === undefined ? uprightRotation(cloud) : undefined;
-  return rotation ? turned(written, transposed(rotation)) : written;
+  const none = [1, 0, 0, 0, 1, 0, 0, 0, 1];
+  const [toUpright, ofGiven] = [written, cloud].map((one) => uprightRotation(one) ?? none);
+  const rotation = multiply3(transposed(ofGiven), toUpright);
+  const isIdentity = rotation.every((value, k) => Math.abs(value - Number(k % 4 === 0)) < 1e-12);
+  return isIdentity ? written : turned(written, rotation);
 }
 
 /** A written file with its errors, measured after reading it. */

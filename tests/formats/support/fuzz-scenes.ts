@@ -199,6 +199,10 @@ export function fuzzScenes(): Readonly<Record<FuzzFormat, readonly FuzzScene[]>>
     ],
     lcc: [{ name: 'meta.lcc', files: writeLcc([smallCloud(20, 1), smallCloud(8, 1)], { cellSize: 10 }) }],
     lcc2: [lcc2()],
+    usd: [
+      one('a.usda', readFileSync(new URL('../../fixtures/usd/scene.usda', import.meta.url))),
+      one('a.usdc', readFileSync(new URL('../../fixtures/usd/scene.usdc', import.meta.url))),
+    ],
     zip: [
       one('a.sog', zipSync(writeSog(cloud), { level: 0 })),
       one('a.zip', zipSync({ 'x/a.ksplat': writeKsplat(cloud, { level: 1 }) })),

@@ -1,7 +1,8 @@
 """Random stages of OpenUSD by usd-core, and its readings of stages: the reference of our reader and writer.
 
 `write FOLDER COUNT SEED` writes random stages, and their splats as usd-core evaluates them to expected.json.
-`read FILES` prints the same for other stages, with the faults that the checkers of usd-core find.
+`read FILES` prints the same for other stages, with the faults that the validators of usd-core find, and writes the root
+layer of each again, as again-NAME.usda and .usdc.
 """
 
 import json
@@ -222,16 +223,13 @@ def read_stage(path):
 
 
 def faults_of(path):
-    """Return the faults that the checkers of usd-core find."""
+    """Return the faults that the validators of usd-core find."""
     context = UsdValidation.ValidationContext(UsdValidation.ValidationRegistry().GetOrLoadAllValidators())
-    found = [error.GetMessage() for error in context.Validate(Usd.Stage.Open(str(path)))]
-    checker = UsdUtils.ComplianceChecker(arkit=str(path).endswith(".usdz"))
-    checker.CheckCompliance(str(path))
-    return found + checker.GetErrors() + checker.GetFailedChecks()
+    return [error.GetMessage() for error in context.Validate(Usd.Stage.Open(str(path)))]
 
 
 def main():
-    """Runs a command."""
+    """Run a command."""
     command, *rest = sys.argv[1:]
     if command == "write":
         folder, count, seed = Path(rest[0]), int(rest[1]), int(rest[2])
@@ -241,7 +239,13 @@ def main():
             write_stage(path)
         (folder / "expected.json").write_text(json.dumps([read_stage(path) for path in paths]))
     else:
-        print(json.dumps([{**read_stage(path), "faults": faults_of(path)} for path in rest]))
+        found = []
+        for path in map(Path, rest):
+            found.append({**read_stage(path), "faults": faults_of(path)})
+            stage = Usd.Stage.Open(str(path))
+            for suffix in (".usda", ".usdc"):
+                stage.GetRootLayer().Export(str(path.with_name(f"again-{path.stem}{suffix}")))
+        print(json.dumps(found))
 
 
 main()

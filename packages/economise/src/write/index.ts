@@ -8,6 +8,7 @@ import { writePly } from './ply.js';
 import { tuneSog, type SogChoice } from './tune-sog.js';
 import { fractionalBitsOf, writeSpz } from './spz.js';
 import type { EncodeWebp } from './sog.js';
+import { writeUsdc, writeUsdz } from './usd.js';
 import { isLodIndex } from './streamed-sog.js';
 
 /** Input of writers from a reduced cloud. */
@@ -57,6 +58,14 @@ const spz = (shBits: number): Encoding => ({
   write: ({ cloud }) => writeSpz(cloud, { shBits }),
 });
 
+/** OpenUSD with float16 and float32; an archive (USDZ) or a layer. All splats of a prim have the same degree. */
+const usd = (write: typeof writeUsdc): Encoding[] =>
+  [true, false].map((hasHalves) => ({
+    title: hasHalves ? 'OpenUSD, float16 with float32 positions' : 'OpenUSD, float32',
+    write: ({ cloud }) => write(cloud, { hasHalves }),
+    hasOneDegree: true,
+  }));
+
 /** GLB for scenes of planes, whose order of splats must be kept: a primitive for each degree would change it. */
 const GLB_OF_PLANES: Encoding = {
   title: 'GLB, one primitive in the order of the scene',
@@ -70,6 +79,8 @@ const ENCODINGS: ReadonlyMap<string, readonly Encoding[]> = new Map([
   ['.spz', [spz(4), spz(5), spz(6), spz(8)]],
   ['.glb', [{ title: 'GLB, a primitive for each degree', write: writeGlb }]],
   ['.ply', [{ title: 'PLY, float32', write: ({ cloud }: WrittenCloud) => writePly(cloud), hasOneDegree: true }]],
+  ['.usdz', usd(writeUsdz)],
+  ['.usdc', usd(writeUsdc)],
 ]);
 
 /**
@@ -96,7 +107,7 @@ export function encodingsFor(
       expected: `a name that ends in ${[...ENCODINGS.keys(), '.sog'].join(', ')}`,
       found: extension || 'no extension',
       remedy:
-        'choose .glb for accuracy, .sog for size, lod-meta.json in a folder for streaming, .ply for tools that read nothing else',
+        'choose .glb for accuracy, .sog for size, lod-meta.json in a folder for streaming, .usdz for OpenUSD, .ply for tools that read nothing else',
     });
   }
   requireFilter(name, extension, cloud);
@@ -118,6 +129,8 @@ const HOLDS_FILTER: Readonly<Record<string, (isCompensated: boolean, variance: n
   '.ply': () => true,
   '.spz': (_, variance) => variance === USUAL_VARIANCE,
   '.glb': (isCompensated, variance) => !isCompensated && variance === USUAL_VARIANCE,
+  '.usdz': (isCompensated, variance) => !isCompensated && variance === USUAL_VARIANCE,
+  '.usdc': (isCompensated, variance) => !isCompensated && variance === USUAL_VARIANCE,
   '.sog': (isCompensated, variance) => variance === USUAL_VARIANCE || (isCompensated && variance === MIP_VARIANCE),
 };
 

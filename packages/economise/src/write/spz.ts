@@ -22,10 +22,11 @@ const FRAME = [0xadbe0003, 4, 6];
 /** Type and length of the limits of an orbiting camera. */
 const SAFE_ORBIT = [0xadbe0002, 12];
 /**
- * Record of this project for per-pixel order (docs/decisions/0022-the-frame-of-spz.md): its type, its length in bytes,
- * and its value.
+ * Record of this project for the trained order (docs/decisions/0022-the-frame-of-spz.md): its type and its length in
+ * bytes; and its values.
  */
-const PIXEL_ORDER = [0x47530001, 4, 1];
+const ORDER = [0x47530001, 4];
+const ORDER_VALUES = { pixel: 1, distance: 2 };
 const FLAG_ANTIALIASED = 1;
 const FLAG_EXTENSIONS = 2;
 
@@ -39,9 +40,10 @@ export async function writeSpz(given: GaussianCloud, options: SpzOptions): Promi
   const cloud = upright(given);
   const { count, shDegree, antialiased } = cloud;
   const orbit = safeOrbitOf(cloud);
+  const order = cloud.hints?.order;
   const records = [
     ...FRAME,
-    ...(cloud.hints?.order === 'pixel' ? PIXEL_ORDER : []),
+    ...(order ? [...ORDER, ORDER_VALUES[order]] : []),
     ...(orbit ? [...SAFE_ORBIT, ...new Uint32Array(Float32Array.from(orbit).buffer)] : []),
   ];
   const coefficients = shCoefficientCount(shDegree) - 1;

@@ -22,18 +22,32 @@ function crc32(bytes: Uint8Array): number {
   return ~code >>> 0;
 }
 
+/** Extra field whose only purpose is its length, and the bytes of its type and length. */
+const [PADDING, PADDING_HEAD] = [0x1986, 4];
+
 /**
  * Writes a ZIP archive without compression, because the files are already compressed.
  * @param files Bytes of the files by name.
+ * @param format Name of the format for errors.
+ * @param alignment The offset of the content of each file is a multiple of it.
  * @throws GaussianSplatError `argument/value` for more than ZIP holds without ZIP64, before the allocation;
  * `out-of-memory/allocation`
  */
-export function writeZip(files: ReadonlyMap<string, Uint8Array>): Uint8Array<ArrayBuffer> {
-  const entries = [...files].map(([name, bytes]) => ({ name: new TextEncoder().encode(name), bytes }));
-  const total = entries.reduce((sum, { name, bytes }) => sum + 30 + 46 + 2 * name.length + bytes.length, 22);
-  requireAtMost('SOG', entries.length, MAX_FILES, 'files in its ZIP archive');
-  requireAtMost('SOG', total, MAX_UINT32, 'bytes in its ZIP archive');
-  const zip = fileBytes('SOG', total);
+export function writeZip(
+  files: ReadonlyMap<string, Uint8Array>,
+  format = 'SOG',
+  alignment = 1,
+): Uint8Array<ArrayBuffer> {
+  const entries = [...files].map(([name, bytes]) => ({ name: new TextEncoder().encode(name), bytes, padding: 0 }));
+  let total = 0;
+  for (const entry of entries) {
+    entry.padding = paddingOf(total + 30 + entry.name.length, alignment);
+    total += 30 + entry.name.length + entry.padding + entry.bytes.length;
+  }
+  total += entries.reduce((sum, { name }) => sum + 46 + name.length, 22);
+  requireAtMost(format, entries.length, MAX_FILES, 'files in its ZIP archive');
+  requireAtMost(format, total, MAX_UINT32, 'bytes in its ZIP archive');
+  const zip = fileBytes(format, total);
   const view = new DataView(zip.buffer);
   let at = 0;
   const put = (fields: readonly (readonly [bytes: 2 | 4, value: number])[]): void => {
@@ -47,10 +61,16 @@ export function writeZip(files: ReadonlyMap<string, Uint8Array>): Uint8Array<Arr
     zip.set(bytes, at);
     at += bytes.length;
   };
-  const places = entries.map(({ name, bytes }) => {
-    const [place, facts] = [at, factsOf(name, bytes)];
-    put([[4, LOCAL], [2, VERSION], ...facts]);
+  const places = entries.map(({ name, bytes, padding }) => {
+    const place = at;
+    put([[4, LOCAL], [2, VERSION], ...factsOf(name, bytes, padding)]);
     append(name);
+    if (padding > 0)
+      put([
+        [2, PADDING],
+        [2, padding - PADDING_HEAD],
+      ]);
+    at = place + 30 + name.length + padding;
     append(bytes);
     return place;
   });
@@ -85,7 +105,7 @@ export function writeZip(files: ReadonlyMap<string, Uint8Array>): Uint8Array<Arr
  * Returns the fields that both headers of a file have: flags (the name is UTF-8), method, time, date, checksum, two
  * sizes, and the lengths of the name and of the extra field.
  */
-function factsOf(name: Uint8Array, bytes: Uint8Array): (readonly [2 | 4, number])[] {
+function factsOf(name: Uint8Array, bytes: Uint8Array, padding = 0): (readonly [2 | 4, number])[] {
   return [
     [2, 0x800],
     [2, 0],
@@ -95,8 +115,14 @@ function factsOf(name: Uint8Array, bytes: Uint8Array): (readonly [2 | 4, number]
     [4, bytes.length],
     [4, bytes.length],
     [2, name.length],
-    [2, 0],
+    [2, padding],
   ];
+}
+
+/** Bytes of the extra field that move content from `at` to a multiple of `alignment`. */
+function paddingOf(at: number, alignment: number): number {
+  const gap = (alignment - (at % alignment)) % alignment;
+  return gap > 0 && gap < PADDING_HEAD ? gap + alignment : gap;
 }
 
 /** Returns the files of an archive that {@link writeZip} wrote, by name. They share the memory of the archive. */
@@ -105,8 +131,11 @@ export function filesOfZip(zip: Uint8Array): Map<string, Uint8Array> {
   const files = new Map<string, Uint8Array>();
   for (let at = 0; view.getUint32(at, true) === LOCAL;) {
     const [length, nameLength] = [view.getUint32(at + 22, true), view.getUint16(at + 26, true)];
-    const first = at + 30 + nameLength;
-    files.set(new TextDecoder().decode(zip.subarray(at + 30, first)), zip.subarray(first, first + length));
+    const first = at + 30 + nameLength + view.getUint16(at + 28, true);
+    files.set(
+      new TextDecoder().decode(zip.subarray(at + 30, at + 30 + nameLength)),
+      zip.subarray(first, first + length),
+    );
     at = first + length;
   }
   return files;

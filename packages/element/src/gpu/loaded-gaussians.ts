@@ -1,3 +1,4 @@
+import type { TrainedOrder } from '@gaussian-splat/core';
 import type { GaussianScene, StreamProgress } from '@gaussian-splat/renderer';
 import { QueueClock } from '@gaussian-splat/renderer/tools';
 import type { SceneBounds } from '../viewer/camera/settings.js';
@@ -51,7 +52,7 @@ export class LoadedGaussians implements Drawable {
   /** The meshes of the source; undefined until they are read, and if there are none. */
   model: MeshModel | undefined;
   /** Sort order of the splats that the file declares; undefined if it declares none. */
-  readonly order: 'pixel' | undefined;
+  readonly order: TrainedOrder | undefined;
   /** Whether the file also contains triangle meshes. */
   readonly hasMeshes: boolean;
   /** Messages about content of the file that is not drawn. */
@@ -81,7 +82,7 @@ export class LoadedGaussians implements Drawable {
     }: {
       live?: Timeline | undefined;
       detail?: LodSettings;
-      order?: 'pixel' | undefined;
+      order?: TrainedOrder | undefined;
       hasMeshes?: boolean | undefined;
       warnings?: readonly string[] | undefined;
     } = {},

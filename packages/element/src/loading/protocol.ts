@@ -1,5 +1,5 @@
 /** Messages between the page and the scene worker. */
-import type { ErrorData, ShDegree, Vector3 } from '@gaussian-splat/core';
+import type { ErrorData, ShDegree, TrainedOrder, Vector3 } from '@gaussian-splat/core';
 import type { ModelPlace } from '@gaussian-splat/core/onnx';
 import type { CpuCheckMessage } from '@gaussian-splat/generator';
 import type { RendererChoice } from '../viewer/attributes.js';
@@ -84,7 +84,7 @@ export interface LoadedFacts {
   /** Messages about content that is not drawn: see `GaussianCloud.warnings`. */
   readonly warnings?: readonly string[] | undefined;
   /** Sort order of splats, if the file declares one: see `CloudHints.order`. */
-  readonly order?: 'pixel' | undefined;
+  readonly order?: TrainedOrder | undefined;
   /** Whether the file also contains triangle meshes. */
   readonly hasMeshes?: boolean | undefined;
 }

@@ -220,8 +220,8 @@ export const ATTRIBUTES = {
    */
   disableTap: flag(),
   /**
-   * Length of one unit of the scene's file, with `m`, `cm` or `mm`. Without it, walking and VR take a unit for one meter, and rulers show numbers alone.
-   * @default unknown
+   * Length of one unit of the scene's file, with `m`, `cm` or `mm`. Without it, that of the file applies (OpenUSD's `metersPerUnit`). If the file has none, walking and VR take a unit for one meter, and rulers show numbers alone.
+   * @default that of the file, else unknown
    * @example unit="37cm"
    */
   unit: text(),

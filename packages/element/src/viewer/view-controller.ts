@@ -279,10 +279,10 @@ export class ViewController implements FrameClient {
   /** Applies the settings of the page to a backend, for its next frames. */
   applyRendering(backend: Backend): void {
     const { quality, maxShDegree: shDegree, filter, order: choice } = this.#host.attributes;
-    const trainedOrder = this.#host.sources.shown.some(({ order }) => order) ? 'pixel' : 'center';
-    const order = choice === 'auto' ? trainedOrder : choice;
-    const trained = filter === 'auto' ? undefined : filter;
-    backend.setRendering({ quality: quality === 'auto' ? 'default' : quality, shDegree, order, filter: trained });
+    const trained = this.#host.sources.shown.find((one) => one.order)?.order ?? 'center';
+    const order = choice === 'auto' ? trained : choice;
+    const declared = filter === 'auto' ? undefined : filter;
+    backend.setRendering({ quality: quality === 'auto' ? 'default' : quality, shDegree, order, filter: declared });
   }
 
   #finishUnseen(): void {

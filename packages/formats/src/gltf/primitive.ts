@@ -1,6 +1,6 @@
 import { shCoefficientCount, type GaussianCloud, type ShDegree } from '@gaussian-splat/core';
 import { grouped } from '../bytes.js';
-import { allocateCloud, SH_C0, type DraftCloud } from '../cloud.js';
+import { allocateCloud, SH_C0, trainedOrder, type DraftCloud } from '../cloud.js';
 import { damaged, warn } from '../faults.js';
 import { isObject, show } from '../json.js';
 import { readSpz } from '../readers/spz.js';
@@ -80,7 +80,8 @@ export async function readPrimitive(
   const cloud = await readNumbers(document, primitive, path, source, range);
   noteUnknown(cloud, splats);
   const { extras } = splats;
-  if (isObject(extras) && extras.sortingMethod === 'pixel') cloud.hints = { order: 'pixel' };
+  const order = isObject(extras) ? trainedOrder(extras.sortingMethod) : undefined;
+  if (order) cloud.hints = { order };
   return cloud;
 }
 

@@ -4,7 +4,7 @@
  */
 import { GaussianSplatError, loadModule, normalize, type Vector3 } from '@gaussian-splat/core';
 import { grouped } from '../bytes.js';
-import type { DraftCloud } from '../cloud.js';
+import { trainedOrder, type DraftCloud } from '../cloud.js';
 import { DEGREE_4, FLAT, warn } from '../faults.js';
 import { OFFSETS, PLAIN, TRAILING } from './gaussian-layout.js';
 import { safeOrbit } from '../safe-orbit.js';
@@ -41,7 +41,9 @@ export function readComments(cloud: DraftCloud, comments: readonly string[]): vo
   // The trainer of gsplat uses a filter variance of 0.3 px², the default.
   else if (mode === 'mip' && !comments.some((text) => /gsplat/i.test(text))) cloud.filterVariance = MIP_VARIANCE;
   const generator = valueOf(comments, /^((?:generated|exported|created) .*)$/i);
-  if (ORDERS_PIXELS.test(valueOf(comments, SORTING) ?? '')) cloud.hints = { ...cloud.hints, order: 'pixel' };
+  const sorting = valueOf(comments, SORTING) ?? '';
+  const order = ORDERS_PIXELS.test(sorting) ? 'pixel' : trainedOrder(sorting);
+  if (order) cloud.hints = { ...cloud.hints, order };
   const up = upOf(comments);
   if (up) cloud.hints = { ...cloud.hints, up };
   if (generator !== undefined) cloud.hints = { ...cloud.hints, generator };

@@ -1,4 +1,4 @@
-import { GaussianSplatError } from '@gaussian-splat/core';
+import { GaussianSplatError, type TrainedOrder } from '@gaussian-splat/core';
 import { viewOf } from '../bytes.js';
 import { safeOrbit, type OrbitLimits } from '../safe-orbit.js';
 import type { SpzHeader } from './header.js';
@@ -16,8 +16,9 @@ const COORDINATE_SYSTEM = 0xadbe0003;
 /** Adobe's limits of an orbiting camera: smallest and largest elevation, smallest radius. */
 const SAFE_ORBIT = 0xadbe0002;
 const PADDING = 0;
-/** Our own record of the order of splats: 1 for per-pixel. */
+/** Our own record of the trained order of splats: a number of {@link ORDERS}, from 1 on. */
 const ORDER = 0x47530001;
+const ORDERS: readonly TrainedOrder[] = ['pixel', 'distance'];
 const MAX_SKIPPED = 8;
 /** Number of fractional bits in the files of all converters. */
 const USUAL_FRACTIONAL_BITS = 12;
@@ -31,7 +32,7 @@ export interface SpzFrame {
   readonly turn?: readonly number[] | undefined;
   /** Whether the file declares no coordinate system. */
   readonly isAssumed?: boolean | undefined;
-  readonly order?: 'pixel' | undefined;
+  readonly order?: TrainedOrder | undefined;
   readonly orbit?: OrbitLimits | undefined;
 }
 
@@ -63,14 +64,14 @@ export function readExtensions(
 ): SpzFrame & { skipped: readonly number[] } {
   const skipped = new Set<number>();
   let frame: SpzFrame | undefined;
-  let order: 'pixel' | undefined;
+  let order: TrainedOrder | undefined;
   let orbit: OrbitLimits | undefined;
   for (const { type, payload } of recordsIn(records)) {
     const length = payload.byteLength;
     const limits = type === SAFE_ORBIT && length >= 12 && !header.followsSpecification ? limitsIn(payload) : undefined;
     if (limits) orbit = limits;
     else if (type === COORDINATE_SYSTEM && length >= 4) frame ??= frameOfSystem(payload.getUint32(0, true), name);
-    else if (type === ORDER && length >= 4) order = payload.getUint32(0, true) === 1 ? 'pixel' : undefined;
+    else if (type === ORDER && length >= 4) order = ORDERS[payload.getUint32(0, true) - 1];
     else if (type !== PADDING && skipped.size < MAX_SKIPPED) skipped.add(type);
   }
   return {

@@ -4,6 +4,7 @@ import {
   type ErrorCode,
   type FilterRule,
   type ShDegree,
+  type TrainedOrder,
   type Vector3,
 } from '@gaussian-splat/core';
 import { constants } from '../generated/shaders.js';
@@ -77,7 +78,7 @@ export interface DetailManifest extends FilterRule {
   /** Coding of the files, which `decodePage` converts to words. Default: files contain the words. */
   readonly coding?: PageCoding;
   /** Sort order of splats in training; undefined if splats were sorted by the depth of their centers. */
-  readonly order?: 'pixel' | undefined;
+  readonly order?: TrainedOrder | undefined;
   readonly origin: Vector3;
   readonly bounds: Bounds;
   readonly trees: readonly Tree[];
@@ -144,7 +145,8 @@ export function checkManifest(value: unknown, where: string, maxPages = MAX_PAGE
     fail('filterVariance', 'a variance of 0 to 1 px², or nothing', filterVariance);
   }
   const { order } = manifest;
-  if (order !== undefined && order !== 'pixel') fail('order', 'pixel, or nothing', order);
+  if (order !== undefined && order !== 'pixel' && order !== 'distance')
+    fail('order', 'pixel, distance, or nothing', order);
   if (!isVector(origin)) fail('origin', '3 numbers', origin);
   const hasBounds = isVector(bounds?.min) && isVector(bounds.max) && isVector(bounds.center);
   if (!hasBounds || !Number.isFinite(bounds?.radius)) fail('bounds', 'min, max, center and radius', bounds);

@@ -1,4 +1,4 @@
-import { GaussianSplatError, type Bounds, type Vector3 } from '@gaussian-splat/core';
+import { GaussianSplatError, type Bounds, type TrainedOrder, type Vector3 } from '@gaussian-splat/core';
 import type { GaussianBlock } from '../gaussian-scene.js';
 import { constants } from '../generated/shaders.js';
 import { type GpuMemory, withMemoryCheck } from '../gpu/memory.js';
@@ -96,7 +96,7 @@ export class StreamedGaussians extends SceneBuffers {
   /** Number of splats in the finest level. */
   readonly leafCount: number;
   /** Sort order of splats in training: see `CloudHints.order`. */
-  readonly order: 'pixel' | undefined;
+  readonly order: TrainedOrder | undefined;
   readonly bounds: Bounds;
   readonly blocks: readonly GaussianBlock[];
   readonly detailBudget: DetailBudget;

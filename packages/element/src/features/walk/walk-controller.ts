@@ -2,12 +2,13 @@ import { subtract, type Vector3 } from '@gaussian-splat/core';
 import type { WalkMap } from '@gaussian-splat/formats/walk';
 import type { ReactiveController } from 'lit';
 import { readAttribute } from '../../viewer/camera/grammar.js';
-import { lengthGrammar, optionalLengthGrammar } from '../../viewer/camera/lengths.js';
+import { lengthGrammar } from '../../viewer/camera/lengths.js';
 import { eyeOfPose } from '../../viewer/camera/orbit.js';
 import type { CameraAction } from '../../viewer/camera/gestures.js';
 import { MAX_MOVER_STEP_MS, prefersReducedMotion } from '../../viewer/motion.js';
 import type { Feature } from '../../viewer/features.js';
 import { LatestTask } from '../../viewer/latest-task.js';
+import { unitOf } from '../../viewer/unit.js';
 import type { Viewer } from '../../viewer/viewer.js';
 import { openFloor } from '../../floor/floor-source.js';
 import { Gamepads } from './gamepads.js';
@@ -282,14 +283,14 @@ export class WalkController implements ReactiveController, Feature {
     return [right + this.#joystick.right, forward + this.#joystick.forward, turn];
   }
 
-  /** Returns the settings of the attributes. Lengths are in meters; `unit` is undefined if the page does not set it. */
+  /** Returns the settings of the attributes. Lengths are in meters; `unit` is undefined if neither page nor file has it. */
   #settings(): { walkMap: string; eyeHeight: number; unit: number | undefined } {
-    const { walkMap, eyeHeight, unit } = this.#viewer.attributes;
+    const { walkMap, eyeHeight } = this.#viewer.attributes;
     const warn = (sentence: string): void => this.#viewer.warn(sentence);
     return {
       walkMap: walkMap?.trim() || 'auto',
       eyeHeight: readAttribute('eye-height', eyeHeight, lengthGrammar('1.6m'), warn),
-      unit: readAttribute('unit', unit, optionalLengthGrammar, warn),
+      unit: unitOf(this.#viewer),
     };
   }
 

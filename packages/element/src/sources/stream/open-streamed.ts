@@ -1,6 +1,6 @@
 /** Opens streamed scenes: manifests of pages (docs/lod-format.md), streamed SOG by boxes, and clips. */
 import { fileRequest } from '@gaussian-splat/core/fetch';
-import { loadModule } from '@gaussian-splat/core';
+import { loadModule, type TrainedOrder } from '@gaussian-splat/core';
 import { MemoryLedger, pickInitialVariants, StreamedGaussians, type PoolOptions } from '@gaussian-splat/renderer';
 import { levelSource } from '@gaussian-splat/renderer/tools';
 import type { LoadedBoxes, ProgressListener, SceneLimits, SceneRequest } from '../../loading/protocol.js';
@@ -31,7 +31,7 @@ export interface StreamedOptions {
 export interface OpenedStream {
   readonly gaussians: OwnedGaussians;
   readonly bounds: SceneBounds;
-  readonly order?: 'pixel' | undefined;
+  readonly order?: TrainedOrder | undefined;
   readonly detail?: LodSettings;
   readonly live?: ClipPlayer;
   readonly warnings?: readonly string[];

@@ -30,6 +30,8 @@ export interface SceneBounds extends Bounds {
   readonly up?: Vector3 | undefined;
   /** Limits for a camera that the scene's file recommends: they replace the automatic ones. */
   readonly orbit?: CloudHints['orbit'];
+  /** Meters of a world unit; undefined if the scene's file does not declare it. */
+  readonly metersPerUnit?: number | undefined;
 }
 
 /** Returns the rotation from scene coordinates to viewer space. */
