@@ -5,10 +5,10 @@ import { readScene, splatRanges } from '@gaussian-splat/formats';
 import { shBasis } from '../oracle/sh.js';
 import { seededRandom } from '../support/random.js';
 import { assertAtMost, assertSameCloud, expectRefusal, largestDifference } from './support/expect.js';
-import { buildGltf, writeGlb } from './support/gltf-writer.js';
+import { buildGltf, withMeshopt, writeGlb } from './support/gltf-writer.js';
 import { smallCloud } from './support/small-cloud.js';
 import { rawSplats } from './support/splats.js';
-import { halfTurned } from '../support/data.js';
+import { halfTurned, needsSharedData, sharedFile } from '../support/data.js';
 import { writeSpz } from './support/spz-writer.js';
 
 const read = (...[meshes, nodes, roots]: Parameters<typeof buildGltf>): Promise<GaussianCloud> => {
@@ -238,6 +238,46 @@ test('copies are bounded, and what is in the file once is not', async () => {
   assert.equal((await readScene(file, { name: 'a.gltf', openFile })).count, count);
 });
 
+test('splats whose buffer views meshoptimizer has compressed are those of the plain file', async () => {
+  for (const extension of ['EXT_meshopt_compression', 'KHR_meshopt_compression']) {
+    const { json, buffer } = buildGltf([[{ cloud: smallCloud(300, 3) }], [{ cloud: smallCloud(9, 0) }]], [{ mesh: 0 }, { mesh: 1 }], [0, 1]); // prettier-ignore
+    const packed = await withMeshopt(json, buffer, extension);
+    const file = writeGlb(packed.json, packed.buffer);
+    const cloud = await readScene(file, { name: 'a.glb' });
+    assertSameCloud(cloud, await readScene(writeGlb(json, buffer), { name: 'a.glb' }));
+    assert.equal(cloud.warnings, undefined);
+    assert.equal(await splatRanges(file, 'a.glb'), undefined, 'compressed views cannot be read in ranges');
+    const views = packed.json.bufferViews as { extensions: Record<string, object> }[];
+    const broken = (change: object): Uint8Array => {
+      const bufferViews = views.map((view, k) =>
+        k === 1 ? { ...view, extensions: { [extension]: { ...view.extensions[extension], ...change } } } : view,
+      );
+      return writeGlb({ ...packed.json, bufferViews }, packed.buffer);
+    };
+    for (const [change, code, message] of [
+      [
+        { byteLength: 5 },
+        'decode/corrupt',
+        /bufferViews\[1\]: expected 300 elements of 12 bytes, compressed by meshop/,
+      ],
+      [{ mode: 'NEW' }, 'decode/header', /bufferViews\[1\]: expected a mode and a filter of meshopt/],
+      [{ byteStride: 300 }, 'decode/header', /a count and a stride of meshopt/],
+      [{ count: 1e9 }, 'out-of-memory/budget', /bytes of memory/],
+      [{ byteLength: 1e9 }, 'decode/truncated', /bufferViews\[1\]/],
+    ] as const)
+      await expectRefusal(broken(change), code, message, { name: 'a.glb' });
+  }
+});
+
+test('a conversion of another tool with meshopt is read', { skip: needsSharedData }, async () => {
+  const [plain, packed] = await Promise.all(
+    ['khr-plain.glb', 'khr-ext-meshopt.glb'].map((name) =>
+      readScene(sharedFile(`../cases/mission-4/${name}`), { name }),
+    ),
+  );
+  assertSameCloud(packed, plain);
+});
+
 test('what the extension allows and we do not draw falls back with a warning, or is refused by name', async () => {
   const { json, buffer } = buildGltf([[{ cloud: smallCloud(2, 0) }]], [{ mesh: 0 }], [0]);
   type Splats = { extensions: { KHR_gaussian_splatting: Record<string, unknown> } };
@@ -276,12 +316,13 @@ test('what the extension allows and we do not draw falls back with a warning, or
   await expectRefusal(zeros, 'decode/unsupported', /accessors\[3\].*bufferView/, { name: 'a.glb' });
   const sparse = accessors.map((accessor, k) => (k === 3 ? { ...accessor, sparse: {} } : accessor));
   await expectRefusal(writeGlb({ ...json, accessors: sparse }, buffer), 'decode/header', /sparse/, { name: 'a' });
-  for (const required of ['EXT_meshopt_compression', 'EXT_mesh_gpu_instancing', 'ACME_warp', 7]) {
+  for (const required of ['EXT_mesh_gpu_instancing', 'ACME_warp', 7]) {
     const file = writeGlb({ ...json, extensionsRequired: ['KHR_gaussian_splatting', required] }, buffer);
     await expectRefusal(file, 'decode/unsupported', new RegExp(`extensionsRequired.*${required}`), { name: 'a.glb' });
   }
   const harmless = [
     ...['KHR_gaussian_splatting', 'KHR_gaussian_splatting_compression_spz_2', 'KHR_mesh_quantization'],
+    ...['EXT_meshopt_compression', 'KHR_meshopt_compression'],
     ...['KHR_materials_unlit', 'KHR_texture_basisu', 'EXT_texture_webp', 'KHR_lights_punctual', 'EXT_mesh_features'],
   ];
   const inside = await readScene(writeGlb({ ...json, extensionsRequired: harmless }, buffer), { name: 'a.glb' });

@@ -132,11 +132,11 @@ test('content speaks before the name', { skip: needsSharedData }, async () => {
 
 test('the registry names every format once and its loaders give readers', async () => {
   assert.deepEqual(sceneFormats.map(({ name }) => name).sort(), [
-    ...['compressed-ply', 'gltf', 'ksplat', 'lcc', 'lcc2', 'lod', 'ply', 'rad', 'sog', 'splat', 'spz', 'zip'],
+    ...['compressed-ply', 'gltf', 'ksplat', 'lcc', 'lcc2', 'lod', 'ply', 'rad', 'sog', 'splat', 'spz', 'usd', 'zip'],
   ]);
   for (const { extensions, mimeTypes, load } of sceneFormats) {
     for (const extension of extensions) assert.match(extension, /^(\.[a-z]+2?)+$/);
-    for (const type of mimeTypes) assert.match(type, /^[a-z]+\/[a-z+-]+$/);
+    for (const type of mimeTypes) assert.match(type, /^[a-z]+\/[a-z+.-]+$/);
     assert.equal(typeof (await load()), 'function');
   }
 });

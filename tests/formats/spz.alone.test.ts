@@ -2,7 +2,7 @@ import assert from 'node:assert/strict';
 import { gunzipSync, gzipSync } from 'node:zlib';
 import { test } from 'node:test';
 import { encodingsFor } from '@gaussian-splat/economise';
-import { readScene } from '@gaussian-splat/formats';
+import { readPrefix, readScene } from '@gaussian-splat/formats';
 import type { GaussianCloud, ShDegree } from '@gaussian-splat/core';
 import { transformCloud } from '../../packages/formats/src/transform/transform-cloud.js';
 import { needsSharedData, sharedFile } from '../support/data.js';
@@ -110,10 +110,13 @@ test('the marks of writers decide the frame of files that name none, which the c
     const cloud = await readScene(writeSpz(splats, { ...options, axes }));
     assertHolds(cloud, splats, options.version);
     assert.equal(cloud.hints?.isUpAssumed, true);
+    assert.match(cloud.warnings!.join(), /does not name its axes.*set up="y"/);
+    const start = await readPrefix(writeSpz(splats, { ...options, axes }), { name: 'a.spz' });
+    assert.equal(start?.warnings, undefined, 'the records are at the end of a file');
   }
   const named = extensionRecord(0xadbe0003, Uint8Array.of(4, 0, 0, 0));
   const cloud = await readScene(writeSpz(splats, { version: 3, extensions: named, axes: [1, -1, -1] }));
-  assert.equal(cloud.hints?.isUpAssumed, undefined);
+  assert.deepEqual([cloud.hints?.isUpAssumed, cloud.warnings], [undefined, undefined]);
 });
 
 test('the coordinate system is found among other extensions', async () => {

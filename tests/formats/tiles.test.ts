@@ -107,6 +107,35 @@ test('transforms of tiles are those of a frame whose third axis points up', asyn
   assert.equal(found.hints?.up, undefined);
 });
 
+test('the vertical axis of glTF contents of early tilesets applies to them and to their harmonics', async () => {
+  const plain = await whole(TREE['root.glb']);
+  // East, north and up of a point of a glTF, as CesiumJS turns its axes.
+  const turns: Readonly<Record<string, (x: number, y: number, z: number) => number[]>> = {
+    Y: (x, y, z) => [x, -z, y],
+    Z: (x, y, z) => [x, y, z],
+    x: (x, y, z) => [-z, y, x],
+  };
+  const read = (gltfUpAxis: unknown, root: object = tile('root.glb')): Promise<GaussianCloud> =>
+    readTiles({ ...TREE, 'tileset.json': json({ asset: { version: '1.0', gltfUpAxis }, geometricError: 9, root }) });
+  const sh = new Set<string>();
+  for (const [axis, turn] of Object.entries(turns)) {
+    const found = await read(axis);
+    const expected = Array.from({ length: plain.count }, (_, i) => {
+      const [x, y, z] = plain.positions.subarray(3 * i, 3 * i + 3);
+      const [e, n, u] = turn(-x, -y, z);
+      return [-e, -u, -n];
+    });
+    assertNear(worldOf(found), expected.flat(), 1e-5);
+    sh.add([...found.sh.subarray(3, 12)].map((value) => value.toFixed(4)).join());
+  }
+  assert.equal(sh.size, 3, 'the harmonics turn along');
+  // A tileset within has its own axis.
+  const inner = await read('Z', tile('inner/tileset.json'));
+  assertNear(inner.positions, (await whole(TREE['inner/b.glb'])).positions, 1e-6);
+  const odd = json({ asset: { version: '1.0', gltfUpAxis: 'W' }, geometricError: 9, root: tile('root.glb') });
+  await expectRefusal(odd, 'decode/unsupported', /gltfUpAxis: expected X, Y or Z, found "W"/, { name: 'tileset.json' });
+});
+
 test('a tileset on the Earth keeps its digits and knows where up is', async () => {
   const [lon, lat] = [0.2, 0.8];
   const up = [Math.cos(lat) * Math.cos(lon), Math.cos(lat) * Math.sin(lon), Math.sin(lat)];

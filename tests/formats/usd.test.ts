@@ -134,6 +134,7 @@ test('flat kernels are discs, and say so', async () => {
   );
   assert.match(flat.warnings!.join(), /2DGS/);
   assert.equal(flat.hints?.isUpAssumed, true, 'the layer has no upAxis');
+  assert.match(flat.warnings!.join(), /does not name its up axis, and y is assumed.*up="z"/);
 });
 
 const written = async (name: string, cloud: GaussianCloud): Promise<Uint8Array[]> => {

@@ -65,7 +65,7 @@ async function writeSingle(scene, tag, page) {
   const { found, missing } = await filesBeside(scene);
   if (isJson(scene) || found.length + missing.length > 0 || isModel(scene))
     throw new CommandError(
-      `${scene} consists of several files, or needs ONNX Runtime. --single takes a scene of one file: PLY, SPZ, SOG, .splat, .ksplat or GLB.`,
+      `${scene} consists of several files, or needs ONNX Runtime. --single takes a scene of one file: PLY, SPZ, SOG, .splat, .ksplat, GLB or USDZ.`,
     );
   const { size } = statSync(scene);
   if (size > MAX_SINGLE)

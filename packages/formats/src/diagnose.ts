@@ -14,7 +14,8 @@ interface ForeignKind {
 }
 
 const CHECK_URL = 'check the address of the scene; the server sent something else';
-const NOT_A_SCENE = 'give the address of a scene file: .ply, .compressed.ply, .spz, .sog, .splat, .ksplat or .glb';
+const NOT_A_SCENE =
+  'give the address of a scene file: .ply, .compressed.ply, .spz, .sog, .splat, .ksplat, .glb or .usdz';
 
 const unread = ({ found, remedy }: UnreadKind): ForeignKind => ({
   code: 'decode/unsupported',
@@ -98,7 +99,7 @@ function isOnnx(bytes: Uint8Array): boolean {
   return bytes.length > 8 && bytes[0] === 8 && bytes[1] > 0 && bytes[1] < 32 && [0x12, 0x3a].includes(bytes[2]);
 }
 
-const A_SCENE = 'a Gaussian splat scene (PLY, compressed PLY, SPZ, SOG, .splat, .ksplat or glTF)';
+const A_SCENE = 'a Gaussian splat scene (PLY, compressed PLY, SPZ, SOG, .splat, .ksplat, glTF or OpenUSD)';
 
 /**
  * Returns the error for a file that is not a supported scene. The error names the kind of file, which is identified by

@@ -6,6 +6,8 @@ export interface TileContent {
   readonly uri: string;
   /** Transform from the coordinates of the tile (z up) to those of the tileset. */
   readonly toTileset: Affine;
+  /** Rotation of glTF contents whose vertical axis is not y, before {@link toTileset}. */
+  readonly turn?: Affine | undefined;
 }
 
 /** A node of the tree. Its contents are drawn, or the child tiles that replace them. */

@@ -27,7 +27,7 @@ export async function contentsAt(
   openSubtree: OpenSubtree,
   toParent: Affine = IDENTITY,
 ): Promise<TileContent[]> {
-  const { root } = parseJson(source, MAX_INDEX_BYTES);
+  const { root, asset } = parseJson(source, MAX_INDEX_BYTES);
   const fail = (path: string, expected: string, found: unknown): never => {
     throw damaged(`${source.name}, ${path}`, expected, show(found), 'decode/header');
   };
@@ -59,7 +59,24 @@ export async function contentsAt(
   };
   const tree = open(root, toParent, false, 'root', 0);
   for (const complete of implicit) await complete();
-  return drawnOf(tree, level);
+  const turn = turnOf(asset, source.name);
+  const contents = drawnOf(tree, level);
+  return turn ? contents.map((content) => ({ ...content, turn })) : contents;
+}
+
+/** Rotations of glTF contents by their vertical axis, from the coordinates of contents whose vertical axis is y. */
+const TURNS: Readonly<Record<string, Affine | undefined>> = {
+  X: [0, 1, 0, 0, 0, 0, 1, 0, 1, 0, 0, 0],
+  Y: undefined,
+  Z: [1, 0, 0, 0, 0, 0, 1, 0, 0, -1, 0, 0],
+};
+
+/** Returns the rotation for the property `gltfUpAxis` of early tilesets; undefined for y, the default. */
+function turnOf(asset: unknown, name: string): Affine | undefined {
+  const axis = isObject(asset) ? (asset.gltfUpAxis ?? 'Y') : 'Y';
+  const key = String(axis).toUpperCase();
+  if (Object.hasOwn(TURNS, key)) return TURNS[key];
+  throw damaged(`${name}, asset.gltfUpAxis`, 'X, Y or Z', show(axis), 'decode/unsupported');
 }
 
 /**

@@ -1,5 +1,6 @@
 /** Writes glTF with KHR_gaussian_splatting; shares no code with the reader. */
 import type { GaussianCloud } from '@gaussian-splat/core';
+import { MeshoptEncoder } from 'meshoptimizer/encoder';
 
 export interface GltfPrimitive {
   readonly cloud: GaussianCloud;
@@ -82,6 +83,35 @@ export function buildGltf(
     buffers: [{ byteLength: at }],
   };
   return { json, buffer: Buffer.concat(chunks) };
+}
+
+/** The same JSON and buffer with all buffer views compressed by meshoptimizer. Elements are vectors of float32. */
+export async function withMeshopt(
+  json: Json,
+  buffer: Uint8Array,
+  extension: string,
+): Promise<{ json: Json; buffer: Buffer }> {
+  await MeshoptEncoder.ready;
+  const widths: Readonly<Record<string, number>> = { SCALAR: 1, VEC3: 3, VEC4: 4 };
+  const accessors = json.accessors as { bufferView: number; count: number; type: string }[];
+  const chunks: Uint8Array[] = [];
+  let at = 0;
+  const bufferViews = (json.bufferViews as { byteOffset: number; byteLength: number }[]).map((view, k) => {
+    const { count, type } = accessors.find(({ bufferView }) => bufferView === k)!;
+    const byteStride = 4 * widths[type];
+    const own = new Uint8Array(buffer.subarray(view.byteOffset, view.byteOffset + view.byteLength));
+    const packed = MeshoptEncoder.encodeGltfBuffer(own, count, byteStride, 'ATTRIBUTES');
+    const place = { buffer: 0, byteOffset: at, byteLength: packed.length, byteStride, count, mode: 'ATTRIBUTES' };
+    chunks.push(packed, new Uint8Array(-packed.length & 3));
+    at += packed.length + (-packed.length & 3);
+    return { buffer: 1, byteOffset: view.byteOffset, byteLength: view.byteLength, extensions: { [extension]: place } };
+  });
+  const fallback = { byteLength: buffer.length, extensions: { [extension]: { fallback: true } } };
+  const used = { extensionsUsed: [...(json.extensionsUsed as string[]), extension], extensionsRequired: [extension] };
+  return {
+    json: { ...json, ...used, bufferViews, buffers: [{ byteLength: at }, fallback] },
+    buffer: Buffer.concat(chunks),
+  };
 }
 
 export function writeGlb(json: Json, buffer: Uint8Array): Uint8Array {

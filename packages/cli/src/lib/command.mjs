@@ -56,8 +56,6 @@ export function parseSceneOptions(args, options) {
  */
 export function sayWarnings(scene, { warnings = [], hints }, out = '.spz') {
   for (const warning of warnings) console.error(`${scene}: ${warning}`);
-  if (hints?.isUpAssumed)
-    console.error(`${scene}: the file does not name its axes, which are inferred from the marks of its writer`);
   if (hints?.orbit && !/\.(spz|ply)$/i.test(out))
     console.error(`${scene}: its limits of the camera are left out, because only .spz and .ply hold them`);
 }

@@ -19,10 +19,10 @@ const HEADER_BYTES = 12;
 
 /**
  * Matches extensions that do not prevent drawing splats if a file requires them: materials, textures, lights, metadata,
- * and compression of meshes. Integer attributes (`KHR_mesh_quantization`) are supported.
+ * and compression of meshes. Integer attributes (`KHR_mesh_quantization`) and meshopt are supported.
  */
 const HARMLESS =
-  /^(KHR_mesh_quantization|KHR_draco_mesh_compression|[A-Z0-9]+_(animation|audio|lights?|materials?|mesh_features|structural_metadata|textures?|xmp)(_|$))|^KHR_gaussian_splatting(_compression_spz(_2)?)?$/;
+  /^(KHR_mesh_quantization|(EXT|KHR)_meshopt_compression|KHR_draco_mesh_compression|[A-Z0-9]+_(animation|audio|lights?|materials?|mesh_features|structural_metadata|textures?|xmp)(_|$))|^KHR_gaussian_splatting(_compression_spz(_2)?)?$/;
 
 /**
  * Parses the container of a GLB, or a glTF in JSON.
@@ -60,10 +60,6 @@ const CONVERT =
   'convert the scene to SPZ or PLY with a tool that knows the extension, or export it with KHR_gaussian_splatting alone';
 /** Remedies for required extensions that are common and unsupported. */
 const WITHOUT: readonly (readonly [extension: RegExp, remedy: string])[] = [
-  [
-    /meshopt/i,
-    'write the file again without compression ("gltf-transform copy" decodes meshopt), or convert it to SPZ or PLY',
-  ],
   [/spz/i, 'export the scene again with KHR_gaussian_splatting_compression_spz_2, or give the SPZ that it was made of'],
 ];
 

@@ -6,6 +6,7 @@ import { damaged } from '../faults.js';
 import type { OpenFile, SceneSource, SplatRange } from '../scene-format.js';
 import { isObject, show } from '../json.js';
 import type { GltfFile, Json } from './container.js';
+import { packingOf } from './meshopt-view.js';
 
 /** A component type of accessors. `max` is the integer that represents 1 in normalized accessors. */
 interface Component {
@@ -53,6 +54,7 @@ export class GltfDocument {
   readonly #open: OpenFile | undefined;
   readonly #openUri: OpenUri | undefined;
   readonly #buffers = new Map<number, Promise<Uint8Array>>();
+  readonly #unpacked = new Map<unknown, Promise<Uint8Array>>();
   /** Files by URI, so that a file of several buffers is fetched once. */
   readonly #files = new Map<string, Promise<Uint8Array>>();
 
@@ -88,6 +90,12 @@ export class GltfDocument {
     const array = this.json[list];
     const found: unknown = Array.isArray(array) && this.isIndex(index) ? array[index] : undefined;
     return isObject(found) ? found : this.fail(`${list}[${String(index)}]`, 'an object', found);
+  }
+
+  /** Whether meshoptimizer has compressed any buffer view. */
+  get hasPackedViews(): boolean {
+    const { bufferViews } = this.json;
+    return Array.isArray(bufferViews) && bufferViews.some((view: unknown) => isObject(view) && packingOf(view));
   }
 
   /** Whether any buffer is in another file. */
@@ -193,9 +201,20 @@ export class GltfDocument {
     return values;
   }
 
-  /** Returns the bytes of a buffer view, by its index. */
+  /** Returns the bytes of a buffer view, by its index. Views that meshoptimizer has compressed are decompressed once. */
   async readView(index: unknown): Promise<Uint8Array> {
-    return this.readRange(this.item('bufferViews', index), `bufferViews[${String(index)}]`);
+    const view = this.item('bufferViews', index);
+    const path = `bufferViews[${String(index)}]`;
+    const packed = packingOf(view);
+    if (packed === undefined) return this.readRange(view, path);
+    const unpacking = this.#unpacked.get(index) ?? this.#unpack(packed, path);
+    this.#unpacked.set(index, unpacking);
+    return unpacking;
+  }
+
+  async #unpack(packed: Json, path: string): Promise<Uint8Array> {
+    const { unpackView } = await loadModule('the code that decodes meshopt', () => import('./unpack-view.js'));
+    return unpackView(this, packed, path);
   }
 
   /**

@@ -109,6 +109,7 @@ export async function gltfSplats(source: SceneSource): Promise<{ count: number; 
   const { document, placed } = open(source);
   if (
     document.hasFilesBeside ||
+    document.hasPackedViews ||
     !placed.every(({ primitive, toScene }) => isUncompressed(primitive) && !isFar(toScene))
   )
     return undefined;

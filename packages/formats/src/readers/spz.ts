@@ -1,5 +1,7 @@
 import { GaussianSplatError, loadModule, type GaussianCloud } from '@gaussian-splat/core';
 import { startsWith } from '../bytes.js';
+import type { DraftCloud } from '../cloud.js';
+import { warn } from '../faults.js';
 import { loadDetection, loadReader } from '../load-files.js';
 import { PREVIEW_STEP, sparse } from '../preview.js';
 import { previewWanted, type SceneSource } from '../scene-format.js';
@@ -31,8 +33,13 @@ export async function readSpz(source: SceneSource): Promise<GaussianCloud> {
   const { header, scene } = found;
   source.signal?.throwIfAborted();
   if (previewWanted(source, header.count)) await source.onPreview?.(await previewOf(header, scene, source));
-  return unpackFrame(header, scene, source);
+  const cloud: DraftCloud = await unpackFrame(header, scene, source);
+  if (cloud.hints?.isUpAssumed) warn(cloud, ASSUMED_AXES);
+  return cloud;
 }
+
+const ASSUMED_AXES =
+  'The file does not name its axes, which are inferred from the marks of its writer. If the scene stands on its head, set up="y".';
 
 /** Unpacks all attributes into the coordinates of a cloud. Few files have a vertical third axis and need a rotation. */
 async function unpackFrame(header: SpzHeader, scene: PackedScene, source: SceneSource): Promise<GaussianCloud> {

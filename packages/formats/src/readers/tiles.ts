@@ -33,7 +33,7 @@ export async function readTiles(source: SceneSource): Promise<GaussianCloud> {
   const level = source.level === 'all' ? 0 : (source.level ?? 0);
   const clouds: GaussianCloud[] = [];
   let others = 0;
-  for await (const { toTileset, uri, bytes } of filesOf(source, level)) {
+  for await (const { toTileset, turn, uri, bytes } of filesOf(source, level)) {
     source.signal?.throwIfAborted();
     const { budget, signal } = source;
     const name = `${source.name}, ${uri}`;
@@ -48,7 +48,8 @@ export async function readTiles(source: SceneSource): Promise<GaussianCloud> {
       throw error;
     });
     // TO_CLOUD is its own inverse, so that the same transform leads from the cloud to the tile.
-    if (cloud) clouds.push(applyMotion(cloud, multiply(TO_CLOUD, multiply(toTileset, TO_CLOUD))));
+    const fromContent = turn ? multiply(toTileset, turn) : toTileset;
+    if (cloud) clouds.push(applyMotion(cloud, multiply(TO_CLOUD, multiply(fromContent, TO_CLOUD))));
     else others++;
   }
   if (clouds.length === 0)
@@ -96,7 +97,7 @@ async function* filesOf(source: SceneSource, level: number): AsyncGenerator<Tile
     };
   list(await contentsAt(source, level, load, subtreeOf('')), 0);
   for (let content = left.pop(); content; content = left.pop()) {
-    const { uri, toTileset, depth } = content;
+    const { uri, toTileset, turn, depth } = content;
     const [path, query = ''] = uri.split(/(?=\?)/, 2);
     const where = `${name}, ${uri}`;
     // A file with several references is fetched once, and charged for each further reference.
@@ -107,7 +108,7 @@ async function* filesOf(source: SceneSource, level: number): AsyncGenerator<Tile
     if (uses.get(uri)) kept.set(uri, bytes);
     else kept.delete(uri);
     if (!isTileset(bytes)) {
-      yield { uri, toTileset, bytes };
+      yield { uri, toTileset, turn, bytes };
       continue;
     }
     if (depth >= MAX_NESTED)

@@ -11,6 +11,7 @@ import { pathOf, shownPath, valueAt, type UsdLayer, type UsdPrim } from '../usd/
 import { readTextLayer } from '../usd/text-layer.js';
 import { placesAt } from '../usd/transforms.js';
 
+const ASSUMED_Y = 'The stage does not name its up axis, and y is assumed. If the scene lies on its side, set up="z".';
 /** Maximum number of arcs and types that messages name. */
 const MAX_NAMED = 4;
 
@@ -53,6 +54,7 @@ export async function readUsd(source: SceneSource): Promise<GaussianCloud> {
   whole.hints = { ...whole.hints, ...stageHints(layer) };
   if (left.length > 0)
     warn(whole, `Content of other layers is left out: ${left.join(', ')}. "usdcat --flatten" puts it into one file.`);
+  if (whole.hints.isUpAssumed) warn(whole, ASSUMED_Y);
   warnOthers(whole, drawn);
   return whole;
 }

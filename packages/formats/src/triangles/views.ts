@@ -3,27 +3,21 @@ import { damaged } from '../faults.js';
 import { isObject } from '../json.js';
 import type { Json } from '../gltf/container.js';
 import type { GltfDocument } from '../gltf/document.js';
+import { meshoptParameters, packingOf, type MeshoptParameters } from '../gltf/meshopt-view.js';
 import { layoutOf } from './costs.js';
 import type { Survey } from './survey.js';
 
 /** A buffer view that meshoptimizer has compressed, with the properties of EXT_meshopt_compression. */
-export interface MeshoptView {
+export interface MeshoptView extends MeshoptParameters {
   readonly source: Uint8Array<ArrayBuffer>;
-  readonly count: number;
-  /** Size of an uncompressed element in bytes. */
-  readonly stride: number;
-  readonly mode: string;
-  readonly filter: string | undefined;
 }
 
-const MODES = ['ATTRIBUTES', 'TRIANGLES', 'INDICES'];
 /** Bytes of an index of a sparse accessor, by component type. */
 const INDEX_BYTES: ReadonlyMap<unknown, number> = new Map([
   [5121, 1],
   [5123, 2],
   [5125, 4],
 ]);
-const FILTERS = ['NONE', 'OCTAHEDRAL', 'QUATERNION', 'EXPONENTIAL', 'COLOR'];
 
 /** Buffer views of the accessors that a scene uses. The constructor validates the ranges of these accessors. */
 export class Views {
@@ -65,19 +59,11 @@ export class Views {
 
   async #readPacked(packed: Json, index: number): Promise<MeshoptView> {
     const document = this.#document;
-    const { count, byteStride, mode, filter = 'NONE' } = packed;
     const path = `bufferViews[${index}]`;
-    if (!MODES.includes(mode as string) || !FILTERS.includes(filter as string))
-      return document.fail(path, 'a mode and a filter of meshopt', { mode, filter });
+    const parameters = meshoptParameters(document, packed, path);
     const source = await document.readRange(packed, path);
-    document.take((count as number) * (byteStride as number) + source.length);
-    return {
-      source: source.slice() as Uint8Array<ArrayBuffer>,
-      count: count as number,
-      stride: byteStride as number,
-      mode: mode as string,
-      filter: filter as string,
-    };
+    document.take(parameters.count * parameters.stride + source.length);
+    return { source: source.slice() as Uint8Array<ArrayBuffer>, ...parameters };
   }
 
   /**
@@ -123,7 +109,7 @@ export class Views {
     const { bufferView, byteOffset = 0 } = place;
     const view = document.item('bufferViews', bufferView);
     const packed = packingOf(view);
-    const length = packed ? this.#unpackedBytes(packed, bufferView as number) : view.byteLength;
+    const length = packed ? unpackedBytes(document, packed, bufferView as number) : view.byteLength;
     if (!document.isIndex(byteOffset) || byteOffset % alignment > 0)
       return document.fail(`${path}.byteOffset`, `a multiple of ${alignment}`, byteOffset);
     if (!document.isIndex(length))
@@ -132,17 +118,9 @@ export class Views {
       throw damaged(`${document.name}, ${path}`, `${grouped(byteOffset + bytes)} bytes`, grouped(length));
     this.#used.add(bufferView as number);
   }
-
-  #unpackedBytes({ count, byteStride }: Json, view: number): number {
-    const { isIndex } = this.#document;
-    const isFine = isIndex(count) && isIndex(byteStride) && byteStride >= 1 && byteStride <= 256;
-    if (isFine) return count * byteStride;
-    return this.#document.fail(`bufferViews[${view}]`, 'a count and a stride of meshopt', { count, byteStride });
-  }
 }
 
-function packingOf({ extensions }: Json): Json | undefined {
-  if (!isObject(extensions)) return undefined;
-  const packed = extensions.EXT_meshopt_compression ?? extensions.KHR_meshopt_compression;
-  return isObject(packed) ? packed : undefined;
+function unpackedBytes(document: GltfDocument, packed: Json, view: number): number {
+  const { count, stride } = meshoptParameters(document, packed, `bufferViews[${view}]`);
+  return count * stride;
 }
