@@ -1,7 +1,7 @@
 import assert from 'node:assert/strict';
 import { gunzipSync, gzipSync } from 'node:zlib';
 import { test } from 'node:test';
-import { encodingsFor } from '@gaussian-splat/economise';
+import { encodingsFor, lossesIn } from '@gaussian-splat/economise';
 import { readPrefix, readScene } from '@gaussian-splat/formats';
 import type { GaussianCloud, ShDegree } from '@gaussian-splat/core';
 import { transformCloud } from '../../packages/formats/src/transform/transform-cloud.js';
@@ -117,6 +117,19 @@ test('the marks of writers decide the frame of files that name none, which the c
   const named = extensionRecord(0xadbe0003, Uint8Array.of(4, 0, 0, 0));
   const cloud = await readScene(writeSpz(splats, { version: 3, extensions: named, axes: [1, -1, -1] }));
   assert.deepEqual([cloud.hints?.isUpAssumed, cloud.warnings], [undefined, undefined]);
+});
+
+test('colors outside the range of SPZ are counted before they are cut', async () => {
+  const cloud = await readScene(writePly([{ name: 'vertex', columns: inriaColumns(rawSplats(20, 1)) }]));
+  assert.deepEqual(lossesIn('a.spz', cloud), []);
+  cloud.sh.set([10, 0, -4], 0);
+  cloud.sh[12 * 7 + 5] = 1.5;
+  const [sentence] = lossesIn('a.SPZ', cloud);
+  assert.match(sentence, /^2 of 20 splats have colors outside the range of SPZ, .* by up to 6\.67\./);
+  assert.deepEqual(lossesIn('a.glb', cloud), []);
+  const [encoding] = encodingsFor('a.spz').slice(-1);
+  const again = await readScene(await encoding.write({ cloud, degrees: new Uint8Array(20).fill(1) }));
+  assertAtMost(Math.abs(again.sh[0] + 6.667 - 10), 0.01, 'the cut color');
 });
 
 test('the coordinate system is found among other extensions', async () => {

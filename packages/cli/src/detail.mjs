@@ -151,7 +151,7 @@ function writeFolder(out, tree, coded, places) {
 async function main({ scene, out, degree, geometry, minPsnr, scored, given, columns, rows, spacing }) {
   const openFile = (path) => readWhole(join(dirname(scene), path));
   const read = await readScene(await readWhole(scene), { name: scene, openFile });
-  sayWarnings(scene, read, 'detail.json');
+  sayWarnings(scene, read, lossesIn('detail.json', read));
   // Pages store no up direction, so the scene is rotated to the default, (0, -1, 0).
   const cloud = upright(toDegree(Math.min(degree, read.shDegree), read));
   const views = given && dealViews(given.views, given.path, uprightRotation(read)).dealt;

@@ -12,6 +12,7 @@ import {
   FIRST_PSNR,
   GpuEvaluator,
   isLodIndex,
+  lossesIn,
   MergingEvaluator,
   RefiningEvaluator,
 } from '@gaussian-splat/economise';
@@ -209,7 +210,7 @@ async function main({
   GpuEvaluator.prepare(device);
   const opened = seconds();
   const cloud = await reading;
-  sayWarnings(scene, cloud, out);
+  sayWarnings(scene, cloud, lossesIn(out, cloud));
   // Unsupported properties of the format are reported before the first image is drawn.
   encodingsFor(out, cloud);
   // Seconds that reading needed after the device was ready.

@@ -19,7 +19,7 @@ export {
   type ViewSplit,
   type ViewOptions,
 } from './views.js';
-export { encodingsFor, type Encoding } from './write/index.js';
+export { encodingsFor, lossesIn, type Encoding } from './write/index.js';
 export { findSteps, type FindStepsOptions, type Steps } from './steps.js';
 export { writeSog, type EncodeWebp, type SogOptions, type SogSteps } from './write/sog.js';
 export { isLodIndex, writeStreamedSog } from './write/streamed-sog.js';

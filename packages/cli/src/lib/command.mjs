@@ -52,12 +52,10 @@ export function parseSceneOptions(args, options) {
 
 /**
  * Prints the unused parts of a scene file to the error stream.
- * @param out {string} File that will be written; default none.
+ * @param losses {string[]} Sentences about parts that the file to be written cannot hold.
  */
-export function sayWarnings(scene, { warnings = [], hints }, out = '.spz') {
-  for (const warning of warnings) console.error(`${scene}: ${warning}`);
-  if (hints?.orbit && !/\.(spz|ply)$/i.test(out))
-    console.error(`${scene}: its limits of the camera are left out, because only .spz and .ply hold them`);
+export function sayWarnings(scene, { warnings = [] }, losses = []) {
+  for (const warning of [...warnings, ...losses]) console.error(`${scene}: ${warning}`);
 }
 
 /** Whether it is a file system error: ENOENT, EACCES, ENOSPC. Its message is clear enough for users. */

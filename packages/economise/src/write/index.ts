@@ -6,7 +6,7 @@ import type { TaskPool } from '../parts/task-pool.js';
 import { writeGlb } from './glb.js';
 import { writePly } from './ply.js';
 import { tuneSog, type SogChoice } from './tune-sog.js';
-import { fractionalBitsOf, writeSpz } from './spz.js';
+import { fractionalBitsOf, lossesOfSpz, writeSpz } from './spz.js';
 import type { EncodeWebp } from './sog.js';
 import { writeUsdc, writeUsdz } from './usd.js';
 import { isLodIndex } from './streamed-sog.js';
@@ -115,6 +115,17 @@ export function encodingsFor(
   if (positions && extension === '.glb' && isOfPlanes(positions)) return [GLB_OF_PLANES];
   if (positions && origin && extension === '.spz') fractionalBitsOf({ positions, origin });
   return found;
+}
+
+/** Returns sentences about parts of a scene that a file of this name cannot hold in any precision. */
+export function lossesIn(name: string, cloud: Pick<GaussianCloud, 'count' | 'sh' | 'shDegree' | 'hints'>): string[] {
+  const { hints } = cloud;
+  return [
+    ...(/\.spz$/i.test(name) ? lossesOfSpz(cloud) : []),
+    ...(hints?.orbit && !/\.(spz|ply)$/i.test(name)
+      ? ['Its limits of the camera are left out, because only .spz and .ply hold them.']
+      : []),
+  ];
 }
 
 type Filter = Partial<Pick<GaussianCloud, 'antialiased' | 'filterVariance'>>;

@@ -64,6 +64,29 @@ export async function writeSpz(given: GaussianCloud, options: SpzOptions): Promi
   return gzip(body);
 }
 
+/** Largest magnitude of coefficients that SPZ holds: of the constant one, and of all others. */
+const [MAX_CONSTANT, MAX_OTHER] = [0.5 / COLOR_SCALE, 1];
+
+/** Returns sentences about colors of a cloud that are outside the range of SPZ, which cuts them. */
+export function lossesOfSpz({ count, sh, shDegree }: Pick<GaussianCloud, 'count' | 'sh' | 'shDegree'>): string[] {
+  const stride = 3 * shCoefficientCount(shDegree);
+  let [cut, largest] = [0, 0];
+  for (let i = 0; i < count; i++) {
+    let beyond = 0;
+    for (let k = 0; k < stride; k++) {
+      const excess = Math.abs(sh[stride * i + k]) - (k < 3 ? MAX_CONSTANT : MAX_OTHER);
+      if (excess > beyond) beyond = excess;
+    }
+    if (beyond > 0) cut++;
+    largest = Math.max(largest, beyond);
+  }
+  if (cut === 0) return [];
+  const [some, all] = [cut, count].map((value) => value.toLocaleString('en'));
+  return [
+    `${some} of ${all} splats have colors outside the range of SPZ, which cuts their coefficients by up to ${largest.toFixed(2)}. PLY, GLB, SOG and USDZ hold them.`,
+  ];
+}
+
 const byte = (value: number): number => Math.min(255, Math.max(0, Math.round(value)));
 
 /**
