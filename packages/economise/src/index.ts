@@ -1,4 +1,12 @@
-export { economisePassing, economiseWithin, FIRST_PSNR, type EconomisedBySearch } from './search-decibels.js';
+export {
+  economisePassing,
+  economiseWithin,
+  FIRST_PSNR,
+  type EconomisedBySearch,
+  type EconomisedPassing,
+  type JudgeFile,
+  type Try,
+} from './search-decibels.js';
 export { economise, type Economised, type EconomiseOptions } from './economise.js';
 export type { CutFigures, Evaluator, EvaluationViews } from './evaluator.js';
 export { GpuEvaluator, type GpuEvaluatorOptions } from './gpu/gpu-evaluator.js';

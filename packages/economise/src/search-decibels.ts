@@ -16,77 +16,40 @@ const MAX_TRIES = 7;
 /** Fraction of the allowed bytes that ends the search for a size. */
 const FULL_ENOUGH = 0.97;
 
+/** Difference in dB between targets of a search for a size, until one is too low and another is too high. */
+const SIZE_STEP = 6;
+
+const BEYOND = 'beyond the format';
+
 type SearchOptions = Omit<EconomiseOptions, 'minPsnr'>;
-
-/** Assessment of a file during a search. */
-interface Verdict {
-  readonly isAccepted: boolean;
-  /** Direction of the next PSNR target. Undefined ends the search. */
-  readonly next?: 'lower' | 'higher';
-  /** Text for {@link EconomiseOptions.onStep}. */
-  readonly description: string;
-}
-
-/** PSNR targets of a search, in dB. */
-interface Range {
-  readonly first: number;
-  /** Difference between consecutive targets, until one target is too low and another is too high. */
-  readonly step: number;
-  /** Difference between the targets that are too low and too high that ends the search. */
-  readonly nearEnough: number;
-}
-
-/**
- * Searches the PSNR target of {@link economise} by bisection.
- * @returns The last accepted file; undefined if no file was accepted.
- * @throws the last error of {@link economise} if it has written no file.
- */
-async function searchDecibels(
-  cloud: GaussianCloud,
-  options: SearchOptions,
-  judge: (found: Economised) => Verdict | Promise<Verdict>,
-  { first, step, nearEnough }: Range,
-): Promise<EconomisedBySearch | undefined> {
-  let [low, high] = [-Infinity, Infinity];
-  let best: EconomisedBySearch | undefined;
-  let refusal: unknown;
-  let isJudged = false;
-  let minPsnr = first;
-  for (let tries = 0; tries < MAX_TRIES && minPsnr >= MIN_PSNR && high - low > nearEnough; tries++) {
-    const found = await economise(cloud, { ...options, minPsnr }).catch((error: unknown) => {
-      refusal = error;
-      return undefinedIfBeyondFormat(error);
-    });
-    isJudged ||= found !== undefined;
-    const { isAccepted, next, description } = found ? await judge(found) : BEYOND_FORMAT;
-    options.onStep?.(`${minPsnr.toFixed(1)} dB: ${description}`);
-    if (found && isAccepted) best = { ...found, minPsnr };
-    if (next === undefined) break;
-    if (next === 'higher') low = minPsnr;
-    else high = minPsnr;
-    if (low === -Infinity) minPsnr = high - step;
-    else minPsnr = high === Infinity ? low + step : (low + high) / 2;
-  }
-  if (refusal !== undefined && !isJudged) throw refusal;
-  return best;
-}
 
 /**
  * Returns the most accurate file of at most `maxBytes`, by bisection of the PSNR target of {@link economise}.
- * @throws GaussianSplatError `argument/value` if no file of 15 dB or more is that small.
+ * @throws GaussianSplatError `argument/value` if no file of 15 dB or more is that small, or the last error of
+ * {@link economise} if it has written no file
  */
 export async function economiseWithin(
   cloud: GaussianCloud,
   maxBytes: number,
   options: SearchOptions,
 ): Promise<EconomisedBySearch> {
-  const judge = ({ bytes: { length } }: Economised): Verdict => {
-    const isAccepted = length <= maxBytes;
-    const description = `${length} bytes`;
-    if (isAccepted && length >= FULL_ENOUGH * maxBytes) return { isAccepted, description };
-    return { isAccepted, next: isAccepted ? 'higher' : 'lower', description };
-  };
-  const best = await searchDecibels(cloud, options, judge, { first: FIRST_PSNR, step: 6, nearEnough: 0 });
+  let [low, high, minPsnr] = [-Infinity, Infinity, FIRST_PSNR];
+  let [best, refusal, hasFile]: [EconomisedBySearch | undefined, unknown, boolean] = [undefined, undefined, false];
+  for (let tries = 0; tries < MAX_TRIES && minPsnr >= MIN_PSNR; tries++) {
+    const found = await economise(cloud, { ...options, minPsnr }).catch((error: unknown) => {
+      refusal = error;
+      return undefinedIfBeyondFormat(error);
+    });
+    hasFile ||= found !== undefined;
+    const length = found?.bytes.length ?? Infinity;
+    options.onStep?.(`${minPsnr.toFixed(1)} dB: ${found ? `${length} bytes` : BEYOND}`);
+    if (found && length <= maxBytes) [best, low] = [{ ...found, minPsnr }, minPsnr];
+    else high = minPsnr;
+    if (low === minPsnr && length >= FULL_ENOUGH * maxBytes) break;
+    if (low === -Infinity) minPsnr = high - SIZE_STEP;
+    else minPsnr = high === Infinity ? low + SIZE_STEP : (low + high) / 2;
+  }
+  if (refusal !== undefined && !hasFile) throw refusal;
   if (best) return best;
   throw new GaussianSplatError('argument/value', {
     where: options.name,
@@ -101,46 +64,113 @@ export async function economiseWithin(
  * @param written Scene that was read from the file, in the coordinates of the source.
  */
 export type JudgeFile = (written: GaussianCloud) => Promise<{
-  readonly passes: boolean;
+  /** `undecided`: the measurements cannot distinguish between the others. It does not count as a pass. */
+  readonly verdict: 'passes' | 'undecided' | 'fails';
   /** Description of the measurements for {@link EconomiseOptions.onStep}. */
   readonly description: string;
 }>;
 
+/** A PSNR target that was tried, and the verdict about its file. */
+export interface Try {
+  readonly minPsnr: number;
+  readonly verdict: 'passes' | 'undecided' | 'fails' | typeof BEYOND;
+  readonly bytes?: number;
+  readonly description: string;
+}
+
+/** Result of {@link economisePassing}, with all tries in the order of their targets, the highest first. */
+export interface EconomisedPassing extends EconomisedBySearch {
+  readonly tries: readonly Try[];
+}
+
+/** Difference in dB between targets of the search, and the difference that ends the search. */
+const [TARGET_STEP, NEAR_ENOUGH] = [2, 0.5];
+const MAX_TARGETS = 10;
+
 /**
- * Returns a small file that passes a test, by bisection of the PSNR target of {@link economise} to 0.5 dB.
- * @param first PSNR target of the first try, in dB.
- * @throws GaussianSplatError `argument/value` if none of the files passes.
+ * Returns the smallest file that passes a test together with all files of higher PSNR targets that were tried. Passes are
+ * not monotonic: noise lets a file pass among others that fail. Targets therefore descend from one above `first` until a
+ * file does not pass, and ascend until the two highest pass. The interval below the lowest pass is divided to 0.5 dB.
+ * @param first Expected PSNR target in dB.
+ * @throws GaussianSplatError `argument/value` if the highest targets do not pass.
  */
 export async function economisePassing(
   cloud: GaussianCloud,
   judge: JudgeFile,
   options: SearchOptions,
   first = FIRST_PSNR,
-): Promise<EconomisedBySearch> {
-  let last = 'no file that the format can hold';
-  const judged = async ({ bytes }: Economised): Promise<Verdict> => {
-    const { name, signal, pool = inline } = options;
-    const written = asGiven(await readInParts(bytes, { name, signal }, pool), cloud);
-    const { passes, description } = await judge(written);
-    last = description;
-    return {
-      isAccepted: passes,
-      next: passes ? 'lower' : 'higher',
-      description: `${bytes.length} bytes, ${description}`,
-    };
+): Promise<EconomisedPassing> {
+  const { name, signal, pool = inline, onStep } = options;
+  const tries: Try[] = [];
+  const files = new Map<number, Economised>();
+  let refusal: unknown;
+  const tryAt = async (minPsnr: number): Promise<Try> => {
+    const found = await economise(cloud, { ...options, minPsnr }).catch((error: unknown) => {
+      refusal = error;
+      return undefinedIfBeyondFormat(error);
+    });
+    const made = found && (await judge(asGiven(await readInParts(found.bytes, { name, signal }, pool), cloud)));
+    const one: Try =
+      found && made
+        ? { minPsnr, bytes: found.bytes.length, ...made }
+        : { minPsnr, verdict: BEYOND, description: BEYOND };
+    if (found && one.verdict === 'passes') files.set(minPsnr, found);
+    tries.push(one);
+    onStep?.(`${minPsnr.toFixed(1)} dB: ${one.bytes === undefined ? '' : `${one.bytes} bytes, `}${one.description}`);
+    return one;
   };
-  const best = await searchDecibels(cloud, options, judged, { first, step: 3, nearEnough: 0.5 });
-  if (best) return best;
+  await climb(tryAt, tries, first);
+  tries.sort((a, b) => b.minPsnr - a.minPsnr);
+  // A lower target may need a larger file: its cut is found in fewer tries.
+  const passing = runOf(tries).filter(({ minPsnr }) => files.has(minPsnr));
+  const smallest = passing.sort((a, b) => a.bytes! - b.bytes!)[0];
+  if (smallest) return { ...files.get(smallest.minPsnr)!, minPsnr: smallest.minPsnr, tries };
+  if (refusal !== undefined && tries.every(({ bytes }) => bytes === undefined)) throw refusal;
   throw new GaussianSplatError('argument/value', {
-    where: options.name,
-    expected: 'a file that passes the gate',
-    found: last,
-    remedy: 'write a more precise format (.ply or .glb)',
+    where: name,
+    expected: 'files that pass the gate at a PSNR target and all higher ones',
+    found: tries.map(({ minPsnr, description }) => `${minPsnr.toFixed(1)} dB ${description}`).join('; '),
+    remedy: tries.some(({ verdict }) => verdict === 'undecided')
+      ? 'give more photographs, which decide what a few cannot, or write a more precise format (.ply or .glb)'
+      : 'write a more precise format (.ply or .glb)',
   });
 }
 
-/** Assessment if the format cannot reach a PSNR target: the next target is lower. */
-const BEYOND_FORMAT: Verdict = { isAccepted: false, next: 'lower', description: 'beyond the format' };
+/**
+ * Tries targets: down from one step above `first` while files pass, up until the two highest pass or the format holds
+ * nothing higher, and then in the interval below the lowest pass.
+ */
+async function climb(tryAt: (minPsnr: number) => Promise<Try>, tries: readonly Try[], first: number): Promise<void> {
+  const isLeft = (): boolean => tries.length < MAX_TARGETS;
+  const sorted = (): Try[] => [...tries].sort((a, b) => b.minPsnr - a.minPsnr);
+  let next = first + TARGET_STEP;
+  for (let isDown = true; isDown && isLeft() && next >= MIN_PSNR; next -= TARGET_STEP) {
+    const { verdict } = await tryAt(next);
+    isDown = verdict === 'passes' || (verdict === BEYOND && tries.every((one) => one.verdict === BEYOND));
+  }
+  while (isLeft()) {
+    const [top, second] = sorted();
+    if (top.verdict === BEYOND || (top.verdict === 'passes' && second?.verdict === 'passes')) break;
+    await tryAt(top.minPsnr + TARGET_STEP);
+  }
+  while (isLeft()) {
+    const targets = sorted();
+    const lowest = runOf(targets).at(-1);
+    const below = lowest && targets.find(({ minPsnr }) => minPsnr < lowest.minPsnr);
+    if (!lowest || !below || lowest.minPsnr - below.minPsnr <= NEAR_ENOUGH) break;
+    await tryAt((lowest.minPsnr + below.minPsnr) / 2);
+  }
+}
+
+/**
+ * Returns the run of passes that begins with the highest target within the format; empty if the highest does not pass.
+ * @param tries Descending targets.
+ */
+function runOf(tries: readonly Try[]): Try[] {
+  const within = tries.filter(({ verdict }) => verdict !== BEYOND);
+  const end = within.findIndex(({ verdict }) => verdict !== 'passes');
+  return within.slice(0, end < 0 ? within.length : end);
+}
 
 function undefinedIfBeyondFormat(error: unknown): undefined {
   if (error instanceof GaussianSplatError && error.code === 'argument/value') return undefined;

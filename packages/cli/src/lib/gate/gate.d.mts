@@ -15,6 +15,9 @@ export interface Metrics {
 export interface GateVerdict {
   readonly figures: Metrics;
   readonly lost: Metrics;
+  /** Standard errors of the mean losses over the photographs. */
+  readonly errors: Metrics;
+  readonly verdict: 'passes' | 'undecided' | 'fails';
   readonly passes: boolean;
   readonly description: string;
 }

@@ -7,9 +7,9 @@ import { fileURLToPath } from 'node:url';
 import { capture, GaussianBuffers, packGaussians, Viewpoint, World } from '@gaussian-splat/renderer';
 import { UsageError } from '../command.mjs';
 import { encodePng, toBytes } from '../draw-scene.mjs';
+import { LIMITS, verdictOf } from './verdicts.mjs';
 
-/** Maximum mean losses over all photographs: PSNR in dB, SSIM and LPIPS. The limits are those of splat-compression-bench. */
-export const LIMITS = { psnr: 0.2, ssim: 0.002, lpips: 0.005 };
+export { LIMITS };
 
 /**
  * Returns the PSNR of a file against the whole scene, in dB, with which it loses 0.2 dB against photographs. This assumes
@@ -85,44 +85,48 @@ export class Gate {
     this.#folder = folder;
   }
 
-  /** Returns the means of the metrics over the photographs. `lpips` is undefined if it cannot be measured. */
+  /** Returns the metrics of each photograph. `lpips` is null in all of them if it cannot be measured. */
   async #measure(cloud, name) {
     const folder = this.#folder ? join(this.#folder, name.replace(/\W+/g, '-')) : mkdtempSync(join(tmpdir(), 'gate-'));
     try {
       const images = await drawPngs(this.#device, cloud, this.#photographs, folder);
       const pairs = images.map((image, k) => [image, this.#photographs[k].photograph]);
-      const { rows } = runMetrics(this.#python, pairs);
-      const mean = (key) => rows.reduce((sum, row) => sum + row[key], 0) / rows.length;
-      return { psnr: mean('psnr'), ssim: mean('ssim'), lpips: rows[0].lpips === null ? undefined : mean('lpips') };
+      return runMetrics(this.#python, pairs).rows;
     } finally {
       if (!this.#folder) rmSync(folder, { recursive: true });
     }
   }
 
   /**
-   * Returns the metrics of a cloud, its losses relative to the first cloud, and whether all measured losses are below
-   * {@link LIMITS}.
+   * Returns the mean metrics of a cloud, its mean losses relative to the first cloud with their standard errors over the
+   * photographs, and the verdict; see {@link verdictOf}. `views` has the losses of each photograph.
    */
   async judge(cloud, name) {
-    const figures = await this.#measure(cloud, name);
-    this.#whole ??= figures;
-    const whole = this.#whole;
-    const lost = {
-      psnr: whole.psnr - figures.psnr,
-      ssim: whole.ssim - figures.ssim,
-      lpips: figures.lpips === undefined ? undefined : figures.lpips - whole.lpips,
-    };
-    const passes = Object.entries(LIMITS).every(([key, max]) => lost[key] === undefined || lost[key] < max);
-    return { figures, lost, passes, description: describe(figures, lost, passes) };
+    const rows = await this.#measure(cloud, name);
+    this.#whole ??= rows;
+    const hasLpips = rows[0].lpips !== null;
+    const views = Object.fromEntries(
+      Object.keys(LIMITS)
+        .filter((key) => key !== 'lpips' || hasLpips)
+        .map((key) => [key, rows.map((row, k) => (this.#whole[k][key] - row[key]) * (key === 'lpips' ? -1 : 1))]),
+    );
+    const mean = (key) => rows.reduce((sum, row) => sum + row[key], 0) / rows.length;
+    const figures = { psnr: mean('psnr'), ssim: mean('ssim'), lpips: hasLpips ? mean('lpips') : undefined };
+    const { lost, errors, verdict } = verdictOf(views);
+    const description = describe(figures, lost, errors, verdict);
+    return { figures, lost, errors, views, verdict, passes: verdict === 'passes', description };
   }
 }
 
-function describe({ psnr, ssim, lpips }, lost, passes) {
-  const signed = (value, digits) => `${value < 0 ? '' : '+'}${value.toFixed(digits)}`;
+function describe({ psnr, ssim, lpips }, lost, errors, verdict) {
+  const change = (key, sign, digits) => {
+    const value = sign * lost[key];
+    return `(${value < 0 ? '' : '+'}${value.toFixed(digits)} ± ${errors[key].toFixed(digits)})`;
+  };
   const losses = [
-    `${psnr.toFixed(2)} dB (${signed(-lost.psnr, 3)})`,
-    `SSIM ${ssim.toFixed(4)} (${signed(-lost.ssim, 4)})`,
-    lpips === undefined ? 'LPIPS not measured' : `LPIPS ${lpips.toFixed(4)} (${signed(lost.lpips, 4)})`,
+    `${psnr.toFixed(2)} dB ${change('psnr', -1, 3)}`,
+    `SSIM ${ssim.toFixed(4)} ${change('ssim', -1, 4)}`,
+    lpips === undefined ? 'LPIPS not measured' : `LPIPS ${lpips.toFixed(4)} ${change('lpips', 1, 4)}`,
   ];
-  return `${passes ? 'passes' : 'fails'}: ${losses.join(', ')}`;
+  return `${verdict}: ${losses.join(', ')}`;
 }
