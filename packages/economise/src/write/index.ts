@@ -33,6 +33,8 @@ export interface Encoding {
   readonly hasOneDegree?: boolean;
   /** Settings that {@link tune} selected; undefined for other formats than SOG. */
   readonly sog?: SogChoice;
+  /** Returns this encoding with its finest steps. Undefined unless {@link tune} selects the steps. */
+  readonly finest?: (cloud: Pick<GaussianCloud, 'shDegree'>) => Encoding;
   /** Returns this encoding with all steps multiplied by a factor. Undefined unless {@link tune} selected the steps. */
   readonly coarser?: (factor: number) => Encoding;
   /**

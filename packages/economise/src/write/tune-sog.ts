@@ -40,6 +40,10 @@ export function tuneSog(encodeWebp: EncodeWebp | undefined, isStreamed = false):
     write: () => {
       throw withoutWebp();
     },
+    finest: ({ shDegree }) => {
+      if (encodeWebp === undefined) throw withoutWebp();
+      return tunedSog({ steps: FINEST, palette: PALETTES.at(-1)!, encodeWebp }, shDegree > 0, isStreamed);
+    },
     tune: async (whole, measure, target, seen) => {
       if (encodeWebp === undefined) throw withoutWebp();
       const options = await tuned(whole, measure, target, encodeWebp, seen);
