@@ -135,7 +135,23 @@ test('SOG is tuned to the figure, or to the bytes, that are asked for', { skip: 
   assert.ok(found.count > 0);
   const both = command('few.ply', '--min-psnr', '40', '--max-mb', '1', '--out', 'less.sog');
   assert.equal(both.status, 2);
-  assert.match(both.said, /one of --min-psnr, --max-mb and --gate/);
+  assert.match(both.said, /one of --min-psnr, --max-mb, --gate and --format-only/);
+});
+
+test('--format-only keeps every splat in every format, without a GPU', async () => {
+  const formats = ['a.usdz', 'a.usdc', 'a.glb', 'a.spz', 'a.ply', 'a.sog', 'streamed/lod-meta.json'];
+  for (const out of someOf(formats, 4)) {
+    const { status, said } = command('scene.ply', '--format-only', '--out', out, '--threads', '1');
+    assert.equal(status, 0, said);
+    assert.match(said, /splats +300, all of the scene\n/);
+    assert.match(said, /the format alone has changed/);
+    assert.doesNotMatch(said, /adapter/);
+    if (out.endsWith('.json')) continue;
+    const found = await readScene(readFileSync(join(folder, out)), { name: out });
+    assert.deepEqual([found.count, found.shDegree], [300, 1], out);
+  }
+  const merged = command('scene.ply', '--format-only', '--merge', '--out', 'b.glb');
+  assert.deepEqual([merged.status, /--merge: expected no --format-only/.test(merged.said)], [2, true], merged.said);
 });
 
 test('where writing fails, what was there stays', () => {

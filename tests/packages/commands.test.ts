@@ -20,6 +20,7 @@ import { dirname, join } from 'node:path';
 import { after, test } from 'node:test';
 import { fileURLToPath } from 'node:url';
 import type { GaussianCloud } from '@gaussian-splat/core';
+import { readScene } from '@gaussian-splat/formats';
 import { PNG } from 'pngjs';
 import { gpuEnvironment } from '../../scripts/lib/gpu-environment.mjs';
 import { buildGltf } from '../formats/support/gltf-writer.js';
@@ -97,6 +98,17 @@ test('gaussian-splat page brings the files that a scene or a model names, and no
   assert.deepEqual(filesOfPage('gltf/scene.gltf'), ['gltf/parts/a b.bin', 'gltf/scene.gltf']);
   assert.deepEqual(filesOfPage('link.onnx'), ['link.contract.json', 'link.onnx']);
   assert.deepEqual(filesOfPage('external.onnx'), ['external.onnx', 'external.weights']);
+});
+
+test('gaussian-splat page --usdz also writes the splats as OpenUSD', async () => {
+  const { status, text } = command('page', 'gltf/scene.gltf', 'page', '--no-serve', '--usdz');
+  assert.equal(status, 0, text);
+  const cloud = await readScene(readFileSync(inFolder('page', 'scene.usdz')), { name: 'scene.usdz' });
+  assert.match(text, new RegExp(`scene\\.usdz: ${cloud.count} splats as OpenUSD`));
+  assert.deepEqual(cloud.hints, { up: [0, 1, 0], metersPerUnit: 1 });
+  const refused = command('page', 'link.onnx', 'page', '--no-serve', '--usdz');
+  assert.match(refused.text, /--usdz takes a scene file/);
+  rmSync(inFolder('page'), { recursive: true });
 });
 
 test('gaussian-splat page brings what descriptions in JSON name, and what these name, and no others', () => {

@@ -1,13 +1,14 @@
 /**
- * Implementation of `gaussian-splat page SCENE... FOLDER [--single] [--port 8000] [--no-serve]`. Reads the scenes, copies
- * the element and them to FOLDER, writes an index.html unless one exists, and serves the folder. Any static host can
- * serve the result. With `--single`, the index.html contains the element and the scene, and can be opened from a disk.
+ * Implementation of `gaussian-splat page SCENE... FOLDER [--single] [--usdz] [--port 8000] [--no-serve]`. Reads the
+ * scenes, copies the element and them to FOLDER, writes an index.html unless one exists, and serves the folder. Any static
+ * host can serve the result. With `--single`, the index.html contains the element and the scene, and can be opened from a
+ * disk.
  */
 import { cpSync, existsSync, mkdirSync, readFileSync, statSync } from 'node:fs';
 import { createRequire } from 'node:module';
 import { basename, dirname, extname, join, relative, resolve } from 'node:path';
 import { fileURLToPath } from 'node:url';
-import { CommandError, parseCommandLine, runCommand, UsageError } from './lib/command.mjs';
+import { CommandError, parseCommandLine, runCommand, sayWarnings, UsageError } from './lib/command.mjs';
 import { filesBeside } from './lib/files-beside.mjs';
 import { obstacleToFolder, writeWhole } from './lib/output-file.mjs';
 import { serve } from './lib/server.mjs';
@@ -18,6 +19,7 @@ const USAGE = `usage: gaussian-splat page SCENE... FOLDER [options]
   SCENE         scene, clip, generator or mesh; several are shown one below the other
   FOLDER        gets the element, the scenes with the files that they name, and an index.html unless there is one
   --single      an index.html that contains the element and the scene, and can be opened from a disk
+  --usdz        also writes the splats as OpenUSD (.usdz) into the folder, for programs that read ParticleField3DGaussianSplat
   --port N      port of the server that shows the page (default 8000, or a free one if it is taken)
   --no-serve    ends when the page is written
 `;
@@ -27,13 +29,14 @@ const CDN = elementFile('cdn');
 const ELEMENT = new URL('../dist/single.js', import.meta.url);
 const SCRIPT = '<script type="module" src="cdn/gaussian-splat.min.js"></script>';
 
-async function makePage({ scenes, folder, port, isServed, isSingle }) {
+async function makePage({ scenes, folder, port, isServed, isSingle, hasUsdz }) {
   const page = join(folder, 'index.html');
   const tags = [];
   for (const scene of scenes) tags.push(await tagShowing(scene));
   mkdirSync(folder, { recursive: true });
   if (isSingle) await writeSingle(scenes[0], tags[0], page);
   else await writeFolder(scenes, tags, folder, page);
+  for (const scene of hasUsdz ? scenes : []) await writeUsdz(scene, folder);
   console.log(`\nThe page is ${isSingle ? page : `in ${folder}`}`);
   if (isServed) await show(folder, port);
 }
@@ -51,6 +54,22 @@ async function writeFolder(scenes, tags, folder, page) {
   if (existsSync(page))
     console.log(`\n${page} exists and was not changed. Paste into it:\n\n${SCRIPT}\n${markup(size)}`);
   else writeWhole(page, htmlOf(`${markup('')}\n  ${SCRIPT}\n${FROM_DISK}`, titleOf(scenes[0])));
+}
+
+/** Writes all splats of a scene as OpenUSD. */
+async function writeUsdz(scene, folder) {
+  if (isModel(scene)) throw new CommandError(`${scene} is a generator: --usdz takes a scene file.`);
+  const [{ startReading }, { changeFormat, lossesIn }, { inline }] = await Promise.all([
+    import('./lib/scene-in-parts.mjs'),
+    import('@gaussian-splat/economise'),
+    import('@gaussian-splat/economise/parts'),
+  ]);
+  const out = join(folder, `${plainTitleOf(scene)}.usdz`);
+  if (resolve(scene) === out) return;
+  const cloud = await (await startReading(scene, inline)).cloud;
+  sayWarnings(scene, cloud, lossesIn(out, cloud));
+  writeWhole(out, (await changeFormat(cloud, { name: out })).bytes);
+  console.log(`\n${out}: ${cloud.count} splats as OpenUSD`);
 }
 
 /** Maximum bytes of a scene in a page of one file: its text must fit into a string of JavaScript. */
@@ -88,7 +107,7 @@ async function writeSingle(scene, tag, page) {
 
 function parseOptions(args) {
   const flag = { type: 'boolean', default: false };
-  const options = { port: { type: 'string', default: '8000' }, 'no-serve': flag, single: flag };
+  const options = { port: { type: 'string', default: '8000' }, 'no-serve': flag, single: flag, usdz: flag };
   const parsed = parseCommandLine(args, options);
   if (parsed === undefined) return undefined;
   const { values, positionals } = parsed;
@@ -111,7 +130,14 @@ function parseOptions(args) {
   const port = Number(values.port);
   if (!(Number.isInteger(port) && port >= 0 && port < 65536))
     throw new UsageError(`--port: expected a number from 0 to 65535, found "${values.port}"`);
-  return { scenes, folder, port, isServed: !values['no-serve'] && !values.single, isSingle: values.single };
+  return {
+    scenes,
+    folder,
+    port,
+    isServed: !values['no-serve'] && !values.single,
+    isSingle: values.single,
+    hasUsdz: values.usdz,
+  };
 }
 
 /** Copies the element without source maps, and without ONNX Runtime (43 MB) unless a scene is a generator. */
@@ -166,7 +192,7 @@ function isCode(path) {
 
 /** Whether a file may be a part of a scene. A list of what is allowed, because servers give meanings to many other names. */
 function isPart(path) {
-  return /\.(ply|spz|splat|ksplat|sog|json|bin|webp|png|jpe?g|ktx2|gltf|glb|rad|radc|lcc2?|subtree|motion|page|pages|gz)$/i.test(
+  return /\.(ply|spz|splat|ksplat|sog|json|bin|webp|png|jpe?g|ktx2|gltf|glb|rad|radc|lcc2?|usd[acz]?|subtree|motion|page|pages|gz)$/i.test(
     path,
   );
 }
@@ -178,10 +204,12 @@ function isJson(path) {
 /** Whether a scene is a generator; the element ignores case, too. */
 const isModel = (path) => extname(path).toLowerCase() === '.onnx';
 
+/** Returns the name of a scene's file without its extension, or that of the folder of a JSON file. */
+const plainTitleOf = (scene) => (isJson(scene) ? basename(dirname(scene)) : basename(scene, extname(scene)));
+
 /** Returns the title of a page: the name of the scene's file, or of the folder of a JSON file. */
 function titleOf(scene) {
-  const file = isJson(scene) ? basename(dirname(scene)) : basename(scene, extname(scene));
-  return file.replaceAll('&', '&amp;').replaceAll('"', '&quot;').replaceAll('<', '&lt;');
+  return plainTitleOf(scene).replaceAll('&', '&amp;').replaceAll('"', '&quot;').replaceAll('<', '&lt;');
 }
 
 const addressOf = (source) => source.split('/').map(encodeURIComponent).join('/');
