@@ -58,6 +58,46 @@ describe('up, as the file says it', () => {
       );
     });
 
+  /** Address of a layer of OpenUSD with a green splat and a red one, on an axis. */
+  const usda = (metadata: string, axis: readonly number[]): string => {
+    const colors = [GREEN, RED].map((color) => `(${color.map((c) => (c - 0.5) / 0.28209479).join(', ')})`);
+    const places = [1, -1].map((sign) => `(${axis.map((value) => sign * value).join(', ')})`);
+    const layer = `#usda 1.0
+(
+${metadata}
+)
+def ParticleField3DGaussianSplat "S"
+{
+    point3f[] positions = [${places.join(', ')}]
+    float3[] scales = [(0.2, 0.2, 0.2), (0.2, 0.2, 0.2)]
+    uniform int radiance:sphericalHarmonicsDegree = 0
+    float3[] radiance:sphericalHarmonicsCoefficients = [${colors.join(', ')}]
+}
+`;
+    return `${URL.createObjectURL(new Blob([layer]))}#scene.usda`;
+  };
+
+  it('a stage of OpenUSD stands upright; an assumed axis is said once', async () => {
+    const said: string[] = [];
+    const { warn } = console;
+    console.warn = (sentence: string) => void said.push(sentence);
+    try {
+      for (const [metadata, axis] of [
+        ['    upAxis = "Z"', [0, 0, 1]],
+        ['', [0, 1, 0]],
+      ] as const) {
+        const element = await showLoaded({ src: usda(metadata, axis) }, 'width: 120px; height: 120px');
+        const screen = await screenOf(element);
+        assert(screen.middleOf(isGreen)!.y < screen.middleOf(isRed)!.y - 20, `green is above: ${metadata}`);
+        const isSaid = element.stats!.warnings.some((sentence) => /y is assumed.*up="z"/.test(sentence));
+        assertEqual(isSaid, metadata === '', 'stats.warnings');
+      }
+    } finally {
+      console.warn = warn;
+    }
+    assertEqual(said.filter((sentence) => /y is assumed/.test(sentence)).length, 1, 'the console');
+  });
+
   it('is overridden by the attribute', async () => {
     const splats: Splat[] = [
       { at: [0, 0, 1], color: GREEN },
