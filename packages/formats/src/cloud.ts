@@ -1,10 +1,4 @@
-import {
-  shCoefficientCount,
-  type GaussianCloud,
-  type ShDegree,
-  type TrainedOrder,
-  type Vector3,
-} from '@gaussian-splat/core';
+import { shCoefficientCount, type GaussianCloud, type ShDegree, type Vector3 } from '@gaussian-splat/core';
 import type { SceneSource } from './scene-format.js';
 
 /** Value of the constant spherical harmonic, 1/(2·sqrt(pi)): color = 0.5 + SH_C0·f_dc. */
@@ -38,10 +32,6 @@ export function allocateCloud(
     droppedCount: 0,
   };
 }
-
-/** Returns a trained order by the name that our files give it; undefined for other values. */
-export const trainedOrder = (name: unknown): TrainedOrder | undefined =>
-  name === 'pixel' || name === 'distance' ? name : undefined;
 
 /** Converts logits to opacities, 1/(1 + exp(-x)), in place. */
 export function sigmoidInPlace(values: Float32Array): void {

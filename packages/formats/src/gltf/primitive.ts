@@ -1,9 +1,10 @@
 import { shCoefficientCount, type GaussianCloud, type ShDegree } from '@gaussian-splat/core';
 import { grouped } from '../bytes.js';
-import { allocateCloud, SH_C0, trainedOrder, type DraftCloud } from '../cloud.js';
+import { allocateCloud, SH_C0, type DraftCloud } from '../cloud.js';
 import { damaged, warn } from '../faults.js';
 import { isObject, show } from '../json.js';
 import { readSpz } from '../readers/spz.js';
+import { trainedOrder } from '../trained-order.js';
 import { transformCloud } from '../transform/transform-cloud.js';
 import type { Json } from './container.js';
 import type { SceneSource, SplatRange } from '../scene-format.js';

@@ -4,10 +4,11 @@
  */
 import { GaussianSplatError, loadModule, normalize, type Vector3 } from '@gaussian-splat/core';
 import { grouped } from '../bytes.js';
-import { trainedOrder, type DraftCloud } from '../cloud.js';
+import type { DraftCloud } from '../cloud.js';
 import { DEGREE_4, FLAT, warn } from '../faults.js';
 import { OFFSETS, PLAIN, TRAILING } from './gaussian-layout.js';
 import { safeOrbit } from '../safe-orbit.js';
+import { trainedOrder } from '../trained-order.js';
 import type { PlyHeader } from './header.js';
 
 /** Filter variance in px² with which Mip-Splatting and the mip mode of Brush train. */

@@ -1,7 +1,7 @@
 import { GaussianSplatError, type ShDegree, type TrainedOrder } from '@gaussian-splat/core';
 import { grouped } from '../bytes.js';
-import { trainedOrder } from '../cloud.js';
 import { damaged } from '../faults.js';
+import { trainedOrder } from '../trained-order.js';
 import { isObject, parseJson, show, type Json, type JsonSource } from '../json.js';
 
 /** For each channel of an image, an array with the value of each byte 0..255. */
