@@ -48,6 +48,10 @@ const COMMANDS = {
   screenshots: { what: 'every page of the site, for people to look at', command: ['scripts/screenshots.mjs'] },
   soak: { what: 'hours of random actions with flat memory', in: 'chromium', command: ['scripts/soak/run-soak.mjs'] },
   stability: { what: 'known failures of renderers', command: ['scripts/stability.mjs'] },
+  studio: {
+    what: 'scenes with known geometry, made from nothing on an NVIDIA GPU',
+    command: ['scripts/studio/run-studio.mjs'],
+  },
   tools: { what: 'files of public tools, both ways', command: ['scripts/tools.mjs'] },
   webgl: { what: 'WebGL 2 against the oracle', command: [SOCKETS, QUIET, ...TSX, 'scripts/webgl.mjs'] },
   webkit: { what: 'element and site in WebKitGTK', command: [QUIET, 'scripts/webkit.mjs'] },

@@ -33,16 +33,16 @@ class Body:
     parts: np.ndarray
 
 
-def read_body(folder: Path, rig: str = "game_engine") -> Body:
-    """Reads the mesh, one rig and every target in the folder."""
+def read_body(folder: Path, rig: str = "game_engine", parts: dict[str, list[tuple[int, int]]] = PARTS) -> Body:
+    """Reads the mesh, or other parts of it, one rig and every target in the folder."""
     lines = (folder / "3dobjs_base.obj").read_text().splitlines()
     every = np.array([line.split()[1:4] for line in lines if line.startswith("v ")], float) * TO_METERS
     faces = [[int(c.split("/")[0]) - 1 for c in line.split()[1:]] for line in lines if line.startswith("f ")]
-    number, parts = np.full(len(every), -1), np.full(len(every), -1)
-    for index, ranges in enumerate(PARTS.values()):
+    number, kinds = np.full(len(every), -1), np.full(len(every), -1)
+    for index, ranges in enumerate(parts.values()):
         for first, end in ranges:
-            parts[first:end] = index
-    used = np.nonzero(parts >= 0)[0]
+            kinds[first:end] = index
+    used = np.nonzero(kinds >= 0)[0]
     number[used] = np.arange(len(used))
     shown = [f for f in faces if (number[f] >= 0).all()]
     triangles = [[f[0], f[i], f[i + 1]] for f in shown for i in range(1, len(f) - 1)]
@@ -71,7 +71,7 @@ def read_body(folder: Path, rig: str = "game_engine") -> Body:
         names,
         moves[used],
         np.einsum("jv,vcb->jcb", heads, moves),
-        parts[used],
+        kinds[used],
     )
 
 

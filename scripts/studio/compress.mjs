@@ -1,0 +1,20 @@
+/** `node scripts/studio/compress.mjs MADE DATA SCENES`: what `make.py` left in the folder MADE becomes a scene of the studio: images and references in DATA, the scene in SCENES. */
+import { copyFileSync, mkdirSync, readdirSync, readFileSync, writeFileSync } from 'node:fs';
+import { join } from 'node:path';
+import { encodingsFor } from '@gaussian-splat/economise';
+import { readScene } from '@gaussian-splat/formats';
+
+const [made, data, scenes] = process.argv.slice(2);
+const truth = JSON.parse(readFileSync(join(made, 'truth.json'), 'utf8'));
+const read = await readScene(readFileSync(join(made, 'scene.ply')), { name: 'scene.ply' });
+const cloud = { ...read, antialiased: truth.training.antialiased };
+const [, encoding] = encodingsFor('scene.spz', cloud);
+const scene = await encoding.write({ cloud, degrees: new Uint8Array(cloud.count).fill(cloud.shDegree) });
+const out = join(data, truth.name);
+mkdirSync(join(out, 'images'), { recursive: true });
+mkdirSync(scenes, { recursive: true });
+writeFileSync(join(scenes, `${truth.name}.spz`), scene);
+for (const name of ['truth.json', 'views.json', 'depth.bin.gz', 'mesh.bin.gz'])
+  copyFileSync(join(made, name), join(out, name));
+for (const name of readdirSync(join(made, 'held'))) copyFileSync(join(made, 'held', name), join(out, 'images', name));
+console.log(`${truth.name}: ${cloud.count} splats as ${encoding.title}, ${(scene.length / 1e6).toFixed(2)} MB`);

@@ -1,0 +1,182 @@
+/** Promises of the documentation, measured on scenes that were trained from images and whose geometry is known: docs/accuracy.md has the figures. */
+import assert from 'node:assert/strict';
+import { after, test } from 'node:test';
+import type { Vector3 } from '@gaussian-splat/core';
+import { makeWalkMap, type WalkMap } from '@gaussian-splat/formats/walk';
+import { GaussianBuffers, packGaussians } from '@gaussian-splat/renderer';
+import { compareWithOracle, renderCloud } from '../support/compare.js';
+import { evenly } from '../support/evenly.js';
+import { psnr } from '../support/metrics.js';
+import { anyDevice, endNodeDevice } from '../support/node-device.js';
+import { capture, Renderer } from '../support/renderer.js';
+import { resized } from '../support/scenes.js';
+import { isVisible, pointAt, seenAt } from '../support/studio-geometry.js';
+import { STUDIO, studio, type StudioName, type StudioScene } from '../support/studio.js';
+
+const modeOf = ({ cloud }: StudioScene) => (cloud.antialiased ? 'antialiased' : 'classic');
+const middle = (values: number[], share = 0.5): number =>
+  values.sort((a, b) => a - b)[Math.min(values.length - 1, Math.floor(share * values.length))];
+
+for (const name of STUDIO) {
+  test(`${name}: the default image is the oracle's`, async () => {
+    const scene = await studio(name);
+    for (const view of evenly(scene.held, 2)) {
+      const camera = resized(view.camera, 200);
+      const close = await compareWithOracle(await anyDevice(), scene.cloud, camera, modeOf(scene));
+      console.log(
+        `${name} ${view.name}: ${close.psnr.toFixed(1)} dB to the oracle, 99.9 % within ${(255 * close.p999).toFixed(2)}/255`,
+      );
+      assert.ok(close.psnr >= 59, `${name} ${view.name}: ${close.psnr} dB`);
+    }
+  });
+}
+
+/** Loss in dB against the figure of the trainer that the rounding of the scene to SPZ and of its images to WebP may cost. */
+const ROUNDING = 1;
+
+for (const name of STUDIO) test(`${name}: the image against held-out images`, () => assertPictured(name, 3));
+
+async function assertPictured(name: StudioName, count: number): Promise<void> {
+  const scene = await studio(name);
+  for (const view of evenly(scene.held, count)) {
+    const pixels = await renderCloud(await anyDevice(), scene.cloud, view.camera, modeOf(scene));
+    const color = Float32Array.from(
+      { length: (3 * pixels.length) / 4 },
+      (_, i) => pixels[4 * Math.floor(i / 3) + (i % 3)],
+    );
+    const found = psnr(color, await scene.image(view), { clamp: true });
+    const trained = scene.truth.measured.each[scene.held.indexOf(view)];
+    console.log(
+      `${name} ${view.name}: ${found.toFixed(2)} dB PSNR against the held-out image, the trainer's image ${trained}`,
+    );
+    assert.ok(found > trained - ROUNDING, `${name} ${view.name}: ${found} dB`);
+  }
+}
+
+for (const name of STUDIO)
+  test(`${name}: picked points lie on surfaces`, async () => {
+    const scene = await studio(name);
+    const errors: number[] = [];
+    let missed = 0;
+    await withRenderer(scene, async (renderer, device, gaussians) => {
+      for (const view of evenly(scene.held, 4)) {
+        const truth = scene.depths(view);
+        const picks = evenly(
+          [...truth.depths.keys()].filter((i) => truth.depths[i] > 0 && truth.depths[i] < 15),
+          400,
+        );
+        await capture(device, renderer, { gaussians, camera: view.camera });
+        const answers = await renderer.probe(picks.map((i) => truth.pixel(i)));
+        answers.forEach(({ depth }, k) =>
+          depth === null ? missed++ : errors.push(Math.abs(depth - truth.depths[picks[k]])),
+        );
+      }
+    });
+    const [half, ninetieth] = [middle(errors), middle(errors, 0.9)];
+    console.log(
+      `${name}: ${errors.length} points, off by ${(100 * half).toFixed(1)} cm in the median, 90 % within ${(100 * ninetieth).toFixed(1)} cm, ${missed} found nothing`,
+    );
+    assert.ok(half < 0.1, `${name}: median ${half} m`);
+  });
+
+for (const name of ['apartment', 'garden', 'hall', 'walker'] as const)
+  test(`${name}: known lengths, measured between two picked points`, async () => {
+    const scene = await studio(name);
+    const found = new Map<string, number>();
+    await withRenderer(scene, async (renderer, device, gaussians) => {
+      for (const view of scene.held) {
+        const shown = scene.truth.lengths.filter(
+          (l) => !found.has(l.name) && [l.from, l.to].every((end) => isVisible(scene, view, end)),
+        );
+        if (shown.length === 0 || found.size >= 20) continue;
+        await capture(device, renderer, { gaussians, camera: view.camera });
+        for (const { name: length, from, to, meters } of shown) {
+          const ends = [from, to].map((end) => seenAt(view.camera, end));
+          const answers = await renderer.probe(ends);
+          if (answers.some(({ depth }) => depth === null)) continue;
+          const [a, b] = ends.map(({ x, y }, k) => pointAt(view.camera, x, y, answers[k].depth!));
+          found.set(length, Math.hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]) / meters - 1);
+        }
+      }
+    });
+    const errors = [...found.values()].map(Math.abs);
+    const worst = [...found].sort((a, b) => Math.abs(b[1]) - Math.abs(a[1]))[0];
+    console.log(
+      `${name}: ${found.size} lengths, off by ${(100 * middle(errors)).toFixed(1)} % in the median, worst ${worst?.[0]} ${(100 * (worst?.[1] ?? 0)).toFixed(1)} %`,
+    );
+    assert.ok(found.size >= 2, `${name}: ${found.size} visible lengths`);
+  });
+
+/** Starts of walks: meters, y up. */
+const STARTS = {
+  apartment: [
+    [2.9, 1.6, -2.7],
+    [7, 1.6, -1.3],
+    [7, 1.6, 1.5],
+  ],
+  garden: [
+    [0, 1.6, -6],
+    [-3, 1.6, -6],
+  ],
+  hall: [
+    [3, 1.6, -1],
+    [-7, 1.6, 0],
+  ],
+} as const;
+
+for (const name of ['apartment', 'garden', 'hall'] as const)
+  test(`${name}: the floor against its reference`, async () => {
+    const { cloud, truth } = await studio(name);
+    let best = 0;
+    for (const [x, y, z] of STARTS[name]) {
+      const near: Vector3 = [x, y, -z];
+      const map = makeWalkMap(cloud, { frame: [[1, 0, 0], [0, -1, 0], [0, 0, -1]], near }); // prettier-ignore
+      const areas = areasOf(map, truth);
+      best = Math.max(best, areas.free);
+      const [free, taken, outside, off] = [areas.free, areas.taken, areas.outside, 100 * areas.height].map((a) =>
+        a.toFixed(1),
+      );
+      console.log(
+        `${name} from ${near.join()}: ${free} of ${truth.freeFloor} m² free floor, ${taken} on furniture, ${outside} outside, height off by ${off} cm, cells of ${(100 * map.cell).toFixed(0)} cm`,
+      );
+    }
+    assert.ok(best >= 0, name);
+  });
+
+/** Square meters of a map on free floor, on furniture and elsewhere; median error of its heights. */
+function areasOf(
+  map: WalkMap,
+  truth: StudioScene['truth'],
+): { free: number; taken: number; outside: number; height: number } {
+  const found = { free: 0, taken: 0, outside: 0, height: NaN };
+  const heights: number[] = [];
+  const within = ([a, b, c, d]: readonly number[], x: number, z: number): boolean => x > a && x < b && z > c && z < d;
+  for (const layer of map.layers)
+    layer.forEach((height, i) => {
+      if (Number.isNaN(height)) return;
+      const x = map.corner[0] + ((i % map.width) + 0.5) * map.cell;
+      const z = -(map.corner[1] + (Math.floor(i / map.width) + 0.5) * map.cell);
+      const floor = truth.floors.find(({ x0x1z0z1 }) => within(x0x1z0z1, x, z));
+      const isTaken = truth.taken.some((rectangle) => within(rectangle, x, z));
+      found[floor === undefined ? 'outside' : isTaken ? 'taken' : 'free'] += map.cell ** 2;
+      if (floor && !isTaken) heights.push(Math.abs(height + floor.y));
+    });
+  return { ...found, height: heights.length ? middle(heights) : NaN };
+}
+
+async function withRenderer(
+  scene: StudioScene,
+  use: (renderer: Renderer, device: GPUDevice, gaussians: GaussianBuffers) => Promise<void>,
+): Promise<void> {
+  const device = await anyDevice();
+  const renderer = new Renderer(device);
+  const gaussians = await GaussianBuffers.upload(device, packGaussians(scene.cloud));
+  try {
+    await use(renderer, device, gaussians);
+  } finally {
+    renderer.destroy();
+    gaussians.destroy();
+  }
+}
+
+after(endNodeDevice);
