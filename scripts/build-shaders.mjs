@@ -17,9 +17,10 @@ const RARE = {
   'clip-shaders': ['animate'],
   'streamed-shaders': ['move_slots', 'page_feedback'],
   'quantized-shaders': ['cull_quantized', 'cull_serial_quantized', 'project_quantized', 'move_quantized_slots'],
-  'auxiliary-shaders': ['rasterize_tiles_auxiliary'],
+  'few-shaders': ['bin_cut', 'bin_index_few', 'bin_order_few', 'rasterize_tiles_few'],
+  'auxiliary-shaders': ['rasterize_tiles_auxiliary', 'rasterize_tiles_auxiliary_few'],
   'probe-shaders': ['probe_depth', 'probe_surface', 'probe_surface_quantized'],
-  'depth-shaders': ['blend_layers', 'rasterize_quads_depth', 'rasterize_tiles_depth'],
+  'depth-shaders': ['blend_layers', 'rasterize_quads_depth', 'rasterize_tiles_depth', 'rasterize_tiles_depth_few'],
   'linear-shaders': ['compose_linear'],
   'rectangle-shaders': ['compose_rectangle'],
   'order-shaders': ['pixel_depths', 'pixel_depths_quantized', 'rasterize_tiles_order'],
@@ -28,6 +29,15 @@ const RARE = {
 const QUANTIZED = {
   stages: ['cull', 'cull_serial', 'pixel_depths', 'probe_surface', 'project'],
   replaced: { 'shared/stored_gaussian': 'shared/quantized_gaussian' },
+};
+/** Stages that are made a second time for images of few tiles: `bin_index_few` of `bin_index` and so on. */
+const SEGMENTS = { 'shared/column': 'shared/single', 'shared/whole_lists': 'shared/segments' };
+const FEW = {
+  bin_index: { 'shared/undivided': 'shared/tile_counts' },
+  bin_order: { 'shared/undivided': 'shared/divide_lists' },
+  rasterize_tiles: SEGMENTS,
+  rasterize_tiles_auxiliary: SEGMENTS,
+  rasterize_tiles_depth: SEGMENTS,
 };
 /**
  * Stages that are made once more for splats that a page cuts, reveals or moves: `cull_modified` of `cull` and so on, which call other functions in place of those that
@@ -112,10 +122,11 @@ const quantizedStages = QUANTIZED.stages.map((path) => ({
   path,
   replaced: QUANTIZED.replaced,
 }));
+const fewStages = Object.entries(FEW).map(([path, replaced]) => ({ stage: `${path}_few`, path, replaced }));
 const modifiedStages = [...plainStages, ...quantizedStages]
   .filter(({ path }) => path in MODIFIED.stages)
   .map((plain) => ({ ...plain, stage: `${plain.stage}_modified`, added: MODIFIED.stages[plain.path] }));
-const stages = [...plainStages, ...quantizedStages, ...modifiedStages];
+const stages = [...plainStages, ...quantizedStages, ...fewStages, ...modifiedStages];
 /** The layout or the number by name, with the files whose stages declare it. */
 const structs = new Map();
 const constants = new Map();

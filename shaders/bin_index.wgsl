@@ -4,6 +4,7 @@
 #import shared/coverage
 #import shared/plan
 #import shared/group
+#import shared/undivided
 
 @group(0) @binding(0) var<storage, read> pair_plan: Plan;
 // Bins of the sorted pairs.
@@ -66,4 +67,5 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
   var word = 0u;
   for (var k = 0u; k < 32u; k++) { word |= ((masks[row + k] >> tile) & 1u) << k; }
   tile_bits[first + lane] = word;
+  count_splats(first, min(first + PROJECT_GROUP, pair_plan.visible), lane, word, mask);
 }

@@ -2,6 +2,7 @@
 // less than a fifth come in any order.
 #import shared/bins
 #import shared/prefix
+#import shared/undivided
 
 @group(0) @binding(0) var<uniform> view: BinView;
 @group(0) @binding(1) var<storage, read> ranges: array<vec2u>;
@@ -37,4 +38,5 @@ fn main(@builtin(local_invocation_index) lane: u32) {
   for (var bin = lane; bin < bins; bin += PREFIX_THREADS) {
     bin_order[atomicAdd(&places[class_of(pairs_of(bin))], 1u)] = bin;
   }
+  divide_lists(lane);
 }

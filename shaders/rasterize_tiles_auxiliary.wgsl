@@ -1,5 +1,6 @@
 // Rasterizes tiles, and writes the contribution of each splat and the depth of each pixel.
 #import shared/paint_columns
+#import shared/whole_lists
 #import shared/median_depth
 
 // Indices of the splats by slot.
@@ -27,7 +28,7 @@ fn aux_clear(lane: u32) {
   atomicStore(&weights[lane], 0u);
 }
 
-fn aux_blend(k: u32, weight: Column, before: Column, after: Column, is_blended: vec4<bool>) {
+fn aux_blend(k: u32, weight: Column, before: Column, after: Column, is_blended: Flags) {
   atomicMax(&weights[k], bitcast<u32>(max(max(weight.x, weight.y), max(weight.z, weight.w))));
   note_depth(k, before, after, is_blended);
 }
@@ -38,5 +39,5 @@ fn aux_store(k: u32) {
 }
 
 fn aux_pixel(pixel: vec2u, row: u32) {
-  textureStore(depths, pixel, vec4f(half_depth[row]));
+  textureStore(depths, pixel, vec4f(row_of(half_depth, row)));
 }

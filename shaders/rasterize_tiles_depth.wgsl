@@ -2,6 +2,7 @@
 // splats.
 #import shared/scene_depth
 #import shared/paint_columns
+#import shared/whole_lists
 #import shared/median_depth
 
 @group(0) @binding(7) var<uniform> scene: SceneDepth;
@@ -21,7 +22,7 @@ override writes_depth: bool = false;
 // layers.
 var<private> topmost: vec2u;
 var<private> limits: Column;
-var<private> passed: vec4u;
+var<private> passed: Column;
 
 fn load_more(k: u32, slot: u32, s: ProjectedSplat, tile_corner: vec2f) { batch_depths[k] = depths[slot]; }
 
@@ -31,22 +32,25 @@ fn start_hiding(position: vec2u) {
   if (!tests_depth) { return; }
   topmost = position;
   for (var row = 0u; row < COLUMN; row++) {
-    if (layers == 0u) { limits[row] = limit_at(texel_of(row)); } else { limits[row] = layer_at(texel_of(row), 0u).depth; }
+    if (layers == 0u) { limits = with_row(limits, row, limit_at(texel_of(row))); }
+    else { limits = with_row(limits, row, layer_at(texel_of(row), 0u).depth); }
   }
 }
 
 // Blends the next layer of a pixel, unless the pixel is finished.
 fn blend_layer(pixels: ptr<function, Pixels>, row: u32) {
-  let layer = layer_at(texel_of(row), passed[row]);
-  passed[row]++;
-  limits[row] = layer_at(texel_of(row), passed[row]).depth;
-  let before = (*pixels).light[row];
+  let nth = row_of(passed, row);
+  let layer = layer_at(texel_of(row), u32(nth));
+  passed = with_row(passed, row, nth + 1.0);
+  limits = with_row(limits, row, layer_at(texel_of(row), u32(nth) + 1u).depth);
+  let before = row_of((*pixels).light, row);
   if (before <= view.transmittance_min) { return; }
-  (*pixels).red[row] += before * layer.color.r;
-  (*pixels).green[row] += before * layer.color.g;
-  (*pixels).blue[row] += before * layer.color.b;
-  (*pixels).light[row] = before * (1.0 - layer.color.a);
-  (*pixels).transmittance[row] = (*pixels).light[row];
+  let own = with_row(Column(0.0), row, before);
+  (*pixels).red += own * layer.color.r;
+  (*pixels).green += own * layer.color.g;
+  (*pixels).blue += own * layer.color.b;
+  (*pixels).light = with_row((*pixels).light, row, before * (1.0 - layer.color.a));
+  (*pixels).transmittance = with_row((*pixels).transmittance, row, row_of((*pixels).light, row));
 }
 
 // Runs before splat k of the batch, because nearer layers come first. A depth without a color layer blocks all light
@@ -58,7 +62,7 @@ fn hide(pixels: ptr<function, Pixels>, k: u32) {
     (*pixels).light = select((*pixels).light, Column(0.0), is_behind);
   } else if (any(is_behind)) {
     for (var row = 0u; row < COLUMN; row++) {
-      while (batch_depths[k] > limits[row]) { blend_layer(pixels, row); }
+      while (batch_depths[k] > row_of(limits, row)) { blend_layer(pixels, row); }
     }
   }
 }
@@ -66,18 +70,18 @@ fn hide(pixels: ptr<function, Pixels>, k: u32) {
 fn hide_rest(pixels: ptr<function, Pixels>) {
   if (!tests_depth) { return; }
   for (var row = 0u; row < COLUMN; row++) {
-    while (passed[row] < layers) { blend_layer(pixels, row); }
+    while (u32(row_of(passed, row)) < layers) { blend_layer(pixels, row); }
   }
 }
 
 fn aux_clear(lane: u32) {}
 
-fn aux_blend(k: u32, weight: Column, before: Column, after: Column, is_blended: vec4<bool>) {
+fn aux_blend(k: u32, weight: Column, before: Column, after: Column, is_blended: Flags) {
   if (writes_depth) { note_depth(k, before, after, is_blended); }
 }
 
 fn aux_store(k: u32) {}
 
 fn aux_pixel(pixel: vec2u, row: u32) {
-  if (writes_depth) { textureStore(median_depth, pixel, vec4f(half_depth[row])); }
+  if (writes_depth) { textureStore(median_depth, pixel, vec4f(row_of(half_depth, row))); }
 }

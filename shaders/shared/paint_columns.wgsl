@@ -1,12 +1,8 @@
-// Blends the splats of a batch into a column of four pixels, in the order of their center depths. Work that does not
-// depend on the pixel is done once for all four. The importing module defines how splats are hidden (`start_hiding`,
+// Blends the splats of a batch into the pixels of a thread, in the order of their center depths. Work that does not
+// depend on the pixel is done once for all of a column. The importing module defines how splats are hidden (`start_hiding`,
 // `hide`, `hide_rest`) and which auxiliary outputs are written (`aux_blend`, `aux_pixel`).
 #import shared/paint_tiles
-
-const SIDE: u32 = TILE;
-const COLUMN: u32 = 4u;
-alias Column = vec4f;
-const STEPS = Column(0.0, 1.0, 2.0, 3.0);
+#import shared/column
 
 struct Pixels {
   red: Column,
@@ -25,7 +21,7 @@ fn packed_color(s: ProjectedSplat, slot: u32) -> vec2u {
 
 fn start_pixels(position: vec2u) -> Pixels {
   let is_inside = f32(position.x) < view.viewport.x;
-  let are_inside = vec4<bool>(is_inside) & (f32(position.y) + STEPS < Column(view.viewport.y));
+  let are_inside = Flags(is_inside) & (f32(position.y) + STEPS < Column(view.viewport.y));
   if (is_inside) { start_hiding(position); }
   let light = select(Column(0.0), Column(1.0), are_inside);
   return Pixels(Column(0.0), Column(0.0), Column(0.0), light, light);
@@ -35,15 +31,18 @@ fn are_finished(pixels: Pixels) -> bool {
   return all(pixels.light <= Column(view.transmittance_min));
 }
 
-// Blends splat k of the batch. It has no branch, which would take a third more time: splats that miss the pixel and
-// finished pixels add zero.
-fn blend(pixels: ptr<function, Pixels>, k: u32, place: vec2f, min_power: f32) {
-  let axis = axes[k];
-  let paint = paints[k];
+fn alpha_of(axis: vec4f, paint: vec2u, place: vec2f, min_power: f32) -> Column {
   let u = axis.x * place.x + axis.y;
   let v = axis.w * (place.y + STEPS) + (axis.z * place.x + bitcast<f32>(paint.x));
   let power = (bitcast<f32>(paint.y) - u * u) - v * v;
-  let alpha = select(Column(0.0), min(Column(ALPHA_MAX), exp2(power)), power >= Column(min_power));
+  return select(Column(0.0), min(Column(ALPHA_MAX), exp2(power)), power >= Column(min_power));
+}
+
+// Blends splat k of the batch. It has no branch, which would take a third more time: splats that miss the pixel and
+// finished pixels add zero.
+fn blend(pixels: ptr<function, Pixels>, k: u32, place: vec2f, min_power: f32) {
+  let paint = paints[k];
+  let alpha = alpha_of(axes[k], paint.xy, place, min_power);
   hide(pixels, k);
   let before = (*pixels).light;
   let full_weight = before * alpha;
@@ -83,6 +82,6 @@ fn finish_pixels(pixels: ptr<function, Pixels>, position: vec2u) {
     let pixel = position + vec2u(0u, row);
     if (any(vec2f(pixel) >= view.viewport)) { break; }
     aux_pixel(pixel, row);
-    store_pixel(pixel, vec3f((*pixels).red[row], (*pixels).green[row], (*pixels).blue[row]), (*pixels).transmittance[row]);
+    store_pixel(pixel, vec3f(row_of((*pixels).red, row), row_of((*pixels).green, row), row_of((*pixels).blue, row)), row_of((*pixels).transmittance, row));
   }
 }

@@ -1,7 +1,6 @@
 // Rasterizes tiles, one workgroup each, front to back in float32 registers, and stops when nothing behind is visible.
 // The importing module defines:
-// - `SIDE` in pixels of what a workgroup rasterizes at most: a tile, or a square of four small tiles; and `COLUMN`, the
-//   pixels of a thread, one above the other: SIDE · SIDE = 256 · COLUMN. Only 64 threads have pixels of a single tile;
+// - the pixels of a thread (shared/column or shared/single);
 // - `Pixels`, a thread's pixels, with `start_pixels`, `paint_batch`, `are_finished` and `finish_pixels`;
 // - additional data for each splat: `packed_color`, `load_more`, `aux_clear` and `aux_store`.
 #import shared/bits
@@ -88,9 +87,22 @@ fn load_splat(k: u32, slot: u32, tile_corner: vec2f) {
   paints[k] = vec4u(bitcast<u32>(v_0), bitcast<u32>(power), packed_color(s, slot));
 }
 
-@compute @workgroup_size(TILE_THREADS)
-fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_index) lane: u32) {
-  let number = group_index(workgroup_id) * view.parts + view.part;
+// What a workgroup rasterizes: a tile of a bin, or for step 1 a square of four.
+struct TilePlace {
+  bin: u32,
+  tile_in_bin: u32,
+  step: u32,
+  // The corner of the tile in pixels; outside of the image for a tile without pixels.
+  corner: vec2u,
+}
+
+fn corner_of(bin: u32, tile_in_bin: u32) -> vec2u {
+  let tile = vec2u(bin % view.bins.x, bin / view.bins.x) * vec2u(BIN_COLUMNS, BIN_ROWS)
+    + vec2u(tile_in_bin % BIN_COLUMNS, tile_in_bin / BIN_COLUMNS);
+  return tile * view.tile_side;
+}
+
+fn place_of(number: u32) -> TilePlace {
   let bins = view.bins.x * view.bins.y;
   // The small tiles of long bins come first, one by one, then those of the other bins, four at a time.
   var single_bins = bins;
@@ -98,34 +110,42 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
   var nth = number / TILES_PER_BIN;
   var tile_in_bin = number % TILES_PER_BIN;
   let step = u32(nth >= single_bins);
-  block_side = view.tile_side / (BLOCK_COLUMNS >> step);
   if (step == 1u) {
     let square = tile_in_bin % SQUARES_PER_BIN;
     nth += 3u * (nth - single_bins) + tile_in_bin / SQUARES_PER_BIN;
     // Two rows of squares are two rows of tiles each.
     tile_in_bin = 2u * (square + (square & SQUARES_PER_ROW));
   }
-  if (nth >= bins) { return; }
+  if (nth >= bins) { return TilePlace(0u, 0u, 0u, vec2u(NOWHERE)); }
   let bin = bin_order[nth];
-  let tile = vec2u(bin % view.bins.x, bin / view.bins.x) * vec2u(BIN_COLUMNS, BIN_ROWS)
-    + vec2u(tile_in_bin % BIN_COLUMNS, tile_in_bin / BIN_COLUMNS);
-  let corner = tile * view.tile_side;
-  // Bins at the edges have tiles outside the image.
-  if (any(vec2f(corner) >= view.viewport)) { return; }
-  let threads = block_side * block_side / COLUMN;
-  let own_block = lane / threads;
-  let in_block = lane % threads;
-  // The topmost pixel of the thread, relative to the corner.
+  return TilePlace(bin, tile_in_bin, step, corner_of(bin, tile_in_bin));
+}
+
+// Whether a tile has pixels: bins at the edges have tiles outside the image.
+fn is_seen(corner: vec2u) -> bool { return all(vec2f(corner) < view.viewport); }
+
+// The block of a thread.
+fn block_of(lane: u32) -> u32 { return lane / (block_side * block_side / COLUMN); }
+
+// The topmost pixel of a thread, relative to the corner.
+fn pixel_of(lane: u32) -> vec2u {
+  let own_block = block_of(lane);
+  let in_block = lane % (block_side * block_side / COLUMN);
   var own_pixel = vec2u(own_block % BLOCK_COLUMNS, own_block / BLOCK_COLUMNS) * block_side
     + vec2u(in_block % block_side, in_block / block_side * COLUMN);
   if (own_block >= BLOCKS) { own_pixel.x = NOWHERE; }
-  let position = corner + own_pixel;
-  let place = vec2f(own_pixel) + 0.5;
-  let min_power = log2(ALPHA_MIN);
+  return own_pixel;
+}
 
-  var pixels = start_pixels(position);
+// Rasterizes the splats of a list until all pixels are finished. If `only_light`, only their light is changed. Returns
+// the number of splats.
+fn paint_list(pixels: ptr<function, Pixels>, first: ListPlace, corner: vec2u, lane: u32, only_light: bool) -> u32 {
+  let own_block = block_of(lane);
+  let place = vec2f(pixel_of(lane)) + 0.5;
+  let min_power = log2(ALPHA_MIN);
+  var list = first;
+  var painted = 0u;
   if (lane == 0u) { paints[NO_SPLAT].y = bitcast<u32>(NO_POWER); }
-  var list = begin_list(bin, tile_in_bin, step);
   loop {
     if (lane < BLOCKS * BATCH_WORDS) { atomicStore(&block_hits[lane], 0u); }
     if (lane == 0u) { atomicStore(&unfinished, 0u); }
@@ -135,13 +155,25 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
     if (count == 0u) { break; }
     workgroupBarrier();
 
-    paint_batch(&pixels, own_block, place, min_power);
-    if (!are_finished(pixels)) { atomicStore(&unfinished, 1u); }
+    if (only_light) { dim_batch(pixels, own_block, place, min_power); }
+    else { paint_batch(pixels, own_block, place, min_power); }
+    if (!are_finished(*pixels)) { atomicStore(&unfinished, 1u); }
     workgroupBarrier();
 
     if (lane < count) { aux_store(lane); }
+    painted += count;
     if (lane == 0u) { is_open = atomicLoad(&unfinished); }
     if (workgroupUniformLoad(&is_open) == 0u) { break; }
   }
+  return painted;
+}
+
+// Rasterizes the whole list of a tile. Returns the number of splats.
+fn paint_whole(tile: TilePlace, lane: u32) -> u32 {
+  block_side = view.tile_side / (BLOCK_COLUMNS >> tile.step);
+  let position = tile.corner + pixel_of(lane);
+  var pixels = start_pixels(position);
+  let painted = paint_list(&pixels, begin_list(tile.bin, tile.tile_in_bin, tile.step), tile.corner, lane, false);
   finish_pixels(&pixels, position);
+  return painted;
 }

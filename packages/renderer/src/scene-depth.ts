@@ -1,5 +1,10 @@
 import { GaussianSplatError, type Camera } from '@gaussian-splat/core';
-import { blendLayers, rasterizeQuadsDepth, rasterizeTilesDepth } from './generated/depth-shaders.js';
+import {
+  blendLayers,
+  rasterizeQuadsDepth,
+  rasterizeTilesDepth,
+  rasterizeTilesDepthFew,
+} from './generated/depth-shaders.js';
 import { constants, layouts } from './generated/shaders.js';
 import { deviceReading, type DepthPlanes } from './depth-reading.js';
 import { BUFFER_USAGE, perDevice, SHADER_STAGE, ShaderProgram, TEXTURE_USAGE, type Overrides } from './gpu/kernel.js';
@@ -166,6 +171,10 @@ export class SceneDepth implements PaintingDepth {
     return {
       tile: constants.TILE,
       kernel: (variant) => rasterizeKernel(this.#device, rasterizeTilesDepth, variant, this.overrides),
+      few: (variant, stage) =>
+        rasterizeKernel(this.#device, rasterizeTilesDepthFew, variant, { ...this.overrides, stage }),
+      // A segment does not know which layers are blended in front of it.
+      hasWholeLists: this.layers > 0,
       bind: (kernel, painted) => this.#tiles.bind(kernel, painted, { depths, ...this.resources }),
     };
   }

@@ -57,3 +57,5 @@ export {
 export { leafLevel, type SplatLevel } from './levels/splat-level.js';
 export { cameraValues } from './view.js';
 export { Ingest } from './generated/live-layouts.js';
+export { fewTilesOn } from './rasterizers/few-tiles-loader.js';
+export { FewTiles } from './rasterizers/few-tiles.js';

@@ -25,9 +25,15 @@ export interface TimingScene {
  * Resolves to whether a variant passes the self-test. The result is cached for each device. The performance timeline
  * contains the duration as `gaussian-splat.self-test`, with the milliseconds that pipelines compile as `detail.compiling`.
  * @param format Format of the targets of later frames, whose pipelines are compiled meanwhile.
+ * @param tested What is tested, if the variant is tested more than once.
  */
-export const passes = (device: GPUDevice, variants: Variants, format?: GPUTextureFormat): Promise<boolean> =>
-  perDevice(device, `right ${JSON.stringify(variants)}`, async () => {
+export const passes = (
+  device: GPUDevice,
+  variants: Variants,
+  format?: GPUTextureFormat,
+  tested = 'variants',
+): Promise<boolean> =>
+  perDevice(device, `right ${tested} ${JSON.stringify(variants)}`, async () => {
     const start = performance.now();
     await madeTogether(device, () => prepare(device, variants, format ?? ANSWER_TARGET.format));
     const detail = { compiling: performance.now() - start };

@@ -1,5 +1,5 @@
 /** Rasterizes tiles with auxiliary outputs. */
-import { rasterizeTilesAuxiliary } from '../generated/auxiliary-shaders.js';
+import { rasterizeTilesAuxiliary, rasterizeTilesAuxiliaryFew } from '../generated/auxiliary-shaders.js';
 import { constants } from '../generated/shaders.js';
 import { BUFFER_USAGE, perDevice, TEXTURE_USAGE } from '../gpu/kernel.js';
 import type {
@@ -8,7 +8,13 @@ import type {
   AuxiliaryTargets,
   AuxiliaryTilePainter,
 } from './rasterizer.js';
-import { rasterizeKernel, type PaintedTiles, type RasterizeKernel, type RasterizeVariant } from './tile-kernels.js';
+import {
+  rasterizeKernel,
+  type FewStage,
+  type PaintedTiles,
+  type RasterizeKernel,
+  type RasterizeVariant,
+} from './tile-kernels.js';
 import { BoundImages } from './tile-painter.js';
 
 /**
@@ -49,6 +55,10 @@ class AuxiliaryPainter implements AuxiliaryTilePainter {
 
   kernel(variant: RasterizeVariant): RasterizeKernel {
     return rasterizeKernel(this.#device, rasterizeTilesAuxiliary, variant);
+  }
+
+  few(variant: RasterizeVariant, stage: FewStage): RasterizeKernel {
+    return rasterizeKernel(this.#device, rasterizeTilesAuxiliaryFew, variant, { stage });
   }
 
   /** Returns new bindings for each frame. They are not cached, because few frames have auxiliary outputs. */

@@ -31,7 +31,19 @@ export const listingKernels = (device: GPUDevice): ListingKernels => ({
 export type RasterizeKernel = ComputeKernel<typeof rasterizeTiles>;
 
 /** Bindings that all kernels which rasterize tiles have. */
-export type PaintedTiles = Parameters<RasterizeKernel['bind']>[0] & { readonly image: GPUTextureView };
+export type PaintedTiles = Parameters<RasterizeKernel['bind']>[0] & {
+  readonly image: GPUTextureView;
+  /** Results of segments of divided lists; undefined if no list is divided. */
+  readonly segments?: GPUBuffer | undefined;
+};
+
+/**
+ * Dispatches of an image of few tiles: shaders/shared/segments.wgsl. {@link WHOLE_LISTS} is the only one if no list is
+ * divided.
+ */
+export const FEW_STAGES = [0, 1, 2, 3] as const;
+export type FewStage = (typeof FEW_STAGES)[number];
+export const WHOLE_LISTS = 3;
 
 /** Properties that select the pipeline of a kernel. */
 export interface RasterizeVariant {

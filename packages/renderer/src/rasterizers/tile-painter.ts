@@ -1,7 +1,14 @@
 /** Variants of tile rasterization. Each frame uses one of them. */
 import { constants, rasterizeTiles } from '../generated/shaders.js';
 import type { Resource } from '../gpu/kernel.js';
-import { rasterizeKernel, type PaintedTiles, type RasterizeKernel, type RasterizeVariant } from './tile-kernels.js';
+import { fewTilesOn } from './few-tiles-loader.js';
+import {
+  rasterizeKernel,
+  type FewStage,
+  type PaintedTiles,
+  type RasterizeKernel,
+  type RasterizeVariant,
+} from './tile-kernels.js';
 
 /** A variant of tile rasterization. */
 export interface TilePainter {
@@ -9,6 +16,10 @@ export interface TilePainter {
   readonly tile: number;
   /** Returns the kernel with the pipeline for a variant. */
   kernel(variant: RasterizeVariant): RasterizeKernel;
+  /** Returns the kernel for a dispatch of an image of few tiles. Undefined if the variant does not draw such images. */
+  few?(variant: RasterizeVariant, stage: FewStage): RasterizeKernel | undefined;
+  /** Whether every list is rasterized as a whole. Default: false. */
+  readonly hasWholeLists?: boolean;
   /** Returns the bind group for a frame's resources. */
   bind(kernel: RasterizeKernel, painted: PaintedTiles): GPUBindGroup;
 }
@@ -41,5 +52,9 @@ export class PlainPainter extends BoundImages implements TilePainter {
 
   kernel(variant: RasterizeVariant): RasterizeKernel {
     return rasterizeKernel(this.#device, rasterizeTiles, variant);
+  }
+
+  few(variant: RasterizeVariant, stage: FewStage): RasterizeKernel | undefined {
+    return fewTilesOn(this.#device).now?.kernel(variant, stage);
   }
 }

@@ -1,5 +1,5 @@
-import { constants, layouts } from '../generated/shaders.js';
-import { BUFFER_USAGE } from '../gpu/kernel.js';
+import { constants, layouts, type binIndex, type binOrder } from '../generated/shaders.js';
+import { BUFFER_USAGE, type Resources } from '../gpu/kernel.js';
 import { BufferOwner, GpuMemory } from '../gpu/memory.js';
 import { writeStruct } from '../gpu/struct.js';
 import { sortedIn, SortStage, type SortBindings } from '../stages/sort.js';
@@ -15,10 +15,22 @@ import type {
   Surface,
 } from './rasterizer.js';
 import { pairBuffers, releasableBytesOf, type PairBuffers } from './pair-buffers.js';
-import { listingKernels, type ListingKernels, type PaintedTiles, type RasterizeVariant } from './tile-kernels.js';
+import {
+  listingKernels,
+  WHOLE_LISTS,
+  type ListingKernels,
+  type PaintedTiles,
+  type RasterizeKernel,
+  type RasterizeVariant,
+} from './tile-kernels.js';
+import { fewTilesOn, type FewTilesLoader } from './few-tiles-loader.js';
+import type { FewBuffers, FewTiles } from './few-tiles.js';
 import { PlainPainter, type TilePainter } from './tile-painter.js';
 
-const { BIN_COLUMNS, BIN_ROWS, DIGITS, PREFIX_THREADS, PROJECT_GROUP, SMALL_TILE, TILES_PER_BIN } = constants;
+const { BIN_COLUMNS, BIN_ROWS, DIGITS, PREFIX_THREADS, MAX_TILES, PROJECT_GROUP, SMALL_TILE, TILES_PER_BIN } =
+  constants;
+/** Maximum number of bins of an image of few tiles. */
+const FEW_BINS = MAX_TILES / TILES_PER_BIN;
 
 const groupsOf = (splats: number): number => Math.ceil(splats / PREFIX_THREADS);
 
@@ -32,19 +44,26 @@ interface Grid {
   readonly count: number;
   /** Number of bits of the index of a bin. */
   readonly bits: number;
+  /** Whether the image has so few tiles that a thread has one pixel. */
+  readonly isFew: boolean;
+  /** Whether long lists are divided. */
+  readonly isDivided: boolean;
 }
 
 /** Returns the bins for an image. Their tiles are small if one pass sorts the pairs by their bins. */
 function gridFor(
   { width, height }: Pick<Surface, 'width' | 'height'>,
   painter: TilePainter,
+  few: FewTiles | undefined,
   tile: number = SMALL_TILE,
 ): Grid {
   const columns = Math.ceil(width / (BIN_COLUMNS * tile));
   const rows = Math.ceil(height / (BIN_ROWS * tile));
   const count = columns * rows;
-  if (count > DIGITS && tile < painter.tile) return gridFor({ width, height }, painter, painter.tile);
-  return { tile, columns, rows, count, bits: Math.ceil(Math.log2(count)) };
+  if (count > DIGITS && tile < painter.tile) return gridFor({ width, height }, painter, few, painter.tile);
+  const isFew = few !== undefined && painter.few !== undefined && count <= FEW_BINS;
+  const isDivided = isFew && !painter.hasWholeLists;
+  return { tile, columns, rows, count, bits: Math.ceil(Math.log2(count)), isFew, isDivided };
 }
 
 /** Bindings for one scratch and one grid of bins. */
@@ -57,8 +76,8 @@ interface GridBindings {
   readonly emit: GPUBindGroup;
   readonly plan: GPUBindGroup;
   readonly sort: SortBindings;
-  readonly index: GPUBindGroup;
-  readonly order: GPUBindGroup;
+  /** Records what follows the sort of the pairs. */
+  readonly list: (pass: GPUComputePassEncoder, groups: number) => void;
 }
 
 /** Image formats that a compute shader can write without an optional feature. */
@@ -95,6 +114,10 @@ export class TilesRasterizer extends BufferOwner implements Rasterizer {
   readonly #sort: SortStage;
   readonly #view: GPUBuffer;
   readonly #viewBytes = new ArrayBuffer(layouts.BinView.size);
+  /** Kernels for images of few tiles; undefined if threads are serial: a processor has enough to do with few tiles. */
+  readonly #fewLoader: FewTilesLoader | undefined;
+  #few: FewTiles | undefined;
+  #fewBuffers: FewBuffers | undefined;
   #inputs: RasterizerInputs | undefined;
   #buffers: PairBuffers | undefined;
   /** Bindings by grid, because images in motion may have fewer pixels. */
@@ -106,6 +129,7 @@ export class TilesRasterizer extends BufferOwner implements Rasterizer {
     this.#accumulation = accumulation;
     this.#plain = new PlainPainter(device);
     this.#kernels = listingKernels(device);
+    this.#fewLoader = threads === 'parallel' ? fewTilesOn(device) : undefined;
     this.#sort = new SortStage(device, threads, 'given');
     const usage = BUFFER_USAGE.uniform | BUFFER_USAGE.copyDestination;
     this.#view = this.memory.buffer('gs.rasterize.view', layouts.BinView.size, usage);
@@ -127,8 +151,11 @@ export class TilesRasterizer extends BufferOwner implements Rasterizer {
   }
 
   prepare(settings: RasterSettings, format: GPUTextureFormat, painter: TilePainter = this.#plain): void {
-    const prepare = (own: Pick<RasterizeVariant, 'format' | 'isFinal'>): unknown =>
-      painter.kernel({ ...own, refusesLast: refusesLast(settings) }).prepare();
+    const prepare = (own: Pick<RasterizeVariant, 'format' | 'isFinal'>): void => {
+      const variant = { ...own, refusesLast: refusesLast(settings) };
+      painter.kernel(variant).prepare();
+      if (painter === this.#plain) this.#fewLoader?.prepare(variant);
+    };
     if (this.finishes(format)) prepare({ format, isFinal: true });
     prepare({ format: this.#accumulation, isFinal: false });
   }
@@ -139,7 +166,7 @@ export class TilesRasterizer extends BufferOwner implements Rasterizer {
     const bound = this.#boundFor(painting, this.#inputs, this.#buffers);
     this.#writeView(painting, bound.grid, { index: 0, count: 1 });
 
-    const { count, plan, emit, index, order } = this.#kernels;
+    const { count, plan, emit } = this.#kernels;
     const timestampWrites = painting.timer?.timestampWrites('bin');
     const bin = encoder.beginComputePass({ label: 'gs.bin', timestampWrites });
     // Dispatches groups for the whole capacity; those beyond the actual splats and pairs end at once.
@@ -148,8 +175,7 @@ export class TilesRasterizer extends BufferOwner implements Rasterizer {
     plan.dispatch(bin, bound.plan, 1);
     emit.dispatch(bin, bound.emit, groups);
     this.#sort.record(bin, bound.sort, this.#inputs.pairCapacity);
-    index.dispatch(bin, bound.index, Math.ceil(this.#inputs.pairCapacity / PROJECT_GROUP));
-    order.dispatch(bin, bound.order, 1);
+    bound.list(bin, Math.ceil(this.#inputs.pairCapacity / PROJECT_GROUP));
     bin.end();
   }
 
@@ -158,26 +184,49 @@ export class TilesRasterizer extends BufferOwner implements Rasterizer {
     if (this.#inputs === undefined || this.#buffers === undefined) return;
     const bound = this.#boundFor(painting, this.#inputs, this.#buffers);
     // Each slice contains every `count`-th workgroup, so that all slices have long and short lists.
-    const groups = Math.ceil((bound.grid.count * TILES_PER_BIN - slice.index) / slice.count);
-    if (groups <= 0) return;
+    const tiles = Math.ceil((bound.grid.count * TILES_PER_BIN - slice.index) / slice.count);
+    if (tiles <= 0) return;
     // An undivided frame uses the view with which its splats were listed.
     if (slice.count > 1) this.#writeView(painting, bound.grid, slice);
     const paint = encoder.beginComputePass({
       label: 'gs.rasterize',
       timestampWrites: timer?.timestampWrites('rasterize'),
     });
-    const kernel = painter.kernel({
+    const variant = {
       ...{ format: surface.format, isFinal: background !== undefined },
       refusesLast: refusesLast(settings),
-    });
-    kernel.dispatch(paint, painter.bind(kernel, this.#painted(bound, surface.view)), groups);
+    };
+    const isDivided = bound.grid.isDivided && slice.count === 1;
+    const dispatches = this.#dispatches(painter, variant, bound.grid.isFew, isDivided, tiles);
+    // All kernels of a frame have the same bindings.
+    const group = painter.bind(dispatches[0][0], this.#painted(bound, surface.view));
+    for (const [kernel, groups] of dispatches) kernel.dispatch(paint, group, groups);
     paint.end();
+  }
+
+  /** Returns the dispatches of a slice with their numbers of workgroups. */
+  #dispatches(
+    painter: TilePainter,
+    variant: RasterizeVariant,
+    isFew: boolean,
+    isDivided: boolean,
+    tiles: number,
+  ): (readonly [RasterizeKernel, number])[] {
+    if (!isFew) return [[painter.kernel(variant), tiles]];
+    if (!isDivided) return [[painter.few!(variant, WHOLE_LISTS)!, tiles]];
+    const { segments } = this.#few!;
+    return ([0, 1, 2] as const).map((stage) => [
+      painter.few!(variant, stage)!,
+      stage === 0 ? segments + tiles : segments,
+    ]);
   }
 
   #release(): void {
     // `free` ignores the ping-pong buffers, because they belong to another `GpuMemory`.
-    for (const buffer of Object.values(this.#buffers ?? {}).flat()) this.memory.free(buffer as GPUBuffer);
+    for (const buffer of Object.values({ ...this.#buffers, ...this.#fewBuffers }).flat())
+      this.memory.free(buffer as GPUBuffer);
     this.#forgetGrids();
+    this.#fewBuffers = undefined;
     this.#buffers = undefined;
   }
 
@@ -186,16 +235,20 @@ export class TilesRasterizer extends BufferOwner implements Rasterizer {
     inputs: RasterizerInputs,
     buffers: PairBuffers,
   ): GridBindings {
-    const grid = gridFor(surface, painter);
+    if (this.#few !== this.#fewLoader?.now) this.#forgetGrids();
+    this.#few = this.#fewLoader?.now;
+    const grid = gridFor(surface, painter, this.#few);
+    if (grid.count <= FEW_BINS) this.#fewLoader?.load();
     const key = JSON.stringify(grid);
     const known = this.#bound.get(key);
     if (known) return known;
     if (this.#bound.size >= MAX_GRIDS) this.#forgetGrids();
+    const words = grid.count + 1 + (grid.isDivided ? this.#few!.words : 0);
     const own = {
       ranges: this.memory.buffer('gs.bin.ranges', 8 * grid.count, BUFFER_USAGE.storage | BUFFER_USAGE.copyDestination),
-      binOrder: this.memory.buffer('gs.bin.order', 4 * (grid.count + 1), BUFFER_USAGE.storage),
+      binOrder: this.memory.buffer('gs.bin.order', 4 * words, BUFFER_USAGE.storage),
     };
-    const bound = { grid, ...own, ...this.#bindings(inputs, buffers, grid.bits, own) };
+    const bound = { grid, ...own, ...this.#bindings(inputs, buffers, grid, own) };
     this.#bound.set(key, bound);
     return bound;
   }
@@ -211,26 +264,42 @@ export class TilesRasterizer extends BufferOwner implements Rasterizer {
   #bindings(
     { plan, splats, order }: RasterizerInputs,
     { rects, groupPairs, plan: pairPlan, bins, pairs, digitCounts, digitTotals }: PairBuffers,
-    bits: number,
+    { bits, isDivided }: Grid,
     { ranges, binOrder }: Pick<GridBindings, 'ranges' | 'binOrder'>,
   ): Omit<GridBindings, 'grid' | 'ranges' | 'binOrder'> {
     const view = this.#view;
     const sorted = sortedIn(bits);
-    const { count, plan: planKernel, emit, index, order: orderKernel } = this.#kernels;
+    const { count, plan: planKernel, emit } = this.#kernels;
+    const indexed = {
+      ...{ view, splats, pair_plan: pairPlan, ranges },
+      bins: bins[sorted],
+      pairs: pairs[sorted],
+      tile_bits: bins[1 - sorted]!,
+    };
     const shared = { view, plan, order, rects, group_pairs: groupPairs };
     return {
       count: count.bind({ ...shared, splats }),
       emit: emit.bind({ ...shared, bins: bins[0], pairs: pairs[0] }),
       plan: planKernel.bind({ values: groupPairs, view, pair_plan: pairPlan, ranges }),
       sort: this.#sort.bind({ plan: pairPlan, keys: bins, values: pairs, digitCounts, digitTotals }, bits),
-      index: index.bind({
-        ...{ view, splats, pair_plan: pairPlan },
-        bins: bins[sorted],
-        pairs: pairs[sorted],
-        ranges,
-        tile_bits: bins[1 - sorted]!,
-      }),
-      order: orderKernel.bind({ view, ranges, bin_order: binOrder }),
+      list: this.#lister(isDivided, indexed, { view, ranges, bin_order: binOrder }),
+    };
+  }
+
+  #lister(
+    isDivided: boolean,
+    indexed: Resources<typeof binIndex>,
+    ordered: Resources<typeof binOrder>,
+  ): GridBindings['list'] {
+    if (isDivided) {
+      this.#fewBuffers ??= this.#few!.buffers(this.memory, this.#inputs!.pairCapacity);
+      return this.#few!.lister(this.#fewBuffers, indexed, ordered);
+    }
+    const { index, order } = this.#kernels;
+    const [indexGroup, orderGroup] = [index.bind(indexed), order.bind(ordered)];
+    return (pass, groups) => {
+      index.dispatch(pass, indexGroup, groups);
+      order.dispatch(pass, orderGroup, 1);
     };
   }
 
@@ -245,6 +314,7 @@ export class TilesRasterizer extends BufferOwner implements Rasterizer {
       ...{ ranges: bound.ranges, bin_order: bound.binOrder },
       // The unsorted input is not needed after the sort.
       tile_bits: bins[1 - sorted]!,
+      segments: this.#fewBuffers?.segments,
       image,
     };
   }

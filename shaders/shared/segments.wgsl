@@ -1,0 +1,128 @@
+// In place of shared/whole_lists, for images of few tiles: long lists are divided into segments (bin_cut), which
+// workgroups rasterize at the same time, in three dispatches, so that no frame waits for a few tiles:
+// 0. the first segment of each divided list, the light that each other segment but the last lets through, and all lists
+//    that are not divided;
+// 1. the other segments: the light before a segment is the product of those in front of it, so that pixels end where
+//    they would in the whole list;
+// 2. the sums of the segments.
+#import shared/paint_tiles
+#import shared/divided
+
+// UNDIVIDED: no list is divided.
+override stage: u32 = 0u;
+const UNDIVIDED = 3u;
+
+// For each segment and thread: light behind it, red, green, blue, the transmittance that it takes, and the depth that
+// halves it. Followed by the number of splats after which each tile was finished in the last frame.
+@group(0) @binding(14) var<storage, read_write> segments: array<f32>;
+
+fn dim(pixels: ptr<function, Pixels>, k: u32, place: vec2f, min_power: f32) {
+  let alpha = alpha_of(axes[k], paints[k].xy, place, min_power);
+  hide(pixels, k);
+  (*pixels).light -= (*pixels).light * alpha;
+}
+
+fn dim_batch(pixels: ptr<function, Pixels>, own_block: u32, place: vec2f, min_power: f32) {
+  for (var word = 0u; word < BATCH_WORDS; word++) {
+    if (are_finished(*pixels)) { break; }
+    var ahead = atomicLoad(&block_hits[own_block * BATCH_WORDS + word]);
+    while (ahead > 0u) {
+      let k = word * 32u + zeros_below(ahead);
+      ahead &= ahead - 1u;
+      let next = select(NO_SPLAT, word * 32u + zeros_below(ahead), ahead != 0u);
+      ahead &= ahead - 1u;
+      dim(pixels, k, place, min_power);
+      dim(pixels, next, place, min_power);
+    }
+  }
+}
+
+fn number_at(segment: u32, number: u32, lane: u32) -> u32 {
+  return (segment * SEGMENT_NUMBERS + number) * TILE_THREADS + lane;
+}
+
+fn are_all_finished(pixels: Pixels, lane: u32) -> bool {
+  if (lane == 0u) { atomicStore(&unfinished, 0u); }
+  workgroupBarrier();
+  if (!are_finished(pixels)) { atomicStore(&unfinished, 1u); }
+  workgroupBarrier();
+  if (lane == 0u) { is_open = atomicLoad(&unfinished); }
+  return workgroupUniformLoad(&is_open) == 0u;
+}
+
+// Keeps the number of splats after which a tile is finished.
+fn keep_end(tile: u32, splats: u32, lane: u32) {
+  if (lane == 0u) { segments[END_AT + tile] = f32(max(splats, 1u)); }
+}
+
+fn sum_segments(first: u32, count: u32, position: vec2u, lane: u32) {
+  var sum = Pixels(Column(0.0), Column(0.0), Column(0.0), Column(0.0), Column(1.0));
+  var depth = 0.0;
+  for (var k = first; k < first + count; k++) {
+    sum.red += segments[number_at(k, 1u, lane)];
+    sum.green += segments[number_at(k, 2u, lane)];
+    sum.blue += segments[number_at(k, 3u, lane)];
+    sum.transmittance -= segments[number_at(k, 4u, lane)];
+    depth = max(depth, segments[number_at(k, 5u, lane)]);
+  }
+  keep_depth(depth);
+  finish_pixels(&sum, position);
+}
+
+// Rasterizes segment `nth` of the `count` segments of a tile.
+fn paint_segment(segment: u32, tile: u32, nth: u32, count: u32, lane: u32) {
+  let at = segment_at(view, segment);
+  let bin = tile / TILES_PER_BIN;
+  let tile_in_bin = tile % TILES_PER_BIN;
+  let corner = corner_of(bin, tile_in_bin);
+  block_side = SMALL_TILE / BLOCK_COLUMNS;
+  let position = corner + pixel_of(lane);
+  if (stage == 2u) {
+    if (nth == 0u) { sum_segments(segment, count, position, lane); }
+    return;
+  }
+  let only_light = stage == 0u && nth > 0u;
+  let is_last = nth + 1u == count;
+  // The first dispatch rasterizes the first segment; nothing is behind the last.
+  if (select(nth == 0u, only_light && is_last, stage == 0u)) { return; }
+  var pixels = start_pixels(position);
+  if (stage == 1u) {
+    for (var k = segment - nth; k < segment; k++) { pixels.light *= segments[number_at(k, 0u, lane)]; }
+    pixels.transmittance = pixels.light;
+  }
+  let before = pixels.light;
+  let is_behind = stage == 1u && are_all_finished(pixels, lane);
+  if (!is_behind) {
+    let list = begin_segment(bin, tile_in_bin, bin_order[at + 2u], bin_order[at + 3u]);
+    let painted = paint_list(&pixels, list, corner, lane, only_light);
+    if (!only_light && (is_last || are_all_finished(pixels, lane))) {
+      keep_end(tile, bin_order[at + 4u] + painted, lane);
+    }
+  }
+  if (stage == 0u) { segments[number_at(segment, 0u, lane)] = pixels.light; }
+  if (only_light) { return; }
+  segments[number_at(segment, 1u, lane)] = pixels.red;
+  segments[number_at(segment, 2u, lane)] = pixels.green;
+  segments[number_at(segment, 3u, lane)] = pixels.blue;
+  segments[number_at(segment, 4u, lane)] = before - pixels.transmittance;
+  segments[number_at(segment, 5u, lane)] = kept_depth();
+}
+
+@compute @workgroup_size(TILE_THREADS)
+fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_index) lane: u32) {
+  let group = group_index(workgroup_id);
+  if (stage == UNDIVIDED || (stage == 0u && group >= MAX_SEGMENTS)) {
+    let number = select(group - MAX_SEGMENTS, group * view.parts + view.part, stage == UNDIVIDED);
+    let place = place_of(number);
+    if (!is_seen(place.corner)) { return; }
+    let tile = place.bin * TILES_PER_BIN + place.tile_in_bin;
+    if (stage == 0u && bin_order[tile_segments_at(view, tile)] > 0u) { return; }
+    let painted = paint_whole(place, lane);
+    if (stage == 0u) { keep_end(tile, painted, lane); }
+    return;
+  }
+  if (group >= bin_order[segment_count_at(view)]) { return; }
+  let at = segment_at(view, group);
+  let numbers = bin_order[at + 1u];
+  paint_segment(group, bin_order[at], numbers & 0xffffu, numbers >> 16u, lane);
+}

@@ -1,0 +1,8 @@
+// In place of shared/column: a thread has one pixel, so that all threads have pixels of a small tile.
+const SIDE: u32 = SMALL_TILE;
+const COLUMN: u32 = 1u;
+alias Column = f32;
+alias Flags = bool;
+const STEPS = 0.0;
+fn row_of(column: Column, row: u32) -> f32 { return column; }
+fn with_row(column: Column, row: u32, value: f32) -> Column { return value; }
