@@ -1,5 +1,5 @@
-// Divides the list of a tile into segments with equal numbers of splats, to the nearest 256 pairs of the bin; the last
-// segment has what is left. One workgroup for each divided list.
+// Divides the list of a tile into segments of as many splats each, to the nearest 256 pairs of the bin. The last segment
+// has the rest. One workgroup for each divided list.
 #import shared/divided
 #import shared/prefix
 

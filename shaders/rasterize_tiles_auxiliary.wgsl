@@ -29,7 +29,7 @@ fn aux_clear(lane: u32) {
 }
 
 fn aux_blend(k: u32, weight: Column, before: Column, after: Column, is_blended: Flags) {
-  atomicMax(&weights[k], bitcast<u32>(max(max(weight.x, weight.y), max(weight.z, weight.w))));
+  atomicMax(&weights[k], bitcast<u32>(largest(weight)));
   note_depth(k, before, after, is_blended);
 }
 

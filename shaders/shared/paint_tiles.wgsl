@@ -87,7 +87,7 @@ fn load_splat(k: u32, slot: u32, tile_corner: vec2f) {
   paints[k] = vec4u(bitcast<u32>(v_0), bitcast<u32>(power), packed_color(s, slot));
 }
 
-// What a workgroup rasterizes: a tile of a bin, or for step 1 a square of four.
+// A tile of a bin, or for step 1 a square of four, for one workgroup.
 struct TilePlace {
   bin: u32,
   tile_in_bin: u32,

@@ -9,7 +9,7 @@ const { DIVISION_WORDS, END_AT, MAX_DIVIDED, MAX_SEGMENTS, MAX_TILES, PROJECT_GR
 
 /** Buffers of one rasterizer for divided lists. */
 export interface FewBuffers {
-  /** Results of segments, and the numbers of splats after which tiles were finished: see shaders/shared/segments.wgsl. */
+  /** Results of segments, and the splats after which each tile was finished: see shaders/shared/segments.wgsl. */
   readonly segments: GPUBuffer;
   /** Number of splats of each tile. */
   readonly tileSplats: GPUBuffer;

@@ -114,7 +114,7 @@ export class TilesRasterizer extends BufferOwner implements Rasterizer {
   readonly #sort: SortStage;
   readonly #view: GPUBuffer;
   readonly #viewBytes = new ArrayBuffer(layouts.BinView.size);
-  /** Kernels for images of few tiles; undefined if threads are serial: a processor has enough to do with few tiles. */
+  /** Kernels for images of few tiles; undefined if threads are serial, because a few tiles keep a CPU busy. */
   readonly #fewLoader: FewTilesLoader | undefined;
   #few: FewTiles | undefined;
   #fewBuffers: FewBuffers | undefined;

@@ -1,0 +1,147 @@
+/** Long lists of tiles are divided into segments, which are blended at the same time: images and other outputs are the same. */
+import assert from 'node:assert/strict';
+import { after, test } from 'node:test';
+import type { Camera, GaussianCloud } from '@gaussian-splat/core';
+import { GaussianBuffers, packGaussians, SceneDepth, type FrameTarget } from '@gaussian-splat/renderer';
+import { FewTiles, fewTilesOn } from '@gaussian-splat/renderer/stages';
+import { AuxiliaryOutputs, readBack } from '@gaussian-splat/renderer/tools';
+import { cloudOf, repeat } from '../support/clouds.js';
+import { endNodeDevice, nodeDevice } from '../support/node-device.js';
+import { seededRandom } from '../support/random.js';
+import { readFrame } from '../support/read-frame.js';
+import { cameraAt } from '../support/scenes.js';
+import { Renderer } from '../support/renderer.js';
+
+after(endNodeDevice);
+
+/** Largest difference of a channel: one step of the float16 that is stored, for colors below 1. */
+const MAX_DIFFERENCE = 0.13 / 255;
+/** Minimum number of splats of a segment, so that a small scene has many of them. */
+const SEGMENT_SPLATS = 64;
+const SIZE = { width: 96, height: 64 };
+const USAGE = { textureBinding: 4, copySource: 1, copyDestination: 2, storageBinding: 8 };
+
+/** Faint splats, so that pixels end in all segments; the nearest and the farthest are seen by some pixels alone. */
+function faint(): GaussianCloud {
+  const random = seededRandom(32);
+  const splat = (spread: number, size: number, opacity: number) => ({
+    position: [random.uniform(-1, 1) * spread, random.uniform(-1, 1) * spread, random.uniform(-0.5, 0.5)] as const,
+    scale: [
+      random.logUniform(0.3, 1) * size,
+      random.logUniform(0.3, 1) * size,
+      random.logUniform(0.3, 1) * size,
+    ] as const,
+    rotation: random.rotation(),
+    opacity,
+    color: [random.uniform(0, 1), random.uniform(0, 1), random.uniform(0, 1)] as const,
+  });
+  return cloudOf([
+    ...repeat(8_000, () => splat(0.1, 0.02, random.logUniform(0.01, 0.4))),
+    ...repeat(300, () => splat(1, 0.1, random.uniform(0.1, 0.9))),
+  ]);
+}
+
+const camera: Camera = { ...cameraAt([0, 0, -4], [0, 0, 0], SIZE), fx: 200, fy: 200 };
+
+/** A host's depth with a wall in the left half, in front of half of the splats. */
+function wallOn(device: GPUDevice): GPUTexture {
+  const texture = device.createTexture({
+    size: [SIZE.width, SIZE.height],
+    format: 'r32float',
+    usage: USAGE.textureBinding | USAGE.copyDestination,
+  });
+  const depths = Float32Array.from({ length: SIZE.width * SIZE.height }, (_, i) =>
+    i % SIZE.width < SIZE.width / 2 ? 4 : 0,
+  );
+  device.queue.writeTexture({ texture }, depths, { bytesPerRow: 4 * SIZE.width }, [SIZE.width, SIZE.height]);
+  return texture;
+}
+
+const outputOn = (device: GPUDevice): GPUTexture =>
+  device.createTexture({
+    size: [SIZE.width, SIZE.height],
+    format: 'r32float',
+    usage: USAGE.storageBinding | USAGE.copySource,
+  });
+
+async function depthsIn(device: GPUDevice, texture: GPUTexture): Promise<Float32Array> {
+  const bytesPerRow = 512;
+  const buffer = device.createBuffer({ size: bytesPerRow * SIZE.height, usage: 0x9 });
+  const encoder = device.createCommandEncoder();
+  encoder.copyTextureToBuffer({ texture }, { buffer, bytesPerRow }, [SIZE.width, SIZE.height]);
+  device.queue.submit([encoder.finish()]);
+  await buffer.mapAsync(1);
+  const values = new Float32Array(buffer.getMappedRange().slice(0));
+  buffer.destroy();
+  return values;
+}
+
+/** Ways to draw a frame, and what they write besides the image. */
+const WAYS: Readonly<
+  Record<string, (device: GPUDevice) => { target: Partial<FrameTarget>; more?: () => Promise<Float32Array> }>
+> = {
+  plain: () => ({ target: {} }),
+  'auxiliary outputs': (device) => {
+    const [contributions, depth] = [device.createBuffer({ size: 4 * 8_448, usage: 0x8c }), outputOn(device)];
+    const more = async (): Promise<Float32Array> => {
+      const weights = await readBack(device, [{ buffer: contributions }]);
+      return Float32Array.of(...new Float32Array(weights[0]), ...(await depthsIn(device, depth)));
+    };
+    return { target: { auxiliary: new AuxiliaryOutputs({ contributions, depth }) }, more };
+  },
+  'depth of a host and median depth': (device) => {
+    const out = outputOn(device);
+    const depth = new SceneDepth(device, { host: { texture: wallOn(device), values: 'linear' }, out });
+    return { target: { depth }, more: () => depthsIn(device, out) };
+  },
+  'a layer of color': (device) => {
+    const color = device.createTexture({
+      size: [SIZE.width, SIZE.height],
+      format: 'rgba8unorm',
+      usage: USAGE.textureBinding | USAGE.copyDestination,
+    });
+    const pixels = new Uint8Array(4 * SIZE.width * SIZE.height).fill(100);
+    device.queue.writeTexture({ texture: color }, pixels, { bytesPerRow: 4 * SIZE.width }, [SIZE.width, SIZE.height]);
+    return {
+      target: { depth: new SceneDepth(device, { host: { texture: wallOn(device), values: 'linear', color } }) },
+    };
+  },
+};
+
+for (const [way, make] of Object.entries(WAYS)) {
+  test(`${way}: lists in segments give what whole lists give, in the first frame and with known ends`, async () => {
+    const device = await nodeDevice();
+    const few = fewTilesOn(device);
+    few.load = () => undefined;
+    few.now = undefined;
+    const gaussians = await GaussianBuffers.upload(device, packGaussians(faint()));
+    const renderer = new Renderer(device, { rasterizer: 'tiles', threads: 'parallel' });
+    const draw = async (): Promise<{ image: Float32Array; more: Float32Array }> => {
+      const { target, more } = make(device);
+      const image = await readFrame(device, renderer, { gaussians, camera, ...target });
+      return { image, more: (await more?.()) ?? new Float32Array() };
+    };
+    const whole = await draw();
+    few.now = new FewTiles(device, SEGMENT_SPLATS);
+    for (const frame of ['first', 'second']) {
+      const divided = await draw();
+      const worst = largest(whole.image, divided.image);
+      const different = whole.more.filter(
+        (value, i) => Math.abs(value - divided.more[i]) > 1e-4 * Math.abs(value) + 1e-6,
+      );
+      console.log(`${way}, ${frame}: ${255 * worst}/255 at most, ${different.length} of ${whole.more.length} others`);
+      assert.ok(worst > 0 || way === 'a layer of color', 'the same sums in another order are not the same bits');
+      assert.ok(worst <= MAX_DIFFERENCE, `a pixel differs by ${worst}`);
+      // A pixel may end, or become half transparent, one splat earlier.
+      assert.ok(different.length <= 2e-3 * whole.more.length, `${different.length} other values differ`);
+    }
+    renderer.destroy();
+    gaussians.destroy();
+  });
+}
+
+function largest(a: Float32Array, b: Float32Array): number {
+  let worst = 0;
+  a.forEach((value, i) => (worst = Math.max(worst, Math.abs(value - b[i]))));
+  return worst;
+}
