@@ -17,6 +17,7 @@ var<workgroup> divided_count: atomic<u32>;
 // The splats of a tile that are expected to be rasterized, and all of them. A tile that was finished in the last frame
 // will be after about as many splats.
 fn splats_of(tile: u32) -> vec2u {
+  if (!is_seen(view, corner_of(view, tile / TILES_PER_BIN, tile % TILES_PER_BIN))) { return vec2u(0u); }
   let count = tile_splats[tile];
   let end = u32(segments[END_AT + tile]);
   return vec2u(select(count, min(count, end + end / 4u + 256u), end > 0u), count);

@@ -96,12 +96,6 @@ struct TilePlace {
   corner: vec2u,
 }
 
-fn corner_of(bin: u32, tile_in_bin: u32) -> vec2u {
-  let tile = vec2u(bin % view.bins.x, bin / view.bins.x) * vec2u(BIN_COLUMNS, BIN_ROWS)
-    + vec2u(tile_in_bin % BIN_COLUMNS, tile_in_bin / BIN_COLUMNS);
-  return tile * view.tile_side;
-}
-
 fn place_of(number: u32) -> TilePlace {
   let bins = view.bins.x * view.bins.y;
   // The small tiles of long bins come first, one by one, then those of the other bins, four at a time.
@@ -118,11 +112,8 @@ fn place_of(number: u32) -> TilePlace {
   }
   if (nth >= bins) { return TilePlace(0u, 0u, 0u, vec2u(NOWHERE)); }
   let bin = bin_order[nth];
-  return TilePlace(bin, tile_in_bin, step, corner_of(bin, tile_in_bin));
+  return TilePlace(bin, tile_in_bin, step, corner_of(view, bin, tile_in_bin));
 }
-
-// Whether a tile has pixels: bins at the edges have tiles outside the image.
-fn is_seen(corner: vec2u) -> bool { return all(vec2f(corner) < view.viewport); }
 
 // The block of a thread.
 fn block_of(lane: u32) -> u32 { return lane / (block_side * block_side / COLUMN); }

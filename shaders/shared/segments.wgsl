@@ -74,7 +74,7 @@ fn paint_segment(segment: u32, tile: u32, nth: u32, count: u32, lane: u32) {
   let at = segment_at(view, segment);
   let bin = tile / TILES_PER_BIN;
   let tile_in_bin = tile % TILES_PER_BIN;
-  let corner = corner_of(bin, tile_in_bin);
+  let corner = corner_of(view, bin, tile_in_bin);
   block_side = SMALL_TILE / BLOCK_COLUMNS;
   let position = corner + pixel_of(lane);
   if (stage == 2u) {
@@ -114,7 +114,7 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
   if (stage == UNDIVIDED || (stage == 0u && group >= MAX_SEGMENTS)) {
     let number = select(group - MAX_SEGMENTS, group * view.parts + view.part, stage == UNDIVIDED);
     let place = place_of(number);
-    if (!is_seen(place.corner)) { return; }
+    if (!is_seen(view, place.corner)) { return; }
     let tile = place.bin * TILES_PER_BIN + place.tile_in_bin;
     if (stage == 0u && bin_order[tile_segments_at(view, tile)] > 0u) { return; }
     let painted = paint_whole(place, lane);

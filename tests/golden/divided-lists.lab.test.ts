@@ -21,8 +21,8 @@ const SEGMENT_SPLATS = 64;
 const SIZE = { width: 96, height: 64 };
 const USAGE = { textureBinding: 4, copySource: 1, copyDestination: 2, storageBinding: 8 };
 
-/** Faint splats, so that pixels end in all segments; the nearest and the farthest are seen by some pixels alone. */
-function faint(): GaussianCloud {
+/** Splats of many opacities, so that pixels end in all segments; the nearest and the farthest are seen by some pixels alone. */
+function layered(): GaussianCloud {
   const random = seededRandom(32);
   const splat = (spread: number, size: number, opacity: number) => ({
     position: [random.uniform(-1, 1) * spread, random.uniform(-1, 1) * spread, random.uniform(-0.5, 0.5)] as const,
@@ -36,7 +36,7 @@ function faint(): GaussianCloud {
     color: [random.uniform(0, 1), random.uniform(0, 1), random.uniform(0, 1)] as const,
   });
   return cloudOf([
-    ...repeat(8_000, () => splat(0.1, 0.02, random.logUniform(0.01, 0.4))),
+    ...repeat(8_000, () => splat(0.4, 0.05, random.logUniform(0.03, 0.9))),
     ...repeat(300, () => splat(1, 0.1, random.uniform(0.1, 0.9))),
   ]);
 }
@@ -108,13 +108,37 @@ const WAYS: Readonly<
   },
 };
 
+/** A device whose buffer of divided lists can be read. */
+function readable(device: GPUDevice): { device: GPUDevice; segmentsIn: () => Promise<number> } {
+  let order: GPUBuffer | undefined;
+  const createBuffer = (descriptor: GPUBufferDescriptor): GPUBuffer => {
+    const isOrder = descriptor.label === 'gs.bin.order';
+    const buffer = device.createBuffer(isOrder ? { ...descriptor, usage: descriptor.usage | 4 } : descriptor);
+    if (isOrder) order = buffer;
+    return buffer;
+  };
+  const segmentsIn = async (): Promise<number> => {
+    // One bin, the number of long bins, the number of segments.
+    const [words] = await readBack(device, [{ buffer: order!, byteOffset: 8, byteLength: 4 }]);
+    return new Uint32Array(words)[0];
+  };
+  const other = new Proxy(device, {
+    get(target, name) {
+      if (name === 'createBuffer') return createBuffer;
+      const value: unknown = Reflect.get(target, name, target);
+      return typeof value === 'function' ? (value.bind(target) as unknown) : value;
+    },
+  });
+  return { device: other, segmentsIn };
+}
+
 for (const [way, make] of Object.entries(WAYS)) {
   test(`${way}: lists in segments give what whole lists give, in the first frame and with known ends`, async () => {
-    const device = await nodeDevice();
+    const { device, segmentsIn } = readable(await nodeDevice());
     const few = fewTilesOn(device);
     few.load = () => undefined;
     few.now = undefined;
-    const gaussians = await GaussianBuffers.upload(device, packGaussians(faint()));
+    const gaussians = await GaussianBuffers.upload(device, packGaussians(layered()));
     const renderer = new Renderer(device, { rasterizer: 'tiles', threads: 'parallel' });
     const draw = async (): Promise<{ image: Float32Array; more: Float32Array }> => {
       const { target, more } = make(device);
@@ -123,8 +147,10 @@ for (const [way, make] of Object.entries(WAYS)) {
     };
     const whole = await draw();
     few.now = new FewTiles(device, SEGMENT_SPLATS);
+    const counts: number[] = [];
     for (const frame of ['first', 'second']) {
       const divided = await draw();
+      if (way !== 'a layer of color') counts.push(await segmentsIn());
       const worst = largest(whole.image, divided.image);
       const different = whole.more.filter(
         (value, i) => Math.abs(value - divided.more[i]) > 1e-4 * Math.abs(value) + 1e-6,
@@ -135,6 +161,8 @@ for (const [way, make] of Object.entries(WAYS)) {
       // A pixel may end, or become half transparent, one splat earlier.
       assert.ok(different.length <= 2e-3 * whole.more.length, `${different.length} other values differ`);
     }
+    console.log(`${way}: ${counts.join(', then ')} segments`);
+    if (way !== 'a layer of color') assert.ok(counts[1] > 10 && counts[1] < counts[0], 'segments end with their tile');
     renderer.destroy();
     gaussians.destroy();
   });
