@@ -6,7 +6,7 @@
 
 @group(0) @binding(0) var<uniform> view: BinView;
 @group(0) @binding(1) var<storage, read> ranges: array<vec2u>;
-// Followed by the number of long bins.
+// Followed by the number of long bins, and the number of pairs of the longest.
 @group(0) @binding(2) var<storage, read_write> bin_order: array<u32>;
 
 // There are four classes for each doubling of the number of pairs.
@@ -15,6 +15,7 @@ const LONGEST = 635u;
 // Zero at the beginning, as WGSL says. By class: its number of bins, then the place of its first bin.
 var<workgroup> places: array<atomic<u32>, PREFIX_THREADS>;
 var<workgroup> pairs: atomic<u32>;
+var<workgroup> longest: atomic<u32>;
 
 fn pairs_of(bin: u32) -> u32 { return ranges[bin].y - ranges[bin].x; }
 
@@ -28,6 +29,7 @@ fn main(@builtin(local_invocation_index) lane: u32) {
     let count = pairs_of(bin);
     atomicAdd(&places[class_of(count)], 1u);
     atomicAdd(&pairs, count);
+    atomicMax(&longest, count);
   }
   workgroupBarrier();
   let own = atomicLoad(&places[lane]);
@@ -38,5 +40,6 @@ fn main(@builtin(local_invocation_index) lane: u32) {
   for (var bin = lane; bin < bins; bin += PREFIX_THREADS) {
     bin_order[atomicAdd(&places[class_of(pairs_of(bin))], 1u)] = bin;
   }
+  if (lane == 0u) { bin_order[bins + 1u] = atomicLoad(&longest); }
   divide_lists(lane);
 }

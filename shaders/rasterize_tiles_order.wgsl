@@ -6,7 +6,6 @@
 #import shared/pixel_depth
 #import shared/cull_stats
 #import shared/whole_lists
-#import shared/single
 
 @group(0) @binding(7) var<storage, read> pixel_depths: array<PixelDepth>;
 @group(0) @binding(8) var<storage, read> cull_stats: array<u32>;
@@ -17,6 +16,9 @@
 @group(0) @binding(12) var layer_color: texture_2d<f32>;
 @group(0) @binding(13) var second_depth: texture_2d<f32>;
 @group(0) @binding(14) var second_color: texture_2d<f32>;
+
+const SIDE: u32 = SMALL_TILE;
+const COLUMN: u32 = 1u;
 
 override tests_depth: bool = false;
 override writes_depth: bool = false;

@@ -12,3 +12,13 @@ fn with_row(column: Column, row: u32, value: f32) -> Column {
   changed[row] = value;
   return changed;
 }
+
+fn finish_pixels(pixels: ptr<function, Pixels>, position: vec2u) {
+  hide_rest(pixels);
+  for (var row = 0u; row < COLUMN; row++) {
+    let pixel = position + vec2u(0u, row);
+    if (any(vec2f(pixel) >= view.viewport)) { break; }
+    aux_pixel(pixel, row);
+    store_pixel(pixel, vec3f((*pixels).red[row], (*pixels).green[row], (*pixels).blue[row]), (*pixels).transmittance[row]);
+  }
+}

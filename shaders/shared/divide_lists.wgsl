@@ -31,11 +31,12 @@ fn divide_lists(lane: u32) {
   for (var tile = lane; tile < tiles; tile += PREFIX_THREADS) { sum += splats_of(tile).x; }
   atomicAdd(&splats, sum);
   workgroupBarrier();
-  let min_splats = max(segment_splats, atomicLoad(&splats) / SHARED_SEGMENTS + 1u);
+  let shared_segments = min(SHARED_SEGMENTS, SHARED_BINS / (view.bins.x * view.bins.y));
+  let min_splats = max(segment_splats, atomicLoad(&splats) / shared_segments + 1u);
   for (var tile = lane; tile < tiles; tile += PREFIX_THREADS) {
     let own = splats_of(tile);
     tile_splats[tile] = 0u;
-    var count = own.x / min_splats;
+    var count = min(own.x / min_splats, LIST_SEGMENTS);
     let size = own.x / max(count, 1u);
     if (count < 2u) { count = 0u; } else if (own.x < own.y) { count++; }
     bin_order[tile_segments_at(view, tile)] = count;

@@ -1,6 +1,6 @@
 // Blends the splats of a batch into the pixels of a thread, in the order of their center depths. Work that does not
-// depend on the pixel is done once for all of a column. The importing module defines how splats are hidden (`start_hiding`,
-// `hide`, `hide_rest`) and which auxiliary outputs are written (`aux_blend`, `aux_pixel`).
+// depend on the pixel is done once for all of a column. The importing module defines how splats are hidden
+// (`start_hiding`, `hide`, `hide_rest`) and which auxiliary outputs are written (`aux_blend`, `aux_pixel`).
 #import shared/paint_tiles
 #import shared/column
 
@@ -31,18 +31,15 @@ fn are_finished(pixels: Pixels) -> bool {
   return all(pixels.light <= Column(view.transmittance_min));
 }
 
-fn alpha_of(axis: vec4f, paint: vec2u, place: vec2f, min_power: f32) -> Column {
-  let u = axis.x * place.x + axis.y;
-  let v = axis.w * (place.y + STEPS) + (axis.z * place.x + bitcast<f32>(paint.x));
-  let power = (bitcast<f32>(paint.y) - u * u) - v * v;
-  return select(Column(0.0), min(Column(ALPHA_MAX), exp2(power)), power >= Column(min_power));
-}
-
 // Blends splat k of the batch. It has no branch, which would take a third more time: splats that miss the pixel and
 // finished pixels add zero.
 fn blend(pixels: ptr<function, Pixels>, k: u32, place: vec2f, min_power: f32) {
+  let axis = axes[k];
   let paint = paints[k];
-  let alpha = alpha_of(axes[k], paint.xy, place, min_power);
+  let u = axis.x * place.x + axis.y;
+  let v = axis.w * (place.y + STEPS) + (axis.z * place.x + bitcast<f32>(paint.x));
+  let power = (bitcast<f32>(paint.y) - u * u) - v * v;
+  let alpha = select(Column(0.0), min(Column(ALPHA_MAX), exp2(power)), power >= Column(min_power));
   hide(pixels, k);
   let before = (*pixels).light;
   let full_weight = before * alpha;
@@ -73,15 +70,5 @@ fn paint_batch(pixels: ptr<function, Pixels>, own_block: u32, place: vec2f, min_
       blend(pixels, k, place, min_power);
       blend(pixels, next, place, min_power);
     }
-  }
-}
-
-fn finish_pixels(pixels: ptr<function, Pixels>, position: vec2u) {
-  hide_rest(pixels);
-  for (var row = 0u; row < COLUMN; row++) {
-    let pixel = position + vec2u(0u, row);
-    if (any(vec2f(pixel) >= view.viewport)) { break; }
-    aux_pixel(pixel, row);
-    store_pixel(pixel, vec3f(row_of((*pixels).red, row), row_of((*pixels).green, row), row_of((*pixels).blue, row)), row_of((*pixels).transmittance, row));
   }
 }

@@ -16,8 +16,22 @@ const UNDIVIDED = 3u;
 // halves it. Followed by the number of splats after which each tile was finished in the last frame.
 @group(0) @binding(14) var<storage, read_write> segments: array<f32>;
 
+// The pixel of a thread, relative to the corner.
+fn pixel_of(lane: u32) -> vec2u {
+  let own_block = lane / (block_side * block_side);
+  let in_block = lane % (block_side * block_side);
+  let corner = vec2u(own_block % BLOCK_COLUMNS, own_block / BLOCK_COLUMNS) * block_side;
+  return corner + vec2u(in_block % block_side, in_block / block_side);
+}
+
+// As `blend` of shared/paint_columns, for light alone.
 fn dim(pixels: ptr<function, Pixels>, k: u32, place: vec2f, min_power: f32) {
-  let alpha = alpha_of(axes[k], paints[k].xy, place, min_power);
+  let axis = axes[k];
+  let paint = paints[k].xy;
+  let u = axis.x * place.x + axis.y;
+  let v = axis.w * place.y + (axis.z * place.x + bitcast<f32>(paint.x));
+  let power = (bitcast<f32>(paint.y) - u * u) - v * v;
+  let alpha = select(0.0, min(ALPHA_MAX, exp2(power)), power >= min_power);
   hide(pixels, k);
   (*pixels).light -= (*pixels).light * alpha;
 }
@@ -35,6 +49,37 @@ fn dim_batch(pixels: ptr<function, Pixels>, own_block: u32, place: vec2f, min_po
       dim(pixels, next, place, min_power);
     }
   }
+}
+
+// Rasterizes the splats of a list until all pixels are finished. If `only_light`, only their light is changed. Returns
+// the number of splats.
+fn paint_list(pixels: ptr<function, Pixels>, first: ListPlace, corner: vec2u, lane: u32, only_light: bool) -> u32 {
+  let own_block = lane / (block_side * block_side);
+  let place = vec2f(pixel_of(lane)) + 0.5;
+  let min_power = log2(ALPHA_MIN);
+  var list = first;
+  var painted = 0u;
+  if (lane == 0u) { paints[NO_SPLAT].y = bitcast<u32>(NO_POWER); }
+  loop {
+    if (lane < BLOCKS * BATCH_WORDS) { atomicStore(&block_hits[lane], 0u); }
+    if (lane == 0u) { atomicStore(&unfinished, 0u); }
+    aux_clear(lane);
+    workgroupBarrier();
+    let count = load_batch(&list, BATCH, vec2f(corner), lane);
+    if (count == 0u) { break; }
+    workgroupBarrier();
+
+    if (only_light) { dim_batch(pixels, own_block, place, min_power); }
+    else { paint_batch(pixels, own_block, place, min_power); }
+    if (!are_finished(*pixels)) { atomicStore(&unfinished, 1u); }
+    workgroupBarrier();
+
+    if (lane < count) { aux_store(lane); }
+    painted += count;
+    if (lane == 0u) { is_open = atomicLoad(&unfinished); }
+    if (workgroupUniformLoad(&is_open) == 0u) { break; }
+  }
+  return painted;
 }
 
 fn number_at(segment: u32, number: u32, lane: u32) -> u32 {
@@ -75,7 +120,6 @@ fn paint_segment(segment: u32, tile: u32, nth: u32, count: u32, lane: u32) {
   let bin = tile / TILES_PER_BIN;
   let tile_in_bin = tile % TILES_PER_BIN;
   let corner = corner_of(view, bin, tile_in_bin);
-  block_side = SMALL_TILE / BLOCK_COLUMNS;
   let position = corner + pixel_of(lane);
   if (stage == 2u) {
     if (nth == 0u) { sum_segments(segment, count, position, lane); }
@@ -111,13 +155,20 @@ fn paint_segment(segment: u32, tile: u32, nth: u32, count: u32, lane: u32) {
 @compute @workgroup_size(TILE_THREADS)
 fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_index) lane: u32) {
   let group = group_index(workgroup_id);
+  block_side = SMALL_TILE / BLOCK_COLUMNS;
   if (stage == UNDIVIDED || (stage == 0u && group >= MAX_SEGMENTS)) {
     let number = select(group - MAX_SEGMENTS, group * view.parts + view.part, stage == UNDIVIDED);
-    let place = place_of(number);
-    if (!is_seen(view, place.corner)) { return; }
-    let tile = place.bin * TILES_PER_BIN + place.tile_in_bin;
+    if (number >= view.bins.x * view.bins.y * TILES_PER_BIN) { return; }
+    let bin = bin_order[number / TILES_PER_BIN];
+    let tile_in_bin = number % TILES_PER_BIN;
+    let tile = bin * TILES_PER_BIN + tile_in_bin;
+    let corner = corner_of(view, bin, tile_in_bin);
+    if (!is_seen(view, corner)) { return; }
     if (stage == 0u && bin_order[tile_segments_at(view, tile)] > 0u) { return; }
-    let painted = paint_whole(place, lane);
+    let position = corner + pixel_of(lane);
+    var pixels = start_pixels(position);
+    let painted = paint_list(&pixels, begin_list(bin, tile_in_bin, 0u), corner, lane, false);
+    finish_pixels(&pixels, position);
     if (stage == 0u) { keep_end(tile, painted, lane); }
     return;
   }

@@ -7,3 +7,10 @@ const STEPS = 0.0;
 fn largest(column: Column) -> f32 { return column; }
 fn row_of(column: Column, row: u32) -> f32 { return column; }
 fn with_row(column: Column, row: u32, value: f32) -> Column { return value; }
+
+fn finish_pixels(pixels: ptr<function, Pixels>, position: vec2u) {
+  hide_rest(pixels);
+  if (any(vec2f(position) >= view.viewport)) { return; }
+  aux_pixel(position, 0u);
+  store_pixel(position, vec3f((*pixels).red, (*pixels).green, (*pixels).blue), (*pixels).transmittance);
+}

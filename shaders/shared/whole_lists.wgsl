@@ -1,10 +1,57 @@
 // Rasterizes whole lists, one tile or square for each workgroup.
 #import shared/paint_tiles
 
-fn dim_batch(pixels: ptr<function, Pixels>, own_block: u32, place: vec2f, min_power: f32) {}
-
 @compute @workgroup_size(TILE_THREADS)
 fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_index) lane: u32) {
-  let tile = place_of(group_index(workgroup_id) * view.parts + view.part);
-  if (is_seen(view, tile.corner)) { _ = paint_whole(tile, lane); }
+  let number = group_index(workgroup_id) * view.parts + view.part;
+  let bins = view.bins.x * view.bins.y;
+  // The small tiles of long bins come first, one by one, then those of the other bins, four at a time.
+  var single_bins = bins;
+  if (view.tile_side < SIDE) { single_bins = bin_order[bins]; }
+  var nth = number / TILES_PER_BIN;
+  var tile_in_bin = number % TILES_PER_BIN;
+  let step = u32(nth >= single_bins);
+  block_side = view.tile_side / (BLOCK_COLUMNS >> step);
+  if (step == 1u) {
+    let square = tile_in_bin % SQUARES_PER_BIN;
+    nth += 3u * (nth - single_bins) + tile_in_bin / SQUARES_PER_BIN;
+    // Two rows of squares are two rows of tiles each.
+    tile_in_bin = 2u * (square + (square & SQUARES_PER_ROW));
+  }
+  if (nth >= bins) { return; }
+  let bin = bin_order[nth];
+  let corner = corner_of(view, bin, tile_in_bin);
+  if (!is_seen(view, corner)) { return; }
+  let threads = block_side * block_side / COLUMN;
+  let own_block = lane / threads;
+  let in_block = lane % threads;
+  // The topmost pixel of the thread, relative to the corner.
+  var own_pixel = vec2u(own_block % BLOCK_COLUMNS, own_block / BLOCK_COLUMNS) * block_side
+    + vec2u(in_block % block_side, in_block / block_side * COLUMN);
+  if (own_block >= BLOCKS) { own_pixel.x = NOWHERE; }
+  let position = corner + own_pixel;
+  let place = vec2f(own_pixel) + 0.5;
+  let min_power = log2(ALPHA_MIN);
+
+  var pixels = start_pixels(position);
+  if (lane == 0u) { paints[NO_SPLAT].y = bitcast<u32>(NO_POWER); }
+  var list = begin_list(bin, tile_in_bin, step);
+  loop {
+    if (lane < BLOCKS * BATCH_WORDS) { atomicStore(&block_hits[lane], 0u); }
+    if (lane == 0u) { atomicStore(&unfinished, 0u); }
+    aux_clear(lane);
+    workgroupBarrier();
+    let count = load_batch(&list, BATCH, vec2f(corner), lane);
+    if (count == 0u) { break; }
+    workgroupBarrier();
+
+    paint_batch(&pixels, own_block, place, min_power);
+    if (!are_finished(pixels)) { atomicStore(&unfinished, 1u); }
+    workgroupBarrier();
+
+    if (lane < count) { aux_store(lane); }
+    if (lane == 0u) { is_open = atomicLoad(&unfinished); }
+    if (workgroupUniformLoad(&is_open) == 0u) { break; }
+  }
+  finish_pixels(&pixels, position);
 }

@@ -7,6 +7,7 @@ const FOLDER = fileURLToPath(new URL('../../renderer/dist/generated/', import.me
 /** Modules in which scripts/build-shaders.mjs and the compiler store the pieces of shaders. */
 export const SHADER_FILES = [
   'shaders.js',
+  'few-shaders.js',
   'auxiliary-shaders.js',
   'budget-shaders.js',
   'live-shaders.js',

@@ -1,6 +1,6 @@
 import type { Capacity, CapacityHistory, SampledFrame } from './capacity-history.js';
 import { BUFFER_USAGE } from './gpu/kernel.js';
-import { copyCounts } from './copy-counts.js';
+import { copyCounts, type CountPlace } from './copy-counts.js';
 import { constants } from './generated/shaders.js';
 import type { Scratch } from './scratch.js';
 
@@ -43,9 +43,10 @@ const PAIRS_PER_SPLAT = 1.5;
 const PAIRS_PER_BUDGETED = 1.1;
 
 /**
- * Bytes of five u32 counts: visible splats, splats beyond the capacity, pairs, pairs beyond the capacity, and coverage.
+ * Bytes of six u32 counts: visible splats, splats beyond the capacity, pairs, pairs beyond the capacity, coverage, and
+ * pairs of the longest list.
  */
-const COUNT_BYTES = 20;
+const COUNT_BYTES = 24;
 
 /**
  * Returns the capacity before the first frame.
@@ -63,6 +64,8 @@ export function initialCapacity(splats: number, max: Capacity, isBudgeted = fals
 export interface FrameCounts extends Capacity {
   /** `cull_stats[COVERED]`: coverage of the frame, as a multiple of the frame times `COVERED_UNIT`. */
   readonly covered: number;
+  /** Number of pairs of the longest list of the rasterizer `tiles`; 0 with `quads`. */
+  readonly longest: number;
 }
 
 /**
@@ -174,10 +177,12 @@ export class CapacityMonitor {
     encoder: GPUCommandEncoder,
     { plan, cullStats }: Pick<Scratch, 'plan' | 'cullStats'>,
     pairPlan: GPUBuffer | undefined,
+    longest?: CountPlace,
   ): boolean {
     if (this.#isReading) return false;
     copyCounts(encoder, plan, pairPlan, this.#staging, 0);
-    encoder.copyBufferToBuffer(cullStats, 4 * constants.COVERED, this.#staging, COUNT_BYTES - 4, 4);
+    encoder.copyBufferToBuffer(cullStats, 4 * constants.COVERED, this.#staging, 16, 4);
+    if (longest) encoder.copyBufferToBuffer(longest.buffer, longest.offset, this.#staging, 20, 4);
     return (this.#isReading = true);
   }
 
@@ -188,7 +193,9 @@ export class CapacityMonitor {
   read(): Promise<FrameCounts | undefined> {
     return this.#staging.mapAsync(0x1).then(
       () => {
-        const [visible, hidden, pairs, lostPairs, covered] = new Uint32Array(this.#staging.getMappedRange().slice(0));
+        const [visible, hidden, pairs, lostPairs, covered, longest] = new Uint32Array(
+          this.#staging.getMappedRange().slice(0),
+        );
         this.#staging.unmap();
         this.#isReading = false;
         if (this.#isDestroyed) {
@@ -197,7 +204,7 @@ export class CapacityMonitor {
         }
         const used = { visible: visible + hidden, pairs: pairs + lostPairs };
         this.judge(used, hidden + lostPairs > 0, this.#image);
-        return { visible, pairs, covered };
+        return { visible, pairs, covered, longest };
       },
       () => undefined,
     );

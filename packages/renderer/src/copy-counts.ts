@@ -1,5 +1,11 @@
 import { layouts } from './generated/shaders.js';
 
+/** A u32 in a buffer; the offset is in bytes. */
+export interface CountPlace {
+  readonly buffer: GPUBuffer;
+  readonly offset: number;
+}
+
 /**
  * Copies four u32 into a buffer: `visible` and `overflow` of the splats, then of the pairs. Without a plan of pairs
  * only the first two are copied.

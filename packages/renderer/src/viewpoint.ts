@@ -280,7 +280,8 @@ export class Viewpoint {
     const { isWatched, submissions, requests, resources } = frame;
     timer?.endFrame?.(encoder);
     for (const request of requests) request.copy(encoder);
-    const isRead = isWatched && resources.monitor.record(encoder, resources.scratch, this.#engine.rasterizer.pairPlan);
+    const { pairPlan, longest } = this.#engine.rasterizer;
+    const isRead = isWatched && resources.monitor.record(encoder, resources.scratch, pairPlan, longest);
     this.#submit(encoder, submissions);
     timer?.submitted?.();
     const counts = isRead ? this.#read(resources) : undefined;
@@ -299,6 +300,7 @@ export class Viewpoint {
    */
   async #read({ monitor, table }: Resources): Promise<FrameCounts | undefined> {
     const counts = await monitor.read();
+    if (counts) this.#engine.rasterizer.learn?.(counts.longest);
     if (counts && this.#overdraw?.note(counts.covered / constants.COVERED_UNIT, table.splats)) this.#onIncomplete();
     return counts;
   }

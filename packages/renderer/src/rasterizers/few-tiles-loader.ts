@@ -20,26 +20,33 @@ export interface FewTilesLoader {
 export const fewTilesOn = (device: GPUDevice): FewTilesLoader =>
   perDevice(device, 'few tiles', () => {
     const wanted: RasterizeVariant[] = [];
-    const prepare = (variant: RasterizeVariant): void => {
-      for (const stage of FEW_STAGES) lazy.now?.kernel(variant, stage).prepare();
+    const prepare = (few: FewTiles | undefined, variant: RasterizeVariant): void => {
+      for (const stage of FEW_STAGES) few?.kernel(variant, stage).prepare();
     };
     const load = async (): Promise<void> => {
       const [{ FewTiles }, { passes }] = await Promise.all([import('./few-tiles.js'), import('../autotune/timing.js')]);
-      const make = (splats?: number): Promise<void> =>
-        madeTogether(device, () => {
-          lazy.now = new FewTiles(device, splats);
-          wanted.forEach(prepare);
+      const make = async (splats?: number): Promise<void> => {
+        let few: FewTiles | undefined;
+        await madeTogether(device, () => {
+          few = new FewTiles(device, splats);
+          for (const variant of wanted) prepare(few, variant);
         });
+        lazy.now = few;
+      };
       await make(TESTED_SPLATS);
       if (await passes(device, PREFERRED, undefined, 'divided lists')) await make();
       else lazy.now = undefined;
     };
     let loading: Promise<void> | undefined;
     const lazy: FewTilesLoader = {
-      load: () => void (loading ??= loadModule('the code for small images', load).catch(() => undefined)),
+      load() {
+        // Software adapters have few threads: more workgroups only cost them time.
+        if (device.adapterInfo?.isFallbackAdapter) return;
+        loading ??= loadModule('the code for small images', load).catch(() => undefined);
+      },
       prepare(variant) {
         wanted.push(variant);
-        prepare(variant);
+        prepare(lazy.now, variant);
       },
     };
     return lazy;

@@ -7,6 +7,8 @@ import { rasterizeKernel, type FewStage, type RasterizeKernel, type RasterizeVar
 
 const { DIVISION_WORDS, END_AT, MAX_DIVIDED, MAX_SEGMENTS, MAX_TILES, PROJECT_GROUP, TILES_PER_BIN } = constants;
 
+const LONG_PAIRS = 8_192;
+
 /** Buffers of one rasterizer for divided lists. */
 export interface FewBuffers {
   /** Results of segments, and the splats after which each tile was finished: see shaders/shared/segments.wgsl. */
@@ -23,14 +25,17 @@ export class FewTiles {
   readonly words = DIVISION_WORDS;
   /** Number of workgroups in front of those of the tiles. */
   readonly segments = MAX_SEGMENTS;
+  /** Minimum number of pairs of the longest list from which lists are divided. Shorter ones would gain nothing. */
+  readonly longPairs: number;
   readonly #device: GPUDevice;
   readonly #index: ComputeKernel<typeof binIndexFew>;
   readonly #order: ComputeKernel<typeof binOrderFew>;
   readonly #cut: ComputeKernel<typeof binCut>;
 
-  /** @param segmentSplats Minimum number of splats of a segment; undefined for that of the shader. */
+  /** @param segmentSplats Minimum number of splats of a segment, for tests with short lists. Default: 512. */
   constructor(device: GPUDevice, segmentSplats?: number) {
     this.#device = device;
+    this.longPairs = segmentSplats ? 0 : LONG_PAIRS;
     this.#index = kernelOf(device, binIndexFew);
     this.#order = kernelOf(device, binOrderFew, segmentSplats ? { segment_splats: segmentSplats } : {});
     this.#cut = kernelOf(device, binCut);

@@ -2,6 +2,7 @@ import type { FrameTimer } from '../gpu/pass-timer.js';
 import type { Camera } from '@gaussian-splat/core';
 import type { Overrides, ShaderDescription, ShaderProgram } from '../gpu/kernel.js';
 import type { RenderSettings } from '../render-settings.js';
+import type { CountPlace } from '../copy-counts.js';
 import type { TilePainter } from './tile-painter.js';
 
 /** Name of a rasterizer. `quads`: hardware rasterization and blending. `tiles`: compute shaders. */
@@ -174,6 +175,10 @@ export interface Rasterizer {
   readonly byteLength: number;
   /** `Plan` of the pairs of splat and bin; undefined for a rasterizer without pairs. */
   readonly pairPlan?: GPUBuffer;
+  /** Place of the number of pairs of the longest list in the last frame; undefined for a rasterizer without lists. */
+  readonly longest?: CountPlace | undefined;
+  /** Takes this number of an earlier frame, by which a kernel is chosen. */
+  learn?(longest: number): void;
   /** Whether the rasterizer can write a final image of this format directly to the target. */
   finishes(format: GPUTextureFormat): boolean;
   /** Returns the required bytes of each buffer of {@link RasterizerInputs.pingPong}. */

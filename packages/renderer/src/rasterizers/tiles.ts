@@ -3,6 +3,7 @@ import { BUFFER_USAGE, type Resources } from '../gpu/kernel.js';
 import { BufferOwner, GpuMemory } from '../gpu/memory.js';
 import { writeStruct } from '../gpu/struct.js';
 import { sortedIn, SortStage, type SortBindings } from '../stages/sort.js';
+import type { CountPlace } from '../copy-counts.js';
 import type { Threads } from '../stages/stage.js';
 import { TRAINED_TRANSMITTANCE } from '../render-settings.js';
 import type {
@@ -12,7 +13,6 @@ import type {
   Rasterizer,
   RasterizerInputs,
   Slice,
-  Surface,
 } from './rasterizer.js';
 import { pairBuffers, releasableBytesOf, type PairBuffers } from './pair-buffers.js';
 import {
@@ -23,48 +23,14 @@ import {
   type RasterizeKernel,
   type RasterizeVariant,
 } from './tile-kernels.js';
+import { FEW_BINS, gridFor, type Grid } from './grid.js';
 import { fewTilesOn, type FewTilesLoader } from './few-tiles-loader.js';
 import type { FewBuffers, FewTiles } from './few-tiles.js';
 import { PlainPainter, type TilePainter } from './tile-painter.js';
 
-const { BIN_COLUMNS, BIN_ROWS, DIGITS, PREFIX_THREADS, MAX_TILES, PROJECT_GROUP, SMALL_TILE, TILES_PER_BIN } =
-  constants;
-/** Maximum number of bins of an image of few tiles. */
-const FEW_BINS = MAX_TILES / TILES_PER_BIN;
+const { PREFIX_THREADS, PROJECT_GROUP, TILES_PER_BIN } = constants;
 
 const groupsOf = (splats: number): number => Math.ceil(splats / PREFIX_THREADS);
-
-/** The bins of an image. */
-interface Grid {
-  /** Side of a tile of the lists in pixels. */
-  readonly tile: number;
-  readonly columns: number;
-  readonly rows: number;
-  /** columns times rows */
-  readonly count: number;
-  /** Number of bits of the index of a bin. */
-  readonly bits: number;
-  /** Whether the image has so few tiles that a thread has one pixel. */
-  readonly isFew: boolean;
-  /** Whether long lists are divided. */
-  readonly isDivided: boolean;
-}
-
-/** Returns the bins for an image. Their tiles are small if one pass sorts the pairs by their bins. */
-function gridFor(
-  { width, height }: Pick<Surface, 'width' | 'height'>,
-  painter: TilePainter,
-  few: FewTiles | undefined,
-  tile: number = SMALL_TILE,
-): Grid {
-  const columns = Math.ceil(width / (BIN_COLUMNS * tile));
-  const rows = Math.ceil(height / (BIN_ROWS * tile));
-  const count = columns * rows;
-  if (count > DIGITS && tile < painter.tile) return gridFor({ width, height }, painter, few, painter.tile);
-  const isFew = few !== undefined && painter.few !== undefined && count <= FEW_BINS;
-  const isDivided = isFew && !painter.hasWholeLists;
-  return { tile, columns, rows, count, bits: Math.ceil(Math.log2(count)), isFew, isDivided };
-}
 
 /** Bindings for one scratch and one grid of bins. */
 interface GridBindings {
@@ -118,6 +84,11 @@ export class TilesRasterizer extends BufferOwner implements Rasterizer {
   readonly #fewLoader: FewTilesLoader | undefined;
   #few: FewTiles | undefined;
   #fewBuffers: FewBuffers | undefined;
+  /** Number of pairs of the longest list in an earlier frame. */
+  #longest = 0;
+  #hasLongLists = false;
+  /** Bindings of the last frame. */
+  #last: GridBindings | undefined;
   #inputs: RasterizerInputs | undefined;
   #buffers: PairBuffers | undefined;
   /** Bindings by grid, because images in motion may have fewer pixels. */
@@ -133,6 +104,14 @@ export class TilesRasterizer extends BufferOwner implements Rasterizer {
     this.#sort = new SortStage(device, threads, 'given');
     const usage = BUFFER_USAGE.uniform | BUFFER_USAGE.copyDestination;
     this.#view = this.memory.buffer('gs.rasterize.view', layouts.BinView.size, usage);
+  }
+
+  get longest(): CountPlace | undefined {
+    return this.#last && { buffer: this.#last.binOrder, offset: 4 * (this.#last.grid.count + 1) };
+  }
+
+  learn(longest: number): void {
+    this.#longest = longest;
   }
 
   get pairPlan(): GPUBuffer | undefined {
@@ -163,7 +142,13 @@ export class TilesRasterizer extends BufferOwner implements Rasterizer {
   /** Records the lists of splats for all bins. */
   prepareFrame(encoder: GPUCommandEncoder, painting: Painting): void {
     if (this.#inputs === undefined || this.#buffers === undefined) return;
+    if (this.#few !== this.#fewLoader?.now) this.#forgetGrids();
+    this.#few = this.#fewLoader?.now;
+    // Lists may shrink by a quarter before they are whole again, so that frames do not alternate.
+    const longPairs = (this.#few?.longPairs ?? 0) * (this.#hasLongLists ? 0.75 : 1);
+    this.#hasLongLists = this.#longest >= longPairs;
     const bound = this.#boundFor(painting, this.#inputs, this.#buffers);
+    this.#last = bound;
     this.#writeView(painting, bound.grid, { index: 0, count: 1 });
 
     const { count, plan, emit } = this.#kernels;
@@ -235,18 +220,17 @@ export class TilesRasterizer extends BufferOwner implements Rasterizer {
     inputs: RasterizerInputs,
     buffers: PairBuffers,
   ): GridBindings {
-    if (this.#few !== this.#fewLoader?.now) this.#forgetGrids();
-    this.#few = this.#fewLoader?.now;
-    const grid = gridFor(surface, painter, this.#few);
+    const grid = gridFor(surface, painter, this.#few, this.#hasLongLists);
     if (grid.count <= FEW_BINS) this.#fewLoader?.load();
     const key = JSON.stringify(grid);
     const known = this.#bound.get(key);
     if (known) return known;
     if (this.#bound.size >= MAX_GRIDS) this.#forgetGrids();
-    const words = grid.count + 1 + (grid.isDivided ? this.#few!.words : 0);
+    const words = grid.count + 2 + (grid.isDivided ? this.#few!.words : 0);
+    if (grid.isFew) this.#fewBuffers ??= this.#few!.buffers(this.memory, inputs.pairCapacity);
     const own = {
       ranges: this.memory.buffer('gs.bin.ranges', 8 * grid.count, BUFFER_USAGE.storage | BUFFER_USAGE.copyDestination),
-      binOrder: this.memory.buffer('gs.bin.order', 4 * words, BUFFER_USAGE.storage),
+      binOrder: this.memory.buffer('gs.bin.order', 4 * words, BUFFER_USAGE.storage | BUFFER_USAGE.copySource),
     };
     const bound = { grid, ...own, ...this.#bindings(inputs, buffers, grid, own) };
     this.#bound.set(key, bound);
@@ -259,6 +243,7 @@ export class TilesRasterizer extends BufferOwner implements Rasterizer {
       this.memory.free(binOrder);
     }
     this.#bound.clear();
+    this.#last = undefined;
   }
 
   #bindings(
@@ -291,10 +276,7 @@ export class TilesRasterizer extends BufferOwner implements Rasterizer {
     indexed: Resources<typeof binIndex>,
     ordered: Resources<typeof binOrder>,
   ): GridBindings['list'] {
-    if (isDivided) {
-      this.#fewBuffers ??= this.#few!.buffers(this.memory, this.#inputs!.pairCapacity);
-      return this.#few!.lister(this.#fewBuffers, indexed, ordered);
-    }
+    if (isDivided) return this.#few!.lister(this.#fewBuffers!, indexed, ordered);
     const { index, order } = this.#kernels;
     const [indexGroup, orderGroup] = [index.bind(indexed), order.bind(ordered)];
     return (pass, groups) => {
