@@ -118,8 +118,8 @@ function readable(device: GPUDevice): { device: GPUDevice; segmentsIn: () => Pro
     return buffer;
   };
   const segmentsIn = async (): Promise<number> => {
-    // One bin, the number of long bins, the number of segments.
-    const [words] = await readBack(device, [{ buffer: order!, byteOffset: 8, byteLength: 4 }]);
+    // One bin, the number of long bins, the pairs of the longest, the number of segments.
+    const [words] = await readBack(device, [{ buffer: order!, byteOffset: 12, byteLength: 4 }]);
     return new Uint32Array(words)[0];
   };
   const other = new Proxy(device, {
