@@ -31,11 +31,15 @@ const QUANTIZED = {
   replaced: { 'shared/stored_gaussian': 'shared/quantized_gaussian' },
 };
 /** Stages that are made a second time for images of few tiles: `bin_index_few` of `bin_index` and so on. */
-const SEGMENTS = { 'shared/column': 'shared/single', 'shared/whole_lists': 'shared/segments' };
+const SEGMENTS = {
+  'shared/column': 'shared/single',
+  'shared/column_rows': 'shared/single_rows',
+  'shared/whole_lists': 'shared/segments',
+};
 const FEW = {
   bin_index: { 'shared/undivided': 'shared/tile_counts' },
   bin_order: { 'shared/undivided': 'shared/divide_lists' },
-  rasterize_tiles: SEGMENTS,
+  rasterize_tiles: { ...SEGMENTS, 'shared/whole_lists': 'shared/plain_segments' },
   rasterize_tiles_auxiliary: SEGMENTS,
   rasterize_tiles_depth: SEGMENTS,
 };

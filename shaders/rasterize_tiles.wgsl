@@ -10,5 +10,3 @@ fn aux_clear(lane: u32) {}
 fn aux_blend(k: u32, weight: Column, before: Column, after: Column, is_blended: Flags) {}
 fn aux_store(k: u32) {}
 fn aux_pixel(pixel: vec2u, row: u32) {}
-fn keep_depth(depth: Column) {}
-fn kept_depth() -> Column { return Column(0.0); }

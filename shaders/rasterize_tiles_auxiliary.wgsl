@@ -1,6 +1,7 @@
 // Rasterizes tiles, and writes the contribution of each splat and the depth of each pixel.
 #import shared/paint_columns
 #import shared/whole_lists
+#import shared/column_rows
 #import shared/median_depth
 
 // Indices of the splats by slot.

@@ -3,6 +3,7 @@
 #import shared/scene_depth
 #import shared/paint_columns
 #import shared/whole_lists
+#import shared/column_rows
 #import shared/median_depth
 
 @group(0) @binding(7) var<uniform> scene: SceneDepth;

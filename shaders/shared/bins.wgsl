@@ -42,16 +42,6 @@ struct BinView {
   tile_side: u32,
 }
 
-// The corner of a tile in pixels.
-fn corner_of(view: BinView, bin: u32, tile_in_bin: u32) -> vec2u {
-  let tile = vec2u(bin % view.bins.x, bin / view.bins.x) * vec2u(BIN_COLUMNS, BIN_ROWS)
-    + vec2u(tile_in_bin % BIN_COLUMNS, tile_in_bin / BIN_COLUMNS);
-  return tile * view.tile_side;
-}
-
-// Whether a tile has pixels: bins at the edges have tiles outside the image.
-fn is_seen(view: BinView, corner: vec2u) -> bool { return all(vec2f(corner) < view.viewport); }
-
 // Width and height of a bin in pixels.
 fn bin_size(view: BinView) -> vec2f {
   return f32(view.tile_side) * vec2f(f32(BIN_COLUMNS), f32(BIN_ROWS));

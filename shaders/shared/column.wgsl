@@ -5,13 +5,6 @@ const COLUMN: u32 = 4u;
 alias Column = vec4f;
 alias Flags = vec4<bool>;
 const STEPS = Column(0.0, 1.0, 2.0, 3.0);
-fn largest(column: Column) -> f32 { return max(max(column.x, column.y), max(column.z, column.w)); }
-fn row_of(column: Column, row: u32) -> f32 { return column[row]; }
-fn with_row(column: Column, row: u32, value: f32) -> Column {
-  var changed = column;
-  changed[row] = value;
-  return changed;
-}
 
 fn finish_pixels(pixels: ptr<function, Pixels>, position: vec2u) {
   hide_rest(pixels);

@@ -23,6 +23,16 @@ const SEGMENT_WORDS = 5u;
 const DIVIDED_AT = 3u + MAX_TILES;
 const DIVISION_WORDS = DIVIDED_AT + MAX_DIVIDED * DIVIDED_WORDS + MAX_SEGMENTS * SEGMENT_WORDS;
 
+// The corner of a tile in pixels.
+fn corner_of(view: BinView, bin: u32, tile_in_bin: u32) -> vec2u {
+  let tile = vec2u(bin % view.bins.x, bin / view.bins.x) * vec2u(BIN_COLUMNS, BIN_ROWS)
+    + vec2u(tile_in_bin % BIN_COLUMNS, tile_in_bin / BIN_COLUMNS);
+  return tile * view.tile_side;
+}
+
+// Whether a tile has pixels: bins at the edges have tiles outside the image.
+fn is_seen(view: BinView, corner: vec2u) -> bool { return all(vec2f(corner) < view.viewport); }
+
 fn segment_count_at(view: BinView) -> u32 { return view.bins.x * view.bins.y + 2u; }
 fn tile_segments_at(view: BinView, tile: u32) -> u32 { return segment_count_at(view) + 2u + tile; }
 fn divided_at(view: BinView, list: u32) -> u32 { return tile_segments_at(view, MAX_TILES) + DIVIDED_WORDS * list; }

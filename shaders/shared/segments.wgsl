@@ -16,6 +16,13 @@ const UNDIVIDED = 3u;
 // halves it. Followed by the number of splats after which each tile was finished in the last frame.
 @group(0) @binding(14) var<storage, read_write> segments: array<f32>;
 
+// The words from `begin` to `end` of the list of a tile.
+fn begin_segment(bin: u32, tile: u32, begin: u32, end: u32) -> ListPlace {
+  let all = ranges[bin];
+  let range = vec2u(max(all.x, 32u * begin), min(all.y, 32u * end));
+  return ListPlace(range, tile, 0u, begin, begin, 0u, 0u);
+}
+
 // The pixel of a thread, relative to the corner.
 fn pixel_of(lane: u32) -> vec2u {
   let own_block = lane / (block_side * block_side);

@@ -4,9 +4,6 @@ const COLUMN: u32 = 1u;
 alias Column = f32;
 alias Flags = bool;
 const STEPS = 0.0;
-fn largest(column: Column) -> f32 { return column; }
-fn row_of(column: Column, row: u32) -> f32 { return column; }
-fn with_row(column: Column, row: u32, value: f32) -> Column { return value; }
 
 fn finish_pixels(pixels: ptr<function, Pixels>, position: vec2u) {
   hide_rest(pixels);

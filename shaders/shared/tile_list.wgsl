@@ -40,13 +40,6 @@ fn begin_list(bin: u32, tile: u32, step: u32) -> ListPlace {
   return ListPlace(range, tile, step, first_word, first_word, 0u, 0u);
 }
 
-// The words from `begin` to `end` of the list of a tile.
-fn begin_segment(bin: u32, tile: u32, begin: u32, end: u32) -> ListPlace {
-  let all = ranges[bin];
-  let range = vec2u(max(all.x, 32u * begin), min(all.y, 32u * end));
-  return ListPlace(range, tile, 0u, begin, begin, 0u, 0u);
-}
-
 fn bits_of(word: u32, tile: u32) -> u32 { return tile_bits[tile_word(word, tile)]; }
 
 // Moves the window to the words from `first_word` on. Ends with a barrier.

@@ -20,8 +20,11 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
   }
   if (nth >= bins) { return; }
   let bin = bin_order[nth];
-  let corner = corner_of(view, bin, tile_in_bin);
-  if (!is_seen(view, corner)) { return; }
+  let tile = vec2u(bin % view.bins.x, bin / view.bins.x) * vec2u(BIN_COLUMNS, BIN_ROWS)
+    + vec2u(tile_in_bin % BIN_COLUMNS, tile_in_bin / BIN_COLUMNS);
+  let corner = tile * view.tile_side;
+  // Bins at the edges have tiles outside the image.
+  if (any(vec2f(corner) >= view.viewport)) { return; }
   let threads = block_side * block_side / COLUMN;
   let own_block = lane / threads;
   let in_block = lane % threads;

@@ -1,9 +1,19 @@
 /** Images of few tiles: a thread has one pixel, and long lists are divided. Loaded with the first such frame. */
 import { binCut, binIndexFew, binOrderFew, rasterizeTilesFew } from '../generated/few-shaders.js';
 import { constants } from '../generated/shaders.js';
-import { BUFFER_USAGE, kernelOf, type ComputeKernel, type Resource } from '../gpu/kernel.js';
+import { passes } from '../autotune/timing.js';
+import { BUFFER_USAGE, kernelOf, madeTogether, type ComputeKernel, type Resource } from '../gpu/kernel.js';
+import { PREFERRED } from '../variants.js';
+import type { FewTilesLoader } from './few-tiles-loader.js';
+import type { TilePainter } from './tile-painter.js';
 import type { GpuMemory } from '../gpu/memory.js';
-import { rasterizeKernel, type FewStage, type RasterizeKernel, type RasterizeVariant } from './tile-kernels.js';
+import {
+  rasterizeKernel,
+  WHOLE_LISTS,
+  type FewStage,
+  type RasterizeKernel,
+  type RasterizeVariant,
+} from './tile-kernels.js';
 
 const { DIVISION_WORDS, END_AT, MAX_DIVIDED, MAX_SEGMENTS, MAX_TILES, PROJECT_GROUP, TILES_PER_BIN } = constants;
 
@@ -23,8 +33,6 @@ export interface FewBuffers {
 export class FewTiles {
   /** Words of `bin_order` that divided lists need. */
   readonly words = DIVISION_WORDS;
-  /** Number of workgroups in front of those of the tiles. */
-  readonly segments = MAX_SEGMENTS;
   /** Minimum number of pairs of the longest list from which lists are divided. Shorter ones would gain nothing. */
   readonly longPairs: number;
   readonly #device: GPUDevice;
@@ -71,4 +79,47 @@ export class FewTiles {
   kernel(variant: RasterizeVariant, stage: FewStage): RasterizeKernel {
     return rasterizeKernel(this.#device, rasterizeTilesFew, variant, { stage });
   }
+
+  /** Compiles the pipelines of a variant. */
+  prepare(variant: RasterizeVariant): void {
+    for (const stage of [...STAGES, WHOLE_LISTS] as const) this.kernel(variant, stage).prepare();
+  }
+
+  /** Returns the dispatches of a frame with their numbers of workgroups. @param tiles Number of tiles. */
+  dispatches(
+    painter: TilePainter,
+    variant: RasterizeVariant,
+    isDivided: boolean,
+    tiles: number,
+  ): (readonly [RasterizeKernel, number])[] {
+    if (!isDivided) return [[painter.few!(variant, WHOLE_LISTS)!, tiles]];
+    return STAGES.map((stage) => [painter.few!(variant, stage)!, MAX_SEGMENTS + (stage === 0 ? tiles : 0)]);
+  }
+}
+
+/** Dispatches of a frame with divided lists: shaders/shared/segments.wgsl. */
+const STAGES = [0, 1, 2] as const;
+/** Minimum number of splats of a segment in the self-test, whose lists are short. */
+const TESTED_SPLATS = 16;
+
+/**
+ * Compiles and tests the kernels. They are used from the test on, and not after it if it fails.
+ * @param wanted Variants whose pipelines are compiled.
+ */
+export async function loadFewTiles(
+  device: GPUDevice,
+  loader: FewTilesLoader,
+  wanted: readonly RasterizeVariant[],
+): Promise<void> {
+  const make = async (splats?: number): Promise<void> => {
+    let few: FewTiles | undefined;
+    await madeTogether(device, () => {
+      few = new FewTiles(device, splats);
+      for (const variant of wanted) few.prepare(variant);
+    });
+    loader.now = few;
+  };
+  await make(TESTED_SPLATS);
+  if (await passes(device, PREFERRED, undefined, 'divided lists')) await make();
+  else loader.now = undefined;
 }

@@ -41,8 +41,7 @@ export type PaintedTiles = Parameters<RasterizeKernel['bind']>[0] & {
  * Dispatches of an image of few tiles: shaders/shared/segments.wgsl. {@link WHOLE_LISTS} is the only one if no list is
  * divided.
  */
-export const FEW_STAGES = [0, 1, 2, 3] as const;
-export type FewStage = (typeof FEW_STAGES)[number];
+export type FewStage = 0 | 1 | 2 | typeof WHOLE_LISTS;
 export const WHOLE_LISTS = 3;
 
 /** Properties that select the pipeline of a kernel. */

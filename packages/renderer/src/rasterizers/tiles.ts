@@ -15,14 +15,7 @@ import type {
   Slice,
 } from './rasterizer.js';
 import { pairBuffers, releasableBytesOf, type PairBuffers } from './pair-buffers.js';
-import {
-  listingKernels,
-  WHOLE_LISTS,
-  type ListingKernels,
-  type PaintedTiles,
-  type RasterizeKernel,
-  type RasterizeVariant,
-} from './tile-kernels.js';
+import { listingKernels, type ListingKernels, type PaintedTiles, type RasterizeVariant } from './tile-kernels.js';
 import { FEW_BINS, gridFor, type Grid } from './grid.js';
 import { fewTilesOn, type FewTilesLoader } from './few-tiles-loader.js';
 import type { FewBuffers, FewTiles } from './few-tiles.js';
@@ -182,28 +175,13 @@ export class TilesRasterizer extends BufferOwner implements Rasterizer {
       refusesLast: refusesLast(settings),
     };
     const isDivided = bound.grid.isDivided && slice.count === 1;
-    const dispatches = this.#dispatches(painter, variant, bound.grid.isFew, isDivided, tiles);
+    const dispatches = bound.grid.isFew
+      ? this.#few!.dispatches(painter, variant, isDivided, tiles)
+      : [[painter.kernel(variant), tiles] as const];
     // All kernels of a frame have the same bindings.
     const group = painter.bind(dispatches[0][0], this.#painted(bound, surface.view));
     for (const [kernel, groups] of dispatches) kernel.dispatch(paint, group, groups);
     paint.end();
-  }
-
-  /** Returns the dispatches of a slice with their numbers of workgroups. */
-  #dispatches(
-    painter: TilePainter,
-    variant: RasterizeVariant,
-    isFew: boolean,
-    isDivided: boolean,
-    tiles: number,
-  ): (readonly [RasterizeKernel, number])[] {
-    if (!isFew) return [[painter.kernel(variant), tiles]];
-    if (!isDivided) return [[painter.few!(variant, WHOLE_LISTS)!, tiles]];
-    const { segments } = this.#few!;
-    return ([0, 1, 2] as const).map((stage) => [
-      painter.few!(variant, stage)!,
-      stage === 0 ? segments + tiles : segments,
-    ]);
   }
 
   #release(): void {
