@@ -109,7 +109,7 @@ test('an interrupted call continues after its last group, and returns the same c
   assert.deepEqual(continued, whole);
 });
 
-/** A room of which a twentieth moves; frames have their splats in other orders, and with noise far below a pixel. */
+/** A room whose twentieth part moves; frames have their splats in other orders, and with noise far below a pixel. */
 function room(frame: number): GaussianCloud {
   const random = seededRandom(5);
   const noise = seededRandom(100 + frame);

@@ -196,7 +196,7 @@ test('an element of another size is measured again: a small frame that gains not
   move(20, 2e5, () => 18);
   assert.equal(quality.plan({ now, pixels: 2e5, hasChanged: true, goesOn: true }).level, 0, 'the small one is whole');
   assert.ok(move(1, 4e6, (level) => 20 * COSTS[level]) <= quality.targetMs, 'the large one is in time within a second');
-  // At the lowest level that a small view may have, all of which is faster.
+  // At the lowest level that a small view may have. All levels below are faster.
   move(5, 4e6, (level) => 20 * COSTS[level]);
   move(2, 4e6, (level) => 60 * COSTS[level]);
   const smallMs = [18, 18, 19, 24, 32];

@@ -118,7 +118,7 @@ new DataView(png.buffer).setUint32(16, 512);
 new DataView(png.buffer).setUint32(20, 512);
 const textured = { index: 0, extensions: { KHR_texture_transform: { scale: [2, 2] } } };
 
-/** Files that contain an object once, of which three.js makes many. */
+/** Files that contain an object once. three.js makes many of it. */
 const MULTIPLIED: Readonly<Record<string, object>> = {
   'instances of a node, for each primitive of its mesh': changed({
     nodes: [{ mesh: 0, extensions: { EXT_mesh_gpu_instancing: { attributes: { TRANSLATION: 1 } } } }],

@@ -12,7 +12,7 @@ after(endNodeDevice);
 
 const camera = cameraAt([0, 0, -6], [0, 0, 0], { width: 96, height: 64 });
 
-/** Balls around the origin, all of which the camera sees. */
+/** Balls around the origin. The camera sees them all. */
 function balls(count: number, seed: number) {
   const random = randomSource(seed);
   return cloudOf(

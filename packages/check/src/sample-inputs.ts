@@ -39,7 +39,7 @@ export function sampleInputs(header: OnnxHeader, contract: Contract): Sample[] {
     ['last time, a third view', stateAt(contract, 4, end)],
   ];
   if (Object.values(contract.inputs).some(({ role }) => role === 'time' || role === 'frame')) {
-    // The times are no simple fractions of a period, at all of which a loop could be in the same state.
+    // The times are no simple fractions of a period, because a loop could be in the same state at all of those.
     for (const [i, share] of TIMES.entries()) {
       states.push([`${share} of the time`, stateAt(contract, 2 + i, share * end)]);
     }

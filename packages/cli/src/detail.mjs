@@ -6,6 +6,7 @@ import { existsSync, mkdirSync, readdirSync, rmSync, statSync, writeFileSync } f
 import { dirname, join, resolve } from 'node:path';
 import { readScene, toDegree, upright, uprightRotation } from '@gaussian-splat/formats';
 import { deviceDescriptor, pickInitialVariants } from '@gaussian-splat/renderer';
+import { lossesIn } from '@gaussian-splat/economise';
 import {
   buildDetailTree,
   codingFor,

@@ -48,7 +48,7 @@ it('casts of 16-bit integers cannot even be loaded: what the check says of them 
 });
 
 describe('recorded commands', () => {
-  // The last writes five tensors, four of which never change.
+  // The last writes five tensors; four never change.
   for (const path of [
     `${FIXTURES}packed.onnx`,
     `${FIXTURES}heavy.onnx`,

@@ -107,7 +107,7 @@ function decode(
       throw damaged(where, 'a mesh of Draco', 'other data');
     const status = decoder.DecodeArrayToMesh(bytes, bytes.length, mesh);
     if (!status.ok() || mesh.ptr === 0) throw damaged(where, 'a mesh of Draco', status.error_msg());
-    // A primitive may decode a large mesh, of which its accessors show little; many primitives may have one mesh.
+    // A primitive may decode a large mesh and show little of it by its accessors; many primitives may have one mesh.
     document.take(DECODED_BYTES * (mesh.num_faces() + mesh.num_points()));
     for (const [id, accessor] of attributes) {
       expectCount(document, accessor, mesh.num_points());

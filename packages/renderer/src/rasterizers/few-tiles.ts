@@ -1,9 +1,8 @@
 /** Images of few tiles: a thread has one pixel, and long lists are divided. Loaded with the first such frame. */
 import { binCut, binIndexFew, binOrderFew, rasterizeTilesFew } from '../generated/few-shaders.js';
 import { constants } from '../generated/shaders.js';
-import { passes } from '../autotune/timing.js';
 import { BUFFER_USAGE, kernelOf, madeTogether, type ComputeKernel, type Resource } from '../gpu/kernel.js';
-import { PREFERRED } from '../variants.js';
+import { PREFERRED, selfTestOn } from '../variants.js';
 import type { FewTilesLoader } from './few-tiles-loader.js';
 import type { TilePainter } from './tile-painter.js';
 import type { GpuMemory } from '../gpu/memory.js';
@@ -120,6 +119,7 @@ export async function loadFewTiles(
     loader.now = few;
   };
   await make(TESTED_SPLATS);
-  if (await passes(device, PREFERRED, undefined, 'divided lists')) await make();
+  const { run } = selfTestOn(device);
+  if (run === undefined || (await run(PREFERRED, 'divided lists'))) await make();
   else loader.now = undefined;
 }
