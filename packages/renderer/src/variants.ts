@@ -30,10 +30,6 @@ export function setVariants(device: GPUDevice, variants: Variants): void {
 /** Returns the current variants of a device. */
 export const variantsOf = (device: GPUDevice): Variants => known(device).variants;
 
-/** The self-test of a device, for kernels that are loaded after its first run; `run` is undefined before. */
-export const selfTestOn = (device: GPUDevice): { run?: (variants: Variants, tested: string) => Promise<boolean> } =>
-  perDevice(device, 'self-test', () => ({}));
-
 /**
  * Messages about failed self-tests of a device's variants, which are then not used. The list is empty for a WebGL
  * context.

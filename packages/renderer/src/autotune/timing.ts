@@ -5,7 +5,8 @@ import { QueueClock } from '../gpu/queue-clock.js';
 import { Viewpoint } from '../viewpoint.js';
 import { World } from '../world.js';
 import type { PackedGaussians } from '../pack/pack.js';
-import { faultsOf, selfTestOn, type Variants } from '../variants.js';
+import { faultsOf, PREFERRED, type Variants } from '../variants.js';
+import { selfTestOf } from '../gpu/self-test-of.js';
 import { expectedImage, faultOf, viewpointOf } from './self-test.js';
 import { copiesOf, packSpheres, probeCamera, sphereCloud } from './spheres.js';
 
@@ -34,7 +35,7 @@ export const passes = (
   tested = 'variants',
 ): Promise<boolean> =>
   perDevice(device, `right ${tested} ${JSON.stringify(variants)}`, async () => {
-    selfTestOn(device).run ??= (own, what) => passes(device, own, undefined, what);
+    selfTestOf(device).run ??= (what) => passes(device, PREFERRED, undefined, what);
     const start = performance.now();
     await madeTogether(device, () => prepare(device, variants, format ?? ANSWER_TARGET.format));
     const detail = { compiling: performance.now() - start };

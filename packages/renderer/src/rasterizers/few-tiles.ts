@@ -2,7 +2,7 @@
 import { binCut, binIndexFew, binOrderFew, rasterizeTilesFew } from '../generated/few-shaders.js';
 import { constants } from '../generated/shaders.js';
 import { BUFFER_USAGE, kernelOf, madeTogether, type ComputeKernel, type Resource } from '../gpu/kernel.js';
-import { PREFERRED, selfTestOn } from '../variants.js';
+import { selfTestOf } from '../gpu/self-test-of.js';
 import type { FewTilesLoader } from './few-tiles-loader.js';
 import type { TilePainter } from './tile-painter.js';
 import type { GpuMemory } from '../gpu/memory.js';
@@ -119,7 +119,7 @@ export async function loadFewTiles(
     loader.now = few;
   };
   await make(TESTED_SPLATS);
-  const { run } = selfTestOn(device);
-  if (run === undefined || (await run(PREFERRED, 'divided lists'))) await make();
+  const { run } = selfTestOf(device);
+  if (run === undefined || (await run('divided lists'))) await make();
   else loader.now = undefined;
 }
