@@ -2,7 +2,7 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { writeClipHead } from '../../packages/formats/src/clip.js';
-import { encodeWalkMap } from '@gaussian-splat/formats/walk';
+import { encodeFloorMap } from '@gaussian-splat/formats/floor';
 import { writeGlb } from '../../packages/economise/src/write/glb.js';
 import { writePly } from '../../packages/economise/src/write/ply.js';
 import { sogFiles } from '../../packages/economise/src/write/sog.js';
@@ -64,10 +64,10 @@ test('what the readers of clips and of floors refuse for its size is not written
   const cells = { cell: 1, corner: [0, 0], step: 0.3, start: [0, 0, 0], area: 1 } as const;
   const layer = new Float32Array(1).fill(NaN);
   const layers = (count: number): Float32Array[] => new Array<Float32Array>(count).fill(layer);
-  assert.ok(encodeWalkMap({ ...cells, width: 1, depth: 1, layers: layers(1024) }).length > 0);
-  assert.throws(() => encodeWalkMap({ ...cells, width: 1, depth: 1, layers: layers(1025) }), {
+  assert.ok(encodeFloorMap({ ...cells, width: 1, depth: 1, layers: layers(1024) }).length > 0);
+  assert.throws(() => encodeFloorMap({ ...cells, width: 1, depth: 1, layers: layers(1025) }), {
     code: 'argument/value',
   });
   const wide = { ...cells, width: 2 ** 13, depth: 2 ** 13, layers: [layer] };
-  assert.throws(() => encodeWalkMap(wide), { code: 'argument/value' });
+  assert.throws(() => encodeFloorMap(wide), { code: 'argument/value' });
 });

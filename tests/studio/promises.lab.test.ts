@@ -2,7 +2,7 @@
 import assert from 'node:assert/strict';
 import { after, test } from 'node:test';
 import type { Vector3 } from '@gaussian-splat/core';
-import { makeWalkMap, type WalkMap } from '@gaussian-splat/formats/walk';
+import { makeFloorMap, type FloorMap } from '@gaussian-splat/formats/floor';
 import { GaussianBuffers, packGaussians } from '@gaussian-splat/renderer';
 import { compareWithOracle, renderCloud } from '../support/compare.js';
 import { evenly } from '../support/evenly.js';
@@ -133,7 +133,7 @@ for (const name of ['apartment', 'garden', 'hall'] as const)
     let best = 0;
     for (const [x, y, z] of STARTS[name]) {
       const near: Vector3 = [x, y, -z];
-      const map = makeWalkMap(cloud, { frame: [[1, 0, 0], [0, -1, 0], [0, 0, -1]], near }); // prettier-ignore
+      const map = makeFloorMap(cloud, { frame: [[1, 0, 0], [0, -1, 0], [0, 0, -1]], near }); // prettier-ignore
       const areas = areasOf(map, truth);
       best = Math.max(best, areas.free);
       const [free, taken, outside, off] = [areas.free, areas.taken, areas.outside, 100 * areas.height].map((a) =>
@@ -148,7 +148,7 @@ for (const name of ['apartment', 'garden', 'hall'] as const)
 
 /** Square meters of a map on free floor, on furniture and elsewhere; median error of its heights. */
 function areasOf(
-  map: WalkMap,
+  map: FloorMap,
   truth: StudioScene['truth'],
 ): { free: number; taken: number; outside: number; height: number } {
   const found = { free: 0, taken: 0, outside: 0, height: NaN };

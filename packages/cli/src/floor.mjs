@@ -1,13 +1,13 @@
 /** Implementation of `gaussian-splat floor`: reads a scene, finds its walkable floor, and writes it as a map. */
 import { readScene } from '@gaussian-splat/formats';
 import {
-  encodeWalkMap,
+  encodeFloorMap,
   floorOf,
   isVoxelPath,
-  makeWalkMap,
+  makeFloorMap,
   readVoxels,
   voxelTreePath,
-} from '@gaussian-splat/formats/walk';
+} from '@gaussian-splat/formats/floor';
 import { basename, dirname, join, resolve } from 'node:path';
 import { CommandError, parseSceneOptions, runCommand, sayWarnings, UsageError } from './lib/command.mjs';
 import { readWhole } from './lib/input-file.mjs';
@@ -95,7 +95,7 @@ async function floorOfScene(scene, up, options) {
   const openFile = (part) => readWhole(join(dirname(scene), part));
   const cloud = await readScene(await readWhole(scene), { name: basename(scene), openFile });
   sayWarnings(basename(scene), cloud);
-  return makeWalkMap(cloud, { ...options, frame: frameOf(up ?? cloud.hints?.up ?? AXES['-y']) });
+  return makeFloorMap(cloud, { ...options, frame: frameOf(up ?? cloud.hints?.up ?? AXES['-y']) });
 }
 
 async function main({ scene, out, up, options }) {
@@ -104,7 +104,7 @@ async function main({ scene, out, up, options }) {
     throw new CommandError(
       `${basename(scene)} has no floor: check --up and --unit, or name a point above it with --near`,
     );
-  const bytes = encodeWalkMap(map);
+  const bytes = encodeFloorMap(map);
   writeWhole(out, bytes);
   const heights = map.layers.flatMap((layer) => [...layer].filter((height) => !Number.isNaN(height)));
   const range = [Math.min, Math.max].map((pick) => heights.reduce((a, b) => pick(a, b)).toFixed(2));

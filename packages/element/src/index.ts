@@ -16,20 +16,7 @@ export type {
   VisibilityDetail,
 } from './viewer/events.js';
 export { GaussianSplatElement } from './viewer/element.js';
-export type {
-  FlightOptions,
-  FrameOptions,
-  HotspotPlace,
-  ImageOptions,
-  ImmersiveStatusDetail,
-  InteractionPrompt,
-  InteractionPromptStyle,
-  MeasureDetail,
-  PathOptions,
-  RecordOptions,
-  ViewChangeDetail,
-  WalkReadyDetail,
-} from './viewer/feature-table.js';
+export type * from './viewer/feature-table.js';
 export type { SceneStats } from './viewer/stats.js';
 export type { DynamicQualityReport } from './dynamic-quality/dynamic-quality-controller.js';
 export type { SettableProperties } from './viewer/media.js';

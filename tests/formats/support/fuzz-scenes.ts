@@ -2,7 +2,7 @@
 import { readFileSync } from 'node:fs';
 import { unzipSync, zipSync } from 'fflate';
 import type { SceneFormatName } from '@gaussian-splat/formats';
-import { encodeWalkMap } from '@gaussian-splat/formats/walk';
+import { encodeFloorMap } from '@gaussian-splat/formats/floor';
 import { clipOf } from '../../support/clips.js';
 import { detailFolder } from '../../support/detail-folder.js';
 import { fixturePath } from '../../support/generators.js';
@@ -253,7 +253,7 @@ export async function otherScenes(): Promise<
     floor: {
       kind: 'floor',
       scenes: [1, 3].map((count) =>
-        one('a.floor', encodeWalkMap({ ...map, layers: Array.from({ length: count }, () => new Float32Array(400)) })),
+        one('a.floor', encodeFloorMap({ ...map, layers: Array.from({ length: count }, () => new Float32Array(400)) })),
       ),
     },
     voxels: { kind: 'voxels', scenes: [voxels()] },

@@ -5,7 +5,7 @@
 import { existsSync, readFileSync, writeFileSync } from 'node:fs';
 import { serialize } from 'node:v8';
 import { GaussianSplatError } from '@gaussian-splat/core';
-import type { FloorOptions } from '@gaussian-splat/formats/walk';
+import type { FloorOptions } from '@gaussian-splat/formats/floor';
 import { clipRoomBytes, unpackClipIndex, type PackedClipIndex } from '@gaussian-splat/formats';
 import * as worker from '../../../packages/element/src/loading/scene-worker.js';
 import type { FuzzScene, ReaderKind } from './fuzz-scenes.js';

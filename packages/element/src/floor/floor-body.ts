@@ -1,5 +1,5 @@
 import type { Vector3 } from '@gaussian-splat/core';
-import { floorAt, stepOn, wayTo, type WalkMap } from '@gaussian-splat/formats/walk';
+import { floorAt, stepOn, wayTo, type FloorMap } from '@gaussian-splat/formats/floor';
 
 /** Walking speed, meters per second. */
 const SPEED = 1.4;
@@ -13,7 +13,7 @@ type Place = readonly [x: number, y: number, z: number];
 
 /** A body on a map of the floor: meters in viewer space. Independent of page and camera. */
 export class FloorBody {
-  readonly map: WalkMap;
+  readonly map: FloorMap;
   #at: Place;
   /** Height of the floor under the eyes, smoothed over time, meters. */
   #eyeFloor: number;
@@ -24,7 +24,7 @@ export class FloorBody {
   #searching: AbortController | undefined;
   #isBlocked = false;
 
-  constructor(map: WalkMap, near: Vector3) {
+  constructor(map: FloorMap, near: Vector3) {
     this.map = map;
     this.#at = map.start;
     this.#eyeFloor = this.#at[1];
@@ -128,7 +128,7 @@ export class FloorBody {
 }
 
 /** Returns the height of the highest floor below a point, meters; undefined if there is none. */
-function floorBelow({ corner, cell, width, depth, layers }: WalkMap, [x, y, z]: Vector3): number | undefined {
+function floorBelow({ corner, cell, width, depth, layers }: FloorMap, [x, y, z]: Vector3): number | undefined {
   const [i, j] = [Math.floor((x - corner[0]) / cell), Math.floor((z - corner[1]) / cell)];
   if (!(i >= 0 && j >= 0 && i < width && j < depth)) return undefined;
   const below = layers.map((layer) => layer[i + width * j]).filter((height) => height <= y);

@@ -1,5 +1,6 @@
+import type { Viewer } from '../viewer/viewer.js';
 import type { ViewerFrame } from '../viewer/camera/orbit.js';
-import { isVoxelPath, type FloorOptions, type WalkMap } from '@gaussian-splat/formats/walk';
+import { isVoxelPath, type FloorOptions, type FloorMap } from '@gaussian-splat/formats/floor';
 import { GaussianSplatError, type Vector3 } from '@gaussian-splat/core';
 import { isStreamed } from '../gpu/open-scene.js';
 import type { SceneRequest } from '../loading/protocol.js';
@@ -20,6 +21,12 @@ export interface FloorSource {
   readonly near: Vector3;
 }
 
+/** Returns the absolute URL of the map that the page names; null if the floor is to be found in the splats. */
+export function mapUrlOf({ attributes, element }: Viewer): string | null {
+  const url = attributes.walkMap?.trim() || 'auto';
+  return url === 'auto' ? null : new URL(url, element.baseURI).href;
+}
+
 /** Free height above the eyes, meters, that a body needs. */
 const ABOVE_EYES = 0.1;
 
@@ -27,7 +34,7 @@ const ABOVE_EYES = 0.1;
  * Returns the map of a scene's floor: from its file, or computed from the splats in a worker. Rejects with
  * GaussianSplatError, or with the signal's reason after it is aborted.
  */
-export async function openFloor(source: FloorSource, signal: AbortSignal): Promise<WalkMap> {
+export async function openFloor(source: FloorSource, signal: AbortSignal): Promise<FloorMap> {
   const { loader, request, mapUrl, frame, metersPerUnit, eyeHeight, near } = source;
   const { url, file, credentials, limits } = request;
   const voxelUrl = mapUrl !== null && isVoxelPath(new URL(mapUrl).pathname) ? mapUrl : undefined;

@@ -1,13 +1,13 @@
 /** Finds the walkable floor of a scene file. The worker loads this module on demand. */
 import { fetchScene, fileOpenerFor, readScene, type FetchSceneOptions } from '@gaussian-splat/formats';
 import {
-  decodeWalkMap,
+  decodeFloorMap,
   floorOf,
-  makeWalkMap,
+  makeFloorMap,
   readVoxels,
   voxelTreePath,
-  type WalkMap,
-} from '@gaussian-splat/formats/walk';
+  type FloorMap,
+} from '@gaussian-splat/formats/floor';
 import { fileLimits, fileName, limitsFrom, named } from '../loading/load-scene.js';
 import type { FloorRequest } from '../loading/protocol.js';
 
@@ -16,13 +16,13 @@ import type { FloorRequest } from '../loading/protocol.js';
  * `map`, reads that instead. Throws GaussianSplatError (`network/*`, `decode/*`, `out-of-memory/*`), or the signal's
  * reason if that is aborted.
  */
-export async function makeFloor(request: FloorRequest, signal: AbortSignal): Promise<WalkMap> {
+export async function makeFloor(request: FloorRequest, signal: AbortSignal): Promise<FloorMap> {
   const { credentials, options, voxelUrl, map } = request;
   const url = voxelUrl ?? request.url;
   const name = fileName(url);
   try {
     const limits = limitsFrom(request);
-    if (map !== undefined) return decodeWalkMap(new Uint8Array(map), undefined, limits());
+    if (map !== undefined) return decodeFloorMap(new Uint8Array(map), undefined, limits());
     const fetchOptions = (): FetchSceneOptions => ({ mode: 'cors', credentials, signal, ...fileLimits(limits()) });
     const bytes = await fetchScene(url, fetchOptions());
     if (voxelUrl !== undefined) {
@@ -35,7 +35,7 @@ export async function makeFloor(request: FloorRequest, signal: AbortSignal): Pro
     }
     const openFile = /^(blob|data):/.test(url) ? undefined : fileOpenerFor(url, fetchOptions);
     const cloud = await readScene(bytes, { name, signal, openFile, ...limits() });
-    return makeWalkMap(cloud, { ...options, limits: limits() });
+    return makeFloorMap(cloud, { ...options, limits: limits() });
   } catch (error) {
     signal.throwIfAborted();
     throw named(error, name);

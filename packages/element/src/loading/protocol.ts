@@ -4,7 +4,7 @@ import type { ModelPlace } from '@gaussian-splat/core/onnx';
 import type { CpuCheckMessage } from '@gaussian-splat/generator';
 import type { RendererChoice } from '../viewer/attributes.js';
 import type { SceneBounds } from '../viewer/camera/settings.js';
-import type { FloorOptions } from '@gaussian-splat/formats/walk';
+import type { FloorOptions } from '@gaussian-splat/formats/floor';
 import type { ClipPart, LoadLimits, SceneSequence, TriangleFile } from '@gaussian-splat/formats';
 import type { PackedGaussians, StreamedScene } from '@gaussian-splat/renderer';
 import type {

@@ -26,7 +26,7 @@ import {
 } from './protocol.js';
 import { loadScene, named } from './load-scene.js';
 import type * as boxes from './lod-boxes.js';
-import type { WalkMap } from '@gaussian-splat/formats/walk';
+import type { FloorMap } from '@gaussian-splat/formats/floor';
 
 export { loadScene };
 
@@ -67,7 +67,7 @@ export const openManifest = async (
   return code.openManifest(request, signal, onProgress);
 };
 
-export const makeFloor = async (request: FloorRequest, signal: AbortSignal): Promise<WalkMap> => {
+export const makeFloor = async (request: FloorRequest, signal: AbortSignal): Promise<FloorMap> => {
   const code = await loadModule('the code that finds the floor', () => import('../floor/make-floor.js'));
   return code.makeFloor(request, signal);
 };

@@ -9,7 +9,7 @@ import {
   type RawAttributes,
 } from './attributes.js';
 import { readAttribute } from './camera/grammar.js';
-import { FEATURES } from './feature-table.js';
+import FEATURES from './feature-table.js';
 
 const NAVIGATIONS = Object.values(FEATURES).flatMap(({ navigation }) => navigation ?? []);
 

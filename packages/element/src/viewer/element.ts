@@ -3,7 +3,7 @@ import { isServer, type PropertyValues, type ReactiveElement, type TemplateResul
 import { adoptStyles, styles } from './styles.js';
 import type { Attributes, FeatureMembers } from './attributes.js';
 import { readAttributes } from './element-attributes.js';
-import { FEATURES } from './feature-table.js';
+import FEATURES from './feature-table.js';
 import type { CameraSettings } from './camera/settings.js';
 import { visitorMessage, type ElementError } from './errors.js';
 import { SharedDevice } from '../gpu/shared-device.js';

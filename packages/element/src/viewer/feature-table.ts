@@ -6,7 +6,6 @@ import { flight } from '../features/flight/row.js';
 import { announcer, input } from '../features/input/row.js';
 import { labels } from '../features/labels/row.js';
 import { print } from '../features/print/row.js';
-import type * as capture from '../features/recording/capture-image.js';
 import { recording } from '../features/recording/row.js';
 import { ruler } from '../features/ruler/row.js';
 import { shadow } from '../features/shadow/row.js';
@@ -24,21 +23,19 @@ import '../features/shadow/row.js';
 import '../features/sky/row.js';
 import '../features/sound/row.js';
 
-export type { InputController } from '../features/input/input-controller.js';
 export type { InteractionPrompt, InteractionPromptStyle } from '../features/input/row.js';
-export type { HotspotController, HotspotPlace } from '../features/labels/hotspot-controller.js';
+export type { HotspotPlace } from '../features/labels/hotspot-controller.js';
 export type { ImageOptions } from '../features/recording/capture-image.js';
 export type { FrameOptions, RecordOptions } from '../features/recording/recording.js';
 export type { MeasureDetail } from '../features/ruler/row.js';
 export type { ViewChangeDetail } from '../features/views/row.js';
-export type { FlightOptions, PathOptions, Tour } from '../features/views/tour.js';
+export type { FlightOptions, PathOptions } from '../features/views/tour.js';
 export type { WalkReadyDetail } from '../features/walk/row.js';
 export type { ImmersiveStatusDetail } from '../features/xr/row.js';
 
-/** Functions for images and videos. */
-export type Recording = typeof capture;
-
-export const FEATURES: FeatureTable = {
+const FEATURES: FeatureTable = {
   ...{ children, views, autoRotate, walk, flight, vr, ar, ruler, shadow, sky, sound, effects, labels, input, motion },
   ...{ announcer, print, recording },
 };
+
+export default FEATURES;

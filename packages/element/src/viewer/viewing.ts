@@ -2,17 +2,14 @@ import type { CameraOrbit, CameraTarget, FieldOfView, PickedPoint } from './came
 import { MediaProperties } from './media.js';
 import { boxOf, type SceneBox } from './scene-queries.js';
 import type { CameraView } from './camera/camera-view.js';
+import type { HotspotController, InputController, Recording, Tour } from './feature-classes.js';
 import type {
   FlightOptions,
   FrameOptions,
-  HotspotController,
   HotspotPlace,
   ImageOptions,
-  InputController,
   PathOptions,
-  Recording,
   RecordOptions,
-  Tour,
 } from './feature-table.js';
 
 /** Methods of the element for its poster, the camera, surface positions, and images. */

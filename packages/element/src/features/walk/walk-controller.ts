@@ -1,5 +1,5 @@
 import { subtract, type Vector3 } from '@gaussian-splat/core';
-import type { WalkMap } from '@gaussian-splat/formats/walk';
+import type { FloorMap } from '@gaussian-splat/formats/floor';
 import type { ReactiveController } from 'lit';
 import { readAttribute } from '../../viewer/camera/grammar.js';
 import { lengthGrammar } from '../../viewer/camera/lengths.js';
@@ -10,7 +10,7 @@ import type { Feature } from '../../viewer/features.js';
 import { LatestTask } from '../../viewer/latest-task.js';
 import { unitOf } from '../../viewer/unit.js';
 import type { Viewer } from '../../viewer/viewer.js';
-import { openFloor } from '../../floor/floor-source.js';
+import { mapUrlOf, openFloor } from '../../floor/floor-source.js';
 import { Gamepads } from './gamepads.js';
 import { Joystick } from './joystick.js';
 import { FloorBody } from '../../floor/floor-body.js';
@@ -153,7 +153,7 @@ export class WalkController implements ReactiveController, Feature {
   }
 
   /** Moves the walker to its start at once, and levels the view. */
-  #begin(map: WalkMap): void {
+  #begin(map: FloorMap): void {
     const { camera } = this.#viewer;
     this.#walker = new FloorBody(map, this.#start);
     camera.lookBy(0, Math.PI / 2 - camera.goal.phi);
@@ -189,10 +189,10 @@ export class WalkController implements ReactiveController, Feature {
 
   /** Computes or fetches the floor, once for each scene and settings. */
   #ask(): void {
-    const { stillRequest: request, camera, frame, services } = this.#viewer;
+    const { stillRequest: request, attributes, camera, frame, services } = this.#viewer;
     if (request === null) return;
-    const { walkMap, eyeHeight, unit } = this.#settings();
-    const key = JSON.stringify([request.url, walkMap, eyeHeight, unit, frame]);
+    const { eyeHeight, unit } = this.#settings();
+    const key = JSON.stringify([request.url, attributes.walkMap, eyeHeight, unit, frame]);
     if (key === this.#askedFor) return;
     this.#forget();
     this.#askedFor = key;
@@ -201,8 +201,7 @@ export class WalkController implements ReactiveController, Feature {
     const options = { loader: services.sceneLoader, request, frame, metersPerUnit, eyeHeight, near };
     this.#opening.run(
       async (signal) => {
-        const mapUrl = walkMap === 'auto' ? null : new URL(walkMap, this.#viewer.element.baseURI).href;
-        const map = await openFloor({ ...options, mapUrl }, signal);
+        const map = await openFloor({ ...options, mapUrl: mapUrlOf(this.#viewer) }, signal);
         if (signal.aborted) return;
         if (map.area < MIN_AREA) return this.#refuse(`its floor has ${map.area.toFixed(1)} m², ${MIN_AREA} are needed`);
         this.#begin(map);
@@ -284,11 +283,10 @@ export class WalkController implements ReactiveController, Feature {
   }
 
   /** Returns the settings of the attributes. Lengths are in meters; `unit` is undefined if neither page nor file has it. */
-  #settings(): { walkMap: string; eyeHeight: number; unit: number | undefined } {
-    const { walkMap, eyeHeight } = this.#viewer.attributes;
+  #settings(): { eyeHeight: number; unit: number | undefined } {
+    const { eyeHeight } = this.#viewer.attributes;
     const warn = (sentence: string): void => this.#viewer.warn(sentence);
     return {
-      walkMap: walkMap?.trim() || 'auto',
       eyeHeight: readAttribute('eye-height', eyeHeight, lengthGrammar('1.6m'), warn),
       unit: unitOf(this.#viewer),
     };

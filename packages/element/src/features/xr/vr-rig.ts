@@ -1,5 +1,5 @@
 import { multiply, subtract, type Vector3 } from '@gaussian-splat/core';
-import { floorAt, type WalkMap } from '@gaussian-splat/formats/walk';
+import { floorAt, type FloorMap } from '@gaussian-splat/formats/floor';
 import { FloorBody } from '../../floor/floor-body.js';
 import type { XrFrame, XrInput, XrPose, XrSpace } from './webxr.js';
 
@@ -17,7 +17,7 @@ const LEAVE_SECONDS = 1;
 const [REACH, RAY_STEP] = [12, 0.05];
 /** Minimum and maximum size of the scene, as a factor of its true size. */
 const [MIN_SCALE, MAX_SCALE] = [0.05, 20];
-/** Horizontal distance of the head from the walker, meters, above which the walker moves under the head. */
+/** Horizontal distance of the head from the body, meters, above which the body moves under the head. */
 const STRAYED = 0.05;
 
 /**
@@ -65,8 +65,8 @@ export class VrRig {
   #grips: readonly [Vector3, Vector3] | undefined;
   /** Position of the session space's origin in viewer space, meters; undefined before the first pose. */
   #origin: Vector3 | undefined;
-  #map: WalkMap | undefined;
-  #walker: FloorBody | undefined;
+  #map: FloorMap | undefined;
+  #body: FloorBody | undefined;
   /** Destination of a teleport, viewer space in meters; undefined if the user does not aim at the floor. */
   target: Vector3 | undefined;
 
@@ -77,17 +77,17 @@ export class VrRig {
   }
 
   /** Sets the map of the floor when it is loaded. */
-  set map(map: WalkMap) {
+  set map(map: FloorMap) {
     this.#map = map;
     if (!this.#pose) return;
     // Visitors may have moved before the map is loaded. Over no floor, such as outside a house, they would walk through walls.
-    const walker = this.#walkerUnder(this.#headAt(this.#pose));
-    if (!walker) {
+    const body = this.#bodyUnder(this.#headAt(this.#pose));
+    if (!body) {
       this.#jump(map.start, this.#pose);
       return;
     }
     const [x, , z] = this.#origin!;
-    this.#origin = [x, this.#floorY(walker.at[1]), z];
+    this.#origin = [x, this.#floorY(body.at[1]), z];
   }
 
   /** Starts to aim with an input that has no trigger button, at its event `selectstart`. */
@@ -138,8 +138,8 @@ export class VrRig {
   #begin(x: number, z: number): Vector3 {
     const { eye, isFloor } = this.#start;
     const head = this.#turned([x, 0, z]);
-    if (this.#map) this.#walker = new FloorBody(this.#map, eye);
-    const below = this.#walker ? this.#walker.at : undefined;
+    if (this.#map) this.#body = new FloorBody(this.#map, eye);
+    const below = this.#body ? this.#body.at : undefined;
     const y = below ? this.#floorY(below[1]) : isFloor ? eye[1] - EYE_HEIGHT : eye[1];
     const [atX, atZ] = below ? [below[0], below[2]] : [eye[0], eye[2]];
     return [atX - head[0], y, atZ - head[2]];
@@ -169,7 +169,7 @@ export class VrRig {
     this.#aim(frame, space, pose, held);
     if (!pad) return;
     const [x, y] = [pad.axes[2] ?? pad.axes[0] ?? 0, pad.axes[3] ?? pad.axes[1] ?? 0];
-    if (handedness === 'left') this.#walk(x, y, pose, seconds);
+    if (handedness === 'left') this.#stride(x, y, pose, seconds);
     else this.#turnBy(x, pose, held);
     held.leave = pad.buttons[LEAVE]?.pressed ? held.leave + seconds : 0;
     if (held.leave >= LEAVE_SECONDS) {
@@ -226,7 +226,7 @@ export class VrRig {
    * Moves the user along the floor, relative to the direction of the head. `x` and `y` are the deflection of the stick,
    * -1..1.
    */
-  #walk(x: number, y: number, pose: XrPose, seconds: number): void {
+  #stride(x: number, y: number, pose: XrPose, seconds: number): void {
     if (this.#start.stepsOnly || seconds === 0) return;
     if (Math.hypot(x, y) < DEAD_ZONE) return this.#settle(seconds);
     const m = pose.transform.matrix;
@@ -236,40 +236,40 @@ export class VrRig {
     const [dx, dz] = [-aheadZ * x - aheadX * y, aheadX * x - aheadZ * y];
     const origin = this.#origin!;
     // Visitors also move by steps of their own.
-    const walker = this.#walkerUnder(this.#headAt(pose));
+    const body = this.#bodyUnder(this.#headAt(pose));
     // The speed is that of the body, not of the scaled scene.
     const time = seconds / this.#scale;
-    if (!walker) {
+    if (!body) {
       const way = 1.4 * time;
       this.#origin = [origin[0] + way * dx, origin[1], origin[2] + way * dz];
       return;
     }
-    const before = walker.at;
-    walker.step(time, dx, dz);
-    const { at, eyeFloor } = walker;
+    const before = body.at;
+    body.step(time, dx, dz);
+    const { at, eyeFloor } = body;
     this.#origin = [origin[0] + at[0] - before[0], this.#floorY(eyeFloor), origin[2] + at[2] - before[2]];
   }
 
   /** Moves the eyes on to their height above the floor, which they may not have reached when the stick came to rest. */
   #settle(seconds: number): void {
-    const walker = this.#walker;
-    if (!walker?.isMoving) return;
-    walker.step(seconds / this.#scale, 0, 0);
+    const body = this.#body;
+    if (!body?.isMoving) return;
+    body.step(seconds / this.#scale, 0, 0);
     const [x, , z] = this.#origin!;
-    this.#origin = [x, this.#floorY(walker.eyeFloor), z];
+    this.#origin = [x, this.#floorY(body.eyeFloor), z];
   }
 
   /**
-   * Returns the walker, which moves under the head if there is a floor. Undefined without a map, and while the head has
+   * Returns the body, which moves under the head if there is a floor. Undefined without a map, and while the head has
    * been over no floor yet.
    */
-  #walkerUnder(head: Vector3): FloorBody | undefined {
+  #bodyUnder(head: Vector3): FloorBody | undefined {
     const isUnder = ({ at }: FloorBody): boolean => Math.hypot(head[0] - at[0], head[2] - at[2]) <= STRAYED;
-    if (!this.#walker && this.#map) {
-      const walker = new FloorBody(this.#map, head);
-      if (isUnder(walker)) this.#walker = walker;
-    } else if (this.#walker && !isUnder(this.#walker)) this.#walker.land(head);
-    return this.#walker;
+    if (!this.#body && this.#map) {
+      const body = new FloorBody(this.#map, head);
+      if (isUnder(body)) this.#body = body;
+    } else if (this.#body && !isUnder(this.#body)) this.#body.land(head);
+    return this.#body;
   }
 
   /** Aims while the trigger is held, and teleports when it is released. */
@@ -287,7 +287,7 @@ export class VrRig {
     const head = this.#headAt(pose);
     const origin = this.#origin!;
     this.#origin = [origin[0] + to[0] - head[0], this.#floorY(to[1]), origin[2] + to[2] - head[2]];
-    if (this.#map) this.#walker = new FloorBody(this.#map, to);
+    if (this.#map) this.#body = new FloorBody(this.#map, to);
   }
 
   /**

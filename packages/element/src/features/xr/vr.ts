@@ -5,7 +5,7 @@ import { lengthGrammar } from '../../viewer/camera/lengths.js';
 import { unitOf } from '../../viewer/unit.js';
 import { prefersReducedMotion } from '../../viewer/motion.js';
 import type { Viewer } from '../../viewer/viewer.js';
-import { openFloor } from '../../floor/floor-source.js';
+import { mapUrlOf, openFloor } from '../../floor/floor-source.js';
 import { GlDrawing } from './gl-drawing.js';
 import { GpuDrawing, gpuOf } from './gpu-drawing.js';
 import { BindingTarget, CopyTarget } from './gpu-targets.js';
@@ -117,13 +117,18 @@ function guideOf(core: Viewer, { session, space, spaceType, signal, drawing }: X
 }
 
 async function findFloor(core: Viewer, unit: number, signal: AbortSignal): ReturnType<typeof openFloor> {
-  const { attributes, camera, frame, services, stillRequest: request, element } = core;
+  const { attributes, camera, frame, services, stillRequest: request } = core;
   if (request === null) throw new Error('no floor');
   const eye = eyeOfPose(camera.goal).map((value) => value * unit) as unknown as Vector3;
   const eyeHeight = readAttribute('eye-height', attributes.eyeHeight, lengthGrammar('1.6m'), () => undefined);
-  const url = attributes.walkMap?.trim() || 'auto';
-  const mapUrl = url === 'auto' ? null : new URL(url, element.baseURI).href;
-  const source = { loader: services.sceneLoader, request, mapUrl, frame, metersPerUnit: unit, eyeHeight };
+  const source = {
+    loader: services.sceneLoader,
+    request,
+    mapUrl: mapUrlOf(core),
+    frame,
+    metersPerUnit: unit,
+    eyeHeight,
+  };
   const map = await openFloor({ ...source, near: eye }, signal);
   if (map.area < MIN_AREA) throw new Error('no floor');
   return map;

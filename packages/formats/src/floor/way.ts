@@ -1,4 +1,4 @@
-import { columnOf, heightOf, placeAt, rowOf, type WalkMap } from './walk-map.js';
+import { columnOf, heightOf, placeAt, rowOf, type FloorMap } from './floor-map.js';
 
 /** Position (x, height of the floor, z) in meters. */
 type Place = readonly [x: number, y: number, z: number];
@@ -29,7 +29,7 @@ const NEIGHBORS = [
  * the search may find.
  * @throws The reason of `signal`
  */
-export async function wayTo(map: WalkMap, from: Place, to: Place, signal?: AbortSignal): Promise<readonly Place[]> {
+export async function wayTo(map: FloorMap, from: Place, to: Place, signal?: AbortSignal): Promise<readonly Place[]> {
   const start = placeAt(map, columnOf(map, from[0]), rowOf(map, from[2]), from[1]);
   const goal = placeAt(map, columnOf(map, to[0]), rowOf(map, to[2]), to[1]);
   if (start < 0 || goal < 0) return [];
@@ -45,7 +45,7 @@ export async function wayTo(map: WalkMap, from: Place, to: Place, signal?: Abort
 
 /** A breadth-first search, which can be continued. */
 class Search {
-  readonly #map: WalkMap;
+  readonly #map: FloorMap;
   readonly #size: number;
   /** For each visited place, the place before it plus 1; 0 for others. Typed, because a floor may have millions of cells. */
   readonly #before: Int32Array;
@@ -53,7 +53,7 @@ class Search {
   #head = 0;
   #tail = 1;
 
-  constructor(map: WalkMap, start: number) {
+  constructor(map: FloorMap, start: number) {
     this.#map = map;
     this.#size = map.width * map.depth;
     this.#before = new Int32Array(map.layers.length * this.#size);

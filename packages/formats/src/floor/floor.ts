@@ -3,7 +3,7 @@ import { grouped } from '../bytes.js';
 import { extinctionOf, type ExtinctionGrid, type GridOptions, type VoxelGrid } from './extinction.js';
 import { FloorWork, tooLarge } from './floor-work.js';
 import { solidsOf } from './solids.js';
-import type { WalkMap } from './walk-map.js';
+import type { FloorMap } from './floor-map.js';
 
 export interface FloorOptions extends GridOptions {
   /** Free height in meters that a body needs above the floor; default 1.6. */
@@ -36,7 +36,7 @@ const MAX_HEIGHTS = 2 ** 25;
  * @throws GaussianSplatError `argument/value` for lengths that are not positive and finite; `out-of-memory/budget` for
  * a scene that takes too much work or memory.
  */
-export function makeWalkMap(cloud: GaussianCloud, options: FloorOptions): WalkMap {
+export function makeFloorMap(cloud: GaussianCloud, options: FloorOptions): FloorMap {
   const work = new FloorWork(options.limits);
   const grid = extinctionOf(cloud, options, work);
   return floorOf(grid, solidsOf(grid), options, work);
@@ -46,17 +46,17 @@ export function makeWalkMap(cloud: GaussianCloud, options: FloorOptions): WalkMa
 type FloorGrid = VoxelGrid & Partial<ExtinctionGrid>;
 
 /**
- * Finds the walkable floor as {@link makeWalkMap} does, but from solid voxels. If `grid` has no optical depths, a surface
+ * Finds the walkable floor as {@link makeFloorMap} does, but from solid voxels. If `grid` has no optical depths, a surface
  * is at the center of its voxel.
  * @param solid Voxels, [nz, ny, nx]: 1 for solid, 0 for empty.
- * @throws GaussianSplatError `out-of-memory/budget` as {@link makeWalkMap} does.
+ * @throws GaussianSplatError `out-of-memory/budget` as {@link makeFloorMap} does.
  */
 export function floorOf(
   grid: FloorGrid,
   solid: Uint8Array,
   options: Omit<FloorOptions, 'frame'> = {},
   work = new FloorWork(options.limits),
-): WalkMap {
+): FloorMap {
   const body: Body = { height: 1.6, radius: 0.2, step: 0.3, ...options };
   const { corner, size, voxel } = grid;
   const middle = [0, 2].map((axis) => corner[axis] + (size[axis] * voxel) / 2);
@@ -129,7 +129,7 @@ class FloorFinder {
     this.#disc = discOf(Math.ceil(body.radius / grid.voxel));
   }
 
-  find(near: Vector3): WalkMap {
+  find(near: Vector3): FloorMap {
     const [nx] = this.#grid.size;
     const regions: Region[] = [];
     this.#floors.forEach((heights, c) => {
@@ -260,7 +260,7 @@ class FloorFinder {
   }
 
   /** Converts a region to a map, cropped to the rectangle of its cells. */
-  #mapOf({ cells, heights, nearest }: Region): WalkMap {
+  #mapOf({ cells, heights, nearest }: Region): FloorMap {
     const { size, corner, voxel } = this.#grid;
     const [nx] = size;
     let [x0, x1, z0, z1] = [Infinity, -1, Infinity, -1];

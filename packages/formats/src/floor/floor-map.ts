@@ -7,7 +7,7 @@ import { inflateUpTo } from '../inflate.js';
  * Walkable floor of a scene: heights of the floor that fit a body, for each cell of a horizontal grid. Coordinates have y up,
  * in meters. A cell has several heights if floors overlap, as on stairs and galleries.
  */
-export interface WalkMap {
+export interface FloorMap {
   /** Edge of a cell in meters. */
   readonly cell: number;
   /** Corner of the first cell with the smallest coordinates, in meters. */
@@ -30,19 +30,19 @@ export interface WalkMap {
  * Returns the height of the floor at a point that is nearest to the height `near`, in meters. Undefined if there is no
  * floor within `map.step` of `near`.
  */
-export function floorAt(map: WalkMap, x: number, z: number, near: number): number | undefined {
+export function floorAt(map: FloorMap, x: number, z: number, near: number): number | undefined {
   const place = placeAt(map, columnOf(map, x), rowOf(map, z), near);
   return place < 0 ? undefined : heightOf(map, place);
 }
 
-export const columnOf = ({ corner, cell }: WalkMap, x: number): number => Math.floor((x - corner[0]) / cell);
-export const rowOf = ({ corner, cell }: WalkMap, z: number): number => Math.floor((z - corner[1]) / cell);
+export const columnOf = ({ corner, cell }: FloorMap, x: number): number => Math.floor((x - corner[0]) / cell);
+export const rowOf = ({ corner, cell }: FloorMap, z: number): number => Math.floor((z - corner[1]) / cell);
 
 /**
  * Returns the place in a cell whose height is nearest to `near`: its layer, times the number of cells, plus the index of
  * the cell. Returns -1 if there is no floor within `map.step` of `near`.
  */
-export function placeAt({ width, depth, layers, step }: WalkMap, column: number, row: number, near: number): number {
+export function placeAt({ width, depth, layers, step }: FloorMap, column: number, row: number, near: number): number {
   if (!(column >= 0 && row >= 0 && column < width && row < depth)) return -1;
   const index = column + width * row;
   let best = -1;
@@ -56,7 +56,7 @@ export function placeAt({ width, depth, layers, step }: WalkMap, column: number,
   return best;
 }
 
-export const heightOf = ({ width, depth, layers }: WalkMap, place: number): number =>
+export const heightOf = ({ width, depth, layers }: FloorMap, place: number): number =>
   layers[Math.floor(place / (width * depth))][place % (width * depth)];
 
 /**
@@ -65,7 +65,7 @@ export const heightOf = ({ width, depth, layers }: WalkMap, place: number): numb
  * @returns The new position; the same array if the body is blocked.
  */
 export function stepOn(
-  map: WalkMap,
+  map: FloorMap,
   from: readonly [number, number, number],
   dx: number,
   dz: number,
@@ -87,7 +87,7 @@ export function stepOn(
 const MAX_PIECES = 4096;
 
 /** Returns the height of the floor at the end of a straight movement; undefined if the floor ends before. */
-function walkTo(map: WalkMap, x: number, y: number, z: number, toX: number, toZ: number): number | undefined {
+function walkTo(map: FloorMap, x: number, y: number, z: number, toX: number, toZ: number): number | undefined {
   const cells = Math.ceil(Math.max(Math.abs(toX - x), Math.abs(toZ - z)) / map.cell);
   const pieces = Math.min(MAX_PIECES, Math.max(1, cells));
   let height: number | undefined = y;
@@ -116,9 +116,9 @@ const BYTES_PER_HEIGHT = 10;
 /**
  * Returns the bytes of a `.floor` file: gzip of one line of JSON, followed by the heights of all layers. Heights are int16
  * differences from the previous height, in units of `heightUnit` meters.
- * @throws GaussianSplatError `argument/value` for a map that {@link decodeWalkMap} would refuse for its size.
+ * @throws GaussianSplatError `argument/value` for a map that {@link decodeFloorMap} would refuse for its size.
  */
-export function encodeWalkMap(map: WalkMap): Uint8Array {
+export function encodeFloorMap(map: FloorMap): Uint8Array {
   const { layers, ...rest } = map;
   const heightBytes = 2 * layers.length * map.width * map.depth;
   if (layers.length > MAX_LAYERS || heightBytes > MAX_BYTES - MAX_HEAD_BYTES)
@@ -159,7 +159,7 @@ const numbersOf = (value: unknown, count: number): readonly unknown[] =>
  * @param name Name of the file in error messages.
  * @throws GaussianSplatError `decode/corrupt`, `out-of-memory/budget`
  */
-export function decodeWalkMap(file: Uint8Array, name = 'walk map', limits: LoadLimits = {}): WalkMap {
+export function decodeFloorMap(file: Uint8Array, name = 'walk map', limits: LoadLimits = {}): FloorMap {
   const budget = new LoadBudget(file.length, limits);
   const fail = (expected: string, found: string): never => {
     throw new GaussianSplatError('decode/corrupt', {
@@ -180,7 +180,7 @@ export function decodeWalkMap(file: Uint8Array, name = 'walk map', limits: LoadL
     fail('a gzip file', (error as Error).message);
   }
   const end = bytes.indexOf(10);
-  let head: Partial<Omit<WalkMap, 'layers'>> & {
+  let head: Partial<Omit<FloorMap, 'layers'>> & {
     format?: string;
     version?: number;
     layers?: number;

@@ -12,18 +12,18 @@ import { gunzipSync, gzipSync } from 'node:zlib';
 import type { GaussianCloud, Vector3 } from '@gaussian-splat/core';
 import { readScene } from '@gaussian-splat/formats';
 import {
-  decodeWalkMap,
-  encodeWalkMap,
+  decodeFloorMap,
+  encodeFloorMap,
   floorAt,
   floorOf,
-  makeWalkMap,
+  makeFloorMap,
   readVoxels,
   stepOn,
   wayTo,
   type FloorOptions,
   type VoxelFiles,
-  type WalkMap,
-} from '@gaussian-splat/formats/walk';
+  type FloorMap,
+} from '@gaussian-splat/formats/floor';
 import { needsSharedData, sharedFile } from '../support/data.js';
 import { isLab, onlyInLab } from '../support/extent.js';
 
@@ -125,7 +125,7 @@ function isOutside([x, y, z]: readonly [number, number, number]): boolean {
 const STEPS = isLab ? 43_200 : 4_320;
 
 function wander(
-  map: WalkMap,
+  map: FloorMap,
   isWrong: (at: readonly [number, number, number]) => boolean,
 ): { out: number; levels: Set<number> } {
   const next = random(7);
@@ -144,7 +144,7 @@ function wander(
 }
 
 test('a room of boxes: the floor, the gallery above it and the stairs between are one map', async () => {
-  const map = makeWalkMap(cloudOf(ROOM), { frame: FRAME, near: [0, 1.5, 2] });
+  const map = makeFloorMap(cloudOf(ROOM), { frame: FRAME, near: [0, 1.5, 2] });
   const ground = floorAt(map, 0, 2, 0);
   assert.ok(ground !== undefined && Math.abs(ground) < 0.02, `the floor is at ${ground} m`);
   const gallery = floorAt(map, 0, -3.7, 2.2);
@@ -162,7 +162,7 @@ test('a room of boxes: the floor, the gallery above it and the stairs between ar
 });
 
 test('the spoilt room: jitter, faint splats and floaters let no one out', () => {
-  const map = makeWalkMap(cloudOf(ROOM, random(3)), { frame: FRAME, near: [0, 1.5, 2] });
+  const map = makeFloorMap(cloudOf(ROOM, random(3)), { frame: FRAME, near: [0, 1.5, 2] });
   assert.ok(map.area > 40, `${map.area} m²`);
   assert.equal(wander(map, isOutside).out, 0);
 });
@@ -174,7 +174,7 @@ test('a path does not leave one side of the map to enter it at the other', async
     const [x, z] = [i % width, Math.floor(i / width)];
     return x < 2 || x >= width - 2 || z === depth - 1 ? 0 : NaN;
   });
-  const map: WalkMap = {
+  const map: FloorMap = {
     ...{ cell, corner: [0, 0], width, depth, layers: [layer], step: 0.3, start: [0.025, 0, 0.025], area: 1 },
   };
   for (const [from, to] of [
@@ -195,7 +195,7 @@ test('a path does not leave one side of the map to enter it at the other', async
 
 test('a path over a floor of 1,000 m² is found in the time of a few frames', async () => {
   const side = 640;
-  const map: WalkMap = {
+  const map: FloorMap = {
     ...{ cell: 0.05, corner: [0, 0], width: side, depth: side, step: 0.3, start: [0, 0, 0], area: 1024 },
     layers: [new Float32Array(side * side)],
   };
@@ -207,7 +207,10 @@ test('a path over a floor of 1,000 m² is found in the time of a few frames', as
 });
 
 /** Counts the tasks of work, with its longest by the places that a proxy of the layers saw read. */
-async function tasksOf(map: WalkMap, work: (map: WalkMap) => Promise<unknown>): Promise<{ max: number; all: number }> {
+async function tasksOf(
+  map: FloorMap,
+  work: (map: FloorMap) => Promise<unknown>,
+): Promise<{ max: number; all: number }> {
   let [max, all, own] = [0, 0, 0];
   const counting = map.layers.map(
     (layer) =>
@@ -232,7 +235,7 @@ async function tasksOf(map: WalkMap, work: (map: WalkMap) => Promise<unknown>): 
 
 test('a search over many floors is divided into short tasks, and ends', async () => {
   const [side, floors] = [30, 256];
-  const map: WalkMap = {
+  const map: FloorMap = {
     ...{ cell: 0.05, corner: [0, 0], width: side, depth: side, step: 1e3, start: [0, 0, 0], area: 1 },
     layers: Array.from({ length: floors }, (_, k) => new Float32Array(side * side).fill(k)),
   };
@@ -243,7 +246,7 @@ test('a search over many floors is divided into short tasks, and ends', async ()
 });
 
 test('a step over cells of a millimeter is bounded', async () => {
-  const map: WalkMap = {
+  const map: FloorMap = {
     ...{ cell: 1e-3, corner: [0, 0], width: 2000, depth: 2, step: 1, start: [0, 0, 0], area: 1 },
     layers: [new Float32Array(4000)],
   };
@@ -252,10 +255,10 @@ test('a step over cells of a millimeter is bounded', async () => {
 });
 
 test('a walk map is stored in centimeters and read again', () => {
-  const map = makeWalkMap(cloudOf(ROOM.slice(0, 5)), { frame: FRAME, near: [0, 1.5, 2] });
-  const file = encodeWalkMap(map);
+  const map = makeFloorMap(cloudOf(ROOM.slice(0, 5)), { frame: FRAME, near: [0, 1.5, 2] });
+  const file = encodeFloorMap(map);
   assert.ok(file.length < 3000, `${file.length} bytes`);
-  const { layers, ...rest } = decodeWalkMap(file);
+  const { layers, ...rest } = decodeFloorMap(file);
   const { layers: before, ...same } = map;
   assert.deepEqual({ ...rest, heightUnit: undefined }, { ...same, heightUnit: undefined });
   layers.forEach((layer, k) =>
@@ -267,22 +270,22 @@ test('a walk map is stored in centimeters and read again', () => {
 });
 
 test('damaged walk maps are refused by name', () => {
-  const file = encodeWalkMap(makeWalkMap(cloudOf(ROOM.slice(0, 5)), { frame: FRAME }));
+  const file = encodeFloorMap(makeFloorMap(cloudOf(ROOM.slice(0, 5)), { frame: FRAME }));
   const damaged = [new Uint8Array(), new Uint8Array(3), file.subarray(0, 40), new Uint8Array(100).fill(31)];
   for (let i = 0; i < 200; i++)
     damaged.push(file.map((byte, at) => (at === (i * 37) % file.length ? byte ^ 0x55 : byte)));
   for (const bytes of damaged)
     try {
-      decodeWalkMap(bytes);
+      decodeFloorMap(bytes);
     } catch (error) {
       assert.equal((error as { code?: string }).code, 'decode/corrupt', String(error));
     }
-  assert.throws(() => decodeWalkMap(file.subarray(0, 40)), { code: 'decode/corrupt' });
+  assert.throws(() => decodeFloorMap(file.subarray(0, 40)), { code: 'decode/corrupt' });
 });
 
 test('walk maps whose first line claims more than there is are refused by name', () => {
   const map = { cell: 0.1, corner: [0, 0], width: 1, depth: 1, step: 0.3, start: [0, 0, 0], area: 1 } as const;
-  const whole = gunzipSync(encodeWalkMap({ ...map, layers: [Float32Array.of(0)] }));
+  const whole = gunzipSync(encodeFloorMap({ ...map, layers: [Float32Array.of(0)] }));
   const head = JSON.parse(new TextDecoder().decode(whole.subarray(0, whole.indexOf(10)))) as object;
   for (const claim of [
     { corner: 5 },
@@ -295,18 +298,18 @@ test('walk maps whose first line claims more than there is are refused by name',
     { format: { toString: 1 } },
   ]) {
     const file = gzipSync(new TextEncoder().encode(`${JSON.stringify({ ...head, ...claim })}\n`));
-    assert.throws(() => decodeWalkMap(file), { code: 'decode/corrupt' }, JSON.stringify(claim));
+    assert.throws(() => decodeFloorMap(file), { code: 'decode/corrupt' }, JSON.stringify(claim));
   }
 });
 
 test('a walk map costs what it weighs', () => {
   const map = { cell: 0.1, corner: [0, 0], width: 4096, depth: 4000, step: 0.3, start: [0, 0, 0], area: 1 } as const;
-  const file = encodeWalkMap({ ...map, layers: [new Float32Array(4096 * 4000)] });
+  const file = encodeFloorMap({ ...map, layers: [new Float32Array(4096 * 4000)] });
   assert.ok(file.length < 100_000, `${file.length} bytes`);
-  assert.throws(() => decodeWalkMap(file), { code: 'out-of-memory/budget' });
+  assert.throws(() => decodeFloorMap(file), { code: 'out-of-memory/budget' });
   const small = { ...map, width: 400 };
   assert.throws(
-    () => decodeWalkMap(encodeWalkMap({ ...small, layers: [new Float32Array(1.6e6)] }), 'a', { maxBytes: 1e6 }),
+    () => decodeFloorMap(encodeFloorMap({ ...small, layers: [new Float32Array(1.6e6)] }), 'a', { maxBytes: 1e6 }),
     {
       code: 'out-of-memory/budget',
     },
@@ -315,11 +318,11 @@ test('a walk map costs what it weighs', () => {
 
 test('what is no room has no floor, and no exception', async () => {
   const single = cloudOf([{ min: [0, 0, 0], max: [0.1, 0.1, 0.1] }]);
-  const map = makeWalkMap(single, { frame: FRAME });
+  const map = makeFloorMap(single, { frame: FRAME });
   assert.equal(map.area < 4, true);
   assert.equal(floorAt(map, 100, 100, 0), undefined);
   assert.deepEqual(await wayTo(map, [0, 0, 0], [50, 0, 50]), []);
-  assert.throws(() => makeWalkMap(single, { frame: FRAME, metersPerUnit: 0 }), { code: 'argument/value' });
+  assert.throws(() => makeFloorMap(single, { frame: FRAME, metersPerUnit: 0 }), { code: 'argument/value' });
 });
 
 /** Plates above each other, every other voxel of 4 m, in 64 columns: each height is compared with all of its column. */
@@ -336,7 +339,7 @@ test('the search for a floor ends after the seconds of the page', () => {
   assert.throws(() => floorOf(grid, solid, { limits: { maxSeconds: 0.2 } }), tooMuch);
   const large = cloudOf(ROOM);
   large.scales.fill(50);
-  assert.throws(() => makeWalkMap(large, { frame: FRAME, limits: { maxSeconds: 0.2 } }), tooMuch);
+  assert.throws(() => makeFloorMap(large, { frame: FRAME, limits: { maxSeconds: 0.2 } }), tooMuch);
   const { user, system } = process.cpuUsage(before);
   assert.ok(user + system < 8e6, `${(user + system) / 1e6} s of CPU`);
 });
@@ -358,7 +361,7 @@ test(
   async () => {
     const cloud = await readScene(readFileSync('demo/scenes/room.spz'), { name: 'room.spz' });
     const before = process.cpuUsage();
-    const map = makeWalkMap(cloud, { frame: FRAME, near: [0, 1.5, 0] });
+    const map = makeFloorMap(cloud, { frame: FRAME, near: [0, 1.5, 0] });
     const { user, system } = process.cpuUsage(before);
     const heights = map.layers[0]
       .filter((height) => !Number.isNaN(height))
@@ -367,7 +370,7 @@ test(
     assert.ok(Math.abs(map.area - 87) < 1, `${map.area} m²`);
     assert.ok(heights[heights.length >> 1] < 0.01, `median ${heights[heights.length >> 1]} m`);
     assert.ok(heights[Math.floor(0.95 * heights.length)] < 0.04);
-    assert.ok(encodeWalkMap(map).length < 2000);
+    assert.ok(encodeFloorMap(map).length < 2000);
     assert.ok(user + system < 6e6, `${(user + system) / 1e6} s of CPU`);
   },
 );
@@ -379,7 +382,7 @@ test(
     const cloud = await readScene(sharedFile('formats/playbot3.ply'), { name: 'playbot3.ply' });
     const east = Float32Array.from({ length: cloud.count }, (_, i) => cloud.positions[3 * i]).sort();
     const metersPerUnit = 6 / (east[Math.floor(0.99 * cloud.count)] - east[Math.floor(0.01 * cloud.count)]);
-    const map = makeWalkMap(cloud, { frame: FRAME, metersPerUnit });
+    const map = makeFloorMap(cloud, { frame: FRAME, metersPerUnit });
     console.log(`${map.area.toFixed(1)} m²`);
     assert.ok(map.area > 25 && map.area < 45, `${map.area} m²`);
     // Heights of opaque splats, by columns of 20 cm.
@@ -405,7 +408,7 @@ test(
 test('statues and a skull in haze have no floor to walk on', { skip: onlyInLab || needsSharedData }, async () => {
   for (const name of ['scenes/st-peter.sog', 'scenes/angel.sog', 'scenes/skull.ply']) {
     const cloud = await readScene(sharedFile(name), { name });
-    const { area } = makeWalkMap(cloud, { frame: FRAME });
+    const { area } = makeFloorMap(cloud, { frame: FRAME });
     console.log(`${name}: ${area.toFixed(1)} m²`);
     assert.ok(area < 4, `${name}: ${area} m²`);
   }
@@ -423,7 +426,7 @@ test(
       const { stdout, stderr, status } = run('demo/scenes/room.spz', '--out', out, '--cell', '10cm');
       assert.equal(status, 0, String(stderr));
       assert.match(String(stdout), /8[67]\.\d m² of floor/);
-      assert.ok(Math.abs(decodeWalkMap(readFileSync(out)).area - 86.8) < 1);
+      assert.ok(Math.abs(decodeFloorMap(readFileSync(out)).area - 86.8) < 1);
       const wrong = run('demo/scenes/room.spz', '--out', out, '--unit', '5');
       assert.equal(wrong.status, 2);
       assert.match(String(wrong.stderr), /--unit: expected a length/);

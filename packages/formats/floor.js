@@ -1,2 +1,2 @@
 /** For bundlers that do not read `exports` (Parcel). */
-export * from './dist/walk/index.js';
+export * from './dist/floor/index.js';
