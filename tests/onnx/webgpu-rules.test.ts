@@ -3,13 +3,7 @@ import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
 import test from 'node:test';
 import { fileURLToPath } from 'node:url';
-import {
-  bytesSource,
-  gpuFindings,
-  miscomputedNodes,
-  readOnnxHeader,
-  WEBGPU_RULES,
-} from '@gaussian-splat/core/onnx';
+import { bytesSource, gpuFindings, miscomputedNodes, readOnnxHeader, WEBGPU_RULES } from '@gaussian-splat/core/onnx';
 import { fixtureHeader } from '../support/generators.js';
 
 const at = (path: string): string => fileURLToPath(new URL(`../${path}`, import.meta.url));

@@ -31,7 +31,10 @@ export function packLevelRuns(given: GaussianCloud, options: PackOptions = {}): 
   const usable = usableIndices(cloud);
   const { sh = 'auto' } = options;
   const droppedCount = cloud.droppedCount + cloud.count - usable.length;
-  return { ...packRuns(cloud, usable, sh === 'auto' ? choosePrecision(noiseIn(cloud, usable), usable.length) : sh), droppedCount };
+  return {
+    ...packRuns(cloud, usable, sh === 'auto' ? choosePrecision(noiseIn(cloud, usable), usable.length) : sh),
+    droppedCount,
+  };
 }
 
 function packRuns(
