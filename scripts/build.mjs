@@ -18,6 +18,7 @@ const SCRIPTS = [
   'docs/search.js',
   'examples/examples.js',
   'examples/features/features.js',
+  'gallery/gallery.js',
   'map/map.js',
   'playground/playground.js',
   'three/three.js',

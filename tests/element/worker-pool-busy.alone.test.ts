@@ -1,4 +1,7 @@
-/** The workers of a page on a busy machine: a worker that reads nothing is only late, and a download is not restarted early. */
+/**
+ * The workers of a page on a busy machine: a worker that reads nothing is only late, and a download is not restarted early.
+ * SECURITY.md: "An untrusted scene delays no other scene".
+ */
 import assert from 'node:assert/strict';
 import { test, type TestContext } from 'node:test';
 import type { WorkerRequest } from '../../packages/element/src/loading/protocol.js';

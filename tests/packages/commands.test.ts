@@ -1,4 +1,7 @@
-/** Commands on scenes and models of several files, and on what people mistype. */
+/**
+ * Commands on scenes and models of several files, and on what people mistype.
+ * SECURITY.md: "Commands and the exporter read untrusted files, too".
+ */
 import assert from 'node:assert/strict';
 import { spawnSync } from 'node:child_process';
 import {

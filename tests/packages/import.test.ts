@@ -17,7 +17,8 @@ function entries(): string[] {
       name: string;
       exports: Record<string, unknown>;
     };
-    const modules = Object.entries(exports).filter(([, target]) => typeof target === 'object');
+    // Entries with types alone are imported by `import type`.
+    const modules = Object.entries(exports).filter(([, target]) => Object(target).default !== undefined);
     return modules.map(([path]) => name + path.slice(1));
   });
 }

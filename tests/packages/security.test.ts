@@ -16,7 +16,7 @@ for (const promise of promises.slice(1)) {
     assert.ok(files.length > 0, 'names a test');
     for (const file of files) {
       const source = readFileSync(root + file, 'utf8');
-      assert.match(source, /\b(test|it|itInLab|describe)\(|recipe/, `${file} has tests`);
+      assert.match(source, /\b(test|it|itInLab|describe)\(|recipe|def test_/, `${file} has tests`);
       assert.ok(source.includes(`"${title}"`), `${file} names "${title}" in a comment that begins with SECURITY.md`);
     }
   });

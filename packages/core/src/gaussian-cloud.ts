@@ -130,7 +130,7 @@ export const MAX_POSITION = 1e18;
 /**
  * Lower limit of the standard deviation along a splat's longest axis, in world units. Smaller splats have no extent.
  */
-export const MIN_LONGEST_SCALE = 1e-12;
+const MIN_LONGEST_SCALE = 1e-12;
 
 /** Throws `argument/cloud` unless the arrays of a cloud have the lengths that `count` and `shDegree` require. */
 export function validateCloud(cloud: GaussianCloud): void {

@@ -4,7 +4,6 @@ export {
   FIRST_PSNR,
   type EconomisedBySearch,
   type EconomisedPassing,
-  type JudgeFile,
   type Try,
 } from './search-decibels.js';
 export { economise, type Economised, type EconomiseOptions } from './economise.js';
@@ -25,7 +24,6 @@ export {
   viewsAround,
   viewsBetween,
   type ViewSplit,
-  type ViewOptions,
 } from './views.js';
 export { changeFormat, type ChangeFormatOptions } from './write/change-format.js';
 export { encodingsFor, lossesIn, type Encoding } from './write/index.js';
@@ -36,4 +34,4 @@ export { filesOfZip } from './write/zip.js';
 export type { MotionSteps } from './clip/curves.js';
 export { codeClip, type CodeClipOptions, type CodedClip } from './clip/code-clip.js';
 export type { ClipStore } from './clip/clip-store.js';
-export { drawOn, type DrawFrame, type FrameImages } from './clip/frame-judges.js';
+export { drawOn, type DrawFrame } from './clip/frame-judges.js';

@@ -1,4 +1,7 @@
-"""Untrusted files: a named error, and no more steps and bytes than a file weighs."""
+"""Untrusted files: a named error, and no more steps and bytes than a file weighs.
+
+SECURITY.md: "Commands and the exporter read untrusted files, too".
+"""
 
 import io
 import pickle
