@@ -14,7 +14,7 @@ const MAY_IMPORT = {
   renderer: ['core'],
   generator: ['core', 'renderer'],
   check: ['core', 'generator'],
-  economise: ['core', 'formats', 'renderer'],
+  optimize: ['core', 'formats', 'renderer'],
   element: ['core', 'formats', 'generator', 'renderer'],
   react: ['element'],
   three: ['core', 'renderer'],

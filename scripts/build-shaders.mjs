@@ -1,6 +1,6 @@
 /**
  * Turns shaders/*.wgsl into packages/renderer/src/generated/: code with its `#import`s resolved, and every
- * binding number, struct layout, workgroup size and numeric constant reflected from the WGSL itself, so that the code neither counts padding nor repeats numbers by hand. `shaders.ts` has the shaders that every scene needs, `live-shaders.ts` those that only generators and image models need, `streamed-shaders.ts` those that only streamed scenes need: pages without them never load these. The stages of economise are in its own
+ * binding number, struct layout, workgroup size and numeric constant reflected from the WGSL itself, so that the code neither counts padding nor repeats numbers by hand. `shaders.ts` has the shaders that every scene needs, `live-shaders.ts` those that only generators and image models need, `streamed-shaders.ts` those that only streamed scenes need: pages without them never load these. The stages of optimize are in its own
  * package, with the structs and constants that only they have.
  */
 import { mkdirSync, readdirSync, writeFileSync } from 'node:fs';
@@ -63,13 +63,13 @@ RARE['modified-shaders'] = [
   ...QUANTIZED.stages.flatMap((stage) => [`${stage}_modified`, `${stage}_quantized_modified`]),
 ];
 /** Shaders of another package, which imports shared parts from the renderer. */
-const ECONOMISE = 'economise';
-RARE[ECONOMISE] = [
-  'economise_cut',
-  'economise_lower',
-  'economise_moments',
-  'economise_score',
-  'economise_take',
+const OPTIMIZE = 'optimize';
+RARE[OPTIMIZE] = [
+  'optimize_cut',
+  'optimize_lower',
+  'optimize_moments',
+  'optimize_score',
+  'optimize_take',
   'image_error',
   'image_error_sum',
   'refine_backward',
@@ -191,7 +191,7 @@ const LAYOUTS = {
   'modified-shaders': 'modified-layouts',
 };
 const layoutsOf = (homes) => (homes.size === 1 ? LAYOUTS[[...homes][0]] : undefined);
-const isOfRenderer = (homes) => [...homes].some((file) => file !== ECONOMISE);
+const isOfRenderer = (homes) => [...homes].some((file) => file !== OPTIMIZE);
 const byName = ([a], [b]) => (a < b ? -1 : 1);
 
 /** @param from the file that has the parts of all other files; by default each part comes from its own file */
@@ -238,13 +238,13 @@ const files = {
   ],
   ...Object.fromEntries(
     Object.keys(RARE)
-      .filter((file) => file !== ECONOMISE)
+      .filter((file) => file !== OPTIMIZE)
       .map((file) => [file, rareFile(file)]),
   ),
 };
 const isOwn = (homes) => !isOfRenderer(homes);
 const ownFile = [
-  ...rareFile(ECONOMISE, '@gaussian-splat/renderer/stages'),
+  ...rareFile(OPTIMIZE, '@gaussian-splat/renderer/stages'),
   ...[structs, constants].flatMap((named) => saidBy(named, isOwn).sort(byName).map(define)),
 ];
 
@@ -254,5 +254,5 @@ function write(folder, name, lines) {
 }
 
 for (const [name, lines] of Object.entries(files)) write(generatedOf('renderer'), name, lines);
-write(generatedOf('economise'), 'shaders', ownFile);
+write(generatedOf('optimize'), 'shaders', ownFile);
 console.log(`shaders: ${stages.length} stages, ${structs.size} structs`);

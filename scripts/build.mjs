@@ -87,7 +87,7 @@ async function buildBesideBundle() {
 function projects() {
   const names =
     extent !== 'element'
-      ? ['core', 'formats', 'renderer', 'generator', 'check', 'economise', 'element', 'react', 'three']
+      ? ['core', 'formats', 'renderer', 'generator', 'check', 'optimize', 'element', 'react', 'three']
       : ['element'];
   return names.map((name) => `packages/${name}`);
 }

@@ -10,7 +10,7 @@ const args = process.argv.slice(2);
 ensureDependencies();
 if (args[0] === 'page') ensureElement();
 else ensurePackages();
-const draws = ['render', 'video', 'detail', 'economise', 'sequence'].includes(args[0]);
+const draws = ['render', 'video', 'detail', 'optimize', 'sequence'].includes(args[0]);
 // On Linux, Dawn in Node uses the SwiftShader that comes with Chromium.
 if (draws && process.platform === 'linux' && process.env.GAUSSIAN_SPLAT_GPU !== 'system' && !findSwiftShader())
   ensureChromium();

@@ -7,7 +7,7 @@ import { build, ensureDependencies } from './lib/prepare.mjs';
 import { root, run } from './lib/run.mjs';
 
 /** Folders of tests that draw. */
-const FOLDERS = ['stages', 'golden', 'detail', 'economise', 'memory', 'stability'];
+const FOLDERS = ['stages', 'golden', 'detail', 'optimize', 'memory', 'stability'];
 /** Prints the adapter of the tests; fails if there is none. */
 const NAME_ADAPTER = `import { requestNodeAdapter } from './packages/cli/src/lib/node-gpu.mjs';
 const { vendor, architecture, device, description } = (await requestNodeAdapter()).info;

@@ -1,6 +1,6 @@
-/** Sets copies of a scene side by side on its ground, as a PLY: a larger scene to time `gaussian-splat economise` with. See packages/economise/README.md. */
+/** Sets copies of a scene side by side on its ground, as a PLY: a larger scene to time `gaussian-splat optimize` with. See packages/optimize/README.md. */
 import { readFileSync, writeFileSync } from 'node:fs';
-import { encodingsFor } from '@gaussian-splat/economise';
+import { encodingsFor } from '@gaussian-splat/optimize';
 import { readScene } from '@gaussian-splat/formats';
 
 const USAGE =

@@ -16,7 +16,7 @@ import { must } from './lib/run.mjs';
 ensureDependencies();
 must(process.execPath, ['scripts/build.mjs', '--packages']);
 const { readScene, upright } = await import('@gaussian-splat/formats');
-const { encodingsFor } = await import('@gaussian-splat/economise');
+const { encodingsFor } = await import('@gaussian-splat/optimize');
 
 const COUNT = 400;
 const folder = mkdtempSync(join(tmpdir(), 'gaussian-splat-tools-'));

@@ -21,7 +21,7 @@ const STEPS = { position: 0.004, rotation: 0.02, scale: 0.05, opacity: 0.02, col
 
 /** Writes `vase.gsv` into a folder. */
 export async function writeClip(folder) {
-  const { codeClip, encodingsFor } = await import('../../packages/economise/dist/index.js');
+  const { codeClip, encodingsFor } = await import('../../packages/optimize/dist/index.js');
   mkdirSync(folder, { recursive: true });
   const { bytes } = await codeClip({
     ...{ frameCount: FRAMES, framesPerSecond: FRAMES_PER_SECOND, framesPerGroup: FRAMES_PER_GROUP, minPsnr: 45 },

@@ -40,7 +40,7 @@ const SECTIONS = [
     'Generators',
     [guide('own-generator'), /^docs\/contract/, /^packages\/(generator|check|exporter)\//, /^demo\/generators\/README/],
   ],
-  ['Accuracy and speed', [/^docs\/accuracy/, /^docs\/benchmark/, /^docs\/stability/, /^packages\/economise\//]],
+  ['Accuracy and speed', [/^docs\/accuracy/, /^docs\/benchmark/, /^docs\/stability/, /^packages\/optimize\//]],
   [
     'Without the element',
     [guide(''), /^packages\/(renderer|three|formats|core|cli)\/README/, /^docs\/(lod-format|sequences)/],

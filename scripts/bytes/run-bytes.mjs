@@ -6,7 +6,7 @@ import { existsSync, mkdirSync, readdirSync, readFileSync, statSync, writeFileSy
 import { join, resolve } from 'node:path';
 import { parseArgs } from 'node:util';
 import { boundsOf } from '@gaussian-splat/core';
-import { encodingsFor, GpuEvaluator, viewsAround } from '@gaussian-splat/economise';
+import { encodingsFor, GpuEvaluator, viewsAround } from '@gaussian-splat/optimize';
 import { deviceDescriptor, pickInitialVariants } from '@gaussian-splat/renderer';
 import { requestNodeAdapter } from '../../packages/cli/src/lib/node-gpu.mjs';
 import { root } from '../lib/run.mjs';
@@ -125,7 +125,7 @@ async function measure(scene, { source, files }, device) {
     }
     const smaller = made(`own-${dB}.sog`);
     const options = ['--min-psnr', String(dB), '--score-views', values['score-views'], '--out', smaller];
-    if (await make(smaller, process.execPath, own('economise', path(source), ...options), values.kept))
+    if (await make(smaller, process.execPath, own('optimize', path(source), ...options), values.kept))
       await file(`SOG, ours, ${dB} dB`, true, smaller);
   }
   evaluator.destroy();

@@ -5,7 +5,7 @@
 import { existsSync, mkdirSync, readFileSync, statSync, writeFileSync } from 'node:fs';
 import { join, resolve } from 'node:path';
 import { parseArgs } from 'node:util';
-import { encodingsFor } from '@gaussian-splat/economise';
+import { encodingsFor } from '@gaussian-splat/optimize';
 import { deviceDescriptor, pickInitialVariants } from '@gaussian-splat/renderer';
 import { checkPython, Gate, LIMITS } from '../../packages/cli/src/lib/gate/gate.mjs';
 import { holdOut, readPhotographs } from '../../packages/cli/src/lib/gate/photographs.mjs';
@@ -101,7 +101,7 @@ async function filesOf(scene, source, cloud, views) {
     const sog = made(`own-${decibels}.sog`);
     const options = ['--min-psnr', decibels, '--views', views, '--out', sog];
     makers.push(async () => {
-      if (!(await make(sog, process.execPath, own('economise', source, ...options), values.kept))) return undefined;
+      if (!(await make(sog, process.execPath, own('optimize', source, ...options), values.kept))) return undefined;
       return file(`SOG, ours, ${decibels} dB`, sog);
     });
     const folder = made(`pages-${decibels}`);

@@ -29,7 +29,7 @@ function packagesOf(file) {
   const all = Object.keys(TESTS_OF);
   const [top, second] = file.split('/');
   if (top === 'packages') return [second];
-  if (top === 'shaders') return ['renderer', 'economise'];
+  if (top === 'shaders') return ['renderer', 'optimize'];
   if (top === 'tests' && second !== 'support' && second !== 'fixtures')
     return all.filter((name) => TESTS_OF[name].includes(second));
   if (top === 'demo' || top === 'benchmarks' || top === 'docs' || file.endsWith('.md')) return ['site'];

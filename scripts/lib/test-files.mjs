@@ -20,7 +20,7 @@ export const DENSE = 'tests/element/browser/high-density.lab.test.ts';
 /** Files of Node that run in one process with the device of tests/support, and thus reuse its compiled pipelines. */
 const SHARES_DEVICE = /^tests\/(detail|golden|stages)\//;
 /** Files of these folders have a process each: they take the machine's memory or threads. Others share one: to start it takes longer than most of them. */
-const ONE_EACH = /^tests\/(economise|packages)\//;
+const ONE_EACH = /^tests\/(optimize|packages)\//;
 
 /** Folders of each package's tests. Tests of demo and documents belong to the site. */
 export const TESTS_OF = {
@@ -29,7 +29,7 @@ export const TESTS_OF = {
   renderer: ['stages', 'golden', 'detail', 'memory', 'oracle', 'stability'],
   generator: ['generator'],
   check: ['check'],
-  economise: ['economise'],
+  optimize: ['optimize'],
   cli: ['packages'],
   element: ['element', 'packages'],
   react: ['frameworks'],

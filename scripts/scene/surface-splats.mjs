@@ -6,7 +6,7 @@
  */
 import { readFileSync, writeFileSync } from 'node:fs';
 import { PNG } from 'pngjs';
-import { writeSpz } from '../../packages/economise/src/write/spz.ts';
+import { writeSpz } from '../../packages/optimize/src/write/spz.ts';
 
 const [source, out, min = '0.015', contrast = '7'] = process.argv.slice(2);
 /** Longest edge of a triangle that is divided no further, world units; and the spread of colors, of 255, within one that is. */

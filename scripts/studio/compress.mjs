@@ -1,7 +1,7 @@
 /** `node scripts/studio/compress.mjs MADE DATA SCENES`: what `make.py` left in the folder MADE becomes a scene of the studio: images and references in DATA, the scene in SCENES. */
 import { copyFileSync, mkdirSync, readdirSync, readFileSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
-import { encodingsFor } from '@gaussian-splat/economise';
+import { encodingsFor } from '@gaussian-splat/optimize';
 import { readScene } from '@gaussian-splat/formats';
 
 const [made, data, scenes] = process.argv.slice(2);

@@ -23,7 +23,7 @@ import {
   type DetailTree,
   type PageSteps,
   HarmonicRounder,
-} from '@gaussian-splat/economise/pages';
+} from '@gaussian-splat/optimize/pages';
 import { deflate } from '../../packages/cli/src/lib/encoders.mjs';
 import { detailFolder } from '../support/detail-folder.js';
 import { drawUntilCalm } from '../support/draw-until-calm.js';

@@ -13,7 +13,7 @@ import {
   QUANTIZED_CHUNK_WORDS,
   type SplatLevel,
 } from '@gaussian-splat/renderer/stages';
-import { buildDetailTree } from '@gaussian-splat/economise/pages';
+import { buildDetailTree } from '@gaussian-splat/optimize/pages';
 import { needsSharedData, sharedFile } from '../support/data.js';
 import { detailFolder } from '../support/detail-folder.js';
 import { onlyInLab, someOf } from '../support/extent.js';

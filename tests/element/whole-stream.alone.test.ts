@@ -4,7 +4,7 @@ import { createServer, type Server } from 'node:http';
 import type { AddressInfo } from 'node:net';
 import { after, before, test } from 'node:test';
 import type { GaussianCloud } from '@gaussian-splat/core';
-import { DEFAULT_STEPS } from '@gaussian-splat/economise/pages';
+import { DEFAULT_STEPS } from '@gaussian-splat/optimize/pages';
 import { finestPages } from '@gaussian-splat/renderer/tools';
 import { glBytes } from '@gaussian-splat/renderer/webgl';
 import { deflate } from '../../packages/cli/src/lib/encoders.mjs';

@@ -3,7 +3,7 @@ import assert from 'node:assert/strict';
 import { createServer, type Server } from 'node:http';
 import type { AddressInfo } from 'node:net';
 import { after, before, test } from 'node:test';
-import { DEFAULT_STEPS } from '@gaussian-splat/economise/pages';
+import { DEFAULT_STEPS } from '@gaussian-splat/optimize/pages';
 import { deflateQuickly } from '../../packages/cli/src/lib/encoders.mjs';
 import { loadScene } from '../../packages/element/src/loading/load-scene.js';
 import type { SceneRequest } from '../../packages/element/src/loading/protocol.js';

@@ -2,7 +2,7 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { deflateSync, strToU8, zipSync } from 'fflate';
-import { encodingsFor } from '@gaussian-splat/economise';
+import { encodingsFor } from '@gaussian-splat/optimize';
 import { readScene } from '@gaussian-splat/formats';
 import { crc32 } from '../../packages/formats/src/zip/crc32.js';
 import { needsSharedData, sharedFile } from '../support/data.js';

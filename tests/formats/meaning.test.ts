@@ -1,7 +1,7 @@
 /** Metadata of files beside their splats, and signs that their numbers are not a plain splat's. */
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { encodingsFor } from '@gaussian-splat/economise';
+import { encodingsFor } from '@gaussian-splat/optimize';
 import { readScene } from '@gaussian-splat/formats';
 import { expectRefusal } from './support/expect.js';
 import { writePly, type PlyColumn } from './support/ply-writer.js';

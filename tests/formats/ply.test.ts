@@ -1,7 +1,7 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import fc from 'fast-check';
-import { encodingsFor } from '@gaussian-splat/economise';
+import { encodingsFor } from '@gaussian-splat/optimize';
 import { readScene } from '@gaussian-splat/formats';
 import { assertAtMost, expectRefusal, largestDifference } from './support/expect.js';
 import { writePly, type PlyColumn, type PlyEncoding, type PlyType } from './support/ply-writer.js';

@@ -3,7 +3,7 @@ import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { gzipSync } from 'node:zlib';
 import { shCoefficientCount } from '@gaussian-splat/core';
-import { encodingsFor } from '@gaussian-splat/economise';
+import { encodingsFor } from '@gaussian-splat/optimize';
 import { readPrefix, readScene } from '@gaussian-splat/formats';
 import { needsSharedData, sharedFile } from '../support/data.js';
 import { assertAtMost, assertSameNumbers } from './support/expect.js';
@@ -41,7 +41,7 @@ for (const [name, share, [min, max], degree] of FILES) {
   });
 }
 
-test('the beginning of an SPZ of economise has the axes that the end of the file declares', async () => {
+test('the beginning of an SPZ of optimize has the axes that the end of the file declares', async () => {
   const cloud = smallCloud(3000, 3);
   const [encoding] = encodingsFor('a.spz', cloud);
   const file = await encoding.write({ cloud, degrees: new Uint8Array(cloud.count).fill(3) });

@@ -2,7 +2,7 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import type { GaussianCloud } from '@gaussian-splat/core';
-import { encodingsFor } from '@gaussian-splat/economise';
+import { encodingsFor } from '@gaussian-splat/optimize';
 import { readScene } from '@gaussian-splat/formats';
 import { buildGltf, writeGlb } from './support/gltf-writer.js';
 import { writePly, type PlyWriterElement } from './support/ply-writer.js';

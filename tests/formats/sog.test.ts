@@ -1,7 +1,7 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { zipSync } from 'fflate';
-import { writeSog as writeBundle } from '@gaussian-splat/economise';
+import { writeSog as writeBundle } from '@gaussian-splat/optimize';
 import { readScene } from '@gaussian-splat/formats';
 import {
   assertAtMost,
@@ -36,7 +36,7 @@ test('version 2, bundle and folder, give every attribute to the bits of the form
   assert.deepEqual(unpacked, read);
 });
 
-test('flat splats remain flat in a SOG of economise', async () => {
+test('flat splats remain flat in a SOG of optimize', async () => {
   const scales = cloud.scales.map((scale, k) => (k % 3 === 2 ? 0 : scale));
   const steps = { place: 1, size: 1e-3, turn: 1, opacity: 1, color: 1e-3, harmonics: 1e-3 };
   const encodeWebp = async (rgba: Uint8ClampedArray, width: number, height: number): Promise<Uint8Array> =>

@@ -1,7 +1,7 @@
 import assert from 'node:assert/strict';
 import { gunzipSync, gzipSync } from 'node:zlib';
 import { test } from 'node:test';
-import { encodingsFor, lossesIn } from '@gaussian-splat/economise';
+import { encodingsFor, lossesIn } from '@gaussian-splat/optimize';
 import { readPrefix, readScene } from '@gaussian-splat/formats';
 import type { GaussianCloud, ShDegree } from '@gaussian-splat/core';
 import { transformCloud } from '../../packages/formats/src/transform/transform-cloud.js';

@@ -1,4 +1,4 @@
-/** OpenUSD against usd-core of PyPI, by the Python of `npm run test:exporter` or of `USD_PYTHON`: 200 random stages, and files that `economise` writes. */
+/** OpenUSD against usd-core of PyPI, by the Python of `npm run test:exporter` or of `USD_PYTHON`: 200 random stages, and files that `optimize` writes. */
 import assert from 'node:assert/strict';
 import { execFileSync, spawnSync } from 'node:child_process';
 import { existsSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
@@ -13,7 +13,7 @@ import {
   type ShDegree,
   type Vector3,
 } from '@gaussian-splat/core';
-import { encodingsFor } from '@gaussian-splat/economise';
+import { encodingsFor } from '@gaussian-splat/optimize';
 import { readScene } from '@gaussian-splat/formats';
 import { shBasis } from '../oracle/sh.js';
 import { needsSharedData, sharedFile } from '../support/data.js';

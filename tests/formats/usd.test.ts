@@ -1,10 +1,10 @@
-/** OpenUSD without usd-core: files of other tools, files of `economise`, and hostile ones. usd-core.alone.test.ts compares with usd-core. */
+/** OpenUSD without usd-core: files of other tools, files of `optimize`, and hostile ones. usd-core.alone.test.ts compares with usd-core. */
 import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
 import { test } from 'node:test';
 import { zipSync } from 'fflate';
 import { halfToNumber, numberToHalf, type GaussianCloud } from '@gaussian-splat/core';
-import { encodingsFor } from '@gaussian-splat/economise';
+import { encodingsFor } from '@gaussian-splat/optimize';
 import { detectFormat, readScene, uprightRotation, turned } from '@gaussian-splat/formats';
 import { needsSharedData, sharedFile } from '../support/data.js';
 import {

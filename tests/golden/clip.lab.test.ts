@@ -2,7 +2,7 @@
 import assert from 'node:assert/strict';
 import { after, test } from 'node:test';
 import { boundsOf, type GaussianCloud } from '@gaussian-splat/core';
-import { viewsAround } from '@gaussian-splat/economise';
+import { viewsAround } from '@gaussian-splat/optimize';
 import {
   clipFrame,
   clipGroupAt,

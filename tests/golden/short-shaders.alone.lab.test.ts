@@ -61,7 +61,7 @@ async function bothForms(): Promise<{ readable: Stage[]; short: Stage[] }> {
     const { code } = plugin.transform(readFileSync(file, 'utf8'), file)!;
     const own = join(folder, basename(dirname(dirname(dirname(file)))));
     cpSync(dirname(file), own, { recursive: true });
-    // Shaders of economise import their shared pieces from the renderer's.
+    // Shaders of optimize import their shared pieces from the renderer's.
     const copy = join(own, basename(file));
     writeFileSync(copy, code.replace('@gaussian-splat/renderer/stages', '../renderer/shaders.js'));
     short.push(...stagesIn((await import(pathToFileURL(copy).href)) as object));

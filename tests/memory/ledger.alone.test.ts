@@ -53,10 +53,7 @@ test('a scene beyond the budget is refused before the device allocates', async (
   await assert.rejects(GaussianBuffers.upload(device, packed), (error: unknown) => {
     assert.ok(error instanceof GaussianSplatError);
     assert.equal(error.code, 'out-of-memory/budget');
-    assert.match(
-      error.message,
-      /scene of 512 splats: expected at most \d+ bytes \(0\.0 MB\).*gaussian-splat economise/,
-    );
+    assert.match(error.message, /scene of 512 splats: expected at most \d+ bytes \(0\.0 MB\).*gaussian-splat optimize/);
     return true;
   });
   assert.deepEqual(created, []);

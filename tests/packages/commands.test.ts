@@ -321,8 +321,8 @@ test('what cannot be written, or would replace what is read, is said before the 
     [/--min-psnr: expected 30 to 60/, 'sequence', 'camera.json', '--out', 'a.gsv', '--min-psnr', '90'],
     [/--per-file/, 'sequence', 'camera.json', '--out', 'a.gsv', '--per-file', '1'],
     [/camera\.json is not a folder/, 'page', 'gltf/scene.gltf', 'camera.json/a', '--no-serve'],
-    [/--images: expected with --gate/, 'economise', 'a.ply', '--min-psnr', '40', '--images', '.', '--out', 'a.spz'],
-    [/--out: .*found \.xyz/, 'economise', 'a.ply', '--min-psnr', '40', '--out', 'a.xyz'],
+    [/--images: expected with --gate/, 'optimize', 'a.ply', '--min-psnr', '40', '--images', '.', '--out', 'a.spz'],
+    [/--out: .*found \.xyz/, 'optimize', 'a.ply', '--min-psnr', '40', '--out', 'a.xyz'],
     [/--out: .*camera\.json is not a folder/, 'video', 'gltf/scene.gltf', '--turntable', '--out', 'camera.json/a'],
   ];
   for (const [sentence, ...args] of someOf(cases, 2)) refused(2, sentence, ...args);

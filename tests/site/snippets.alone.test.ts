@@ -24,7 +24,7 @@ import type * as React from 'react';
 import type * as core from '@gaussian-splat/core';
 import type { Contract, gaussianLayout as layoutOf } from '@gaussian-splat/core/contract';
 import type { OnnxHeader } from '@gaussian-splat/core/onnx';
-import type * as economise from '@gaussian-splat/economise';
+import type * as optimize from '@gaussian-splat/optimize';
 import type * as models from '@gaussian-splat/generator';
 import type * as drawing from '@gaussian-splat/renderer';
 import type { GaussianSplatElement } from '@gaussian-splat/react';
@@ -47,7 +47,7 @@ declare global {
   const contract: Contract;
   const boundsOf: typeof core.boundsOf;
   const gaussianLayout: typeof layoutOf;
-  const views: economise.ViewSplit;
+  const views: optimize.ViewSplit;
   const gaussians: drawing.GaussianBuffers;
   const roomGaussians: drawing.GaussianBuffers;
   const plantGaussians: drawing.GaussianBuffers;

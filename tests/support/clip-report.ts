@@ -15,7 +15,7 @@ import { availableParallelism, tmpdir } from 'node:os';
 import { join, resolve } from 'node:path';
 import { fileURLToPath } from 'node:url';
 import { parseArgs } from 'node:util';
-import { codeClip, drawOn, type CodedClip } from '@gaussian-splat/economise';
+import { codeClip, drawOn, type CodedClip } from '@gaussian-splat/optimize';
 import { CLIP_HEAD_BYTES, clipIndexBytes, parseClip, writeClipHead, type ClipIndex } from '@gaussian-splat/formats';
 import { deviceDescriptor, pickInitialVariants } from '@gaussian-splat/renderer';
 import { encodeWebp } from '../../packages/cli/src/lib/encoders.mjs';

@@ -1,6 +1,6 @@
 /** Small clips, written without measurement, and their frames. */
 import type { GaussianCloud } from '@gaussian-splat/core';
-import { codeClip, encodingsFor, type CodedClip } from '@gaussian-splat/economise';
+import { codeClip, encodingsFor, type CodedClip } from '@gaussian-splat/optimize';
 import {
   clipFrame,
   clipGroupAt,

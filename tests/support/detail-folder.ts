@@ -7,7 +7,7 @@ import {
   writePages,
   type DetailTreeOptions,
   type PageSteps,
-} from '@gaussian-splat/economise/pages';
+} from '@gaussian-splat/optimize/pages';
 
 export interface DetailFolder {
   readonly manifest: DetailManifest;

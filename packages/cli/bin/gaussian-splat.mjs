@@ -5,7 +5,7 @@ const COMMANDS = {
   video: 'a camera path or a turntable as PNG files, mp4 or webm, without a browser',
   page: 'a folder with a page that shows a scene, for any static host',
   detail: 'a scene as a folder that is streamed from static hosting',
-  economise: 'a smaller scene of a given PSNR or size',
+  optimize: 'a smaller scene of a given PSNR or size',
   sequence: 'a sequence of scenes as a clip, or as its first frame and the motion after it',
   floor: 'the floor of a scene, on which visitors of a page can walk',
   check: 'whether an ONNX generator keeps its contract',

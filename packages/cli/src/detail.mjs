@@ -6,7 +6,7 @@ import { existsSync, mkdirSync, readdirSync, rmSync, statSync, writeFileSync } f
 import { dirname, join, resolve } from 'node:path';
 import { readScene, toDegree, upright, uprightRotation } from '@gaussian-splat/formats';
 import { deviceDescriptor, pickInitialVariants } from '@gaussian-splat/renderer';
-import { lossesIn } from '@gaussian-splat/economise';
+import { lossesIn } from '@gaussian-splat/optimize';
 import {
   buildDetailTree,
   codingFor,
@@ -15,7 +15,7 @@ import {
   placesOnGrid,
   DEFAULT_STEPS,
   writePages,
-} from '@gaussian-splat/economise/pages';
+} from '@gaussian-splat/optimize/pages';
 import { parseSceneOptions, runCommand, sayWarnings, UsageError } from './lib/command.mjs';
 import { deflate, deflateQuickly } from './lib/encoders.mjs';
 import { dealViews, parseViews } from './lib/given-views.mjs';

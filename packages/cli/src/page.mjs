@@ -61,8 +61,8 @@ async function writeUsdz(scene, folder) {
   if (isModel(scene)) throw new CommandError(`${scene} is a generator: --usdz takes a scene file.`);
   const [{ startReading }, { changeFormat, lossesIn }, { inline }] = await Promise.all([
     import('./lib/scene-in-parts.mjs'),
-    import('@gaussian-splat/economise'),
-    import('@gaussian-splat/economise/parts'),
+    import('@gaussian-splat/optimize'),
+    import('@gaussian-splat/optimize/parts'),
   ]);
   const out = join(folder, `${plainTitleOf(scene)}.usdz`);
   if (resolve(scene) === out) return;

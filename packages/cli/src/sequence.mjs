@@ -4,7 +4,7 @@ import { basename, dirname, join, resolve } from 'node:path';
 import { framePath, parseSequence, readScene } from '@gaussian-splat/formats';
 import { deviceDescriptor, pickInitialVariants } from '@gaussian-splat/renderer';
 import { CommandError, parseSceneOptions, runCommand, UsageError } from './lib/command.mjs';
-import { codeClip, drawOn } from '@gaussian-splat/economise';
+import { codeClip, drawOn } from '@gaussian-splat/optimize';
 import { openClipStore } from './lib/clip-store.mjs';
 import { encodeWebp } from './lib/encoders.mjs';
 import { requestNodeAdapter } from './lib/node-gpu.mjs';

@@ -95,6 +95,6 @@ function overBudget(label: string, bytes: number, max: string): GaussianSplatErr
     where: label,
     expected: `at most ${max}`,
     found: inBytes(bytes),
-    remedy: 'show a smaller scene (gaussian-splat economise makes one), remove others, or raise memoryBudget',
+    remedy: 'show a smaller scene (gaussian-splat optimize makes one), remove others, or raise memoryBudget',
   });
 }

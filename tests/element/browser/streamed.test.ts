@@ -1,6 +1,6 @@
 import { GaussianSplatElement } from '@gaussian-splat/element';
 import { MemoryLedger } from '@gaussian-splat/renderer';
-import { DEFAULT_STEPS } from '@gaussian-splat/economise/pages';
+import { DEFAULT_STEPS } from '@gaussian-splat/optimize/pages';
 import { itInLab } from '../../support/extent-in-pages.js';
 import { detailFolder } from '../../support/detail-folder.js';
 import { pebbles } from '../../support/scenes/pebbles.js';

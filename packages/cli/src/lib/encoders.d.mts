@@ -1,4 +1,4 @@
-import type { EncodeWebp } from '@gaussian-splat/economise';
+import type { EncodeWebp } from '@gaussian-splat/optimize';
 export const encodeWebp: EncodeWebp;
 export function deflate(bytes: Uint8Array): Uint8Array;
 export function deflateQuickly(bytes: Uint8Array): Uint8Array;

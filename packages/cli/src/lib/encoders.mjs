@@ -1,4 +1,4 @@
-/** Encoders that commands pass to @gaussian-splat/economise: raw deflate, and lossless WebP. */
+/** Encoders that commands pass to @gaussian-splat/optimize: raw deflate, and lossless WebP. */
 import { readFileSync } from 'node:fs';
 import { createRequire } from 'node:module';
 import { dirname, join } from 'node:path';
@@ -29,7 +29,7 @@ function load() {
   return init(new WebAssembly.Module(readFileSync(join(folder, CODEC))));
 }
 
-/** Encodes lossless WebP, as `EncodeWebp` of @gaussian-splat/economise specifies. */
+/** Encodes lossless WebP, as `EncodeWebp` of @gaussian-splat/optimize specifies. */
 export async function encodeWebp(data, width, height, effort) {
   await (loading ??= load());
   const options = { lossless: 1, exact: 1, quality: 100 * effort, method: Math.round(6 * effort) };

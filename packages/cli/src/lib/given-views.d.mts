@@ -1,5 +1,5 @@
 import type { CalibratedView } from '@gaussian-splat/core';
-import type { ViewSplit } from '@gaussian-splat/economise';
+import type { ViewSplit } from '@gaussian-splat/optimize';
 
 export function parseViews(path: string): CalibratedView[];
 export function dealViews(

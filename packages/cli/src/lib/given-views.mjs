@@ -1,6 +1,6 @@
 /** Cameras of a file that a command takes with `--views`. */
 import { cameraFromCalibration, multiply } from '@gaussian-splat/core';
-import { dealOwnViews } from '@gaussian-splat/economise';
+import { dealOwnViews } from '@gaussian-splat/optimize';
 import { UsageError } from './command.mjs';
 import { readJson } from './input-file.mjs';
 

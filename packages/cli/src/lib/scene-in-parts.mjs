@@ -1,5 +1,5 @@
 import { openSync, closeSync, fstatSync, readSync } from 'node:fs';
-import { gatherParts } from '@gaussian-splat/economise/parts';
+import { gatherParts } from '@gaussian-splat/optimize/parts';
 import { HEADER_BYTES, splatRanges } from '@gaussian-splat/formats';
 import { readInThread } from './scene-thread.mjs';
 

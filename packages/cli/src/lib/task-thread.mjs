@@ -1,7 +1,7 @@
 /** Module of a thread of a `ThreadPool`, which runs tasks in sequence. */
 import { closeSync, openSync, readSync } from 'node:fs';
 import { parentPort } from 'node:worker_threads';
-import { readBlocks, tasks } from '@gaussian-splat/economise/parts';
+import { readBlocks, tasks } from '@gaussian-splat/optimize/parts';
 import { readPrefix } from '@gaussian-splat/formats';
 import { packError } from './thread-errors.mjs';
 

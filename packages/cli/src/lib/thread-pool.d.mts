@@ -1,4 +1,4 @@
-import type { TaskPool } from '@gaussian-splat/economise';
+import type { TaskPool } from '@gaussian-splat/optimize';
 
 export function usualThreads(): number;
 

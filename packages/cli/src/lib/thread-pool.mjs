@@ -1,6 +1,6 @@
 /**
- * Pool of threads with shared memory for the tasks of `@gaussian-splat/economise`. It implements `TaskPool` of
- * packages/economise/src/parts/task-pool.ts.
+ * Pool of threads with shared memory for the tasks of `@gaussian-splat/optimize`. It implements `TaskPool` of
+ * packages/optimize/src/parts/task-pool.ts.
  */
 import { existsSync } from 'node:fs';
 import { availableParallelism } from 'node:os';

@@ -120,6 +120,6 @@ function requireRoom(gl: WebGL2RenderingContext, { count, shDegree, geometry, sh
     where: `scene of ${count} splats, drawn with WebGL 2`,
     expected: `at most ${max} splats with harmonics of degree ${shDegree}: textures of this browser have ${side} rows at most`,
     found: String(count),
-    remedy: 'show a smaller scene (gaussian-splat economise makes one), or use a browser with WebGPU',
+    remedy: 'show a smaller scene (gaussian-splat optimize makes one), or use a browser with WebGPU',
   });
 }

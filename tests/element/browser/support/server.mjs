@@ -553,7 +553,7 @@ async function clipOf(frameCount) {
 }
 
 async function makeClip(frameCount) {
-  const { codeClip, encodingsFor } = await import('@gaussian-splat/economise');
+  const { codeClip, encodingsFor } = await import('@gaussian-splat/optimize');
   const { readScene, parseClip } = await import('@gaussian-splat/formats');
   const first = await readScene(ball(200, COLORS[0]), { name: 'ball.splat' });
   const frameOf = (frame) => {

@@ -1,0 +1,168 @@
+/** Clips keep what the encoder says of them: in every frame, with harmonics that turn, and with still splats once. */
+import assert from 'node:assert/strict';
+import { test } from 'node:test';
+import type { Camera, GaussianCloud } from '@gaussian-splat/core';
+import { codeClip, viewsAround, type ClipStore, type CodeClipOptions, type DrawFrame } from '@gaussian-splat/optimize';
+import { parseClip } from '@gaussian-splat/formats';
+import { encodeWebp } from '../../packages/cli/src/lib/encoders.mjs';
+import { meanSquare } from '../../packages/optimize/src/measure.js';
+import { clipOf, framesOf } from '../support/clips.js';
+import { cloudOf, type SplatDescription } from '../support/clouds.js';
+import { seededRandom } from '../support/random.js';
+import { turningBall } from '../support/scenes/turning-ball.js';
+import { cpuPainter } from './twin/index.js';
+
+const SPLATS = 200;
+const FRAMES = 18;
+
+/** Splats of a ball that drifts in waves. In frames 8 and 9, some of them are white. */
+function flashing(frame: number): GaussianCloud {
+  const random = seededRandom(9);
+  return cloudOf(
+    Array.from({ length: SPLATS }, (_, i): SplatDescription => {
+      const place = random.direction();
+      const own = {
+        scale: [random.uniform(0.1, 0.2), random.uniform(0.1, 0.2), random.uniform(0.05, 0.1)] as const,
+        ...{ rotation: random.rotation(), opacity: random.uniform(0.5, 0.9) },
+        color: [random.uniform(0, 1), random.uniform(0, 1), 0.4] as const,
+      };
+      const isWhite = i % 10 === 0 && (frame === 8 || frame === 9);
+      const position = place.map((value, k) => value + 0.1 * Math.sin(0.3 * frame + 3 * place[(k + 1) % 3]));
+      return {
+        ...own,
+        position: position as unknown as SplatDescription['position'],
+        color: isWhite ? [1, 1, 1] : own.color,
+      };
+    }),
+  );
+}
+
+/** Draws on the CPU, at a quarter of the size. */
+const draw: DrawFrame = async (frame, views) => {
+  const small = views.map((view): Camera => ({
+    ...view,
+    ...{ width: view.width / 4, height: Math.floor(view.height / 4) },
+    ...{ fx: view.fx / 4, fy: view.fy / 4, cx: view.cx / 4, cy: view.cy / 4 },
+  }));
+  const references = await cpuPainter.draw(frame, small);
+  return {
+    compare: async (cloud) => (await cpuPainter.draw(cloud, small)).map((image, k) => meanSquare(image, references[k])),
+    destroy: () => undefined,
+  };
+};
+
+const options = (frameOf: (frame: number) => GaussianCloud, minPsnr: number): CodeClipOptions => ({
+  ...{ frameCount: FRAMES, framesPerSecond: 10, framesPerGroup: 6, minPsnr, draw, encodeWebp },
+  openFrame: async (frame) => frameOf(frame),
+});
+
+test('the PSNR that is returned is that of the worst frame, and all frames were measured', async () => {
+  const target = 38;
+  const clip = await codeClip(options(flashing, target));
+  assert.equal(clip.measured, FRAMES);
+  assert.ok(clip.worstPsnr >= target, `${clip.worstPsnr} dB`);
+  const frameAt = framesOf(clip.bytes);
+  // Other views than those that were measured.
+  const views = viewsAround(parseClip(clip.bytes, 'a.gsv').bounds, 2, { seed: 77 });
+  for (let frame = 0; frame < FRAMES; frame++) {
+    const errors = await (await draw(flashing(frame), views)).compare(await frameAt(frame));
+    const found = -10 * Math.log10(Math.max(...errors));
+    assert.ok(found > target - 3.5, `frame ${frame}: ${found.toFixed(1)} dB`);
+  }
+});
+
+test('a PSNR that nothing reaches is returned as it is', async () => {
+  const blind: DrawFrame = async () => ({ compare: async () => [0.01], destroy: () => undefined });
+  const clip = await codeClip({ ...options(flashing, 45), frameCount: 4, draw: blind });
+  assert.ok(Math.abs(clip.worstPsnr - 20) < 1e-9);
+  assert.equal(clip.measured, 4);
+});
+
+/** Files in memory that can be written a number of times. */
+class MemoryStore implements ClipStore {
+  readonly files = new Map<string, Uint8Array>();
+  left = Infinity;
+
+  async read(name: string): Promise<Uint8Array | undefined> {
+    return this.files.get(name);
+  }
+
+  async write(name: string, bytes: Uint8Array): Promise<void> {
+    if (this.left-- <= 0) throw new Error('interrupted');
+    this.files.set(name, bytes.slice());
+  }
+}
+
+test('an interrupted call continues after its last group, and returns the same clip', async () => {
+  const whole = await codeClip(options(flashing, 34));
+  const store = new MemoryStore();
+  store.left = 5;
+  await assert.rejects(codeClip({ ...options(flashing, 34), store }), /interrupted/);
+  assert.ok(store.files.has('state.json'));
+  store.left = Infinity;
+  const steps: string[] = [];
+  const progress: number[] = [];
+  const again = { store, onStep: (step: string) => steps.push(step), onProgress: (n: number) => progress.push(n) };
+  const continued = await codeClip({ ...options(flashing, 34), ...again });
+  assert.ok(steps.includes('continues with frame 6'), steps.join('\n'));
+  assert.deepEqual(progress, [12, 18]);
+  assert.deepEqual(continued, whole);
+});
+
+/** A room whose twentieth part moves; frames have their splats in other orders, and with noise far below a pixel. */
+function room(frame: number): GaussianCloud {
+  const random = seededRandom(5);
+  const noise = seededRandom(100 + frame);
+  const splats = Array.from({ length: 400 }, (_, i): SplatDescription => {
+    const position = [random.uniform(-3, 3), random.uniform(-1, 1), random.uniform(-3, 3)] as const;
+    const [x, y, z] = position;
+    const moved = i % 20 === 0 ? 0.2 * frame : noise.uniform(-1e-4, 1e-4);
+    return {
+      ...{ position: [x + moved, y, z], scale: random.uniform(0.05, 0.2), opacity: random.uniform(0.4, 0.9) },
+      ...{ color: [random.uniform(0, 1), 0.5, 0.5], rotation: random.rotation() },
+    };
+  });
+  return cloudOf(frame % 2 === 0 ? splats : splats.reverse());
+}
+
+test('splats that never change are in the file once, and in every frame', async () => {
+  const splatsOf = (bytes: Uint8Array): number => {
+    const { groups, still } = parseClip(bytes, 'a.gsv');
+    return [...still, ...groups.flatMap(({ parts }) => parts)].reduce((sum, part) => sum + part.splats, 0);
+  };
+  const once = await clipOf(room, { frames: 30, framesPerGroup: 30 });
+  const often = await clipOf(room, { frames: 30, framesPerGroup: 5 });
+  assert.deepEqual([once.still, often.still], [0, 380]);
+  // Each of the six groups has the 20 splats that move.
+  assert.deepEqual([splatsOf(once.bytes), splatsOf(often.bytes)], [400, 380 + 6 * 20]);
+  const frameAt = framesOf(often.bytes);
+  for (const frame of [0, 4, 5, 17, 29]) {
+    const [shown, source] = [await frameAt(frame), room(frame)];
+    assert.equal(shown.count, source.count, `frame ${frame}`);
+    for (let i = 0; i < source.count; i++) {
+      const distances = Array.from({ length: shown.count }, (_, k) =>
+        Math.hypot(...[0, 1, 2].map((axis) => shown.positions[3 * k + axis] - source.positions[3 * i + axis])),
+      );
+      assert.ok(Math.min(...distances) < 0.01, `frame ${frame}, splat ${i}: ${Math.min(...distances)} away`);
+    }
+  }
+});
+
+test('harmonics turn with their splats if those of the frames do, over more than a whole turn', async () => {
+  for (const turns of [true, false]) {
+    const { bytes } = await clipOf((frame) => turningBall({ frame, turns }), { frames: 60, framesPerGroup: 60 });
+    const frameAt = framesOf(bytes);
+    for (const frame of [0, 11, 40, 59]) {
+      const [shown, source] = [await frameAt(frame), turningBall({ frame, turns })];
+      let worst = 0;
+      for (let i = 0; i < source.count; i++) {
+        const apart = Array.from({ length: shown.count }, (_, k) =>
+          Math.hypot(...[0, 1, 2].map((axis) => shown.positions[3 * k + axis] - source.positions[3 * i + axis])),
+        );
+        const k = apart.indexOf(Math.min(...apart));
+        for (let n = 0; n < 48; n++) worst = Math.max(worst, Math.abs(shown.sh[48 * k + n] - source.sh[48 * i + n]));
+      }
+      assert.ok(worst < 0.02, `turns: ${turns}, frame ${frame}: a coefficient differs by ${worst}`);
+    }
+  }
+});

@@ -1,0 +1,151 @@
+/** Splats are followed through frames that do not say which of them were in the one before. */
+import assert from 'node:assert/strict';
+import { test } from 'node:test';
+import { shCoefficientCount, type GaussianCloud, type ShDegree } from '@gaussian-splat/core';
+import { cutTracks } from '../../packages/optimize/src/clip/cut-tracks.js';
+import { followSplats } from '../../packages/optimize/src/clip/tracks.js';
+import { parseClip, readClipPart, upright } from '@gaussian-splat/formats';
+import { clipOf, framesOf } from '../support/clips.js';
+import { cloudOf } from '../support/clouds.js';
+import { fountain } from '../support/scenes/fountain.js';
+
+test('drops that are born fast and close together keep their own track', () => {
+  const frameOf = fountain({ splats: 40_000, frames: 300, framesPerSecond: 30 });
+  const frames = Array.from({ length: 6 }, (_, frame) => frameOf(45 + frame));
+  const tracks = followSplats(frames);
+  const sizeOf = new Map<number, number>();
+  let changes = 0;
+  frames.forEach(({ scales }, f) => {
+    tracks.of[f].forEach((track, i) => {
+      // The volume of a splat of this scene never changes, and no two have the same.
+      const volume = scales[3 * i] * scales[3 * i + 1] * scales[3 * i + 2];
+      const before = sizeOf.get(track);
+      if (before !== undefined && Math.abs(volume / before - 1) > 1e-3) changes++;
+      sizeOf.set(track, volume);
+    });
+  });
+  assert.ok(changes < 20, `${changes} times a track goes over to another splat`);
+});
+
+test('a track that goes over to another splat is divided, one that turns is not', () => {
+  const spin = (angle: number): readonly [number, number, number, number] => [
+    Math.cos(angle / 2),
+    0,
+    0,
+    Math.sin(angle / 2),
+  ];
+  const scale = [0.1, 0.05, 0.02] as const;
+  const frames = Array.from({ length: 6 }, (_, frame) =>
+    cloudOf([
+      // In its place, from the fourth frame on, is another one.
+      {
+        position: [0, 0, 0],
+        color: [0.5, 0.5, 0.5],
+        opacity: 0.9,
+        rotation: spin(frame < 3 ? 0 : 0.5),
+        scale: [...scale],
+      },
+      { position: [3, 0, 0], color: [0.5, 0.5, 0.5], opacity: 0.9, rotation: spin(0.3 * frame), scale: [...scale] },
+    ]),
+  );
+  const followed = followSplats(frames);
+  assert.equal(followed.count, 2);
+  const { count, of, lives } = cutTracks(followed);
+  assert.equal(count, 3);
+  assert.deepEqual([...lives.first], [0, 0, 3]);
+  assert.deepEqual([...lives.end], [3, 6, 6]);
+  assert.deepEqual(
+    of.map((tracks) => [...tracks]),
+    [0, 1, 2, 3, 4, 5].map((frame) => [frame < 3 ? 0 : 2, 1]),
+  );
+});
+
+const shownAt = (bytes: Uint8Array, frame: number): Promise<GaussianCloud> => framesOf(bytes)(frame);
+
+/** Asserts that each splat of a cloud is visible in another one, at its place with its opacity and coefficients. */
+function assertShown(shown: GaussianCloud, source: GaussianCloud, what: string): void {
+  const [from, to] = [source, shown].map(({ shDegree }) => 3 * shCoefficientCount(shDegree));
+  let visible = 0;
+  for (let k = 0; k < shown.count; k++) if (shown.opacities[k] > 0.01) visible++;
+  assert.equal(visible, source.count, `${what}: splats`);
+  for (let i = 0; i < source.count; i++) {
+    const distances = Array.from({ length: shown.count }, (_, k) =>
+      Math.hypot(
+        shown.opacities[k] - source.opacities[i],
+        ...[0, 1, 2].map((axis) => shown.positions[3 * k + axis] - source.positions[3 * i + axis]),
+        ...Array.from({ length: to }, (_, c) => shown.sh[to * k + c] - (c < from ? source.sh[from * i + c] : 0)),
+      ),
+    );
+    assert.ok(Math.min(...distances) < 0.05, `${what}: splat ${i} is ${Math.min(...distances)} away`);
+  }
+}
+
+const SPLATS = 12;
+/** A frame of a row of splats that moves. The last splat is only in odd frames. */
+const rowAt = (frame: number, shDegree: ShDegree = 0): GaussianCloud =>
+  cloudOf(
+    Array.from({ length: SPLATS - 1 + (frame % 2) }, (_, i) => ({
+      position: [i, 0.1 * frame, i === SPLATS - 1 ? 3 : 0] as const,
+      ...{ color: [0.2 + 0.05 * i, 0.5, 0.5] as const, opacity: 0.8, scale: 0.1 + 0.01 * i },
+      sh: Array.from({ length: 45 }, (_, k) => 0.02 * ((i + k) % 5)),
+    })),
+    shDegree,
+  );
+
+test('one frame, two and three, and frames that are equal, become clips with these frames', async () => {
+  for (const frames of [1, 2, 3]) {
+    for (const [name, frameOf] of [
+      ['others', (frame: number) => rowAt(frame)],
+      ['equal', () => rowAt(1)],
+    ] as const) {
+      const { bytes } = await clipOf(frameOf, { frames, framesPerGroup: 2 });
+      assert.equal(parseClip(bytes, 'a.gsv').frameCount, frames);
+      for (let frame = 0; frame < frames; frame++)
+        assertShown(await shownAt(bytes, frame), frameOf(frame), `${frames} frames, ${name}, frame ${frame}`);
+    }
+  }
+});
+
+test('frames of different degrees become a clip of the highest, in which no group has less than its frames', async () => {
+  const degrees = [0, 2, 1, 3] as const;
+  const frameOf = (frame: number): GaussianCloud => rowAt(1, degrees[frame]);
+  for (const framesPerGroup of [1, 2, 4]) {
+    const { bytes } = await clipOf(frameOf, { frames: 4, framesPerGroup });
+    const index = parseClip(bytes, 'a.gsv');
+    assert.equal(index.shDegree, 3);
+    for (let frame = 0; frame < 4; frame += framesPerGroup) {
+      // Coefficients above the constant one are those of the frame in which a splat is most opaque, here the first.
+      const shown = await shownAt(bytes, frame);
+      assert.equal(shown.shDegree, 3);
+      assertShown(shown, frameOf(frame), `groups of ${framesPerGroup}, frame ${frame}`);
+    }
+    const { frames, parts } = index.groups.at(-1)!;
+    const { start, sceneBytes, motionBytes } = parts[0];
+    const part = { bytes: bytes.subarray(start, start + sceneBytes + motionBytes), part: parts[0], frames };
+    await assert.rejects(readClipPart({ ...part, shDegree: 2, name: 'a.gsv' }), /degree 2 at most.*degree 3/s);
+  }
+});
+
+test('frames that name another direction up become a clip that stands upright, scene and motion alike', async () => {
+  const frames = Array.from({ length: 4 }, (_, frame) =>
+    Array.from({ length: 30 }, (_, i) => ({
+      position: [i % 5, 0.1 * frame + i / 30, Math.floor(i / 5) + 0.2 * frame] as const,
+      ...{ color: [0.5, 0.5, 0.5] as const, opacity: 0.9, scale: 0.1 },
+    })),
+  ).map((splats) => ({ ...cloudOf(splats), hints: { up: [0, 0, 1] as const } }));
+  const { bytes } = await clipOf((frame) => frames[frame], { frames: 4, framesPerGroup: 4, name: 'a.spz' });
+  const index = parseClip(bytes, 'a.gsv');
+  for (const frame of [0, 3]) {
+    const shown = await shownAt(bytes, frame);
+    const source = upright(frames[frame]);
+    const distances = Array.from({ length: 30 }, (_, i) =>
+      Math.min(
+        ...Array.from({ length: 30 }, (_, k) =>
+          Math.hypot(...[0, 1, 2].map((axis) => shown.positions[3 * k + axis] - source.positions[3 * i + axis])),
+        ),
+      ),
+    );
+    assert.ok(Math.max(...distances) < 0.02, `frame ${frame}: ${Math.max(...distances)}`);
+  }
+  assert.equal(index.bounds.up, undefined);
+});
