@@ -19,11 +19,11 @@ os.environ.setdefault("TORCH_CUDA_ARCH_LIST", "9.0")
 
 # Cap of splats, and whether the scene is trained antialiased.
 SCENES = {
-    "apartment": (400_000, False),
-    "product": (260_000, False),
-    "garden": (420_000, False),
-    "hall": (320_000, True),
-    "walker": (120_000, False),
+    "apartment": (320_000, False),
+    "product": (160_000, False),
+    "garden": (360_000, False),
+    "hall": (260_000, True),
+    "walker": (90_000, False),
 }
 STRIDE = 4  # depth and ids are told at every fourth pixel
 
@@ -38,9 +38,11 @@ def main() -> None:
     parser.add_argument("--held", type=int, default=48)
     parser.add_argument("--width", type=int, default=800)
     parser.add_argument("--samples", type=int, default=48)
+    parser.add_argument("--held-samples", type=int, default=256, help="of a held-out image")
     parser.add_argument("--steps", type=int, default=15_000)
     parser.add_argument("--seconds", type=float, default=1e9, help="longest training")
     parser.add_argument("--until", type=float, default=1e12, help="time (seconds since 1970) by which all must be done")
+    parser.add_argument("--reserve", type=float, default=110, help="seconds before --until that are kept for training")
     parser.add_argument("--frames", type=int, default=24, help="of a moving scene")
     parser.add_argument("--parts", type=Path, default=Path("/tmp/studio-parts"))
     parser.add_argument("--look", action="store_true", help="only writes the held-out images")
@@ -125,7 +127,7 @@ class Making:
         return None
 
     def picture_held(self, views) -> dict:
-        """Held-out images: mean exposure, twice the samples, no noise of a sensor; depth and ids of each."""
+        """Held-out images: mean exposure, more samples, no noise of a sensor; depth and ids of each."""
         import phone
 
         poses, pixels, coded, depths, ids = [], [], [], [], []
@@ -137,7 +139,7 @@ class Making:
                 or np.percentile(np.linalg.norm(where - eye, axis=2)[things < 255], 8) < 0.3
             ):
                 continue
-            light = self.renderer.light(camera, self.options.samples * 2)
+            light = self.renderer.light(camera, self.options.held_samples)
             image = (
                 (phone.shown(light * self.stage.exposure, self.torch) * 255 + 0.5)
                 .clamp(0, 255)
@@ -179,7 +181,7 @@ class Making:
             colors.append(color)
             images.append(image)
             poses.append(pose_of(eye, target))
-            if time.time() > self.options.until - 110:
+            if time.time() > self.options.until - self.options.reserve:
                 break
             if len(images) % 50 == 0:
                 self.say(f"{len(images)} images")

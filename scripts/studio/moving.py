@@ -53,7 +53,7 @@ def make(making) -> None:
 def _plain(making, eye, target):
     import phone
 
-    light = making.renderer.light(making.aim(eye, target), making.options.samples * 2)
+    light = making.renderer.light(making.aim(eye, target), making.options.held_samples)
     return (
         (phone.shown(light * making.stage.exposure, making.torch) * 255 + 0.5)
         .clamp(0, 255)
