@@ -53,19 +53,11 @@ class Renderer:
         )
         kinds = "albedo:albedo,normal:sh_normal,depth:depth,shape:shape_index"
         self.features = mi.load_dict({"type": "aov", "aovs": kinds})
-        self.seed, self.things, self.cleaner = 0, None, None
+        self.seed, self.things = 0, None
 
     def light(self, camera, samples: int):
         """Denoised linear light (H, W, 3), as xp's array."""
         self.seed += 3
-        if self.cleaner is None:
-            self.cleaner = optix(camera.film().size())
-        if self.cleaner:
-            noisy = mi.render(self.scene, sensor=camera, spp=samples, seed=self.seed)
-            guide = mi.render(self.scene, sensor=camera, spp=16, seed=self.seed + 2, integrator=self.features)
-            to_sensor = camera.world_transform().inverse()
-            clean = self.cleaner(noisy, albedo=guide[..., :3], normals=guide[..., 3:6], to_sensor=to_sensor)
-            return self.move(np.nan_to_num(np.array(clean), nan=0.0, posinf=0.0, neginf=0.0))
         halves = [self._take(camera, samples // 2, None, self.seed + k) for k in (0, 1)]
         guide = self._take(camera, 8, self.features, self.seed + 2)
         return denoised(self.xp, halves, guide[..., :3], guide[..., 3:6], guide[..., 6])
@@ -102,18 +94,6 @@ class Renderer:
             number = int(np.array(dr.reinterpret_array(mi.UInt32, mi.ShapePtr(shape))).ravel()[0])
             table[number] = ids[int(shape.id().removeprefix("part"))]
         return table
-
-
-def optix(size):
-    """NVIDIA's denoiser, or False where the variant or the driver has none: `denoised` then takes its place."""
-    try:
-        cleaner = mi.OptixDenoiser(size, albedo=True, normals=True)
-        black = mi.TensorXf(np.zeros((size[1], size[0], 3), np.float32))
-        dr.eval(cleaner(black, albedo=black, normals=black))
-        return cleaner
-    except (AttributeError, RuntimeError) as error:
-        print(f"expected the denoiser of OptiX, found: {error}; a wavelet filter takes its place", flush=True)
-        return False
 
 
 def denoised(xp, halves, albedo, normal, depth, levels: int = 5):

@@ -12,6 +12,7 @@ from torch.nn.functional import conv2d
 DEVICE = "cuda"
 RATES = {"means": 1.6e-4, "scales": 5e-3, "quats": 1e-3, "opacities": 5e-2, "sh0": 2.5e-3, "shN": 2.5e-3 / 20}
 NEAR = 0.05
+NEUTRAL = torch.tensor([1.0, 0.0], device=DEVICE)  # gain and offset of an exposure
 
 
 class Images:
@@ -100,10 +101,12 @@ def train(
     reach = float((eyes - eyes.mean(0)).norm(dim=1).max()) * 1.1
     adams = optimizers(splats, reach)
     strategy = MCMCStrategy(
-        cap_max=cap, refine_start_iter=500, refine_stop_iter=int(steps * 0.8), refine_every=100, verbose=False
-    )
+        # Noise moves a center by its covariance times a rate: for a scene of another size than 1 it has to be rescaled.
+        cap_max=cap, noise_lr=5e5 / reach**2, refine_start_iter=500, refine_stop_iter=int(steps * 0.8),
+        refine_every=100, verbose=False,
+    )  # fmt: skip
     state = strategy.initialize_state()
-    tone = torch.nn.Parameter(torch.tensor([1.0, 0.0], device=DEVICE).repeat(len(images), 3, 1))
+    tone = torch.nn.Parameter(NEUTRAL.repeat(len(images), 3, 1))
     tones = torch.optim.Adam([tone], lr=2e-3, fused=True)
     began, order, rate = time.time(), [], adams["means"].param_groups[0]["lr"]
     for step in range(steps):
@@ -115,10 +118,10 @@ def train(
         k = int(order.pop())
         goal = images[k]
         image, info = draw(splats, images, k, min(int(part * 8), 3), antialiased)
-        image = image * tone[k, :, 0] + tone[k, :, 1]
+        exposure = tone[k] - tone.mean(0) + NEUTRAL  # the mean over all images is fixed, or splats and exposures drift apart
+        image = image * exposure[:, 0] + exposure[:, 1]
         loss = 0.8 * (image - goal).abs().mean() + 0.2 * (1 - similarity(image, goal))
-        loss = loss + 0.01 * splats["opacities"].sigmoid().mean() + 0.01 * splats["scales"].exp().mean()
-        loss = loss + ((tone - torch.tensor([1.0, 0.0], device=DEVICE)).mean(0) ** 2).sum()
+        loss = loss + 0.01 * splats["opacities"].sigmoid().mean() + 0.01 / reach * splats["scales"].exp().mean()
         loss.backward()
         for adam in [*adams.values(), tones]:
             adam.step()
