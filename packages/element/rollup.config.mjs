@@ -169,7 +169,7 @@ export default [
   },
   {
     input: { 'scene-worker': path('./dist/loading/scene-worker.js') },
-    // The page imports `loadScene` from it, so its exports stay; readers import what they share with it from it.
+    // The page imports `runOnPage` from it, so its exports stay; readers import what they share with it from it.
     preserveEntrySignatures: 'allow-extension',
     plugins,
     output: [output, { dir: path('./dist/loading'), format: 'cjs', plugins: [workerAsText] }],

@@ -47,7 +47,7 @@ async function open(folder: string, filenames: readonly string[], boxes: number,
   files.set(`lod-meta.json`, index);
   const request = { url: `${base}/${folder}/lod-meta.json`, credentials: 'omit', sh: 'auto' } as const;
   const start = process.cpuUsage();
-  const answer = await openBoxes(request, new AbortController().signal, () => undefined).catch(
+  const answer = await openBoxes(request, new AbortController().signal, { onProgress: () => undefined }).catch(
     (error: { code: string }) => error.code,
   );
   const { user, system } = process.cpuUsage(start);

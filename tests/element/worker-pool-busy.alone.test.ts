@@ -4,7 +4,7 @@
  */
 import assert from 'node:assert/strict';
 import { test, type TestContext } from 'node:test';
-import type { WorkerRequest } from '../../packages/element/src/loading/protocol.js';
+import type { WorkerRequest } from '../../packages/element/src/loading/worker-messages.js';
 import { WorkerPool } from '../../packages/element/src/loading/worker-pool.js';
 
 class FakeWorker extends EventTarget {

@@ -63,11 +63,11 @@ test('the texts make the code of the worker: a reader of each format runs', { sk
     }
     return require(name);
   };
-  const worker = (await load('./scene-worker.js')) as { loadScene: (...args: unknown[]) => Promise<unknown> };
+  const worker = (await load('./scene-worker.js')) as { runOnPage: (...args: unknown[]) => Promise<unknown> };
   const skull = readFileSync(new URL('../../demo/scenes/skull.spz', import.meta.url));
   const url = `data:application/octet-stream;base64,${skull.toString('base64')}`;
   const request = { url, credentials: 'omit', sh: 'auto' };
-  const scene = await worker.loadScene(request, new AbortController().signal, { onProgress: () => undefined });
+  const scene = await worker.runOnPage('load', request, new AbortController().signal, { onProgress: () => undefined });
   assert.ok((scene as { packed: { count: number } }).packed.count > 10_000);
 });
 

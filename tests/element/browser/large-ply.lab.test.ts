@@ -42,8 +42,8 @@ describe('a large PLY', () => {
   let expected: PackedGaussians;
   before(async () => {
     // One thread without helpers.
-    const { loadScene } = (await import(SCRIPT)) as typeof sceneWorker;
-    const whole = await loadScene(request(FILE), signal, { onProgress: ignore });
+    const { runOnPage } = (await import(SCRIPT)) as typeof sceneWorker;
+    const whole = await runOnPage('load', request(FILE), signal, { onProgress: ignore });
     assert('packed' in whole && whole.packed, 'a scene');
     expected = whole.packed;
     assertEqual(expected.droppedCount, Math.ceil(SPLATS / 16_911) * 17 - 3, 'splats that are of no use');
@@ -113,7 +113,7 @@ describe('a large PLY', () => {
         joined!.chunks.set(chunks);
       }
     };
-    const scene = await loader.open(request(FILE), signal, ignore, undefined, onPart);
+    const scene = await loader.ask('load', request(FILE), signal, { onPart });
     assert(!('packed' in scene) && joined, 'a scene whose splats came before it');
     assertSame(joined, expected);
   });

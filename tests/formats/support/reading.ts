@@ -6,8 +6,8 @@ import { existsSync, readFileSync, writeFileSync } from 'node:fs';
 import { serialize } from 'node:v8';
 import { GaussianSplatError } from '@gaussian-splat/core';
 import type { FloorOptions } from '@gaussian-splat/formats/floor';
-import { clipRoomBytes, unpackClipIndex, type PackedClipIndex } from '@gaussian-splat/formats';
-import * as worker from '../../../packages/element/src/loading/scene-worker.js';
+import { clipRoomBytes, unpackClipIndex } from '@gaussian-splat/formats';
+import { runOnPage } from '../../../packages/element/src/loading/scene-worker.js';
 import type { FuzzScene, ReaderKind } from './fuzz-scenes.js';
 
 /** Bounds for a file of `bytes`, as SECURITY.md has them. */
@@ -78,30 +78,31 @@ class Server {
   };
 }
 
+const listeners: Parameters<typeof runOnPage>[3] = { onProgress: () => undefined };
+
 /** Asks the worker's code as the element does. Returns all answers. */
 async function ask(kind: ReaderKind, { name, files }: FuzzScene): Promise<unknown[]> {
   const { signal } = new AbortController();
-  const ignore = (): void => undefined;
   const url = ORIGIN + name;
   const request = { url, credentials: 'same-origin', sh: 'auto', isWhole: true } as const;
   const options: FloorOptions = { frame: FRAME, near: [0, 1.6, 0] };
   switch (kind) {
     case 'load':
-      return [await worker.loadScene(request, signal, { onProgress: ignore })];
+      return [await runOnPage('load', request, signal, listeners)];
     case 'levels':
-      return [await worker.openBoxes(request, signal, ignore)];
+      return [await runOnPage('boxes', request, signal, listeners)];
     case 'clip':
       return clip(url, signal);
     case 'manifest':
-      return [await worker.openManifest(request, signal, ignore)];
+      return [await runOnPage('manifest', request, signal, listeners)];
     case 'floor':
-      return [await worker.makeFloor({ ...request, options, map: files[name].slice().buffer }, signal)];
+      return [await runOnPage('floor', { ...request, options, map: files[name].slice().buffer }, signal, listeners)];
     case 'voxels':
-      return [await worker.makeFloor({ ...request, options, voxelUrl: url }, signal)];
+      return [await runOnPage('floor', { ...request, options, voxelUrl: url }, signal, listeners)];
     case 'mesh':
-      return [await worker.openMeshFile(request, signal)];
+      return [await runOnPage('mesh', request, signal, listeners)];
     case 'model':
-      return [await worker.openModel({ place: { url, credentials: 'same-origin' } }, signal)];
+      return [await runOnPage('model', { place: { url, credentials: 'same-origin' } }, signal, listeners)];
   }
 }
 
@@ -109,10 +110,8 @@ async function ask(kind: ReaderKind, { name, files }: FuzzScene): Promise<unknow
 let clipBytes = 0;
 
 async function clip(url: string, signal: AbortSignal): Promise<unknown[]> {
-  const asked = { isClip: true, url, credentials: 'same-origin' } as const;
-  const part = async (more: object): Promise<unknown> =>
-    ((await worker.openBoxes({ ...asked, ...more }, signal, () => undefined)) as { clip: unknown }).clip;
-  const opened = (await part({})) as { index: PackedClipIndex; tag?: string; file?: Blob };
+  const asked = { url, credentials: 'same-origin' } as const;
+  const opened = await runOnPage('clip', asked, signal, listeners);
   const index = unpackClipIndex(opened.index);
   const { groups, shDegree, origin } = index;
   clipBytes = clipRoomBytes(index);
@@ -121,7 +120,8 @@ async function clip(url: string, signal: AbortSignal): Promise<unknown[]> {
   for (const group of new Set([0, groups.length - 1])) {
     const { frames, parts } = groups[group];
     const own = { part: parts[0], group, frames, shDegree, origin };
-    answers.push(await part({ whole: opened.file, tag: opened.tag, part: own }));
+    const place = { ...asked, whole: opened.file, tag: opened.tag };
+    answers.push(await runOnPage('clip-part', { ...place, ...own }, signal, listeners));
   }
   return answers;
 }

@@ -49,5 +49,5 @@ export async function openFloor(source: FloorSource, signal: AbortSignal): Promi
     });
   const options: FloorOptions = { metersPerUnit, frame, height: eyeHeight + ABOVE_EYES, near };
   const asked = { url, file, credentials, limits, options, voxelUrl, map };
-  return loader.ask({ type: 'floor', request: asked }, signal, ({ makeFloor }) => makeFloor(asked, signal));
+  return loader.ask('floor', asked, signal);
 }

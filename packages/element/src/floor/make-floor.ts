@@ -7,9 +7,19 @@ import {
   readVoxels,
   voxelTreePath,
   type FloorMap,
+  type FloorOptions,
 } from '@gaussian-splat/formats/floor';
 import { fileLimits, fileName, limitsFrom, named } from '../loading/load-scene.js';
-import type { FloorRequest } from '../loading/protocol.js';
+import type { FileRequest } from '../loading/protocol.js';
+
+/** A scene file whose floor is to be found, and the dimensions of the walker. */
+export interface FloorRequest extends FileRequest {
+  /** Absolute address of a `.voxel.json`, which replaces the splats as the source of the floor. */
+  readonly voxelUrl?: string | undefined;
+  /** Bytes of a `.floor` file, which is decoded instead. */
+  readonly map?: ArrayBuffer | undefined;
+  readonly options: FloorOptions;
+}
 
 /**
  * Reads a scene file again, usually from the browser's cache, and finds its floor. If the request has a `voxelUrl` or a

@@ -130,7 +130,11 @@ async function openLoadedScene(
     );
     return parts.then((uploads) => uploads.add(part));
   };
-  const loading = options.loader.open(request, abort.signal, options.onProgress, showPreview, onPart);
+  const loading = options.loader.ask('load', request, abort.signal, {
+    onProgress: options.onProgress,
+    onPreview: showPreview,
+    onPart,
+  });
   try {
     const chosen = choosing.catch(unlessWrong);
     chosen.catch(ignore);

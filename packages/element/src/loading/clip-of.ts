@@ -12,14 +12,32 @@ import {
   type ClipPartContent,
   type FetchedRange,
 } from '@gaussian-splat/formats';
-import { GaussianSplatError, loadModule } from '@gaussian-splat/core';
+import { GaussianSplatError, loadModule, type ShDegree, type Vector3 } from '@gaussian-splat/core';
 import type { FourDgsClip } from '@gaussian-splat/formats/4dgs';
 import { packAnimation, type PackedAnimation } from '@gaussian-splat/renderer/tools';
 import { fileLimits, fileName, limitsFrom, named } from './load-scene.js';
-import type { ClipRequest } from './protocol.js';
+import type { FileRequest } from './protocol.js';
 
 /** Size of the first request, bytes. It contains the index of most clips. */
 const HEAD_BYTES = 8_192;
+
+/** A clip whose index is to be read. */
+export interface ClipRequest extends FileRequest {
+  /** Content of the whole file, if the page already has it. */
+  readonly whole?: Blob | undefined;
+  /** Validator of the version of the file that the index is from: see `FetchedRange.tag`. */
+  readonly tag?: string | undefined;
+}
+
+/** A part of a group of frames of a clip. */
+export interface ClipPartRequest extends ClipRequest {
+  readonly part: ClipPart;
+  /** Index of the group that the part belongs to. */
+  readonly group: number;
+  readonly frames: number;
+  readonly shDegree: ShDegree;
+  readonly origin: Vector3;
+}
 
 /** A clip whose index has been parsed. */
 export interface OpenedClip {
@@ -32,15 +50,11 @@ export interface OpenedClip {
   readonly file?: Blob;
 }
 
-/** Returns the index of a clip, or the packed content of a part if the request names one. */
-export const readClip = (request: ClipRequest, signal: AbortSignal): Promise<OpenedClip | PackedAnimation> =>
-  (request.part ? readPart : openClip)(request, signal);
-
 /**
  * Reads the head and the index of a clip. Throws GaussianSplatError (`network/*`, `decode/*`, `out-of-memory/*`), or
  * the signal's reason if that is aborted.
  */
-async function openClip(request: ClipRequest, signal: AbortSignal): Promise<OpenedClip> {
+export async function openClip(request: ClipRequest, signal: AbortSignal): Promise<OpenedClip> {
   const name = fileName(request.url);
   const limits = limitsFrom(request);
   try {
@@ -60,21 +74,20 @@ async function openClip(request: ClipRequest, signal: AbortSignal): Promise<Open
 }
 
 /** Reads a part of a group of frames, and packs it into the layout of the GPU. Throws as {@link openClip} does. */
-async function readPart(request: ClipRequest, signal: AbortSignal): Promise<PackedAnimation> {
-  const { origin } = request.part!;
+export async function readPart(request: ClipPartRequest, signal: AbortSignal): Promise<PackedAnimation> {
   const name = fileName(request.url);
   try {
     const { cloud, motion } = isFourDgs(request) ? await groupOfFourDgs(request) : await readGsvPart(request, signal);
     signal.throwIfAborted();
-    return packAnimation(cloud, motion, origin);
+    return packAnimation(cloud, motion, request.origin);
   } catch (error) {
     signal.throwIfAborted();
     throw named(error, name);
   }
 }
 
-async function readGsvPart(request: ClipRequest, signal: AbortSignal): Promise<ClipPartContent> {
-  const { part, frames, shDegree } = request.part!;
+async function readGsvPart(request: ClipPartRequest, signal: AbortSignal): Promise<ClipPartContent> {
+  const { part, frames, shDegree } = request;
   const limits = limitsFrom(request);
   const { bytes } = await bytesAt(request, part.start, endOf(part), signal, limits());
   return readClipPart({ bytes, part, frames, shDegree, name: fileName(request.url), limits: limits() });
@@ -110,11 +123,11 @@ async function fourDgsClip(request: ClipRequest, bytes: Uint8Array): Promise<Fou
   return clip;
 }
 
-async function groupOfFourDgs(request: ClipRequest): Promise<ClipPartContent> {
-  const { url, whole, part } = request;
+async function groupOfFourDgs(request: ClipPartRequest): Promise<ClipPartContent> {
+  const { url, whole, group } = request;
   const clip =
     opened?.url === url ? opened.clip : await fourDgsClip(request, new Uint8Array(await whole!.arrayBuffer()));
-  return clip.group(part!.group);
+  return clip.group(group);
 }
 
 const tooShort = (where: string, expected: number, found: number): GaussianSplatError =>

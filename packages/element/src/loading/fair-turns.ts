@@ -1,4 +1,4 @@
-import type { WorkerRequest } from './protocol.js';
+import type { WorkerRequest } from './worker-messages.js';
 import type { Job, WorkerSlot } from './worker-slot.js';
 
 /** Worker time that a source gets before those that have had less come first, ms. */

@@ -13,9 +13,8 @@ import {
   type RowLayout,
   type SortedBlock,
 } from '@gaussian-splat/renderer/tools';
-import type { LoadListeners } from './load-scene.js';
 import { PreviewTimes } from './part-previews.js';
-import type { LoadedScene, SceneRequest, SentScene } from './protocol.js';
+import type { LoadedScene, SceneRequest, SentScene, TaskListeners } from './protocol.js';
 import { BATCH_ROWS, RowHelpers } from './row-helpers.js';
 
 /** Maximum number of splats in a preview. */
@@ -48,7 +47,7 @@ export class LargePly {
   readonly #count: number;
   readonly #sh: SceneRequest['sh'];
   readonly #limits: () => LoadLimits;
-  readonly #listeners: LoadListeners;
+  readonly #listeners: TaskListeners;
   readonly #previews = new PreviewTimes();
   readonly #helpers = new RowHelpers(({ first, count, bytes }) => this.#packer?.place(first, count, bytes));
   /** Properties of the scene, from the first rows. */
@@ -75,7 +74,7 @@ export class LargePly {
     name: string,
     { sh }: SceneRequest,
     limits: () => LoadLimits,
-    listeners: LoadListeners,
+    listeners: TaskListeners,
   ): Promise<LargePly | undefined> {
     const { maxSplats = Infinity } = limits();
     const { rows, count = 0 } = (await splatRanges(beginning, name).catch(() => undefined)) ?? {};
@@ -92,7 +91,7 @@ export class LargePly {
     count: number,
     sh: SceneRequest['sh'],
     limits: () => LoadLimits,
-    listeners: LoadListeners,
+    listeners: TaskListeners,
   ) {
     this.#name = name;
     this.#header = header;

@@ -13,16 +13,7 @@ import {
 import { fileName, named, throttled } from './load-helpers.js';
 import type { LargePly } from './large-ply.js';
 import { ProgressSum } from './progress-sum.js';
-import type {
-  LoadedFacts,
-  LoadedScene,
-  LoadedSequence,
-  PartListener,
-  PreviewListener,
-  ProgressListener,
-  SceneRequest,
-  SentScene,
-} from './protocol.js';
+import type { LoadedFacts, LoadedScene, LoadedSequence, SceneRequest, SentScene, TaskListeners } from './protocol.js';
 
 /** Delay of the first preview after the start of the load, ms. Shorter downloads need no preview. */
 const PREVIEW_AFTER_MS = 300;
@@ -39,26 +30,6 @@ const none = (): undefined => undefined;
 
 export { fileName, named, throttled };
 
-/** Listeners of a load. */
-export interface LoadListeners {
-  readonly onProgress: ProgressListener;
-  /** Receives previews of the scene; absent if none are wanted. */
-  readonly onPreview?: PreviewListener | undefined;
-  /** Receives the splats of a large scene while they are sorted. If it is absent, the splats are part of the result. */
-  readonly onPart?: PartListener | undefined;
-  /**
-   * Called with true before the thread becomes busy and does not respond, perhaps repeatedly. Called with false when it
-   * responds again.
-   */
-  readonly onReading?: (isReading: boolean) => void;
-  /**
-   * Requests other workers for packing.
-   * @param max Maximum number of workers.
-   * @param onHelper Called with a port to each worker when that worker is available.
-   */
-  readonly askForHelp?: (max: number, onHelper: (port: MessagePort) => void) => void;
-}
-
 /**
  * Loads a scene, or the manifest of a sequence of scenes. Throws GaussianSplatError (`network/*`, `decode/*`,
  * `out-of-memory/*`), or the signal's reason if that is aborted.
@@ -66,7 +37,7 @@ export interface LoadListeners {
 export async function loadScene(
   request: SceneRequest,
   signal: AbortSignal,
-  listeners: LoadListeners,
+  listeners: TaskListeners,
 ): Promise<LoadedScene | SentScene | LoadedSequence> {
   const { onProgress, onPreview, onPart, onReading } = listeners;
   try {
@@ -187,7 +158,7 @@ const LARGE_BYTES = 1 << 22;
 
 /** Reads a file in transit with several workers, if it is a PLY whose rows they can share. */
 class SharedReading {
-  readonly #of: readonly [name: string, request: SceneRequest, limits: () => LoadLimits, listeners: LoadListeners];
+  readonly #of: readonly [name: string, request: SceneRequest, limits: () => LoadLimits, listeners: TaskListeners];
   #isRefused = false;
   /**
    * The shared PLY; undefined before its header has arrived. Resolves with undefined for a file that must be read as a
@@ -195,7 +166,7 @@ class SharedReading {
    */
   ply: Promise<LargePly | undefined> | undefined;
 
-  constructor(request: SceneRequest, name: string, limits: () => LoadLimits, listeners: LoadListeners) {
+  constructor(request: SceneRequest, name: string, limits: () => LoadLimits, listeners: TaskListeners) {
     this.#of = [name, request, limits, listeners];
   }
 

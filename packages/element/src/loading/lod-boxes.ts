@@ -1,6 +1,4 @@
-/**
- * Reads streamed SOG scenes box by box. The worker loads this module for the first such scene, and for the first clip.
- */
+/** Reads streamed SOG scenes box by box. The worker loads this module for the first such scene. */
 import {
   fetchScene,
   LoadBudget,
@@ -11,11 +9,43 @@ import {
   type FetchSceneOptions,
   type LodScene,
 } from '@gaussian-splat/formats';
-import { loadModule } from '@gaussian-splat/core';
-import { layoutLevels, packLevelPage } from '@gaussian-splat/renderer/tools';
+import type { StreamedScene } from '@gaussian-splat/renderer';
+import { layoutLevels, packLevelPage, type LevelPage, type LevelScene } from '@gaussian-splat/renderer/tools';
 import { fileLimits, fileName, limitsFrom, named, throttled } from './load-scene.js';
 import { ProgressSum } from './progress-sum.js';
-import type { BoxRequest, ClipAnswer, ClipRequest, LoadedBoxes, ProgressListener, SceneRequest } from './protocol.js';
+import type { SceneLimits, SceneRequest, TaskListeners } from './protocol.js';
+
+/** A streamed SOG scene with its coarsest levels. */
+export interface LoadedBoxes {
+  readonly levels: LevelScene;
+  /** Paths of the SOG files, relative to the index. */
+  readonly files: readonly string[];
+  /**
+   * [R, 3] levels of all boxes, coarsest first within a box: index of the file, index of the first splat, and number of
+   * splats.
+   */
+  readonly runs: Float64Array;
+  /** [B] index in `runs` of the first level of each box. */
+  readonly firstRuns: Uint32Array;
+}
+
+/**
+ * A request for a level of a box of a streamed SOG scene. It contains all data that the worker needs, because the
+ * worker may have been restarted since the previous request.
+ */
+export interface BoxRequest {
+  /** Absolute address of the index. */
+  readonly url: string;
+  /** Path of the SOG file, relative to the index. */
+  readonly path: string;
+  /** Index of the level's first splat in the file. */
+  readonly first: number;
+  readonly count: number;
+  readonly page: LevelPage;
+  readonly scene: StreamedScene;
+  readonly credentials: RequestCredentials;
+  readonly limits?: SceneLimits | undefined;
+}
 
 /** Cache of decoded files for all streamed SOG scenes of the page. */
 const files = new SogFiles();
@@ -33,20 +63,14 @@ function accountOf(url: string): LoadBudget {
 }
 
 /**
- * Reads the index of a streamed SOG scene and the coarsest level of each of its boxes; or data of a clip, for a request
- * of one. Throws GaussianSplatError (`network/*`, `decode/*`, `out-of-memory/*`), or the signal's reason if that is
- * aborted.
+ * Reads the index of a streamed SOG scene and the coarsest level of each of its boxes. Throws GaussianSplatError
+ * (`network/*`, `decode/*`, `out-of-memory/*`), or the signal's reason if that is aborted.
  */
 export async function openBoxes(
-  request: SceneRequest | ClipRequest,
+  request: SceneRequest,
   signal: AbortSignal,
-  onProgress: ProgressListener,
-): Promise<LoadedBoxes | ClipAnswer<unknown>> {
-  if ('isClip' in request) {
-    const { readClip } = await loadModule('the code that reads clips', () => import('./clip-of.js'));
-    const clip = await readClip(request, signal);
-    return { clip, levels: clip };
-  }
+  { onProgress }: Pick<TaskListeners, 'onProgress'>,
+): Promise<LoadedBoxes> {
   const { url, credentials, sh } = request;
   const name = fileName(url);
   const limits = limitsFrom(request);

@@ -3,7 +3,7 @@ import { GaussianSplatError } from '@gaussian-splat/core';
 import { fetchScene, LoadBudget } from '@gaussian-splat/formats';
 import { checkManifest, type DetailManifest } from '@gaussian-splat/renderer';
 import { fileName, named, throttled } from './load-helpers.js';
-import type { FileRequest, ProgressListener } from './protocol.js';
+import type { FileRequest, TaskListeners } from './protocol.js';
 
 export { decodePage } from '@gaussian-splat/renderer/tools';
 
@@ -22,7 +22,7 @@ const PAGE_BYTES = 128;
 export async function openManifest(
   { url, credentials, limits = {} }: FileRequest,
   signal: AbortSignal,
-  onProgress: ProgressListener,
+  { onProgress }: Pick<TaskListeners, 'onProgress'>,
 ): Promise<DetailManifest> {
   try {
     const { maxBytes, maxSeconds, maxSplats = Infinity } = limits;

@@ -11,7 +11,13 @@ import {
 } from '@gaussian-splat/formats';
 import { fileLimits, fileName, limitsFrom, named, throttled } from './load-scene.js';
 import { ProgressSum } from './progress-sum.js';
-import type { FileRequest, LoadedMesh, ProgressListener } from './protocol.js';
+import type { FileRequest, TaskListeners } from './protocol.js';
+
+/** The validated triangles of a file, and its decoded images. */
+export interface LoadedMesh extends Omit<TriangleFile, 'images'> {
+  /** Images of the file, by their index; undefined for unused ones. */
+  readonly images: readonly (ImageBitmap | undefined)[];
+}
 
 /**
  * Fetches a glTF and the files that it names, checks their memory costs, and decodes the images. Throws
@@ -20,7 +26,7 @@ import type { FileRequest, LoadedMesh, ProgressListener } from './protocol.js';
 export async function openMeshFile(
   request: FileRequest,
   signal: AbortSignal,
-  onProgress: ProgressListener = () => undefined,
+  { onProgress }: Pick<TaskListeners, 'onProgress'>,
 ): Promise<LoadedMesh> {
   const { url, credentials } = request;
   const name = fileName(url);

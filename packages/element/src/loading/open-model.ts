@@ -3,9 +3,15 @@
  * first generator.
  */
 import { GaussianSplatError } from '@gaussian-splat/core';
-import { openHeader, type OnnxHeader, type OpenedModel } from '@gaussian-splat/core/onnx';
+import { openHeader, type ModelPlace, type OnnxHeader, type OpenedModel } from '@gaussian-splat/core/onnx';
 import { fileLimits, fileName, limitsFrom, named } from './load-scene.js';
-import type { ModelRequest } from './protocol.js';
+import type { SceneLimits } from './protocol.js';
+
+/** A model whose header is to be read. */
+export interface ModelRequest {
+  readonly place: ModelPlace;
+  readonly limits?: SceneLimits | undefined;
+}
 
 /**
  * Maximum number of nodes, tensors, values, metadata entries and files of a model, because the main thread processes

@@ -1,23 +1,12 @@
 import { loadModule } from '@gaussian-splat/core';
 import { why } from '../gpu/request-device.js';
-import type {
-  FileRequest,
-  LoadedScene,
-  LoadedSequence,
-  PartListener,
-  PreviewListener,
-  ProgressListener,
-  SceneRequest,
-  SentScene,
-  WorkerRequest,
-} from './protocol.js';
+import type { FileRequest, LoadedScene, PreviewListener, ProgressListener, SceneRequest } from './protocol.js';
 import type * as workerModule from './scene-worker.js';
+import type { WorkerRequest } from './worker-messages.js';
 import { WORKER_SOURCES } from './worker-sources.js';
 import { spawnAt } from './spawn-worker.js';
 import { WorkerPool } from './worker-pool.js';
-
-/** The module of the worker's code. */
-export type SceneWorker = typeof workerModule;
+import type { AnswerOf, RequestOf, TaskType } from './worker-tasks.js';
 
 /**
  * Loads scenes in workers. One worker serves the whole page: it starts with the first load and ends when idle. More
@@ -76,68 +65,37 @@ export class SceneLoader {
     onProgress: ProgressListener,
     onPreview?: PreviewListener,
   ): Promise<LoadedScene> {
-    const loaded = await this.open(request, signal, onProgress, onPreview);
+    const loaded = await this.ask('load', request, signal, { onProgress, onPreview });
     if ('frames' in loaded) throw await why(({ sequenceWithin }) => sequenceWithin(request.url));
-    return loaded;
+    // Without `onPart`, the answer contains the splats.
+    return loaded as LoadedScene;
   }
 
-  /** Loads a scene as {@link load} does, or the manifest of a sequence, if the address names one. */
-  open(
-    request: SceneRequest,
-    signal: AbortSignal,
-    onProgress: ProgressListener,
-    onPreview?: PreviewListener,
-  ): Promise<LoadedScene | LoadedSequence>;
-  /**
-   * Loads a scene or the manifest of a sequence, and may pass on the splats of a large scene as they are read.
-   * @param onPart Receives the splats of a large scene before the promise resolves: see {@link SentScene}.
-   */
-  open(
-    request: SceneRequest,
-    signal: AbortSignal,
-    onProgress: ProgressListener,
-    onPreview: PreviewListener | undefined,
-    onPart: PartListener,
-  ): Promise<LoadedScene | SentScene | LoadedSequence>;
-  open(
-    request: SceneRequest,
-    signal: AbortSignal,
-    onProgress: ProgressListener,
-    onPreview?: PreviewListener,
-    onPart?: PartListener,
-  ): Promise<LoadedScene | SentScene | LoadedSequence> {
-    return this.ask(
-      { type: 'load', request, wantsPreviews: onPreview !== undefined, wantsParts: onPart !== undefined },
-      signal,
-      ({ loadScene }) => loadScene(request, signal, { onProgress, onPreview }),
-      { onProgress, onPreview, onPart },
-    );
-  }
-
-  /**
-   * Fetches the bytes of one file. Rejects with GaussianSplatError (`network/*`, `out-of-memory/*`), or with the
-   * signal's reason as soon as the signal is aborted.
-   */
+  /** Fetches the bytes of one file. Rejects as {@link ask} does. */
   fetchFile(request: FileRequest, signal: AbortSignal): Promise<ArrayBuffer> {
-    return this.ask({ type: 'file', request }, signal, ({ fetchFile }) => fetchFile(request, signal));
+    return this.ask('file', request, signal);
   }
 
   /**
-   * Sends a request to a worker, and returns its answer: see `WorkerRequest`. Rejects as {@link load} does.
-   * @param here Runs the request on the main thread, if workers are not available.
+   * Runs a task in a worker, or on the main thread if workers are not available. Rejects with GaussianSplatError
+   * (`network/*`, `decode/*`, `out-of-memory/*`), or with the signal's reason as soon as the signal is aborted.
+   * @returns the answer of the task: see `WORKER_TASKS`; undefined for tasks that run only in workers, without one.
    */
-  ask<T>(
-    request: WorkerRequest,
+  ask<T extends TaskType>(
+    type: T,
+    request: RequestOf<T>,
     signal: AbortSignal,
-    here: (code: SceneWorker) => Promise<T>,
-    options?: Parameters<WorkerPool['run']>[3],
-  ): Promise<T> {
-    const run = (asked: WorkerRequest): Promise<T> =>
-      this.#pool.run(asked, signal, async () => here(await this.#code()), options);
+    options: Parameters<WorkerPool['run']>[3] = {},
+  ): Promise<AnswerOf<T>> {
+    const { onProgress = () => undefined, onPreview } = options;
+    const here = async (): Promise<AnswerOf<T>> =>
+      (await this.#code()).runOnPage(type, request, signal, { onProgress, onPreview });
+    const run = (asked: RequestOf<T>): Promise<AnswerOf<T>> =>
+      this.#pool.run({ type, request: asked } as WorkerRequest, signal, here, options);
     return origin === 'null' ? withFile(request).then(run) : run(request);
   }
 
-  async #code(): Promise<SceneWorker> {
+  async #code(): Promise<typeof workerModule> {
     try {
       return await loadModule('the code that reads scenes', () => import('./scene-worker.js'));
     } catch (error) {
@@ -154,13 +112,12 @@ export class SceneLoader {
  * Adds the content of a `blob:` address to a request. Workers cannot read such addresses of pages without an origin,
  * which are opened from a disk or in a sandboxed frame.
  */
-async function withFile(asked: WorkerRequest): Promise<WorkerRequest> {
-  const { request } = asked as { readonly request?: Partial<FileRequest> };
-  const url = request?.url;
-  if (!url?.startsWith('blob:')) return asked;
+async function withFile<T>(request: T): Promise<T> {
+  const { url } = request as Partial<FileRequest>;
+  if (!url?.startsWith('blob:')) return request;
   const file = await fetch(url).then(
     (response) => response.blob(),
     () => undefined,
   );
-  return { ...asked, request: { ...request, file } } as WorkerRequest;
+  return { ...request, file };
 }

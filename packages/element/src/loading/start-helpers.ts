@@ -1,5 +1,5 @@
 /** Starts helping workers. The module is loaded only for scenes that several workers pack. */
-import type { PageMessage, WorkerMessage } from './protocol.js';
+import type { PageMessage, WorkerMessage } from './worker-messages.js';
 
 /** Number of threads that helpers leave free: the worker that is helped, the main thread, and one for the network. */
 const OTHERS = 3;

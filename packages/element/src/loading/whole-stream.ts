@@ -15,9 +15,8 @@ import {
   pageLayout,
   type InstanceList,
 } from '@gaussian-splat/renderer/tools';
-import type { LoadListeners } from './load-scene.js';
 import { openManifest } from './open-manifest.js';
-import type { LoadedScene, SceneRequest } from './protocol.js';
+import type { LoadedScene, SceneRequest, TaskListeners } from './protocol.js';
 
 /** GPU memory of a splat in bytes, with harmonics of degree 3 in 8 bits, and with data of each frame: see `glBytes`. */
 const SPLAT_BYTES = 4 * (8 + 14 + 9);
@@ -25,7 +24,7 @@ const SPLAT_BYTES = 4 * (8 + 14 + 9);
 const GROWTH = 8;
 
 /** Limits, listeners and functions of the load of a scene. */
-export interface StreamLoad extends Pick<LoadListeners, 'onProgress' | 'onPreview' | 'onReading'> {
+export interface StreamLoad extends Pick<TaskListeners, 'onProgress' | 'onPreview' | 'onReading'> {
   readonly name: string;
   readonly limits: () => LoadLimits;
   /** Returns the options of another download, which adds to the progress. */
@@ -71,7 +70,7 @@ async function loadPages(
   signal: AbortSignal,
   { options, pack, onProgress, onPreview, onReading }: StreamLoad,
 ): Promise<LoadedScene> {
-  const manifest = await openManifest(request, signal, onProgress);
+  const manifest = await openManifest(request, signal, { onProgress });
   if (manifest.geometry === undefined) throw ofVersion1(request.url);
   const list = listPages(manifest);
   const pages = finestPages(list, Math.floor(maxSplats / constants.CULL_GROUP));

@@ -1,6 +1,7 @@
 import { GaussianSplatError, Lazy } from '@gaussian-splat/core';
 import { FairTurns } from './fair-turns.js';
-import { buffersOf, type PartListener, type WorkerMessage, type WorkerRequest } from './protocol.js';
+import { buffersOf, type PartListener } from './protocol.js';
+import type { WorkerMessage, WorkerRequest } from './worker-messages.js';
 import { WorkerSlot, type Job } from './worker-slot.js';
 
 /** Time for which an idle worker is kept, ms, because pages with several elements load one scene after another. */
@@ -161,7 +162,7 @@ export class WorkerPool {
     if (at >= 0) this.#queue.splice(at, 1);
     if (!slot) return;
     slot.drop(job);
-    this.#rest(slot, /^(file|box)/.test(job.request.type) ? STREAMING_IDLE_MS : IDLE_MS);
+    this.#rest(slot, /^(file|box|clip)/.test(job.request.type) ? STREAMING_IDLE_MS : IDLE_MS);
     this.#placeQueued();
   }
 

@@ -1,4 +1,5 @@
-import type { PageMessage, PartListener, PreviewListener, ProgressListener, WorkerRequest } from './protocol.js';
+import type { PartListener, PreviewListener, ProgressListener } from './protocol.js';
+import type { PageMessage, WorkerRequest } from './worker-messages.js';
 
 /** A request to a worker, with its listeners. */
 export interface Job {
@@ -106,8 +107,8 @@ export class WorkerSlot {
   }
 
   #send(job: Job): void {
-    const { id, request, transfer } = job;
+    const { id, request, transfer, onPreview, onPart } = job;
     job.sentAt = performance.now();
-    this.post({ ...request, id }, transfer);
+    this.post({ ...request, id, wantsPreviews: onPreview !== undefined, wantsParts: onPart !== undefined }, transfer);
   }
 }

@@ -1,5 +1,5 @@
 import { DATA_WIDTH, SplatOrder, type OrderView } from '@gaussian-splat/renderer/webgl';
-import type { PageMessage, WorkerMessage } from '../loading/protocol.js';
+import type { PageMessage, WorkerMessage } from '../loading/worker-messages.js';
 import type { SortAnswer, SortRequest } from '../loading/sort-splats.js';
 
 /**

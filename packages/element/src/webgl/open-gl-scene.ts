@@ -43,13 +43,15 @@ export async function openGlScene(
     if (!live().ownsControls()) throw cannotShow('a post-processor', reason);
     const previews = new Previews(options);
     const scene = await loader
-      .open(request, signal, onProgress, options.onPreview && previews.show)
+      .ask('load', request, signal, { onProgress, onPreview: options.onPreview && previews.show })
       .finally(() => previews.end());
     signal.throwIfAborted();
     requireAlone();
     if ('frames' in scene) throw cannotShow('a sequence of scenes', reason);
-    beforeUpload(glBytes(scene.packed));
-    return await GlLoaded.open(lease, scene, openOptions(options, signal));
+    // Without `onPart`, the answer contains the splats.
+    const whole = scene as LoadedScene;
+    beforeUpload(glBytes(whole.packed));
+    return await GlLoaded.open(lease, whole, openOptions(options, signal));
   } catch (error) {
     lease.release();
     throw error;

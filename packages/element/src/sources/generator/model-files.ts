@@ -1,7 +1,7 @@
 /** Reads the headers of models, in a worker, and fetches the files beside them. */
 import { GaussianSplatError } from '@gaussian-splat/core';
 import { bytesOf, fetchPatiently } from '@gaussian-splat/core/fetch';
-import type { ModelPlace, OpenedModel } from '@gaussian-splat/core/onnx';
+import type { ModelPlace } from '@gaussian-splat/core/onnx';
 import type { ModelSource } from '@gaussian-splat/generator';
 import type { SceneLimits } from '../../loading/protocol.js';
 import type { SceneLoader } from '../../loading/scene-loader.js';
@@ -9,11 +9,8 @@ import type { SceneLoader } from '../../loading/scene-loader.js';
 /** Returns a function that reads the header of a model in a worker, within the limits of the page. */
 export function readsHeaders(loader: SceneLoader, limits: SceneLimits | undefined): ModelSource['openHeader'] {
   return (place: ModelPlace, signal = new AbortController().signal) => {
-    const request = { place, limits };
     const transfer = 'bytes' in place ? [place.bytes.buffer as ArrayBuffer] : undefined;
-    return loader.ask<OpenedModel>({ type: 'model', request }, signal, ({ openModel }) => openModel(request, signal), {
-      transfer,
-    });
+    return loader.ask('model', { place, limits }, signal, { transfer });
   };
 }
 

@@ -1,6 +1,6 @@
 import { GaussianSplatError, type Bounds, type Vector3 } from '@gaussian-splat/core';
 import type { Reservation } from '@gaussian-splat/renderer/tools';
-import type { LoadedMesh } from '../../loading/protocol.js';
+import type { LoadedMesh } from '../../loading/open-mesh-file.js';
 import { unpackedViews } from './unpack.js';
 import {
   AnimationMixer,

@@ -7,8 +7,9 @@ import { limited, type OpenOptions } from '../../gpu/open-scene.js';
 import { assertWebGpu } from '../../gpu/request-device.js';
 import { withLease } from '../../gpu/shared-device.js';
 import type { Timeline } from '../generator/dynamic-model.js';
-import type { FileRequest, LoadedMesh, SceneRequest } from '../../loading/protocol.js';
-import type { SceneLoader, SceneWorker } from '../../loading/scene-loader.js';
+import type { LoadedMesh } from '../../loading/open-mesh-file.js';
+import type { FileRequest, SceneRequest } from '../../loading/protocol.js';
+import type { SceneLoader } from '../../loading/scene-loader.js';
 import { Model } from './model.js';
 
 /**
@@ -19,14 +20,14 @@ export function fetchMesh(
   loader: SceneLoader,
   { url, credentials, limits }: FileRequest,
   signal: AbortSignal,
-  onProgress?: OpenOptions['onProgress'],
+  onProgress: OpenOptions['onProgress'] = () => undefined,
 ): Promise<LoadedMesh> {
   const request = { url, credentials, limits };
-  const here = ({ openMeshFile }: SceneWorker): Promise<LoadedMesh> => openMeshFile(request, signal, onProgress);
-  return loader.ask({ type: 'mesh', request }, signal, here, { onProgress }).catch(async (error: unknown) => {
+  return loader.ask('mesh', request, signal, { onProgress }).catch(async (error: unknown) => {
     // The worker that bundlers build as a single file for strict pages contains no decoders.
     if (!isMissingDecoder(error)) throw error;
-    return here(await loadModule('the code that reads meshes', () => import('../../loading/scene-worker.js')));
+    const { runOnPage } = await loadModule('the code that reads meshes', () => import('../../loading/scene-worker.js'));
+    return runOnPage('mesh', request, signal, { onProgress });
   });
 }
 

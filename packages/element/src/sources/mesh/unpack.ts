@@ -1,5 +1,5 @@
 import { GaussianSplatError } from '@gaussian-splat/core';
-import type { LoadedMesh } from '../../loading/protocol.js';
+import type { LoadedMesh } from '../../loading/open-mesh-file.js';
 import { loadMeshoptDecoder } from './three.js';
 
 /**

@@ -1,11 +1,9 @@
 /** Plays clips of moving splats. The module is loaded only for clips. */
 import { clipGroupAt, clipRooms, frameAt, unpackClipIndex, type ClipIndex } from '@gaussian-splat/formats';
 import { AnimatedGaussians } from '@gaussian-splat/renderer';
-import type { PackedAnimation } from '@gaussian-splat/renderer/tools';
 import type { SceneBounds } from '../../viewer/camera/settings.js';
-import type { OpenedClip } from '../../loading/clip-of.js';
-import type { ClipAnswer, ClipRequest, ProgressListener, SceneRequest } from '../../loading/protocol.js';
-import type { SceneWorker, SceneLoader } from '../../loading/scene-loader.js';
+import type { ProgressListener, SceneRequest } from '../../loading/protocol.js';
+import type { SceneLoader } from '../../loading/scene-loader.js';
 import { GroupCache, partsIn, STILL } from './group-cache.js';
 import { GroupSlots } from './group-slots.js';
 import { PlayDirection } from './play-direction.js';
@@ -57,23 +55,18 @@ export class ClipPlayer implements Timeline {
    */
   static async open(options: ClipOptions): Promise<ClipPlayer> {
     const { device, loader, request, signal, onProgress, memoryBudget, startSeconds, listeners } = options;
-    const ask = async <T>(own: Pick<ClipRequest, 'whole' | 'part' | 'tag'>, aborted: AbortSignal): Promise<T> => {
-      const { url, credentials, limits } = request;
-      const asked: ClipRequest = { isClip: true, url, credentials, limits, ...own };
-      const here = ({ openBoxes }: SceneWorker): Promise<ClipAnswer<T>> =>
-        openBoxes(asked, aborted, () => undefined) as Promise<ClipAnswer<T>>;
-      return (await loader.ask({ type: 'boxes', request: asked }, aborted, here)).clip;
-    };
-    const whole = await localFile(request.url);
-    const opened = await ask<OpenedClip>({ whole }, signal);
+    const { url, credentials, limits } = request;
+    const whole = await localFile(url);
+    const opened = await loader.ask('clip', { url, credentials, limits, whole }, signal);
     const index = unpackClipIndex(opened.index);
     const file = opened.file ?? (opened.isPartial ? whole : new Blob([await loader.fetchFile(request, signal)]));
     const cache = new GroupCache(index, {
       fetchPart: (group, part, aborted) => {
         const { groups, shDegree, origin } = index;
         const frames = group === STILL ? 1 : groups[group].frames;
+        const place = { url, credentials, limits, whole: file, tag: opened.tag };
         const own = { part: partsIn(index, group)[part], group, frames, shDegree, origin };
-        return ask<PackedAnimation>({ whole: file, tag: opened.tag, part: own }, aborted);
+        return loader.ask('clip-part', { ...place, ...own }, aborted);
       },
       onArrival: () => {
         onProgress(file ? index.byteLength : cache.loadedBytes, index.byteLength);

@@ -3,7 +3,7 @@
  * them.
  */
 import { DetailedGaussians } from '@gaussian-splat/renderer';
-import { readPacked, type PackedLevels } from '@gaussian-splat/renderer/tools';
+import { readPacked } from '@gaussian-splat/renderer/tools';
 import type { LoadedGaussians } from '../../gpu/loaded-gaussians.js';
 import { buffersOf } from '../../loading/protocol.js';
 import type { SceneLoader } from '../../loading/scene-loader.js';
@@ -28,9 +28,8 @@ export async function buildLevels(
   });
   signal.throwIfAborted();
   // The arrays are transferred to the worker, because building levels would block the main thread for seconds.
-  const nothing = async (): Promise<undefined> => undefined;
   const transfer = buffersOf(packed);
-  const levels = await loader.ask<PackedLevels | undefined>({ type: 'levels', packed }, signal, nothing, { transfer });
+  const levels = await loader.ask('levels', packed, signal, { transfer });
   if (levels === undefined) return undefined;
   const left = memoryBudget === undefined ? undefined : memoryBudget - gaussians.byteLength;
   const detailed = await DetailedGaussians.upload(place.device, gaussians, levels, { memoryBudget: left });

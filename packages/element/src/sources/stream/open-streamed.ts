@@ -3,8 +3,8 @@ import { fileRequest } from '@gaussian-splat/core/fetch';
 import { loadModule, type TrainedOrder } from '@gaussian-splat/core';
 import { MemoryLedger, pickInitialVariants, StreamedGaussians, type PoolOptions } from '@gaussian-splat/renderer';
 import { levelSource } from '@gaussian-splat/renderer/tools';
-import type { LoadedBoxes, ProgressListener, SceneLimits, SceneRequest } from '../../loading/protocol.js';
-import type { SceneWorker, SceneLoader } from '../../loading/scene-loader.js';
+import type { ProgressListener, SceneLimits, SceneRequest } from '../../loading/protocol.js';
+import type { SceneLoader } from '../../loading/scene-loader.js';
 import type { ClipPlayer } from '../players/clip-player.js';
 import type { DynamicRequest } from '../generator/dynamic-model.js';
 import type { SceneBounds } from '../../viewer/camera/settings.js';
@@ -126,12 +126,7 @@ type Open = (
 const openPages: Open = async (request, device, { loader, signal, onProgress }, pool) => {
   const { limits = {} } = request;
   const allowance = new Allowance(limits);
-  const manifest = await loader.ask(
-    { type: 'manifest', request },
-    signal,
-    ({ openManifest }) => openManifest(request, signal, onProgress),
-    { onProgress },
-  );
+  const manifest = await loader.ask('manifest', request, signal, { onProgress });
   return StreamedGaussians.open(device, manifest, {
     ...pool,
     isDecoded: true,
@@ -143,12 +138,7 @@ const openPages: Open = async (request, device, { loader, signal, onProgress }, 
 };
 
 const openBoxes: Open = async (request, device, { loader, signal, onProgress }, pool) => {
-  const { levels, files, runs, firstRuns } = await loader.ask(
-    { type: 'boxes', request },
-    signal,
-    ({ openBoxes }) => openBoxes(request, signal, onProgress) as Promise<LoadedBoxes>,
-    { onProgress },
-  );
+  const { levels, files, runs, firstRuns } = await loader.ask('boxes', request, signal, { onProgress });
   const { url, credentials } = request;
   const allowance = new Allowance(request.limits);
   const source = levelSource(levels, async (page, aborted) => {
@@ -156,8 +146,7 @@ const openBoxes: Open = async (request, device, { loader, signal, onProgress }, 
     const part = `${page.box} ${page.level}`;
     const place = { url, path: files[file], first, count };
     const box = { ...place, page, scene: levels.scene, credentials, limits: allowance.of(part) };
-    const here = ({ readBox }: SceneWorker): Promise<ArrayBuffer> => readBox(box, aborted);
-    return new Uint32Array(await allowance.note(part, loader.ask({ type: 'box', request: box }, aborted, here)));
+    return new Uint32Array(await allowance.note(part, loader.ask('box', box, aborted)));
   });
   return StreamedGaussians.openSource(device, source, pool);
 };
