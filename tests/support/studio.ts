@@ -16,7 +16,7 @@ const TRUTHS = fileURLToPath(new URL('../fixtures/studio/', import.meta.url));
 const SCENES = fileURLToPath(new URL('../../demo/scenes/studio/', import.meta.url));
 
 /** All scenes that are in the repository. */
-export const STUDIO = ['apartment', 'garden', 'hall', 'walker'] as const;
+export const STUDIO = ['apartment', 'garden', 'hall', 'product', 'walker'] as const;
 export type StudioName = (typeof STUDIO)[number];
 
 /** A rectangle of the floor: smallest and largest x, smallest and largest z. */
