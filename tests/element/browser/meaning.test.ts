@@ -92,6 +92,8 @@ def ParticleField3DGaussianSplat "S"
         const isSaid = element.stats!.warnings.some((sentence) => /y is assumed.*up="z"/.test(sentence));
         assertEqual(isSaid, metadata === '', 'stats.warnings');
       }
+      // Once the page names the axis, there is nothing left to say.
+      await showLoaded({ src: usda('', [0, 1, 0]), up: 'y' }, 'width: 120px; height: 120px');
     } finally {
       console.warn = warn;
     }

@@ -1,4 +1,4 @@
-import { Lazy, type Camera, type Matrix4 } from '@gaussian-splat/core';
+import { Lazy, type Camera, type Matrix4, type Vector3 } from '@gaussian-splat/core';
 import type { ReactiveControllerHost, ReactiveElement } from 'lit';
 import type { Attributes } from './attributes.js';
 import type { DetailHost } from '../sources/stream/detail-controller.js';
@@ -73,6 +73,8 @@ export interface SourceOwner {
   readonly dynamicValues: DynamicHost['owner']['dynamicValues'];
   /** False if the source follows the clock of its parent element. */
   readonly hasOwnClock: boolean;
+  /** Up direction that the page sets, in the axes of the file; undefined for that of the file. */
+  readonly ownUp: Vector3 | undefined;
   /** Attributes of a child, which take precedence over those of the element. */
   readonly overrides?: Partial<Attributes>;
   /** Opens a source that contains no splats, such as a mesh; undefined for splats. */

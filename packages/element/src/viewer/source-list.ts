@@ -110,7 +110,9 @@ export class SourceList implements EntryList {
       await this.#core.prepareFor(scene);
       if (scene.isDestroyed || scene.place.isLost || entry.scene.scene !== scene || !this.#all.includes(entry)) return;
       scene.onChange = () => this.#core.requestFrame();
-      for (const warning of scene.warnings) this.#core.warn(`<gaussian-splat>: ${warning}`);
+      // The page that sets `up` knows that the file does not.
+      for (const warning of scene.warnings)
+        if (!entry.owner.ownUp || !warning.includes('up="')) this.#core.warn(`<gaussian-splat>: ${warning}`);
       enter(new WorldEntry(this.world, scene));
       this.#latest = entry;
       this.changed();

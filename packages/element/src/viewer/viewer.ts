@@ -61,6 +61,12 @@ export class Viewer implements SourceOwner {
   declare onFrame: (() => void) | undefined;
   readonly view: ViewController;
   readonly hasOwnClock = true;
+
+  /** Up direction that the page sets, in the axes of the file; undefined for that of the file. */
+  get ownUp(): Vector3 | undefined {
+    return this.attributes.up;
+  }
+
   /** The clock of the element. */
   readonly playback: PlaybackController;
   readonly live: DynamicWiring;

@@ -205,6 +205,11 @@ export abstract class SplatChild extends ReactiveElement implements SourceOwner 
   abstract get source(): Source;
 
   /** @internal */
+  get ownUp(): Vector3 | undefined {
+    return this.#placed.up;
+  }
+
+  /** @internal */
   get dynamicValues(): Omit<DynamicState, 'timeSeconds'> {
     return NO_VALUES;
   }
