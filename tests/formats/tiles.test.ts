@@ -22,9 +22,9 @@ const tile = (uri: string | undefined, more: object = {}): object => ({
   ...more,
 });
 
-const readTiles = async (files: Files, level?: number): Promise<GaussianCloud> =>
+const readTiles = async (files: Files, level?: number, maxSplats?: number): Promise<GaussianCloud> =>
   readScene(files['tileset.json'], {
-    ...{ name: 'tileset.json', level },
+    ...{ name: 'tileset.json', level, maxSplats },
     openFile: (path) => (path in files ? Promise.resolve(files[path]) : Promise.reject(new Error(`no ${path}`))),
   });
 const whole = (bytes: Uint8Array): Promise<GaussianCloud> => readScene(bytes, { name: 'a.glb' });
@@ -53,6 +53,15 @@ test('the finest tiles are the scene, and each level leaves out the lowest', asy
   assertNear(finest.sh, [...a.sh, ...b.sh], 1e-6);
   const coarse = await readTiles(TREE, 1);
   assertNear(coarse.positions, root.positions, 1e-6);
+});
+
+test('the finest level with few enough splats is read; if the coarsest has too many, the error says so', async () => {
+  const counts = [50, 49, 10].map(async (max) => (await readTiles(TREE, undefined, max)).count);
+  assert.deepEqual(await Promise.all(counts), [50, 10, 10]);
+  await assert.rejects(readTiles(TREE, undefined, 9), {
+    code: 'out-of-memory/budget',
+    message: /at most 9 splats.*10/s,
+  });
 });
 
 test('tiles that are added are drawn beside those below them', async () => {

@@ -27,8 +27,8 @@ export interface ReadSceneOptions extends LoadLimits {
    */
   readonly level?: number | 'all';
   /**
-   * Maximum number of splats. Of a streamed SOG, the finest level within this limit is read. Scenes that exceed the limit
-   * are rejected with `out-of-memory/budget`, also streamed SOG if the coarsest level exceeds it.
+   * Maximum number of splats. Of streamed SOG, LCC and 3D Tiles, the finest level within this limit is read. Scenes that
+   * exceed the limit are rejected with `out-of-memory/budget`, also those with levels if the coarsest exceeds it.
    */
   readonly maxSplats?: number;
   /**

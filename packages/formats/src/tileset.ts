@@ -12,10 +12,18 @@ const MAX_DEPTH = 500;
 
 const IDENTITY: Affine = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0];
 
+/** Figures of all tilesets of one load. */
+export interface TreeLoad {
+  /** Number of tiles, which is limited. */
+  tiles: number;
+  /** Levels of tiles below the highest root: no level above this number is coarser. */
+  height: number;
+}
+
 /**
  * Returns the files of a tileset at a level of detail. Level 0 is the finest; level n omits the n lowest levels of tiles
  * in each branch.
- * @param load Number of tiles of all tilesets of a load, which this function increases. They share one limit.
+ * @param load Figures of all tilesets of a load, which this function updates.
  * @param openSubtree Opens the subtrees of implicit tiles by their URIs from the tileset.
  * @param toParent Transform from the coordinates of the tileset to those of its parent.
  * @throws GaussianSplatError `decode/header`, `decode/corrupt`, `decode/truncated`, or as `parseJson` and `openSubtree` do
@@ -23,7 +31,7 @@ const IDENTITY: Affine = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0];
 export async function contentsAt(
   source: JsonSource,
   level: number,
-  load: { tiles: number },
+  load: TreeLoad,
   openSubtree: OpenSubtree,
   toParent: Affine = IDENTITY,
 ): Promise<TileContent[]> {
@@ -60,7 +68,8 @@ export async function contentsAt(
   const tree = open(root, toParent, false, 'root', 0);
   for (const complete of implicit) await complete();
   const turn = turnOf(asset, source.name);
-  const contents = drawnOf(tree, level);
+  const { contents, height } = drawnOf(tree, level);
+  load.height = Math.max(load.height, height);
   return turn ? contents.map((content) => ({ ...content, turn })) : contents;
 }
 
@@ -80,10 +89,10 @@ function turnOf(asset: unknown, name: string): Affine | undefined {
 }
 
 /**
- * Returns the contents that are drawn for a tree at a level. Each is listed once, because lists of all tiles of a chain
+ * Returns the contents that are drawn for a tree at a level, and the height of the tree. Each is listed once, because lists of all tiles of a chain
  * would take memory by the square of its length.
  */
-function drawnOf(tree: Tile, level: number): TileContent[] {
+function drawnOf(tree: Tile, level: number): { readonly contents: TileContent[]; readonly height: number } {
   const drawn: TileContent[] = [];
   const draw = (contents: readonly TileContent[]): void => {
     for (const content of contents) drawn.push(content);
@@ -102,8 +111,8 @@ function drawnOf(tree: Tile, level: number): TileContent[] {
     }
     return height;
   };
-  visit(tree);
-  return drawn;
+  const height = visit(tree);
+  return { contents: drawn, height };
 }
 
 /** Returns an extension of a tile, with which version 1.0 has what version 1.1 has as a property. */

@@ -7,7 +7,7 @@ import { MAX_PATH } from '../lod/meta.js';
 import { mergeClouds } from '../merge-clouds.js';
 import type { SceneSource } from '../scene-format.js';
 import type { TileContent } from '../tile.js';
-import { contentsAt } from '../tileset.js';
+import { contentsAt, type TreeLoad } from '../tileset.js';
 import { applyMotion } from '../transform/moved-cloud.js';
 import { isTileset, readGltf } from './gltf.js';
 import { noParts } from './sog.js';
@@ -26,14 +26,27 @@ const ON_EARTH = 1e6;
 
 /**
  * Reads a tileset of 3D Tiles whose tiles are glTF with splats, at the level of detail `source.level`; 0 is the finest.
- * In a georeferenced tileset, `hints.up` is the direction away from the Earth's center. Tiles without splats are skipped
- * with a warning.
+ * If it has more than `source.maxSplats` splats, the finest coarser level with fewer is read, else the coarsest. A
+ * tileset does not say how many splats its tiles have, so that each level is read until it has too many. In a
+ * georeferenced tileset, `hints.up` is the direction away from the Earth's center. Tiles without splats are skipped with
+ * a warning.
  */
 export async function readTiles(source: SceneSource): Promise<GaussianCloud> {
-  const level = source.level === 'all' ? 0 : (source.level ?? 0);
+  for (let level = source.level === 'all' ? 0 : (source.level ?? 0); ; level++) {
+    const whole = await readLevel(source, level);
+    if (whole) return whole;
+  }
+}
+
+/** Reads a level; undefined if it has too many splats and is not the coarsest. */
+async function readLevel(source: SceneSource, level: number): Promise<GaussianCloud | undefined> {
+  const { maxSplats = Infinity } = source;
+  const load: TreeLoad = { tiles: 0, height: 0 };
   const clouds: GaussianCloud[] = [];
   let others = 0;
-  for await (const { toTileset, turn, uri, bytes } of filesOf(source, level)) {
+  let count = 0;
+  const hasCoarser = (): boolean => maxSplats < Infinity && level < load.height;
+  for await (const { toTileset, turn, uri, bytes } of filesOf(source, level, load)) {
     source.signal?.throwIfAborted();
     const { budget, signal } = source;
     const name = `${source.name}, ${uri}`;
@@ -45,12 +58,16 @@ export async function readTiles(source: SceneSource): Promise<GaussianCloud> {
     const openFile = (path: string, query?: string): Promise<Uint8Array> => opened(source, folder + path, query);
     const cloud = await readGltf({ bytes, name, budget, signal, openFile }).catch((error: unknown) => {
       if (error instanceof GaussianSplatError && error.code === 'decode/not-splats') return undefined;
+      if (error instanceof GaussianSplatError && error.code === 'out-of-memory/budget' && hasCoarser()) return null;
       throw error;
     });
+    if (cloud === null) return undefined;
     // TO_CLOUD is its own inverse, so that the same transform leads from the cloud to the tile.
     const fromContent = turn ? multiply(toTileset, turn) : toTileset;
     if (cloud) clouds.push(applyMotion(cloud, multiply(TO_CLOUD, multiply(fromContent, TO_CLOUD))));
     else others++;
+    count += cloud?.count ?? 0;
+    if (count > maxSplats && hasCoarser()) return undefined;
   }
   if (clouds.length === 0)
     throw damaged(
@@ -72,7 +89,7 @@ export async function readTiles(source: SceneSource): Promise<GaussianCloud> {
 type TileFile = TileContent & { readonly bytes: Uint8Array };
 
 /** Iterates over the glTF files of a tileset and of nested tilesets, at a level of detail. */
-async function* filesOf(source: SceneSource, level: number): AsyncGenerator<TileFile> {
+async function* filesOf(source: SceneSource, level: number, load: TreeLoad): AsyncGenerator<TileFile> {
   const { name, budget } = source;
   const left: (TileContent & { readonly depth: number })[] = [];
   /** Number of remaining references to each file. */
@@ -88,7 +105,6 @@ async function* filesOf(source: SceneSource, level: number): AsyncGenerator<Tile
       uses.set(content.uri, (uses.get(content.uri) ?? 0) + 1);
     }
   };
-  const load = { tiles: 0 };
   const subtreeOf =
     (folder: string) =>
     async (uri: string): Promise<Uint8Array> => {
