@@ -5,7 +5,7 @@ import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import type { ClipIndex } from '@gaussian-splat/formats';
 import type { PackedAnimation } from '@gaussian-splat/renderer/tools';
-import { GroupCache, partsIn } from '../../packages/element/dist/sources/players/group-cache.js';
+import { GroupCache, partsIn } from '../../packages/element/dist/sources/clip/group-cache.js';
 
 const FRAMES = 30;
 const SPLATS = 150_000;

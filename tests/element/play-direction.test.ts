@@ -1,7 +1,7 @@
 /** The direction of playback, from the frames that are requested. */
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { indicesFrom, PlayDirection } from '../../packages/element/dist/sources/players/play-direction.js';
+import { indicesFrom, PlayDirection } from '../../packages/element/dist/sources/play-direction.js';
 
 const directionsOf = (frames: readonly number[], loops: boolean): number[] => {
   const direction = new PlayDirection(48, 24);

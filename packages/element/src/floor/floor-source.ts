@@ -2,9 +2,9 @@ import type { Viewer } from '../viewer/viewer.js';
 import type { ViewerFrame } from '../viewer/camera/orbit.js';
 import { isVoxelPath, type FloorOptions, type FloorMap } from '@gaussian-splat/formats/floor';
 import { GaussianSplatError, type Vector3 } from '@gaussian-splat/core';
-import { isStreamed } from '../gpu/open-scene.js';
 import type { SceneRequest } from '../loading/protocol.js';
 import type { SceneLoader } from '../loading/scene-loader.js';
+import { kindOf } from '../sources/source-kinds.js';
 
 /** Sources and settings from which {@link openFloor} makes a map of the floor. */
 export interface FloorSource {
@@ -40,7 +40,7 @@ export async function openFloor(source: FloorSource, signal: AbortSignal): Promi
   const voxelUrl = mapUrl !== null && isVoxelPath(new URL(mapUrl).pathname) ? mapUrl : undefined;
   const isMap = mapUrl !== null && voxelUrl === undefined;
   const map = isMap ? await loader.fetchFile({ url: mapUrl, credentials, limits }, signal) : undefined;
-  if (mapUrl === null && isStreamed(request))
+  if (mapUrl === null && kindOf(request).name === 'stream')
     throw new GaussianSplatError('argument/value', {
       where: 'walk-map',
       expected: 'a file of the floor, because the scene is streamed',

@@ -11,6 +11,7 @@ import type {
 } from '@gaussian-splat/renderer';
 import type { ProbeAnswer, ProbePoint, WorkTime } from '@gaussian-splat/renderer/tools';
 import type { Frame, FrameFilter } from '../sources/generator/frame-filter.js';
+import type { Content } from '../sources/content.js';
 
 /** Settings of all frames of an element. */
 export interface Rendering {
@@ -50,6 +51,8 @@ export interface Drawable {
   readonly place: DeviceOwner;
   /** Number of submissions into which the work of a frame is divided. */
   readonly submissions: number;
+  /** Returns whether the backend can draw a content: see {@link Backend.can}. */
+  can(content: Content): boolean;
   /** Creates a backend that draws on the device of this scene. */
   openBackend(contents: FrameSource, events: BackendEvents): Backend;
 }
@@ -105,6 +108,8 @@ export interface CanvasFrame {
 /** Draws frames on canvases: `WebGpuBackend` or `WebGlBackend`. */
 export interface Backend {
   readonly place: DeviceOwner;
+  /** Returns whether the backend can draw a content. Its class has the same function, which is asked before a load. */
+  can(content: Content): boolean;
   /** @throws GaussianSplatError `unsupported/webgl` without WebGPU. */
   readonly device: GPUDevice;
   /** GPU memory for drawing in bytes, without that of the splats. */

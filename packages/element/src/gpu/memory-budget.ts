@@ -1,4 +1,5 @@
 import { MemoryLedger } from '@gaussian-splat/renderer';
+import type { FileRequest } from '../loading/protocol.js';
 
 /** Returns whether the primary pointer is coarse, as on phones and tablets. */
 export function isHandheld(): boolean {
@@ -21,7 +22,13 @@ export function defaultMemoryBudget(): number | undefined {
  * Returns the default limit of CPU memory for a load, in bytes. A splat takes several times as much CPU memory, in the
  * file and as numbers, as GPU memory.
  */
-export const loadBytes = (memoryBudget = Infinity): number => Math.min(8 * memoryBudget, 2 ** 32);
+const loadBytes = (memoryBudget = Infinity): number => Math.min(8 * memoryBudget, 2 ** 32);
+
+/** Returns a request with a limit of bytes: the request's own, or the default. */
+export const limited = <T extends FileRequest>(request: T, memoryBudget: number | undefined): T => ({
+  ...request,
+  limits: { maxBytes: loadBytes(memoryBudget), ...request.limits },
+});
 
 /** Limits that {@link limitScenes} has set, by device. Any other limit was set by the page, and is kept. */
 const set = new WeakMap<GPUDevice, number>();

@@ -34,6 +34,8 @@ export interface SceneRequest extends FileRequest {
   readonly sh: ShPrecision | 'auto';
   /** Whether all levels of detail in the file are loaded; otherwise only the finest. */
   readonly levels?: boolean;
+  /** Whether the file is shown as triangle meshes, without splats. */
+  readonly isMesh?: boolean | undefined;
   /** Renderer of the scene; default: WebGPU. */
   readonly renderer?: RendererChoice;
   /** Whether a streamed SOG scene is loaded completely, in its finest level. */

@@ -26,6 +26,8 @@ export interface Source {
   /** URLs of further models, separated by spaces: each receives the Gaussians of the previous one. null for none. */
   readonly chain: string | null;
   readonly postprocess: string | null;
+  /** Whether the file is shown as triangle meshes, without splats. */
+  readonly isMesh?: boolean;
 }
 
 /** The element as its features see it: its properties of playback and of effects besides those of HTMLElement. */

@@ -4,8 +4,10 @@ import { toElementError, type ElementError } from './errors.js';
 import type * as comeBack from '../gpu/device-recovery.js';
 import { delay, DeviceLostError, isDeviceFailure, pageVisible } from '../gpu/device-failures.js';
 import type { LoadedGaussians } from '../gpu/loaded-gaussians.js';
-import { isStreamed, openScene, type openGaussians, type OpenOptions } from '../gpu/open-scene.js';
+import { openScene } from '../gpu/open-scene.js';
 import type { ProgressListener, SceneRequest } from '../loading/protocol.js';
+import type { OpenOptions } from '../sources/source-kind.js';
+import { kindOf } from '../sources/source-kinds.js';
 import { LatestTask } from './latest-task.js';
 import { isSameContract } from '../loading/same-contract.js';
 import type { Services } from './element-host.js';
@@ -32,8 +34,6 @@ export interface SceneHost {
   readonly memoryBudget: number | undefined;
   /** Parameters for opening a generator that the element provides, not the request: see {@link OpenOptions.live}. */
   readonly dynamicRequest: ReturnType<OpenOptions['live']>;
-  /** `open` opens sources other than scenes of splats; default: {@link openGaussians}. */
-  readonly owner: { readonly open?: typeof openGaussians | undefined };
   /** Shows a scene. Resolves when its first frame is drawn. */
   show(scene: LoadedGaussians, entrance: Entrance): Promise<void>;
   /** Called before the current scene is destroyed. If `clear` is true, its last frame must disappear, too. */
@@ -253,7 +253,8 @@ export class SceneController implements ReactiveController {
    */
   async #refine(): Promise<void> {
     const [request, scene] = [this.#request, this.#scene];
-    if (this.#state !== 'ready' || request === null || scene === null || scene.live || isStreamed(request)) return;
+    if (this.#state !== 'ready' || request === null || scene === null || scene.live) return;
+    if (kindOf(request).name !== 'file') return;
     const { shPrecision, shDegree } = scene.gaussians;
     if (request.sh === 'auto' || request.sh === shPrecision || shDegree === 0) return;
     const signal = this.#running.renew();
@@ -342,7 +343,7 @@ export class SceneController implements ReactiveController {
   }
 
   async #open(request: SceneRequest, signal: AbortSignal, isNew: boolean, onProgress: ProgressListener): Promise<void> {
-    const { services, memoryBudget, core, owner } = this.#of;
+    const { services, memoryBudget, core } = this.#of;
     const onPreview =
       isNew && core!.wantsPreviews ? (preview: LoadedGaussians) => this.#showPreview(preview) : undefined;
     const beforeUpload = (byteLength: number): void => {
@@ -353,7 +354,6 @@ export class SceneController implements ReactiveController {
     };
     this.#setReleasable(true);
     const scene = await openScene(request, {
-      open: owner.open,
       device: services.sharedDevice,
       loader: services.sceneLoader,
       frameUrl: (url) => this.#of.services.urlModifier?.(url) ?? url,

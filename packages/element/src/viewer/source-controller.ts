@@ -1,5 +1,5 @@
 import type { Attributes } from './attributes.js';
-import { limited } from '../gpu/open-scene.js';
+import { limited } from '../gpu/memory-budget.js';
 import type { SceneRequest } from '../loading/protocol.js';
 import { Addresses } from './source-request.js';
 import type { Services, Source } from './element-host.js';
@@ -70,6 +70,6 @@ export class SourceController {
     const { attributes, services } = this.#host;
     const { sceneLimits, urlModifier } = services;
     const request = this.#addresses.request(source, attributes, urlModifier);
-    return request && limited({ ...request, limits: sceneLimits }, this.#host);
+    return request && limited({ ...request, limits: sceneLimits }, this.#host.memoryBudget);
   }
 }

@@ -77,8 +77,6 @@ export interface SourceOwner {
   readonly ownUp: Vector3 | undefined;
   /** Attributes of a child, which take precedence over those of the element. */
   readonly overrides?: Partial<Attributes>;
-  /** Opens a source that contains no splats, such as a mesh; undefined for splats. */
-  readonly open?: SceneHost['owner']['open'];
   /** Sets the transform of the source; absent if its frame is that of the world. */
   place?(member: WorldEntry, core: EntryCore): void;
   /** Returns the matrix from the coordinates of nested children (y up) to the world; absent for the element itself. */

@@ -34,7 +34,7 @@ export class Addresses {
 
   /** Returns the request for the element's scene; null if `src` is missing or empty. */
   request(
-    { src, contract, chain }: Source,
+    { src, contract, chain, isMesh }: Source,
     { crossorigin, quality, detail, renderer }: Pick<Attributes, 'crossorigin' | 'quality' | 'detail' | 'renderer'>,
     modifier: UrlModifier,
   ): SceneRequest | null {
@@ -47,6 +47,7 @@ export class Addresses {
       levels: typeof detail === 'number' && detail > 0,
       isWhole: !detail || detail === 'off',
       renderer,
+      isMesh,
       contract,
       chain: this.#chain.of(listed(chain), modifier),
     };

@@ -3,6 +3,7 @@ import { LoadedGaussians, type OwnedGaussians } from '../gpu/loaded-gaussians.js
 import { limit } from '../gpu/memory-budget.js';
 import type { FrameSource, Backend, BackendEvents } from '../gpu/backend.js';
 import type { LoadedScene } from '../loading/protocol.js';
+import type { Content } from '../sources/content.js';
 import { WebGlBackend } from './webgl-backend.js';
 import type { GlLease } from './gl-session.js';
 
@@ -78,12 +79,9 @@ export class GlLoaded extends LoadedGaussians {
     return new WebGlBackend(this, events);
   }
 
-  /** True, so that no levels of detail are built. */
-  override get hasOwnLevels(): boolean {
-    return true;
+  override can(content: Content): boolean {
+    return WebGlBackend.can(content);
   }
-
-  override setDetail(): void {}
 }
 
 const NO_MESHES = 'the triangles of the file are not shown: this page draws with WebGL 2, which shows splats alone';

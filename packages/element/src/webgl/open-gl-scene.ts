@@ -2,14 +2,27 @@
 import { faultsOf } from '@gaussian-splat/renderer/tools';
 import { glBytes } from '@gaussian-splat/renderer/webgl';
 import type { LoadedGaussians } from '../gpu/loaded-gaussians.js';
-import { isGenerator, isStreamed, type OpenOptions } from '../gpu/open-scene.js';
+import type { Content } from '../sources/content.js';
+import type { OpenOptions } from '../sources/source-kind.js';
+import { kindOf } from '../sources/source-kinds.js';
 import { streamCaps } from '../sources/stream/stream-caps.js';
-import type { LoadedScene, SceneRequest } from '../loading/protocol.js';
+import type { LoadedScene, LoadedSequence, SceneRequest } from '../loading/protocol.js';
 import { GlLoaded } from './gl-loaded.js';
 import { acquireGl, cannotShow, noWebGl, type GlLease } from './gl-session.js';
+import { WebGlBackend } from './webgl-backend.js';
 
 /** Selector of children that add sources to the element's own scene. */
 const CHILDREN = 'splat-scene, splat-mesh';
+
+/** Contents that WebGL does not draw, as messages call them. */
+const NAMES: Partial<Record<Content, string>> = {
+  children: 'a <splat-scene> or <splat-mesh>',
+  mesh: 'a mesh',
+  generator: 'a generator',
+  clip: 'a clip',
+  sequence: 'a sequence of scenes',
+  'post-processor': 'a post-processor',
+};
 
 /**
  * Opens a scene file with WebGL 2.
@@ -22,32 +35,27 @@ export async function openGlScene(
   options: OpenOptions,
   reason: unknown,
 ): Promise<LoadedGaussians> {
-  // Levels of detail need WebGPU. WebGL draws the finest level, or as much of a streamed scene as fits into memory.
   const { memoryBudget = Infinity } = options;
-  const streamBytes = isStreamed(asked) ? Math.min(memoryBudget, streamCaps().bytes) : undefined;
-  const request = { ...asked, levels: false, streamBytes };
+  const isStream = kindOf(asked).name === 'stream';
+  const streamBytes = isStream ? Math.min(memoryBudget, streamCaps().bytes) : undefined;
+  const request = { ...asked, levels: asked.levels && WebGlBackend.can('levels'), streamBytes };
   const lease = acquireGl();
   if (lease === undefined) throw reason ?? noWebGl();
   if (reason instanceof Error) faultsOf(lease.gl)[0] = `WebGL 2 draws: ${reason.message}`;
   const { signal, onProgress, beforeUpload, loader, live } = options;
-  const requireAlone = (): void => {
-    const { element } = live();
-    if (element.matches(CHILDREN) || element.querySelector(`:scope > :is(${CHILDREN})`))
-      throw cannotShow('a <splat-scene> or <splat-mesh>', reason);
+  const requireDrawable = (found?: LoadedSequence): void => {
+    const refused = contentsOf(kindOf(request, found).name, live()).find((content) => !WebGlBackend.can(content));
+    if (refused) throw cannotShow(NAMES[refused] ?? refused, reason);
   };
   try {
-    requireAlone();
-    if (isGenerator(request) || request.chain?.length) throw cannotShow('a generator', reason);
-    if (streamBytes !== undefined && !new URL(request.url).pathname.endsWith('.json'))
-      throw cannotShow('a clip', reason);
-    if (!live().ownsControls()) throw cannotShow('a post-processor', reason);
+    requireDrawable();
     const previews = new Previews(options);
     const scene = await loader
       .ask('load', request, signal, { onProgress, onPreview: options.onPreview && previews.show })
       .finally(() => previews.end());
     signal.throwIfAborted();
-    requireAlone();
-    if ('frames' in scene) throw cannotShow('a sequence of scenes', reason);
+    // Children may have been added meanwhile.
+    requireDrawable('frames' in scene ? scene : undefined);
     // Without `onPart`, the answer contains the splats.
     const whole = scene as LoadedScene;
     beforeUpload(glBytes(whole.packed));
@@ -56,6 +64,12 @@ export async function openGlScene(
     lease.release();
     throw error;
   }
+}
+
+/** Returns what an element shows, with a source of a kind. */
+function contentsOf(kind: Content, { element, ownsControls }: ReturnType<OpenOptions['live']>): readonly Content[] {
+  const hasOthers = element.matches(CHILDREN) || element.querySelector(`:scope > :is(${CHILDREN})`) !== null;
+  return [...(hasOthers ? ['children' as const] : []), kind, ...(ownsControls() ? [] : ['post-processor' as const])];
 }
 
 const openOptions = (

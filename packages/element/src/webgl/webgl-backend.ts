@@ -17,6 +17,7 @@ import type {
   Rendering,
   Surface,
 } from '../gpu/backend.js';
+import type { Content } from '../sources/content.js';
 import { DepthSorter, type SortedSplats } from './depth-sorter.js';
 import type { GlLoaded } from './gl-loaded.js';
 import { cannotShow } from './gl-session.js';
@@ -42,8 +43,10 @@ interface CopySurface extends Surface {
   readonly context: CanvasRenderingContext2D;
 }
 
-/** Draws one scene with WebGL. A worker sorts its splats. */
+/** Draws one scene file with WebGL, or as much of a streamed scene as fits into memory. A worker sorts its splats. */
 export class WebGlBackend implements Backend {
+  static readonly can = (content: Content): boolean => content === 'file' || content === 'stream';
+  readonly can = WebGlBackend.can;
   readonly filter = undefined;
   readonly isPrepared = true;
   readonly scene: GlLoaded;

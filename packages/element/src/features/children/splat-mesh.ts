@@ -1,6 +1,4 @@
-import { loadModule } from '@gaussian-splat/core';
 import type { PropertyDeclarations } from 'lit';
-import type { openGaussians } from '../../gpu/open-scene.js';
 import type { Source } from '../../viewer/element-host.js';
 import type { PropertiesOf } from '../../viewer/attribute.js';
 import { MESH_ATTRIBUTES } from './attributes.js';
@@ -37,17 +35,8 @@ export class SplatMeshElement extends SplatChild {
 
   /** @internal */
   get source(): Source {
-    return { src: this.src, contract: null, chain: null, postprocess: null };
+    return { src: this.src, contract: null, chain: null, postprocess: null, isMesh: true };
   }
-
-  /** Opens the mesh, a source without splats. @internal */
-  readonly open: typeof openGaussians = async (request, options) => {
-    const { openMesh } = await loadModule(
-      'the code that shows meshes',
-      () => import('../../sources/mesh/open-mesh.js'),
-    );
-    return openMesh(request, options);
-  };
 }
 
 declare global {

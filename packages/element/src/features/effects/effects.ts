@@ -157,7 +157,7 @@ export class Effects implements Feature {
     const isChanged = cuts.length > 0 || grown < 1 || share < 1 || this.#shader !== null;
     let modifier = this.#modifiers.get(member);
     if (cuts.length > MAX_CUTS) this.#viewer.warn(tooManyCuts(cuts.length));
-    if (isChanged && scene.renderer === 'webgl') return this.#viewer.warn(NO_WEBGL);
+    if (isChanged && !scene.can('modifiers')) return this.#viewer.warn(NO_WEBGL);
     if (!isChanged || scene.drawn.blocks.length === 0) {
       if (modifier) this.#forget(member, modifier);
       return;
@@ -188,7 +188,7 @@ export class Effects implements Feature {
   }
 
   #compile(scene: LoadedGaussians): Promise<void> {
-    if (scene.renderer === 'webgl') return Promise.resolve();
+    if (!scene.can('modifiers')) return Promise.resolve();
     const { device } = scene.place;
     const before = this.#compiling.get(device) ?? Promise.resolve();
     const compiling = before.then(() => this.#compileNow(device, scene));

@@ -1,11 +1,12 @@
 import { GaussianSplatError } from '@gaussian-splat/core';
 import { GlGaussians, GlRenderer, positionsIn } from '@gaussian-splat/renderer/webgl';
 import { isHandheld } from '../../gpu/memory-budget.js';
-import { isGenerator, isStreamed } from '../../gpu/open-scene.js';
 import type { LoadedGaussians } from '../../gpu/loaded-gaussians.js';
 import type { SceneRequest } from '../../loading/protocol.js';
 import type { SceneLoader } from '../../loading/scene-loader.js';
+import { kindOf } from '../../sources/source-kinds.js';
 import { GlLoaded } from '../../webgl/gl-loaded.js';
+import { WebGlBackend } from '../../webgl/webgl-backend.js';
 
 /** Timeout for making a context compatible with a headset, milliseconds: browsers without a headset never answer. */
 const COMPATIBLE_MS = 2_000;
@@ -83,9 +84,10 @@ export async function openXrScene(
     const renderer = new GlRenderer(gl, textures);
     return { renderer, positions, origin: textures.facts.origin, destroy: () => renderer.destroy() };
   }
-  if (isGenerator(request)) throw unsupported('the file of a scene', 'a generator');
   const inLevels = { ...request, levels: false, isWhole: false };
-  const streamBytes = isStreamed(inLevels) ? STREAM_BYTES[isHandheld() ? 'handheld' : 'computer'] : undefined;
+  const { name } = kindOf(inLevels);
+  if (!WebGlBackend.can(name)) throw unsupported('the file of a scene', `a ${name}`);
+  const streamBytes = name === 'stream' ? STREAM_BYTES[isHandheld() ? 'handheld' : 'computer'] : undefined;
   const asked = { ...inLevels, streamBytes };
   const { packed } = await loader.load(asked, signal, () => undefined);
   signal.throwIfAborted();

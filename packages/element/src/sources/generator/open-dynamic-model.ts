@@ -8,9 +8,8 @@ import { pickInitialVariants } from '@gaussian-splat/renderer';
 import { LoadedGaussians } from '../../gpu/loaded-gaussians.js';
 import { limitScenes } from '../../gpu/memory-budget.js';
 import { images as frames, unlessWrong } from '../../gpu/initial-frames.js';
-import type { OpenOptions } from '../../gpu/open-scene.js';
-import type { DeviceLease } from '../../gpu/shared-device.js';
-import type { ProgressListener, SceneRequest } from '../../loading/protocol.js';
+import type { ProgressListener } from '../../loading/protocol.js';
+import type { SourceKind } from '../source-kind.js';
 import { inputsOf } from './inputs.js';
 import type { DynamicModel, DynamicRequest } from './dynamic-model.js';
 import { InputImages } from './input-images.js';
@@ -55,15 +54,9 @@ export const upOf = ({ coordinates }: Contract): Vector3 | undefined =>
  */
 const WARM_UP = 0.25;
 
-/**
- * Opens the scene of a generator. Rejects with GaussianSplatError, or the signal's reason.
- * @param lease Lease of the device, which the caller releases if the promise rejects.
- */
-export async function openDynamicScene(
-  request: SceneRequest,
-  options: OpenOptions,
-  lease: DeviceLease,
-): Promise<LoadedGaussians> {
+/** Opens the scene of a generator. */
+export const openDynamicScene: SourceKind['open'] = async (request, options, acquiring) => {
+  const lease = await acquiring;
   const { signal, onProgress, beforeUpload, memoryBudget, submissions } = options;
   let live: DynamicModel | undefined;
   try {
@@ -86,7 +79,7 @@ export async function openDynamicScene(
     live?.gaussians.destroy();
     throw error;
   }
-}
+};
 
 /**
  * Opens a generator and waits for its first run. Rejects with GaussianSplatError, or the signal's reason.

@@ -2,7 +2,7 @@ import type { GaussianModelFile } from '@gaussian-splat/generator';
 import { DynamicGaussians } from '@gaussian-splat/renderer';
 import type { SceneBounds } from '../../viewer/camera/settings.js';
 import { LoadedGaussians } from '../../gpu/loaded-gaussians.js';
-import type { OpenOptions } from '../../gpu/open-scene.js';
+import type { OpenOptions } from '../source-kind.js';
 import { withLease } from '../../gpu/shared-device.js';
 import type { DynamicRequest, Timeline } from './dynamic-model.js';
 import type { InputImages } from './input-images.js';

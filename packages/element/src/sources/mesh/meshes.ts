@@ -4,7 +4,7 @@ import type { FrameTarget } from '@gaussian-splat/renderer';
 import type { ProbeAnswer, ProbePoint } from '@gaussian-splat/renderer/tools';
 import { credentialsOf } from '../../viewer/attributes.js';
 import type { LoadedGaussians, MeshModel } from '../../gpu/loaded-gaussians.js';
-import { limited } from '../../gpu/open-scene.js';
+import { limited } from '../../gpu/memory-budget.js';
 import type { Frame } from '../generator/frame-filter.js';
 import type { SourceEntry } from '../../viewer/source-entry.js';
 import type { WorldEntry } from '../../viewer/world-entry.js';
@@ -91,7 +91,7 @@ export class Meshes {
   ): Promise<void> {
     const { signal } = scene;
     const request = { url, credentials: credentialsOf(attributes.crossorigin), limits: services.sceneLimits };
-    const mesh = await fetchMesh(services.sceneLoader, limited(request, { memoryBudget }), signal);
+    const mesh = await fetchMesh(services.sceneLoader, limited(request, memoryBudget), signal);
     for (const warning of mesh.warnings) this.#core.warn(`<gaussian-splat>: ${warning}`);
     const model = await openModel(mesh, url, { device: scene.place.device, signal, memoryBudget });
     await this.prepare(scene, model);

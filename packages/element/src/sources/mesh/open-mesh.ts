@@ -3,13 +3,11 @@ import { GaussianSplatError, loadModule } from '@gaussian-splat/core';
 import { MemoryLedger, type GaussianScene } from '@gaussian-splat/renderer';
 import { LoadedGaussians } from '../../gpu/loaded-gaussians.js';
 import { limitScenes } from '../../gpu/memory-budget.js';
-import { limited, type OpenOptions } from '../../gpu/open-scene.js';
-import { assertWebGpu } from '../../gpu/request-device.js';
-import { withLease } from '../../gpu/shared-device.js';
 import type { Timeline } from '../generator/dynamic-model.js';
 import type { LoadedMesh } from '../../loading/open-mesh-file.js';
-import type { FileRequest, SceneRequest } from '../../loading/protocol.js';
+import type { FileRequest, ProgressListener } from '../../loading/protocol.js';
 import type { SceneLoader } from '../../loading/scene-loader.js';
+import type { SourceKind } from '../source-kind.js';
 import { Model } from './model.js';
 
 /**
@@ -20,7 +18,7 @@ export function fetchMesh(
   loader: SceneLoader,
   { url, credentials, limits }: FileRequest,
   signal: AbortSignal,
-  onProgress: OpenOptions['onProgress'] = () => undefined,
+  onProgress: ProgressListener = () => undefined,
 ): Promise<LoadedMesh> {
   const request = { url, credentials, limits };
   return loader.ask('mesh', request, signal, { onProgress }).catch(async (error: unknown) => {
@@ -59,23 +57,20 @@ export async function openModel(
 }
 
 /** Opens a mesh file as a source without splats, which has the same lifecycle as every source. */
-export async function openMesh(request: SceneRequest, options: OpenOptions): Promise<LoadedGaussians> {
-  await assertWebGpu();
-  const { device, signal, onProgress, live: dynamicRequest, submissions, beforeUpload, loader } = options;
-  return withLease(device, async (acquiring) => {
-    const mesh = await fetchMesh(loader, limited(request, options), signal, onProgress);
-    const lease = await acquiring;
-    beforeUpload(mesh.byteLength);
-    const model = await openModel(mesh, request.url, { ...options, device: lease.device });
-    const { onShown } = dynamicRequest().listeners;
-    const live: Timeline | undefined = Number.isNaN(model.duration) ? undefined : timelineOf(model, onShown);
-    const bounds = { ...model.bounds, up: [0, 1, 0] as const };
-    const { warnings } = mesh;
-    const loaded = new LoadedGaussians(lease, noSplats(), bounds, submissions, { live, warnings });
-    loaded.model = model;
-    return loaded;
-  });
-}
+export const openMesh: SourceKind['open'] = async (request, options, acquiring) => {
+  const { signal, onProgress, live: dynamicRequest, submissions, beforeUpload, loader } = options;
+  const mesh = await fetchMesh(loader, request, signal, onProgress);
+  const lease = await acquiring;
+  beforeUpload(mesh.byteLength);
+  const model = await openModel(mesh, request.url, { ...options, device: lease.device });
+  const { onShown } = dynamicRequest().listeners;
+  const live: Timeline | undefined = Number.isNaN(model.duration) ? undefined : timelineOf(model, onShown);
+  const bounds = { ...model.bounds, up: [0, 1, 0] as const };
+  const { warnings } = mesh;
+  const loaded = new LoadedGaussians(lease, noSplats(), bounds, submissions, { live, warnings });
+  loaded.model = model;
+  return loaded;
+};
 
 /**
  * Returns the animations of a model as the timeline of a scene.

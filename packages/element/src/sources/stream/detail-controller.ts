@@ -66,7 +66,7 @@ export class DetailController {
    */
   update(scene: LoadedGaussians | null): void {
     if (scene !== this.#scene) this.#begin(scene);
-    if (scene === null || scene.isDestroyed || scene.live !== undefined) return;
+    if (scene === null || scene.isDestroyed || scene.live !== undefined || !scene.can('levels')) return;
     this.#setThreshold(scene, this.#host.attributes.detail);
     if (scene.hasOwnLevels) return;
     if (this.#choice === 'off') return this.#dismiss(scene);

@@ -1,39 +1,27 @@
-/** Opens streamed scenes: manifests of pages (docs/lod-format.md), streamed SOG by boxes, and clips. */
+/** Opens streamed scenes: manifests of pages (docs/lod-format.md), and streamed SOG by boxes. */
 import { fileRequest } from '@gaussian-splat/core/fetch';
-import { loadModule, type TrainedOrder } from '@gaussian-splat/core';
-import { MemoryLedger, pickInitialVariants, StreamedGaussians, type PoolOptions } from '@gaussian-splat/renderer';
+import type { TrainedOrder } from '@gaussian-splat/core';
+import { MemoryLedger, StreamedGaussians, type PoolOptions } from '@gaussian-splat/renderer';
 import { levelSource } from '@gaussian-splat/renderer/tools';
-import type { ProgressListener, SceneLimits, SceneRequest } from '../../loading/protocol.js';
-import type { SceneLoader } from '../../loading/scene-loader.js';
-import type { ClipPlayer } from '../players/clip-player.js';
-import type { DynamicRequest } from '../generator/dynamic-model.js';
+import type { SceneLimits, SceneRequest } from '../../loading/protocol.js';
 import type { SceneBounds } from '../../viewer/camera/settings.js';
 import { LoadedGaussians, type OwnedGaussians } from '../../gpu/loaded-gaussians.js';
-import { limitScenes } from '../../gpu/memory-budget.js';
-import { images, unlessWrong } from '../../gpu/initial-frames.js';
-import type { DeviceLease } from '../../gpu/shared-device.js';
+import { prepareDevice } from '../../gpu/initial-frames.js';
 import type { LodSettings } from '../../gpu/backend.js';
+import type { OpenOptions, SourceKind } from '../source-kind.js';
 import { streamCaps } from './stream-caps.js';
 
-export interface StreamedOptions {
-  readonly loader: SceneLoader;
-  readonly signal: AbortSignal;
-  readonly onProgress: ProgressListener;
-  /** Maximum GPU memory of the scene, in bytes; undefined for the default of the device. */
-  readonly memoryBudget: number | undefined;
+interface StreamedOptions extends OpenOptions {
   /** Called when a part has arrived, so that another frame is needed. */
   readonly onChange: () => void;
-  /** Returns additional parameters for opening a clip. */
-  readonly live: () => Pick<DynamicRequest, 'listeners' | 'loops' | 'state'>;
 }
 
 /** A scene that is loaded in parts, after its coarsest part has arrived. */
-export interface OpenedStream {
+interface OpenedStream {
   readonly gaussians: OwnedGaussians;
   readonly bounds: SceneBounds;
   readonly order?: TrainedOrder | undefined;
   readonly detail?: LodSettings;
-  readonly live?: ClipPlayer;
   readonly warnings?: readonly string[];
 }
 
@@ -50,7 +38,6 @@ const DETAIL = 1;
  * @throws GaussianSplatError `network/*`, `decode/*`, `out-of-memory/*`, or the signal's reason.
  */
 async function openStreamed(request: SceneRequest, device: GPUDevice, options: StreamedOptions): Promise<OpenedStream> {
-  if (!new URL(request.url).pathname.endsWith('.json')) return openClip(request, device, options);
   const { signal, memoryBudget = Infinity, onChange } = options;
   const caps = streamCaps();
   const warnings: string[] = [];
@@ -77,15 +64,6 @@ async function openStreamed(request: SceneRequest, device: GPUDevice, options: S
     return { ...{ gaussians, bounds, order, warnings }, detail: { detail: DETAIL, splatBudget: caps.splats } };
   gaussians.destroy();
   throw signal.reason;
-}
-
-async function openClip(request: SceneRequest, device: GPUDevice, options: StreamedOptions): Promise<OpenedStream> {
-  const { ClipPlayer } = await loadModule('the code that plays clips', () => import('../players/clip-player.js'));
-  const { listeners, loops, state } = options.live();
-  const startSeconds = state().timeSeconds;
-  const player = await ClipPlayer.open({ ...options, request, device, listeners, loops, startSeconds });
-  const { gaussians, bounds } = player;
-  return { gaussians, bounds, live: player };
 }
 
 /**
@@ -151,23 +129,14 @@ const openBoxes: Open = async (request, device, { loader, signal, onProgress }, 
   return StreamedGaussians.openSource(device, source, pool);
 };
 
-/** Opens a streamed scene, which then owns the lease. If the promise rejects, the caller releases the lease. */
-export async function openStreamedScene(
-  request: SceneRequest,
-  options: Omit<StreamedOptions, 'onChange'> & { beforeUpload(byteLength: number): void; readonly submissions: number },
-  lease: DeviceLease,
-): Promise<LoadedGaussians> {
-  const { loader, signal, onProgress, beforeUpload, memoryBudget, submissions, live } = options;
+/** Opens a streamed scene. */
+export const openStreamedScene: SourceKind['open'] = async (request, options, acquiring) => {
+  const lease = await acquiring;
   const opened: { scene?: LoadedGaussians } = {};
-  await pickInitialVariants(lease.device, images()).catch(unlessWrong);
-  limitScenes(lease.device, memoryBudget);
-  signal.throwIfAborted();
   const onChange = (): void => opened.scene?.onChange();
   // The size of the scene is unknown until the manifest is loaded, so its limit is reported.
-  beforeUpload(memoryBudget ?? 0);
-  const { gaussians, bounds, ...rest } = await openStreamed(request, lease.device, {
-    ...{ loader, signal, onProgress, memoryBudget, onChange, live },
-  });
-  opened.scene = new LoadedGaussians(lease, gaussians, bounds, submissions, rest);
+  await prepareDevice(lease, options, options.memoryBudget ?? 0);
+  const { gaussians, bounds, ...rest } = await openStreamed(request, lease.device, { ...options, onChange });
+  opened.scene = new LoadedGaussians(lease, gaussians, bounds, options.submissions, rest);
   return opened.scene;
-}
+};

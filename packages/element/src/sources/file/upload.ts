@@ -1,7 +1,7 @@
 import { GaussianBuffers } from '@gaussian-splat/renderer';
-import type { LoadedFacts, LoadedScene } from '../loading/protocol.js';
-import { LoadedGaussians } from './loaded-gaussians.js';
-import type { DeviceLease } from './shared-device.js';
+import type { LoadedFacts, LoadedScene } from '../../loading/protocol.js';
+import { LoadedGaussians } from '../../gpu/loaded-gaussians.js';
+import type { DeviceLease } from '../../gpu/shared-device.js';
 
 export interface SceneUploadOptions {
   readonly signal: AbortSignal;

@@ -1,7 +1,7 @@
 /** Uploads scenes while their splats are sorted. The module is loaded for the first such scene. */
 import { GaussianBuffers } from '@gaussian-splat/renderer';
 import { sceneBytes, type BlockBuffers, type PackedHead, type PackedPortion } from '@gaussian-splat/renderer/tools';
-import type { ScenePart } from '../loading/protocol.js';
+import type { ScenePart } from '../../loading/protocol.js';
 
 export interface PartUploadOptions {
   readonly signal: AbortSignal;

@@ -3,11 +3,12 @@ import { type Bounds } from '@gaussian-splat/core';
 import { BackOff, fileRequest } from '@gaussian-splat/core/fetch';
 import { frameAt, framePath, type SceneSequence } from '@gaussian-splat/formats';
 import { SequenceGaussians, type PackedGaussians } from '@gaussian-splat/renderer';
-import type { LoadedGaussians } from '../../gpu/loaded-gaussians.js';
+import { LoadedGaussians } from '../../gpu/loaded-gaussians.js';
 import type { LoadedScene, LoadedSequence, ProgressListener, SceneRequest } from '../../loading/protocol.js';
 import type { SceneLoader } from '../../loading/scene-loader.js';
 import { FrameRoom } from '../generator/frame-room.js';
-import { indicesFrom, PlayDirection } from './play-direction.js';
+import { indicesFrom, PlayDirection } from '../play-direction.js';
+import type { SourceKind } from '../source-kind.js';
 import type { DynamicListeners, DynamicState, Timeline } from '../generator/dynamic-model.js';
 
 export interface SequenceOptions {
@@ -247,3 +248,14 @@ async function load(
 
 const bytesOf = ({ geometry, sh, chunks }: PackedGaussians): number =>
   geometry.byteLength + sh.byteLength + chunks.byteLength;
+
+/** Opens the sequence whose manifest was found. */
+export const openSequence: SourceKind['open'] = async (request, options, acquiring, found) => {
+  const lease = await acquiring;
+  const { listeners, loops } = options.live();
+  const player = await SequencePlayer.open(found!, { ...options, request, device: lease.device, listeners, loops });
+  const { gaussians, bounds } = player;
+  const scene = new LoadedGaussians(lease, gaussians, bounds, options.submissions, { live: player });
+  player.scene = scene;
+  return scene;
+};

@@ -1,6 +1,6 @@
-import type { LoadedScene } from '../loading/protocol.js';
-import type { LoadedGaussians } from './loaded-gaussians.js';
-import { withLease, type SharedDevice } from './shared-device.js';
+import type { LoadedScene } from '../../loading/protocol.js';
+import type { LoadedGaussians } from '../../gpu/loaded-gaussians.js';
+import { withLease, type SharedDevice } from '../../gpu/shared-device.js';
 import { upload, type SceneUploadOptions } from './upload.js';
 
 export interface PreviewUploadOptions extends SceneUploadOptions {

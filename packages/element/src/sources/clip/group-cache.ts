@@ -1,7 +1,7 @@
 import { BackOff } from '@gaussian-splat/core/fetch';
 import { clipPartBytes, type ClipIndex, type ClipPart } from '@gaussian-splat/formats';
 import type { PackedAnimation } from '@gaussian-splat/renderer/tools';
-import { indicesFrom } from './play-direction.js';
+import { indicesFrom } from '../play-direction.js';
 
 /** Index in place of a group's for the parts that never change, which all groups share. */
 export const STILL = -1;

@@ -1,0 +1,93 @@
+import { loadModule } from '@gaussian-splat/core';
+import { pickInitialVariants, prepareInitialVariants } from '@gaussian-splat/renderer';
+import { sceneBytes } from '@gaussian-splat/renderer/tools';
+import { images, unlessWrong } from '../../gpu/initial-frames.js';
+import type { LoadedGaussians } from '../../gpu/loaded-gaussians.js';
+import { limitScenes } from '../../gpu/memory-budget.js';
+import type { DeviceLease } from '../../gpu/shared-device.js';
+import type { LoadedScene, PartListener, SceneRequest } from '../../loading/protocol.js';
+import type { OpenOptions, SourceKind } from '../source-kind.js';
+import type { PartUploads } from './part-uploads.js';
+import type { PreviewUploads } from './preview-uploads.js';
+import { shown, upload } from './upload.js';
+
+/**
+ * Requests the device and the file concurrently, then uploads the scene. Rejects as {@link SourceKind.open} does.
+ * @param openFound Opens a file that turned out to be a manifest.
+ */
+export async function openFile(
+  request: SceneRequest,
+  options: OpenOptions,
+  acquiring: Promise<DeviceLease>,
+  openFound: SourceKind['open'],
+): Promise<LoadedGaussians> {
+  // If the device or the file fails, the other is canceled: bytes are useless without a GPU.
+  const abort = new AbortController();
+  const giveUp = (): void => abort.abort(options.signal.reason);
+  options.signal.addEventListener('abort', giveUp, { once: true });
+  // Variants for the first frame are selected while the bytes are in transit, and the splats are uploaded.
+  prepareInitialVariants();
+  const choosing = acquiring.then(({ device }) => pickInitialVariants(device, images()));
+  choosing.catch(ignore);
+  const { onPreview } = options;
+  let previews: Promise<PreviewUploads> | undefined;
+  const showPreview =
+    onPreview &&
+    ((preview: LoadedScene): void => {
+      previews ??= import('./preview-uploads.js').then(
+        ({ PreviewUploads }) => new PreviewUploads({ ...options, onPreview, ready: choosing }),
+      );
+      previews.then((uploads) => uploads.show(preview), ignore);
+    });
+  const endPreviews = (): void => void previews?.then((uploads) => uploads.end(), ignore);
+  const device = acquiring.then(({ device }) => {
+    options.signal.throwIfAborted();
+    limitScenes(device, options.memoryBudget);
+    return device;
+  });
+  const beforeUpload = (byteLength: number): void => {
+    endPreviews();
+    options.beforeUpload(byteLength);
+  };
+  let parts: Promise<PartUploads> | undefined;
+  const onPart: PartListener = (part) => {
+    parts ??= loadModule('the code that uploads large scenes', () => import('./part-uploads.js')).then(
+      ({ PartUploads }) => new PartUploads(device, { ...options, beforeUpload }),
+    );
+    return parts.then((uploads) => uploads.add(part));
+  };
+  const loading = options.loader.ask('load', request, abort.signal, {
+    onProgress: options.onProgress,
+    onPreview: showPreview,
+    onPart,
+  });
+  try {
+    const chosen = choosing.catch(unlessWrong);
+    chosen.catch(ignore);
+    const [lease, scene] = await Promise.all([acquiring, loading, device]);
+    if ('frames' in scene) {
+      await chosen;
+      return await openFound(request, options, acquiring, scene);
+    }
+    if (scene.packed === undefined) {
+      const gaussians = await (await parts!).finish();
+      await chosen;
+      options.signal.throwIfAborted();
+      return shown(lease, gaussians, scene, options);
+    }
+    beforeUpload(sceneBytes(scene.packed));
+    return await upload(lease, scene, options, chosen);
+  } catch (error) {
+    endPreviews();
+    parts?.then((uploads) => uploads.destroy(), ignore);
+    abort.abort(error);
+    loading.catch(ignore);
+    throw error;
+  } finally {
+    options.signal.removeEventListener('abort', giveUp);
+  }
+}
+
+function ignore(): void {
+  // Another promise reports the failure.
+}

@@ -1,0 +1,53 @@
+import type { LoadedGaussians } from '../gpu/loaded-gaussians.js';
+import type { DeviceLease, SharedDevice } from '../gpu/shared-device.js';
+import type { LoadedSequence, ProgressListener, SceneRequest } from '../loading/protocol.js';
+import type { SceneLoader } from '../loading/scene-loader.js';
+import type { SourceKindName } from './content.js';
+import type { DynamicRequest } from './generator/dynamic-model.js';
+
+/** A kind of source: a row of `SOURCE_KINDS`. */
+export interface SourceKind {
+  readonly name: SourceKindName;
+  /**
+   * Returns whether a request is for a source of this kind.
+   * @param found Manifest that the file of the request turned out to be; undefined before it is read.
+   */
+  matches(request: SceneRequest, found: LoadedSequence | undefined): boolean;
+  /**
+   * Opens a source with WebGPU. The result owns the lease of the device. Rejects with GaussianSplatError, or with the
+   * signal's reason; the caller then releases the lease.
+   * @param acquiring Resolves with the device, which is requested while the bytes are in transit.
+   */
+  open(
+    request: SceneRequest,
+    options: OpenOptions,
+    acquiring: Promise<DeviceLease>,
+    found: LoadedSequence | undefined,
+  ): Promise<LoadedGaussians>;
+}
+
+/** Services and settings for opening a source, and functions that are called meanwhile. */
+export interface OpenOptions {
+  readonly device: SharedDevice;
+  readonly loader: SceneLoader;
+  readonly signal: AbortSignal;
+  /** Returns the address from which a frame of a sequence is fetched, as the page rewrites it. */
+  readonly frameUrl: (url: string) => string;
+  readonly onProgress: ProgressListener;
+  /**
+   * Called with a preview of a scene that is still loading. The callee owns the preview. Absent if no previews are
+   * wanted.
+   */
+  readonly onPreview?: (preview: LoadedGaussians) => void;
+  /**
+   * Called with the GPU memory of the new scene, in bytes, just before its upload. The callee can free the old scene,
+   * so that both never coexist.
+   */
+  readonly beforeUpload: (byteLength: number) => void;
+  /** Maximum GPU memory of the scene, in bytes; undefined if only the device limits it. */
+  readonly memoryBudget: number | undefined;
+  /** Number of submissions into which the work of a frame is divided. */
+  readonly submissions: number;
+  /** Returns additional parameters for opening a generator. */
+  readonly live: () => Omit<DynamicRequest, 'url' | 'chain' | 'contract' | 'credentials' | 'memoryBudget'>;
+}
