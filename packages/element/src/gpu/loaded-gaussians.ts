@@ -4,7 +4,6 @@ import { QueueClock } from '@gaussian-splat/renderer/tools';
 import type { SceneBounds } from '../viewer/camera/settings.js';
 import type { Timeline } from '../sources/generator/dynamic-model.js';
 import type { FrameSource, LodSettings, Backend, BackendEvents, Drawable } from './backend.js';
-import type { Content } from '../sources/content.js';
 import type { DeviceLease } from './shared-device.js';
 import { WebGpuBackend } from './webgpu-backend.js';
 
@@ -45,6 +44,7 @@ export interface MeshModel {
 export class LoadedGaussians implements Drawable {
   /** Kind of backend that draws the scene. */
   readonly renderer: 'webgpu' | 'webgl' = 'webgpu';
+  readonly can: Backend['can'] = () => true;
   readonly #bounds: SceneBounds;
   /** The generator, sequence or clip that writes the Gaussians; undefined for those of a file. */
   readonly live: Timeline | undefined;
@@ -148,11 +148,6 @@ export class LoadedGaussians implements Drawable {
     this.setLevels(undefined);
     this.#gaussians.destroy();
     this.#gaussians = gaussians;
-  }
-
-  /** Returns whether the backend of the scene can draw a content. */
-  can(content: Content): boolean {
-    return WebGpuBackend.can(content);
   }
 
   /** Creates a backend on the device of the scene. */

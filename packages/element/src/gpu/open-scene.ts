@@ -1,11 +1,11 @@
 import { loadModule, type GaussianSplatError } from '@gaussian-splat/core';
 import type { SceneRequest } from '../loading/protocol.js';
 import type { OpenOptions } from '../sources/source-kind.js';
-import { kindOf } from '../sources/source-kinds.js';
+import { openSource } from '../sources/source-kinds.js';
 import { chooseAtRest } from './choose-at-rest.js';
 import type { LoadedGaussians } from './loaded-gaussians.js';
 import { assertWebGpu, why } from './request-device.js';
-import { withLease, type DeviceLease } from './shared-device.js';
+import { withLease } from './shared-device.js';
 
 /**
  * Opens the requested source. Uses WebGL if the request demands it, or if it allows it and WebGPU is unavailable.
@@ -29,9 +29,7 @@ export async function openScene(request: SceneRequest, options: OpenOptions): Pr
 async function openWithWebGpu(request: SceneRequest, options: OpenOptions): Promise<LoadedGaussians> {
   // WebGPU is checked first, so that no bytes are fetched in vain.
   await assertWebGpu();
-  const open = (lease: Promise<DeviceLease>): Promise<LoadedGaussians> =>
-    kindOf(request).open(request, options, lease, undefined);
-  const scene = await withLease(options.device, open);
+  const scene = await withLease(options.device, (acquiring) => openSource(request, options, acquiring));
   // A mesh has no splats whose variants could be chosen.
   if (!scene.model) chooseAtRest(scene.place.device);
   return scene;

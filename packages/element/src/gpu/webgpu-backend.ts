@@ -21,8 +21,7 @@ import { why } from './request-device.js';
  * before the canvas.
  */
 export class WebGpuBackend implements Backend {
-  static readonly can: Backend['can'] = () => true;
-  readonly can = WebGpuBackend.can;
+  readonly can: Backend['can'] = () => true;
   readonly viewpoint: Viewpoint;
   readonly device: GPUDevice;
   readonly place: DeviceOwner;

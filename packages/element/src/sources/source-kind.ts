@@ -13,18 +13,20 @@ export interface SourceKind {
    * @param found Manifest that the file of the request turned out to be; undefined before it is read.
    */
   matches(request: SceneRequest, found: LoadedSequence | undefined): boolean;
-  /**
-   * Opens a source with WebGPU. The result owns the lease of the device. Rejects with GaussianSplatError, or with the
-   * signal's reason; the caller then releases the lease.
-   * @param acquiring Resolves with the device, which is requested while the bytes are in transit.
-   */
-  open(
-    request: SceneRequest,
-    options: OpenOptions,
-    acquiring: Promise<DeviceLease>,
-    found: LoadedSequence | undefined,
-  ): Promise<LoadedGaussians>;
+  /** Imports the code that opens sources of this kind. */
+  load(): Promise<{ readonly open: OpenSource }>;
 }
+
+/**
+ * Opens a source of a kind: see `openSource`. Returns the manifest instead, if the file of the request turned out to be
+ * one.
+ */
+export type OpenSource = (
+  request: SceneRequest,
+  options: OpenOptions,
+  acquiring: Promise<DeviceLease>,
+  found: LoadedSequence | undefined,
+) => Promise<LoadedGaussians | LoadedSequence>;
 
 /** Services and settings for opening a source, and functions that are called meanwhile. */
 export interface OpenOptions {

@@ -1,73 +1,34 @@
 /** The kinds of sources. No other file decides whether a request is for a generator, a stream or a file. */
 import { loadModule } from '@gaussian-splat/core';
+import type { LoadedGaussians } from '../gpu/loaded-gaussians.js';
+import type { DeviceLease } from '../gpu/shared-device.js';
 import type { LoadedSequence, SceneRequest } from '../loading/protocol.js';
-import { openFile } from './file/open-file.js';
-import type { SourceKind } from './source-kind.js';
-
-/** Returns a function that loads code, and opens a source with it. */
-const late =
-  <Code>(purpose: string, load: () => Promise<Code>, openOf: (code: Code) => SourceKind['open']): SourceKind['open'] =>
-  async (...asked) =>
-    openOf(await loadModule(purpose, load))(...asked);
+import { open } from './file/open-file.js';
+import type { OpenOptions, SourceKind } from './source-kind.js';
 
 /** All kinds of sources. A source is of the first kind that matches its request. */
 const SOURCE_KINDS: readonly SourceKind[] = [
-  {
-    name: 'mesh',
-    matches: ({ isMesh }) => isMesh === true,
-    open: late(
-      'the code that shows meshes',
-      () => import('./mesh/open-mesh.js'),
-      ({ openMesh }) => openMesh,
-    ),
-  },
+  { name: 'mesh', matches: ({ isMesh }) => isMesh ?? false, load: () => import('./mesh/open-mesh.js') },
   {
     name: 'generator',
-    matches: ({ url, contract }) => !isEmpty(contract) || /\.onnx$/i.test(nameIn(url)),
-    open: late(
-      'the code that runs generators',
-      () => import('./generator/open-dynamic-model.js'),
-      (code) => code.openDynamicScene,
-    ),
+    matches: ({ url, contract }) => (contract ?? '') !== '' || /\.onnx$/i.test(nameIn(url)),
+    load: () => import('./generator/open-dynamic-model.js'),
   },
   {
     name: 'clip',
     matches: ({ url }) => /\.(gsv|4dgs)$/i.test(nameIn(url)),
-    open: late(
-      'the code that plays clips',
-      () => import('./clip/clip-player.js'),
-      ({ openClip }) => openClip,
-    ),
+    load: () => import('./clip/clip-player.js'),
   },
   {
     // A `detail.json`, or a `lod-meta.json`, unless the request is for its finest level, complete.
     name: 'stream',
-    matches: ({ url, isWhole }) => {
-      const name = /(^|\/)(detail|lod-meta)\.json$/i.exec(nameIn(url));
-      return name !== null && !(isWhole && name[2] === 'lod-meta');
-    },
-    open: late(
-      'the code that streams scenes',
-      () => import('./stream/open-streamed.js'),
-      (code) => code.openStreamedScene,
-    ),
+    matches: ({ url, isWhole }) =>
+      (isWhole ? /(^|\/)detail\.json$/i : /(^|\/)(detail|lod-meta)\.json$/i).test(nameIn(url)),
+    load: () => import('./stream/open-streamed.js'),
   },
-  {
-    // Its manifest may have any name.
-    name: 'sequence',
-    matches: (_, found) => found !== undefined,
-    open: late(
-      'the code that plays sequences',
-      () => import('./sequence/sequence-player.js'),
-      (code) => code.openSequence,
-    ),
-  },
-  {
-    name: 'file',
-    matches: () => true,
-    open: (request, options, acquiring) =>
-      openFile(request, options, acquiring, (...asked) => kindOf(request, asked[3]).open(...asked)),
-  },
+  // The manifest of a sequence may have any name.
+  { name: 'sequence', matches: (_, found) => found !== undefined, load: () => import('./sequence/sequence-player.js') },
+  { name: 'file', matches: () => true, load: async () => ({ open }) },
 ];
 
 /**
@@ -77,7 +38,23 @@ const SOURCE_KINDS: readonly SourceKind[] = [
 export const kindOf = (request: SceneRequest, found?: LoadedSequence): SourceKind =>
   SOURCE_KINDS.find((kind) => kind.matches(request, found))!;
 
-const isEmpty = (contract: unknown): boolean => contract === undefined || contract === null || contract === '';
+/**
+ * Opens a source with WebGPU. The result owns the lease of the device. Rejects with GaussianSplatError, or with the
+ * signal's reason; the caller then releases the lease.
+ * @param acquiring Resolves with the device, which is requested while the bytes are in transit.
+ * @param found Manifest that the file of the request turned out to be; absent before it is read.
+ */
+export async function openSource(
+  request: SceneRequest,
+  options: OpenOptions,
+  acquiring: Promise<DeviceLease>,
+  found?: LoadedSequence,
+): Promise<LoadedGaussians> {
+  const { name, load } = kindOf(request, found);
+  const code = await loadModule(`the code that opens a ${name}`, load);
+  const opened = await code.open(request, options, acquiring, found);
+  return 'frames' in opened ? openSource(request, options, acquiring, opened) : opened;
+}
 
 /**
  * Returns the text that identifies the kind of a file: the path of an address, or the name that a page has appended to

@@ -3,7 +3,6 @@ import { LoadedGaussians, type OwnedGaussians } from '../gpu/loaded-gaussians.js
 import { limit } from '../gpu/memory-budget.js';
 import type { FrameSource, Backend, BackendEvents } from '../gpu/backend.js';
 import type { LoadedScene } from '../loading/protocol.js';
-import type { Content } from '../sources/content.js';
 import { WebGlBackend } from './webgl-backend.js';
 import type { GlLease } from './gl-session.js';
 
@@ -16,6 +15,7 @@ export interface GlUploadOptions {
 /** A scene in WebGL textures. It is drawn alone, without levels of detail. */
 export class GlLoaded extends LoadedGaussians {
   override readonly renderer = 'webgl';
+  override readonly can = WebGlBackend.can;
   readonly lease: GlLease;
   readonly frames: GlRenderer;
   readonly textures: GlGaussians;
@@ -77,10 +77,6 @@ export class GlLoaded extends LoadedGaussians {
 
   override openBackend(_: FrameSource, events: BackendEvents): Backend {
     return new WebGlBackend(this, events);
-  }
-
-  override can(content: Content): boolean {
-    return WebGlBackend.can(content);
   }
 }
 

@@ -1,15 +1,16 @@
 /** Plays clips of moving splats. The module is loaded only for clips. */
 import { clipGroupAt, clipRooms, frameAt, unpackClipIndex, type ClipIndex } from '@gaussian-splat/formats';
-import { AnimatedGaussians } from '@gaussian-splat/renderer';
+import { AnimatedGaussians, pickInitialVariants } from '@gaussian-splat/renderer';
 import { LoadedGaussians } from '../../gpu/loaded-gaussians.js';
-import { prepareDevice } from '../../gpu/initial-frames.js';
+import { images, unlessWrong } from '../../gpu/initial-frames.js';
+import { limitScenes } from '../../gpu/memory-budget.js';
 import type { SceneBounds } from '../../viewer/camera/settings.js';
 import type { ProgressListener, SceneRequest } from '../../loading/protocol.js';
 import type { SceneLoader } from '../../loading/scene-loader.js';
 import { GroupCache, partsIn, STILL } from './group-cache.js';
 import { GroupSlots } from './group-slots.js';
 import { PlayDirection } from '../play-direction.js';
-import type { SourceKind } from '../source-kind.js';
+import type { OpenSource } from '../source-kind.js';
 import type { DynamicListeners, DynamicState, Timeline } from '../generator/dynamic-model.js';
 
 export interface ClipOptions {
@@ -140,11 +141,14 @@ async function localFile(url: string): Promise<Blob | undefined> {
 }
 
 /** Opens a clip at the time of its clock. */
-export const openClip: SourceKind['open'] = async (request, options, acquiring) => {
+export const open: OpenSource = async (request, options, acquiring) => {
   const lease = await acquiring;
   const { listeners, loops, state } = options.live();
+  await pickInitialVariants(lease.device, images()).catch(unlessWrong);
+  limitScenes(lease.device, options.memoryBudget);
+  options.signal.throwIfAborted();
   // The size of the clip is unknown until its index is loaded, so its limit is reported.
-  await prepareDevice(lease, options, options.memoryBudget ?? 0);
+  options.beforeUpload(options.memoryBudget ?? 0);
   const startSeconds = state().timeSeconds;
   const player = await ClipPlayer.open({ ...options, request, device: lease.device, listeners, loops, startSeconds });
   return new LoadedGaussians(lease, player.gaussians, player.bounds, options.submissions, { live: player });

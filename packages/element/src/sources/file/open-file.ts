@@ -2,25 +2,15 @@ import { loadModule } from '@gaussian-splat/core';
 import { pickInitialVariants, prepareInitialVariants } from '@gaussian-splat/renderer';
 import { sceneBytes } from '@gaussian-splat/renderer/tools';
 import { images, unlessWrong } from '../../gpu/initial-frames.js';
-import type { LoadedGaussians } from '../../gpu/loaded-gaussians.js';
 import { limitScenes } from '../../gpu/memory-budget.js';
-import type { DeviceLease } from '../../gpu/shared-device.js';
-import type { LoadedScene, PartListener, SceneRequest } from '../../loading/protocol.js';
-import type { OpenOptions, SourceKind } from '../source-kind.js';
+import type { LoadedScene, PartListener } from '../../loading/protocol.js';
+import type { OpenSource } from '../source-kind.js';
 import type { PartUploads } from './part-uploads.js';
 import type { PreviewUploads } from './preview-uploads.js';
 import { shown, upload } from './upload.js';
 
-/**
- * Requests the device and the file concurrently, then uploads the scene. Rejects as {@link SourceKind.open} does.
- * @param openFound Opens a file that turned out to be a manifest.
- */
-export async function openFile(
-  request: SceneRequest,
-  options: OpenOptions,
-  acquiring: Promise<DeviceLease>,
-  openFound: SourceKind['open'],
-): Promise<LoadedGaussians> {
+/** Requests the device and the file concurrently, then uploads the scene. */
+export const open: OpenSource = async (request, options, acquiring) => {
   // If the device or the file fails, the other is canceled: bytes are useless without a GPU.
   const abort = new AbortController();
   const giveUp = (): void => abort.abort(options.signal.reason);
@@ -67,7 +57,7 @@ export async function openFile(
     const [lease, scene] = await Promise.all([acquiring, loading, device]);
     if ('frames' in scene) {
       await chosen;
-      return await openFound(request, options, acquiring, scene);
+      return scene;
     }
     if (scene.packed === undefined) {
       const gaussians = await (await parts!).finish();
@@ -86,7 +76,7 @@ export async function openFile(
   } finally {
     options.signal.removeEventListener('abort', giveUp);
   }
-}
+};
 
 function ignore(): void {
   // Another promise reports the failure.

@@ -9,7 +9,7 @@ import { LoadedGaussians } from '../../gpu/loaded-gaussians.js';
 import { limitScenes } from '../../gpu/memory-budget.js';
 import { images as frames, unlessWrong } from '../../gpu/initial-frames.js';
 import type { ProgressListener } from '../../loading/protocol.js';
-import type { SourceKind } from '../source-kind.js';
+import type { OpenSource } from '../source-kind.js';
 import { inputsOf } from './inputs.js';
 import type { DynamicModel, DynamicRequest } from './dynamic-model.js';
 import { InputImages } from './input-images.js';
@@ -55,7 +55,7 @@ export const upOf = ({ coordinates }: Contract): Vector3 | undefined =>
 const WARM_UP = 0.25;
 
 /** Opens the scene of a generator. */
-export const openDynamicScene: SourceKind['open'] = async (request, options, acquiring) => {
+export const open: OpenSource = async (request, options, acquiring) => {
   const lease = await acquiring;
   const { signal, onProgress, beforeUpload, memoryBudget, submissions } = options;
   let live: DynamicModel | undefined;

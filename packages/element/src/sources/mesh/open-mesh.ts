@@ -7,7 +7,7 @@ import type { Timeline } from '../generator/dynamic-model.js';
 import type { LoadedMesh } from '../../loading/open-mesh-file.js';
 import type { FileRequest, ProgressListener } from '../../loading/protocol.js';
 import type { SceneLoader } from '../../loading/scene-loader.js';
-import type { SourceKind } from '../source-kind.js';
+import type { OpenSource } from '../source-kind.js';
 import { Model } from './model.js';
 
 /**
@@ -57,7 +57,7 @@ export async function openModel(
 }
 
 /** Opens a mesh file as a source without splats, which has the same lifecycle as every source. */
-export const openMesh: SourceKind['open'] = async (request, options, acquiring) => {
+export const open: OpenSource = async (request, options, acquiring) => {
   const { signal, onProgress, live: dynamicRequest, submissions, beforeUpload, loader } = options;
   const mesh = await fetchMesh(loader, request, signal, onProgress);
   const lease = await acquiring;

@@ -8,7 +8,7 @@ import type { LoadedScene, LoadedSequence, ProgressListener, SceneRequest } from
 import type { SceneLoader } from '../../loading/scene-loader.js';
 import { FrameRoom } from '../generator/frame-room.js';
 import { indicesFrom, PlayDirection } from '../play-direction.js';
-import type { SourceKind } from '../source-kind.js';
+import type { OpenSource } from '../source-kind.js';
 import type { DynamicListeners, DynamicState, Timeline } from '../generator/dynamic-model.js';
 
 export interface SequenceOptions {
@@ -250,7 +250,7 @@ const bytesOf = ({ geometry, sh, chunks }: PackedGaussians): number =>
   geometry.byteLength + sh.byteLength + chunks.byteLength;
 
 /** Opens the sequence whose manifest was found. */
-export const openSequence: SourceKind['open'] = async (request, options, acquiring, found) => {
+export const open: OpenSource = async (request, options, acquiring, found) => {
   const lease = await acquiring;
   const { listeners, loops } = options.live();
   const player = await SequencePlayer.open(found!, { ...options, request, device: lease.device, listeners, loops });

@@ -1,14 +1,15 @@
 /** Opens streamed scenes: manifests of pages (docs/lod-format.md), and streamed SOG by boxes. */
 import { fileRequest } from '@gaussian-splat/core/fetch';
 import type { TrainedOrder } from '@gaussian-splat/core';
-import { MemoryLedger, StreamedGaussians, type PoolOptions } from '@gaussian-splat/renderer';
+import { MemoryLedger, pickInitialVariants, StreamedGaussians, type PoolOptions } from '@gaussian-splat/renderer';
 import { levelSource } from '@gaussian-splat/renderer/tools';
 import type { SceneLimits, SceneRequest } from '../../loading/protocol.js';
 import type { SceneBounds } from '../../viewer/camera/settings.js';
 import { LoadedGaussians, type OwnedGaussians } from '../../gpu/loaded-gaussians.js';
-import { prepareDevice } from '../../gpu/initial-frames.js';
+import { images, unlessWrong } from '../../gpu/initial-frames.js';
+import { limitScenes } from '../../gpu/memory-budget.js';
 import type { LodSettings } from '../../gpu/backend.js';
-import type { OpenOptions, SourceKind } from '../source-kind.js';
+import type { OpenOptions, OpenSource } from '../source-kind.js';
 import { streamCaps } from './stream-caps.js';
 
 interface StreamedOptions extends OpenOptions {
@@ -130,12 +131,15 @@ const openBoxes: Open = async (request, device, { loader, signal, onProgress }, 
 };
 
 /** Opens a streamed scene. */
-export const openStreamedScene: SourceKind['open'] = async (request, options, acquiring) => {
+export const open: OpenSource = async (request, options, acquiring) => {
   const lease = await acquiring;
   const opened: { scene?: LoadedGaussians } = {};
   const onChange = (): void => opened.scene?.onChange();
+  await pickInitialVariants(lease.device, images()).catch(unlessWrong);
+  limitScenes(lease.device, options.memoryBudget);
+  options.signal.throwIfAborted();
   // The size of the scene is unknown until the manifest is loaded, so its limit is reported.
-  await prepareDevice(lease, options, options.memoryBudget ?? 0);
+  options.beforeUpload(options.memoryBudget ?? 0);
   const { gaussians, bounds, ...rest } = await openStreamed(request, lease.device, { ...options, onChange });
   opened.scene = new LoadedGaussians(lease, gaussians, bounds, options.submissions, rest);
   return opened.scene;
