@@ -1,7 +1,7 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import fc from 'fast-check';
-import { Damper } from '../../packages/element/src/viewer/camera/damper.js';
+import { Damper } from '../support/element/camera.js';
 
 const value = fc.double({ min: -1e6, max: 1e6, noNaN: true });
 const decay = fc.double({ min: 1, max: 1e4, noNaN: true });

@@ -2,7 +2,7 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { orderView } from '@gaussian-splat/renderer/webgl';
-import { DepthSorter } from '../../packages/element/src/webgl/depth-sorter.js';
+import { DepthSorter } from '../support/element/parts.js';
 import { cameraAt } from '../support/scenes.js';
 
 /** A worker that has started, and records the messages of the page. */

@@ -2,8 +2,7 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { GaussianSplatError } from '@gaussian-splat/core';
-import { unrecoverable } from '../../packages/element/src/gpu/device-recovery.js';
-import { DeviceLostError } from '../../packages/element/src/gpu/device-failures.js';
+import { unrecoverable, DeviceLostError } from '../support/element/parts.js';
 
 test('a lost device is reported with the words of the browser and a remedy', () => {
   const info = { reason: 'unknown', message: 'DXGI_ERROR_DEVICE_HUNG.' } as GPUDeviceLostInfo;

@@ -1,6 +1,6 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { DoubleTap } from '../../packages/element/src/viewer/camera/double-tap.js';
+import { DoubleTap } from '../support/element/camera.js';
 
 /** Down and up of each tap: time, duration, position, how far the finger slides, whether another is down, whether the browser takes it. */
 type Tap = [ms: number, x: number, more?: { rest?: number; slide?: number; alone?: boolean; taken?: boolean }];

@@ -1,6 +1,6 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { FrameRoom } from '../../packages/element/src/sources/generator/frame-room.js';
+import { FrameRoom } from '../support/element/parts.js';
 
 const MB = 1 << 20;
 

@@ -6,8 +6,8 @@ import { boundsOf, type Bounds, type Camera, type GaussianCloud, type Vector3 } 
 import { resolveContract } from '@gaussian-splat/core/contract';
 import { bytesSource, readOnnxHeader } from '@gaussian-splat/core/onnx';
 import { readScene } from '@gaussian-splat/formats';
-import { CameraController } from '../../packages/element/src/viewer/camera-controller.js';
-import { declaredBounds } from '../../packages/element/src/sources/generator/open-dynamic-model.js';
+import { CameraController } from '../support/element/camera.js';
+import { declaredBounds } from '../support/element/parts.js';
 import { settings } from '../support/camera-settings.js';
 import { needsSharedData, sharedFile } from '../support/data.js';
 import { randomSource } from '../support/gpu.js';

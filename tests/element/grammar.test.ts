@@ -1,9 +1,14 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import fc from 'fast-check';
-import { credentialsOf, type RawAttributes } from '../../packages/element/src/viewer/attributes.js';
-import { ALL_ATTRIBUTES, readAttributes } from '../../packages/element/src/viewer/element-attributes.js';
-import { MESH_ATTRIBUTES, SCENE_ATTRIBUTES } from '../../packages/element/src/features/children/attributes.js';
+import {
+  credentialsOf,
+  type RawAttributes,
+  ALL_ATTRIBUTES,
+  readAttributes,
+  MESH_ATTRIBUTES,
+  SCENE_ATTRIBUTES,
+} from '../support/element/parts.js';
 import {
   fieldOfViewGrammar,
   numberGrammar,
@@ -12,9 +17,12 @@ import {
   targetGrammar,
   upGrammar,
   type AttributeGrammar,
-} from '../../packages/element/src/viewer/camera/grammar.js';
-import { lengthGrammar, optionalLengthGrammar } from '../../packages/element/src/viewer/camera/lengths.js';
-import { CameraOrbit, CameraTarget, FieldOfView } from '../../packages/element/src/viewer/camera/values.js';
+  lengthGrammar,
+  optionalLengthGrammar,
+  CameraOrbit,
+  CameraTarget,
+  FieldOfView,
+} from '../support/element/camera.js';
 
 const orbit = orbitGrammar('0deg 75deg auto');
 const DEGREE = Math.PI / 180;

@@ -1,7 +1,7 @@
 /** A large PLY whose download starts again, and brings another file than before. */
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { LargePly } from '../../packages/element/src/loading/large-ply.js';
+import { LargePly } from '../support/element/loading.js';
 import { writePly } from '../formats/support/ply-writer.js';
 import { inriaColumns, rawSplats } from '../formats/support/splats.js';
 

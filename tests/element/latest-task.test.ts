@@ -1,7 +1,7 @@
 /** The latest request wins: earlier requests have no more effect, and their failures are ignored. */
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { LatestTask } from '../../packages/element/src/viewer/latest-task.js';
+import { LatestTask } from '../support/element/parts.js';
 
 const settled = (): Promise<void> => new Promise(setImmediate);
 

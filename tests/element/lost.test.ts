@@ -10,9 +10,9 @@ import {
   pinchOf,
   wheelOf,
   type CameraAction,
-} from '../../packages/element/src/viewer/camera/gestures.js';
-import { toViewer } from '../../packages/element/src/viewer/camera/orbit.js';
-import { CameraController } from '../../packages/element/src/viewer/camera-controller.js';
+  toViewer,
+  CameraController,
+} from '../support/element/camera.js';
 import { settings } from '../support/camera-settings.js';
 
 const BOUNDS: Bounds = { min: [0, 1, 2], max: [2, 5, 4], center: [1, 3, 3], radius: 2 };

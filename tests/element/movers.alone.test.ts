@@ -2,10 +2,8 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import type { Bounds } from '@gaussian-splat/core';
-import type { RawAttributes } from '../../packages/element/src/viewer/attributes.js';
-import { AutoRotateController } from '../../packages/element/src/features/auto-rotate/auto-rotate-controller.js';
-import { CameraController } from '../../packages/element/src/viewer/camera-controller.js';
-import { PromptController } from '../../packages/element/src/features/input/prompt-controller.js';
+import { type RawAttributes, AutoRotateController, PromptController } from '../support/element/parts.js';
+import { CameraController } from '../support/element/camera.js';
 import { settings } from '../support/camera-settings.js';
 import { viewerOf } from '../support/viewer.js';
 

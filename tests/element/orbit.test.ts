@@ -2,8 +2,12 @@ import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { cross, dot, eyeOf, lookAt, type Bounds, type Matrix4, type Vector3 } from '@gaussian-splat/core';
 import fc from 'fast-check';
-import { keyOf, orbitOf, panOf, pinchOf, wheelOf } from '../../packages/element/src/viewer/camera/gestures.js';
 import {
+  keyOf,
+  orbitOf,
+  panOf,
+  pinchOf,
+  wheelOf,
   cameraOfPose,
   eyeOfPose,
   framingDistance,
@@ -13,13 +17,13 @@ import {
   toViewer,
   viewerFrame,
   type CameraPose,
-} from '../../packages/element/src/viewer/camera/orbit.js';
-import { OrbitCamera } from '../../packages/element/src/viewer/camera/orbit-camera.js';
-import { limitsOf, poseOf } from '../../packages/element/src/viewer/camera/settings.js';
-import { project } from '../../packages/element/src/viewer/camera/projection.js';
-import { CameraController } from '../../packages/element/src/viewer/camera-controller.js';
-import { boxOf } from '../../packages/element/src/viewer/scene-queries.js';
-import { LabelView, type Located } from '../../packages/element/src/shared/label-box.js';
+  OrbitCamera,
+  limitsOf,
+  poseOf,
+  project,
+  CameraController,
+} from '../support/element/camera.js';
+import { boxOf, LabelView, type Located } from '../support/element/parts.js';
 import { settings } from '../support/camera-settings.js';
 
 /** Rows of the frame of each up axis, as they stand in no formula. */

@@ -4,7 +4,7 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { COSTS, p95, restlessWindows, reversals, run, type Frame, type Gpu } from '../support/pace-gpu.js';
-import { quantile } from '../../packages/element/src/dynamic-quality/display-interval.js';
+import { quantile } from '../support/element/quality.js';
 import { randomSource } from '../support/gpu.js';
 
 type Random = (from: number, to: number) => number;

@@ -2,10 +2,7 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import fc from 'fast-check';
-import { DisplayInterval } from '../../packages/element/src/dynamic-quality/display-interval.js';
-import { QUALITY_LEVELS } from '../../packages/element/src/dynamic-quality/quality-levels.js';
-import { nextQuality } from '../../packages/element/src/dynamic-quality/next-quality.js';
-import { INITIAL_QUALITY } from '../../packages/element/src/dynamic-quality/start.js';
+import { DisplayInterval, QUALITY_LEVELS, nextQuality, INITIAL_QUALITY } from '../support/element/quality.js';
 import { COSTS, LEVELS, p95, restlessWindows, reversals, run } from '../support/pace-gpu.js';
 
 const LOWEST = COSTS.length - 1;

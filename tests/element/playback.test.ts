@@ -1,7 +1,7 @@
 /** The clock of scenes that move, against what HTML has for video. */
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { PlaybackController, type PlaybackEvent } from '../../packages/element/src/viewer/playback-controller.js';
+import { PlaybackController, type PlaybackEvent } from '../support/element/parts.js';
 
 /** A clock of a scene of four seconds, with the frames that it asked for, its events, and listeners of these. */
 function clock(

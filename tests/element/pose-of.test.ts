@@ -1,7 +1,7 @@
 /** Rotations of joints, to the formats of poses and back. */
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { poseOf, turnsOf } from '../../packages/element/src/sources/generator/pose-of.js';
+import { poseOf, turnsOf } from '../support/element/parts.js';
 
 /**
  * Axis-angle, radians: nothing, little, around each axis, half turns, for which matrices divide by a different number

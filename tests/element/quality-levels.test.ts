@@ -2,7 +2,7 @@
 import assert from 'node:assert/strict';
 import { readdirSync, readFileSync } from 'node:fs';
 import { test } from 'node:test';
-import { QUALITY_LEVELS } from '../../packages/element/src/dynamic-quality/quality-levels.js';
+import { QUALITY_LEVELS } from '../support/element/quality.js';
 import { QUALITIES } from '@gaussian-splat/renderer';
 
 interface Line {

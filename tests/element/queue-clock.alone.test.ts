@@ -3,8 +3,8 @@ import assert from 'node:assert/strict';
 import { test, type TestContext } from 'node:test';
 import { QueueClock, type WorkTime } from '@gaussian-splat/renderer/tools';
 import { GlClock } from '@gaussian-splat/renderer/webgl';
-import { DynamicQualityController } from '../../packages/element/src/dynamic-quality/dynamic-quality-controller.js';
-import type { FrameScheduler } from '../../packages/element/src/gpu/frame-scheduler.js';
+import { DynamicQualityController } from '../support/element/quality.js';
+import type { FrameScheduler } from '../support/element/parts.js';
 import { LEVELS } from '../support/pace-gpu.js';
 
 const INTERVAL = 1000 / 60;

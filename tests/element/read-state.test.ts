@@ -4,8 +4,7 @@ import { test } from 'node:test';
 import type { Camera, GaussianSplatError } from '@gaussian-splat/core';
 import type { Contract } from '@gaussian-splat/core/contract';
 import type { GeneratorModel, GeneratorState } from '@gaussian-splat/generator';
-import type { DynamicState } from '../../packages/element/src/sources/generator/dynamic-model.js';
-import { StateReader } from '../../packages/element/src/sources/generator/read-state.js';
+import { type DynamicState, StateReader } from '../support/element/parts.js';
 
 const CAMERA = {} as Camera;
 const STATE: DynamicState = { timeSeconds: 0, pose: undefined, controls: {}, images: {} };

@@ -1,16 +1,14 @@
 /** The time of the full frame once the camera rests: the real controller, with the test's clock and a simulated GPU. */
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { DetailController } from '../../packages/element/src/sources/stream/detail-controller.js';
+import { DetailController, FrameScheduler, type LoadedGaussians } from '../support/element/parts.js';
 import {
   DynamicQualityController,
   type FramePlan,
   type DynamicQualityOptions,
-} from '../../packages/element/src/dynamic-quality/dynamic-quality-controller.js';
-import { FrameScheduler } from '../../packages/element/src/gpu/frame-scheduler.js';
-import type { LoadedGaussians } from '../../packages/element/src/gpu/loaded-gaussians.js';
-import type { SceneLoader } from '../../packages/element/src/loading/scene-loader.js';
-import { waitForRest } from '../../packages/element/src/dynamic-quality/start.js';
+  waitForRest,
+} from '../support/element/quality.js';
+import type { SceneLoader } from '../support/element/loading.js';
 import { COSTS, LEVELS } from '../support/pace-gpu.js';
 
 const INTERVAL = 1000 / 60;

@@ -2,7 +2,7 @@
 import assert from 'node:assert/strict';
 import { mock, test } from 'node:test';
 import type { Bounds } from '@gaussian-splat/core';
-import { RunWatch, type Watched } from '../../packages/element/src/sources/generator/run-watch.js';
+import { RunWatch, type Watched } from '../support/element/parts.js';
 
 type Sample = Awaited<ReturnType<Watched['readSample']>>;
 const DRAWN: Sample = { bounds: {} as Bounds, drawn: 64, unusable: 0 };

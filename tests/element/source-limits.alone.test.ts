@@ -7,9 +7,8 @@ import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { writePly } from '../formats/support/ply-writer.js';
 import { inriaColumns, rawSplats } from '../formats/support/splats.js';
-import { SourceController, type SourceHost } from '../../packages/element/src/viewer/source-controller.js';
-import { PreviewSchedule } from '../../packages/element/src/loading/preview-schedule.js';
-import type { SceneLimits, SceneRequest } from '../../packages/element/src/loading/protocol.js';
+import { SourceController, type SourceHost } from '../support/element/parts.js';
+import { PreviewSchedule, type SceneLimits, type SceneRequest } from '../support/element/loading.js';
 
 function limitsWith(memoryBudget: number | undefined, sceneLimits: SceneLimits): SceneLimits | undefined {
   let found: SceneRequest | null = null;

@@ -2,8 +2,7 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { faultsOf } from '@gaussian-splat/renderer/tools';
-import type { LoadedGaussians } from '../../packages/element/src/gpu/loaded-gaussians.js';
-import { statsOf, type StatsContext } from '../../packages/element/src/viewer/stats.js';
+import { type LoadedGaussians, statsOf, type StatsContext } from '../support/element/parts.js';
 
 const scene = {
   gaussians: { count: 60, byteLength: 0 },

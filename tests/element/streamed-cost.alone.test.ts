@@ -9,7 +9,7 @@ import { after, before, test } from 'node:test';
 import { serialize } from 'node:v8';
 import { strToU8, zipSync } from 'fflate';
 import { LoadBudget, SogFiles } from '@gaussian-splat/formats';
-import { openBoxes } from '../../packages/element/src/loading/lod-boxes.js';
+import { openBoxes } from '../support/element/loading.js';
 import { smallCloud } from '../formats/support/small-cloud.js';
 import { writeSog } from '../formats/support/sog-writer.js';
 import { writeWebp } from '../formats/support/webp-writer.js';

@@ -1,7 +1,7 @@
 /** Values of poses and controls in the forms that trackers and authors have. */
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { readControls, readNumbers, type Numbers } from '../../packages/element/src/sources/generator/values.js';
+import { readControls, readNumbers, type Numbers } from '../support/element/parts.js';
 
 test('landmarks, nested lists and texts of them are the same numbers', () => {
   const landmarks = [

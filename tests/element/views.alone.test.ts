@@ -14,15 +14,20 @@ import {
   toViewer,
   viewerFrame,
   type CameraPose,
-} from '../../packages/element/src/viewer/camera/orbit.js';
-import { ATTRIBUTES } from '../../packages/element/src/viewer/attributes.js';
-import { fieldOfViewGrammar, orbitGrammar, targetGrammar } from '../../packages/element/src/viewer/camera/grammar.js';
-import { poseOf } from '../../packages/element/src/viewer/camera/settings.js';
-import { CameraController } from '../../packages/element/src/viewer/camera-controller.js';
-import { poseOfView, type CameraView, type ViewContext } from '../../packages/element/src/viewer/camera/camera-view.js';
-import { Flight } from '../../packages/element/src/features/views/flight.js';
-import { easingOf, pathThrough, unwound } from '../../packages/element/src/viewer/camera/path.js';
-import { readViews } from '../../packages/element/src/viewer/camera/read-views.js';
+  fieldOfViewGrammar,
+  orbitGrammar,
+  targetGrammar,
+  poseOf,
+  CameraController,
+  poseOfView,
+  type CameraView,
+  type ViewContext,
+  easingOf,
+  pathThrough,
+  unwound,
+  readViews,
+} from '../support/element/camera.js';
+import { ATTRIBUTES, Flight } from '../support/element/parts.js';
 import { settings } from '../support/camera-settings.js';
 import { needsSharedData, sharedFile } from '../support/data.js';
 

@@ -1,8 +1,7 @@
 /** The parts of walking that need no page: a body that is put down, and the sticks of gamepads. */
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { Gamepads } from '../../packages/element/src/features/walk/gamepads.js';
-import { FloorBody } from '../../packages/element/src/floor/floor-body.js';
+import { Gamepads, FloorBody } from '../support/element/parts.js';
 
 /** Two floors of 4 x 4 m around the origin, at 0 m and, in its half with positive x, at 2 m. */
 const side = 80;

@@ -4,8 +4,7 @@
  */
 import assert from 'node:assert/strict';
 import { test, type TestContext } from 'node:test';
-import type { WorkerRequest } from '../../packages/element/src/loading/worker-messages.js';
-import { WorkerPool } from '../../packages/element/src/loading/worker-pool.js';
+import { type WorkerRequest, WorkerPool } from '../support/element/loading.js';
 
 class FakeWorker extends EventTarget {
   readonly posted: string[] = [];

@@ -1,8 +1,7 @@
 /** The workers of a page: a simulated worker, and the test's clock. */
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import type { WorkerRequest } from '../../packages/element/src/loading/worker-messages.js';
-import { WorkerPool } from '../../packages/element/src/loading/worker-pool.js';
+import { type WorkerRequest, WorkerPool } from '../support/element/loading.js';
 
 class FakeWorker extends EventTarget {
   readonly posted: string[] = [];

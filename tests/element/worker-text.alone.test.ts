@@ -4,8 +4,7 @@ import { existsSync, readFileSync } from 'node:fs';
 import { test } from 'node:test';
 import { fileURLToPath } from 'node:url';
 import { runInThisContext, Script } from 'node:vm';
-import type { CHUNKS } from '../../packages/element/src/loading/worker-code.js';
-import { BOOTSTRAP } from '../../packages/element/src/loading/worker-bootstrap.js';
+import { type CHUNKS, BOOTSTRAP } from '../support/element/loading.js';
 
 const folder = fileURLToPath(new URL('../../packages/element/dist/loading/', import.meta.url));
 const skip = existsSync(`${folder}worker-code.js`) ? false : 'no bundle: npm run build';

@@ -5,9 +5,8 @@ import type { AddressInfo } from 'node:net';
 import { after, before, test } from 'node:test';
 import { DEFAULT_STEPS } from '@gaussian-splat/optimize/pages';
 import { deflateQuickly } from '../../packages/cli/src/lib/encoders.mjs';
-import { loadScene } from '../../packages/element/src/loading/load-scene.js';
-import type { SceneRequest } from '../../packages/element/src/loading/protocol.js';
-import { openXrScene, type XrSceneSource } from '../../packages/element/src/features/xr/xr-scene.js';
+import { loadScene, type SceneRequest } from '../support/element/loading.js';
+import { openXrScene, type XrSceneSource } from '../support/element/parts.js';
 import { smallCloud } from '../formats/support/small-cloud.js';
 import { detailFolder } from '../support/detail-folder.js';
 

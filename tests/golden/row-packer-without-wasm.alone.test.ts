@@ -3,7 +3,7 @@ import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { packGaussians } from '@gaussian-splat/renderer';
 import { packCloud, RowPacker } from '@gaussian-splat/renderer/tools';
-import { LargePly } from '../../packages/element/src/loading/large-ply.js';
+import { LargePly } from '../support/element/loading.js';
 import { writePly } from '../formats/support/ply-writer.js';
 import { inriaColumns, rawSplats } from '../formats/support/splats.js';
 import { cloudOf, repeat } from '../support/clouds.js';

@@ -6,7 +6,7 @@ import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { GaussianSplatError } from '@gaussian-splat/core';
 import { bytesSource, readOnnxHeader, type OnnxHeader } from '@gaussian-splat/core/onnx';
-import { openModel } from '../../packages/element/src/loading/open-model.js';
+import { openModel } from '../support/element/loading.js';
 import { isLab } from '../support/extent.js';
 import { fixtureBytes, fixtureNames } from '../support/generators.js';
 import { seededRandom } from '../support/random.js';

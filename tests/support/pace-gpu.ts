@@ -1,8 +1,5 @@
 /** Simulated GPUs for dynamic quality, and measures of the chosen levels. */
-import type { QualityLevel } from '../../packages/element/src/dynamic-quality/quality-levels.js';
-import { nextQuality } from '../../packages/element/src/dynamic-quality/next-quality.js';
-import { quantile } from '../../packages/element/src/dynamic-quality/display-interval.js';
-import { INITIAL_QUALITY, type QualityState } from '../../packages/element/src/dynamic-quality/start.js';
+import { type QualityLevel, nextQuality, quantile, INITIAL_QUALITY, type QualityState } from './element/quality.js';
 import { randomSource } from './gpu.js';
 
 /** Levels that do not change with the element's. */

@@ -1,4 +1,4 @@
-import type { Viewer } from '../../packages/element/src/viewer/viewer.js';
+import type { Viewer } from './element/parts.js';
 
 const nothing = (): undefined => undefined;
 

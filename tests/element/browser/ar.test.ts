@@ -1,4 +1,5 @@
 /** AR with an emulated phone in an emulated room: the position and size of the subject, and the file for iPhones. */
+import { insideOf } from './support/inside.js';
 import '@gaussian-splat/element';
 import type { GaussianSplatElement } from '@gaussian-splat/element';
 import { GlRenderer } from '@gaussian-splat/renderer/webgl';
@@ -120,8 +121,7 @@ describe('AR', () => {
 
   itInLab('stands on the plane, front to the person, in its true size', async () => {
     const [element, m] = await start({ 'ar-scale': 'fixed', unit: '10cm' });
-    const { bounds } = (element as unknown as { core: { camera: { bounds: { center: number[]; radius: number } } } })
-      .core.camera;
+    const { bounds } = insideOf(element).camera;
     const size = Math.hypot(m[0], m[1], m[2]);
     assert(Math.abs(size / 0.1 - 1) < 1e-3, `${size} m for a unit`);
     const { readScene, fetchScene } = await import('@gaussian-splat/formats');
@@ -143,7 +143,7 @@ describe('AR', () => {
 
   itInLab('is 0.5 to 1 m large at first where no size is known', async () => {
     const [element, m] = await start({});
-    const { bounds } = (element as unknown as { core: { camera: { bounds: { radius: number } } } }).core.camera;
+    const { bounds } = insideOf(element).camera;
     const size = 2 * bounds.radius * Math.hypot(m[0], m[1], m[2]);
     assert(size > 0.45 && size < 1.05, `${size} m`);
     element.exitXR!();
@@ -158,8 +158,7 @@ describe('AR', () => {
       [{}, [wall], wall.at[2]],
     ] as const) {
       const [element, m] = await start(attributes as Record<string, string>, undefined, hits);
-      const { bounds } = (element as unknown as { core: { camera: { bounds: { center: number[]; radius: number } } } })
-        .core.camera;
+      const { bounds } = insideOf(element).camera;
       const ahead = 'ar-placement' in attributes ? bounds.radius * Math.hypot(m[0], m[1], m[2]) : 0;
       const middle = inRoom(m, bounds.center);
       assert(Math.abs(middle[2] - z - ahead) < 0.03, `${middle} in place of ${z}`);
@@ -187,7 +186,7 @@ describe('AR', () => {
 
     const wall: Hit = { at: [0, 1.6, -2], normal: [0, 0, 1] };
     const [other, before] = await start({ 'ar-placement': 'wall' }, undefined, [wall]);
-    const { bounds } = (other as unknown as { core: { camera: { bounds: { center: number[] } } } }).core.camera;
+    const { bounds } = insideOf(other).camera;
     for (let moved = 0; moved < 0.41; moved += 0.1) {
       touch([[moved, 1.6 + moved / 2, -2]]);
       await frames(2);
@@ -222,7 +221,7 @@ describe('AR', () => {
     const box = label.getBoundingClientRect();
     const around = overlay.getBoundingClientRect();
     const at = [(box.x + box.width / 2 - around.x) / around.width, (box.y + box.height / 2 - around.y) / around.height];
-    const { bounds } = (element as unknown as { core: { camera: { bounds: { center: number[] } } } }).core.camera;
+    const { bounds } = insideOf(element).camera;
     const row = (r: number): number =>
       bounds.center.reduce((sum, value, k) => sum + m[4 * r + k] * value, m[4 * r + 3]);
     const [x, y, z] = [row(0), row(1), row(2)];

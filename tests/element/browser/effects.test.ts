@@ -1,4 +1,5 @@
 /** Effects of a page on splats: `<splat-cut>`, `reveal-effect` and `splatShader`. */
+import { insideOf } from './support/inside.js';
 import '@gaussian-splat/element';
 import type { GaussianSplatElement } from '@gaussian-splat/element';
 import { emulateMedia } from '@web/test-runner-commands';
@@ -38,17 +39,10 @@ async function cut(parent: Element, attributes: Readonly<Record<string, string>>
   parent.append(child);
   const element = parent.closest('gaussian-splat')!;
   await customElements.whenDefined('splat-cut');
-  await until(() => coreOf(element).sources.world.placements.some(({ modifier }) => modifier), 'the cut acts');
+  await until(() => insideOf(element).sources.world.placements.some(({ modifier }) => modifier), 'the cut acts');
   await frames(3);
   return child;
 }
-
-interface Inside {
-  readonly core: {
-    readonly sources: { readonly world: { readonly placements: readonly { readonly modifier: unknown }[] } };
-  };
-}
-const coreOf = (element: GaussianSplatElement): Inside['core'] => (element as unknown as Inside).core;
 
 it('a cut hides what is inside or outside, moves without a pipeline or a buffer, and goes again', async () => {
   const element = await showLoaded(VIEW);

@@ -2,7 +2,7 @@
 import { GaussianSplatElement } from '@gaussian-splat/element';
 import type { PackedGaussians } from '@gaussian-splat/renderer';
 import type * as sceneWorker from '../../../packages/element/src/loading/scene-worker.js';
-import type { PartListener } from '../../../packages/element/src/loading/protocol.js';
+import type { PartListener } from '../../support/element/loading.js';
 import { assert, assertEqual, nextEvent, show, showLoaded } from './support/harness.js';
 
 const SPLATS = 200_000;

@@ -1,4 +1,5 @@
 /** Points of the scene: under a pointer, under a label, and the image of all of them. */
+import { insideOf } from './support/inside.js';
 import '@gaussian-splat/element';
 import type { GaussianSplatElement } from '@gaussian-splat/element';
 import { GaussianSplatElement as ElementClass } from '@gaussian-splat/element';
@@ -152,7 +153,7 @@ describe('positionFromPoint', () => {
     const [x, y] = pageOf(element, [1, 0, 0]);
     const taps = new Taps();
     let picks = 0;
-    const { core } = element as unknown as { core: { positionFromPoint: () => Promise<unknown> } };
+    const core = insideOf(element);
     const ask = core.positionFromPoint.bind(core);
     core.positionFromPoint = (...place) => (picks++, ask(...place));
     await taps.tap(x, y);

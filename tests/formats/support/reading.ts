@@ -7,7 +7,7 @@ import { serialize } from 'node:v8';
 import { GaussianSplatError } from '@gaussian-splat/core';
 import type { FloorOptions } from '@gaussian-splat/formats/floor';
 import { clipRoomBytes, unpackClipIndex } from '@gaussian-splat/formats';
-import { runOnPage } from '../../../packages/element/src/loading/scene-worker.js';
+import { runOnPage } from '../../support/element/loading.js';
 import type { FuzzScene, ReaderKind } from './fuzz-scenes.js';
 
 /** Bounds for a file of `bytes`, as SECURITY.md has them. */

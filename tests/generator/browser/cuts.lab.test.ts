@@ -1,4 +1,5 @@
 /** Cuts of a scene that a generator makes: they act on every frame, and picking respects them. */
+import { insideOf } from '../../element/browser/support/inside.js';
 import '@gaussian-splat/element';
 import { GaussianSplatElement } from '@gaussian-splat/element';
 import { assert, assertEqual, nextEvent, showLoaded, until } from '../../element/browser/support/harness.js';
@@ -36,18 +37,12 @@ async function isPicked(element: GaussianSplatElement, screen: Screen, side: 0 |
   return false;
 }
 
-interface Inside {
-  readonly core: {
-    readonly sources: { readonly world: { readonly placements: readonly { readonly modifier: unknown }[] } };
-  };
-}
-
 /** Adds a cut, and waits until the code and pipelines of cuts are loaded. */
 async function cut(parent: Element, attributes: Readonly<Record<string, string>>): Promise<HTMLElement> {
   const child = document.createElement('splat-cut');
   for (const [name, value] of Object.entries(attributes)) child.setAttribute(name, value);
   parent.append(child);
-  const { sources } = (parent.closest('gaussian-splat') as unknown as Inside).core;
+  const { sources } = insideOf(parent.closest('gaussian-splat')!);
   await until(() => sources.world.placements.some(({ modifier }) => modifier), 'the cut acts');
   return child;
 }
