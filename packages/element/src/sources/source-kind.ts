@@ -9,10 +9,10 @@ import type { DynamicRequest } from './generator/dynamic-model.js';
 export interface SourceKind {
   readonly name: SourceKindName;
   /**
-   * Returns whether a request is for a source of this kind.
+   * Returns a truthy value if a request is for a source of this kind.
    * @param found Manifest that the file of the request turned out to be; undefined before it is read.
    */
-  matches(request: SceneRequest, found: LoadedSequence | undefined): boolean;
+  matches(request: SceneRequest, found: LoadedSequence | undefined): unknown;
   /** Imports the code that opens sources of this kind. */
   load(): Promise<{ readonly open: OpenSource }>;
 }

@@ -8,10 +8,10 @@ import type { OpenOptions, SourceKind } from './source-kind.js';
 
 /** All kinds of sources. A source is of the first kind that matches its request. */
 const SOURCE_KINDS: readonly SourceKind[] = [
-  { name: 'mesh', matches: ({ isMesh }) => isMesh ?? false, load: () => import('./mesh/open-mesh.js') },
+  { name: 'mesh', matches: ({ isMesh }) => isMesh, load: () => import('./mesh/open-mesh.js') },
   {
     name: 'generator',
-    matches: ({ url, contract }) => (contract ?? '') !== '' || /\.onnx$/i.test(nameIn(url)),
+    matches: ({ url, contract }) => contract || /\.onnx$/i.test(nameIn(url)),
     load: () => import('./generator/open-dynamic-model.js'),
   },
   {
@@ -27,7 +27,7 @@ const SOURCE_KINDS: readonly SourceKind[] = [
     load: () => import('./stream/open-streamed.js'),
   },
   // The manifest of a sequence may have any name.
-  { name: 'sequence', matches: (_, found) => found !== undefined, load: () => import('./sequence/sequence-player.js') },
+  { name: 'sequence', matches: (_, found) => found, load: () => import('./sequence/sequence-player.js') },
   { name: 'file', matches: () => true, load: async () => ({ open }) },
 ];
 
