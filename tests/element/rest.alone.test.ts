@@ -325,7 +325,12 @@ test('levels of detail are built once frames have moved slowly for 1.5 s, rests 
     ...{ memoryBudget: undefined, splatsChanged: () => undefined, owner: { warn: () => undefined } },
   });
   const place = { isLost: false };
-  detail.update({ place, gaussians: { count: 60_000, blocks: [] }, detail: {} } as unknown as LoadedGaussians);
+  detail.update({
+    place,
+    gaussians: { count: 60_000, blocks: [] },
+    detail: {},
+    can: () => true,
+  } as unknown as LoadedGaussians);
   const pass = (milliseconds: number): void => {
     now += milliseconds;
     context.mock.timers.tick(milliseconds);
