@@ -19,6 +19,4 @@ export {
 } from 'three/webgpu';
 export { materialOpacity, neutralToneMapping, output, sRGBTransferOETF, texture, vec4 } from 'three/tsl';
 export { GLTFLoader } from 'three/addons/loaders/GLTFLoader.js';
-
-export const loadMeshoptDecoder = async () =>
-  (await import('three/addons/libs/meshopt_decoder.module.js')).MeshoptDecoder;
+export { DynamicLighting } from 'three/addons/lighting/DynamicLighting.js';

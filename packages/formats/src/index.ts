@@ -1,4 +1,5 @@
 export { LoadBudget, type LoadLimits } from './budget.js';
+export { parseJson } from './json.js';
 export { detectFormat } from './detect.js';
 export { fetchScene, fileOpenerFor, type FetchSceneOptions } from './fetch-scene.js';
 export { sceneFormats } from './late-formats.js';
@@ -21,7 +22,6 @@ export { boundedImageHeader, type ImageHeader } from './triangles/image-size.js'
 export { readTriangles, type TriangleFile, type TriangleSource } from './triangles/read-triangles.js';
 export { Ktx2Decoder } from './triangles/ktx2.js';
 export type { ImageFile } from './triangles/images.js';
-export type { MeshoptView } from './triangles/views.js';
 export { isSequence, MAX_HEADER_BYTES as HEADER_BYTES } from './signatures.js';
 export type { FileBytes } from './bytes.js';
 export { frameAt, framePath, parseSequence, sequencePaths, type FramePattern, type SceneSequence } from './sequence.js';

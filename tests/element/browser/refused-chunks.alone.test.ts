@@ -18,7 +18,6 @@ const NOT_ASKED: Readonly<Record<string, string>> = {
   'device-recovery': 'no device comes back: tests/stability/browser',
   search: 'depends on what an earlier visit has kept',
   refusal: 'a page that refuses workers: tests/element/browser/cdn.test.ts',
-  'meshopt_decoder.module': 'compressed meshes',
   'detail-budget': 'streamed scenes that exceed their budget of splats',
   'decode-page': 'coded pages are decoded by the worker',
   'start-helpers': 'PLY files of 32 MB',

@@ -61,7 +61,7 @@ export const WORKER_TASKS = {
     load: async () =>
       (await loadModule('the code that reads meshes', () => import('./open-mesh-file.js'))).openMeshFile,
     transfer: ({ views, images }) => [
-      ...views.flatMap((view) => (view ? ('source' in view ? view.source : view).buffer : [])),
+      ...views.flatMap((view) => view?.buffer ?? []),
       ...images.flatMap((image) => image ?? []),
     ],
   }),

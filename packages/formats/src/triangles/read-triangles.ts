@@ -8,7 +8,7 @@ import { decodeDraco } from './draco.js';
 import { Images, type ImageFile } from './images.js';
 import { Survey } from './survey.js';
 import { trimmed } from './trim.js';
-import { Views, type MeshoptView } from './views.js';
+import { Views } from './views.js';
 
 /** Input of {@link readTriangles}: a file in memory, and access to the files that it refers to. */
 export interface TriangleSource {
@@ -30,8 +30,8 @@ export interface TriangleFile {
    * because their bytes are in `views`. Images have neither URIs nor buffer views, because they are in `images`.
    */
   readonly json: Json;
-  /** Content of each buffer view: bytes in a buffer of its own, or a compressed {@link MeshoptView}. Undefined if unused. */
-  readonly views: readonly (Uint8Array<ArrayBuffer> | MeshoptView | undefined)[];
+  /** Content of each buffer view, decompressed, in a buffer of its own; undefined if unused. */
+  readonly views: readonly (Uint8Array<ArrayBuffer> | undefined)[];
   /** Encoded file of each image; undefined for unused ones. */
   readonly images: readonly (ImageFile | undefined)[];
   /** GPU memory of geometry and textures in bytes. */

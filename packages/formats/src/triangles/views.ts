@@ -3,14 +3,9 @@ import { damaged } from '../faults.js';
 import { isObject } from '../json.js';
 import type { Json } from '../gltf/container.js';
 import type { GltfDocument } from '../gltf/document.js';
-import { meshoptParameters, packingOf, type MeshoptParameters } from '../gltf/meshopt-view.js';
+import { meshoptParameters, packingOf } from '../gltf/meshopt-view.js';
 import { layoutOf } from './costs.js';
 import type { Survey } from './survey.js';
-
-/** A buffer view that meshoptimizer has compressed, with the properties of EXT_meshopt_compression. */
-export interface MeshoptView extends MeshoptParameters {
-  readonly source: Uint8Array<ArrayBuffer>;
-}
 
 /** Bytes of an index of a sparse accessor, by component type. */
 const INDEX_BYTES: ReadonlyMap<unknown, number> = new Map([
@@ -35,35 +30,24 @@ export class Views {
   }
 
   /**
-   * Copies the used buffer views from their buffers.
+   * Copies the used buffer views from their buffers. Compressed ones are decompressed.
    * @returns One entry for each buffer view of the file; undefined for unused ones.
    * @throws GaussianSplatError `decode/*`, `out-of-memory/budget`; errors of fetching buffers
    */
-  async read(): Promise<(Uint8Array<ArrayBuffer> | MeshoptView | undefined)[]> {
+  async read(): Promise<(Uint8Array<ArrayBuffer> | undefined)[]> {
     const { bufferViews } = this.#document.json;
-    const views: (Uint8Array<ArrayBuffer> | MeshoptView | undefined)[] = new Array(
-      Array.isArray(bufferViews) ? bufferViews.length : 0,
-    ).fill(undefined);
-    for (const index of this.#used) {
-      const packed = packingOf(this.#document.item('bufferViews', index));
-      views[index] = packed ? await this.#readPacked(packed, index) : await this.#copyOf(index);
-    }
+    const length = Array.isArray(bufferViews) ? bufferViews.length : 0;
+    const views = new Array<Uint8Array<ArrayBuffer> | undefined>(length).fill(undefined);
+    for (const index of this.#used) views[index] = await this.#copyOf(index);
     return views;
   }
 
   async #copyOf(index: number): Promise<Uint8Array<ArrayBuffer>> {
     const bytes = await this.#document.readView(index);
+    // Decompressed bytes have a buffer of their own.
+    if (packingOf(this.#document.item('bufferViews', index))) return bytes as Uint8Array<ArrayBuffer>;
     this.#document.take(bytes.length);
     return bytes.slice() as Uint8Array<ArrayBuffer>;
-  }
-
-  async #readPacked(packed: Json, index: number): Promise<MeshoptView> {
-    const document = this.#document;
-    const path = `bufferViews[${index}]`;
-    const parameters = meshoptParameters(document, packed, path);
-    const source = await document.readRange(packed, path);
-    document.take(parameters.count * parameters.stride + source.length);
-    return { source: source.slice() as Uint8Array<ArrayBuffer>, ...parameters };
   }
 
   /**

@@ -4,6 +4,7 @@ import type { ProbeAnswer, ProbePoint } from '@gaussian-splat/renderer/tools';
 import {
   Camera as ThreeCamera,
   DepthTexture,
+  DynamicLighting,
   FloatType,
   HalfFloatType,
   Raycaster,
@@ -28,6 +29,8 @@ import { light, showAsDisplayed, showThrough } from './shown-colors.js';
 
 /** Number of samples per pixel. */
 const SAMPLES = 4;
+/** Maximum number of lights of each kind, of all meshes of an element. Each file has at most 16. */
+const MAX_LIGHTS = 128;
 
 /** Kinds of triangles, which are drawn in this order. Each is a layer number of three.js. */
 const [OPAQUE, TRANSPARENT] = [0, 1];
@@ -94,6 +97,9 @@ export class MeshLayer {
     await renderer.init();
     device.onuncapturederror = onuncapturederror;
     renderer.setClearColor(0, 0);
+    renderer.lighting = new DynamicLighting({
+      ...{ maxDirectionalLights: MAX_LIGHTS, maxPointLights: MAX_LIGHTS, maxSpotLights: MAX_LIGHTS },
+    });
     return new MeshLayer(device, renderer, await makeEnvironment(device, renderer));
   }
 

@@ -1,7 +1,6 @@
 import { GaussianSplatError, type Bounds, type Vector3 } from '@gaussian-splat/core';
 import type { Reservation } from '@gaussian-splat/renderer/tools';
 import type { LoadedMesh } from '../../loading/open-mesh-file.js';
-import { unpackedViews } from './unpack.js';
 import {
   AnimationMixer,
   Box3,
@@ -78,9 +77,8 @@ export class Model {
    */
   static async read(mesh: LoadedMesh, url: string, reservation: Reservation): Promise<Model> {
     try {
-      const views = await unpackedViews(mesh.views, url);
       const loader = new GLTFLoader();
-      loader.register((parser) => ({ name: 'checked', beforeRoot: () => fill(parser, views, mesh.images) }));
+      loader.register((parser) => ({ name: 'checked', beforeRoot: () => fill(parser, mesh) }));
       // The type of the first parameter is the bytes of a file, but the loader accepts parsed JSON as well.
       return new Model(await loader.parseAsync(mesh.json, ''), reservation);
     } catch (error) {
@@ -150,10 +148,9 @@ const texturesOf = (material: Material): Texture[] =>
 /** Puts the buffer views and images of a file into the cache that the loader reads before it fetches. */
 async function fill(
   { cache, sourceCache }: GLTFParser,
-  views: readonly (ArrayBuffer | undefined)[],
-  images: LoadedMesh['images'],
+  { views, images }: Pick<LoadedMesh, 'views' | 'images'>,
 ): Promise<void> {
-  for (const [index, view] of views.entries()) if (view) cache.add(`bufferView:${index}`, Promise.resolve(view));
+  for (const [index, view] of views.entries()) if (view) cache.add(`bufferView:${index}`, Promise.resolve(view.buffer));
   for (const [index, image] of images.entries()) {
     if (!image) continue;
     const texture = new Texture(image);

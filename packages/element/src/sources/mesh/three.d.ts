@@ -166,8 +166,17 @@ export class AnimationMixer {
   stopAllAction(): void;
   uncacheRoot(root: Object3D): void;
 }
+/** Lights whose number is a uniform: materials are compiled for kinds of lights, not for each light. */
+export class DynamicLighting {
+  constructor(maxima: {
+    readonly maxDirectionalLights: number;
+    readonly maxPointLights: number;
+    readonly maxSpotLights: number;
+  });
+}
 export class WebGPURenderer {
   constructor(options: object);
+  lighting: DynamicLighting;
   readonly backend: { get(object: object): { readonly texture?: GPUTexture } };
   init(): Promise<unknown>;
   setRenderTarget(target: RenderTarget | null): void;
@@ -198,18 +207,3 @@ export class GLTFLoader {
     path: string,
   ): Promise<{ readonly scene: Group; readonly animations: readonly AnimationClip[] }>;
 }
-
-export interface MeshoptDecoder {
-  /**
-   * Fulfills when the decoder is compiled. Rejects if the page forbids WebAssembly; absent if there is no WebAssembly.
-   */
-  readonly ready?: Promise<void>;
-  decodeGltfBufferAsync(
-    count: number,
-    stride: number,
-    source: Uint8Array,
-    mode: string,
-    filter: string | undefined,
-  ): Promise<Uint8Array<ArrayBuffer>>;
-}
-export const loadMeshoptDecoder: () => Promise<MeshoptDecoder>;
