@@ -1,6 +1,6 @@
 /**
  * Servers that are slow, silent, broken or lie: a download ends with the right bytes or a named error, in bounded time and with a bounded number of requests, and never with two files in one.
- * SECURITY.md: "Downloads end".
+ * SECURITY.md: "Downloads end", "Files that change are not mixed".
  */
 import assert from 'node:assert/strict';
 import { createServer, type IncomingMessage, type ServerResponse } from 'node:http';
@@ -273,7 +273,7 @@ test('ranges of two versions of a file are not mixed', async () => {
     ['"a"', '"b"', undefined].map((tag) => rangeFrom((response) => nine(response, tag ? { ETag: tag } : {}), '"a"')),
   );
   assert.equal(same.found, '9 bytes');
-  assert.deepEqual(other, { found: 'network/interrupted: another version ("b")', requests: 1 });
+  assert.deepEqual(other, { found: 'network/changed: another version ("b")', requests: 1 });
   assert.equal(none.found, '9 bytes', 'a header that pages cannot read is no other version');
 });
 

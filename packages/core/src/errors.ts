@@ -29,6 +29,8 @@ export type ErrorCode =
   | 'network/status'
   /** The connection ended before the last byte. */
   | 'network/interrupted'
+  /** The file was replaced on its server while it was loading. */
+  | 'network/changed'
   /** The URL cannot be parsed. */
   | 'network/url'
   /** The page is not in a secure context, so that WebGPU is unavailable. */

@@ -31,8 +31,8 @@ export interface FetchRangeOptions extends Pick<
  * the other bytes are discarded. Interrupted connections and temporarily unavailable servers are retried.
  * @param url Absolute URL.
  * @returns The bytes of the range; fewer if the file ends before `end`.
- * @throws GaussianSplatError `network/unreachable`, `network/status`, `network/interrupted` (also for another version of
- * the file), `out-of-memory/budget`; the reason of `signal`.
+ * @throws GaussianSplatError `network/unreachable`, `network/status`, `network/interrupted`, `network/changed` for
+ * another version of the file, `out-of-memory/budget`; the reason of `signal`.
  */
 export async function fetchRange(
   url: string,

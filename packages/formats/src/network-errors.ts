@@ -60,7 +60,7 @@ export function interrupted(
 
 /** @param before Validator of the version that was requested first. @param now Validator of the current version. */
 export function changed(address: URL, before: string, now: string): GaussianSplatError {
-  return new GaussianSplatError('network/interrupted', {
+  return new GaussianSplatError('network/changed', {
     where: label(address),
     expected: `the version of the file that began to load (${before.slice(0, 80)})`,
     found: `another version (${now.slice(0, 80)})`,

@@ -1,4 +1,7 @@
-/** Clips: one file that is played by byte ranges, with the words of HTMLMediaElement. */
+/**
+ * Clips: one file that is played by byte ranges, with the words of HTMLMediaElement.
+ * SECURITY.md: "Files that change are not mixed".
+ */
 import '@gaussian-splat/element';
 import { unzipSync } from 'fflate';
 import type { GaussianSplatElement } from '@gaussian-splat/element';
@@ -157,6 +160,35 @@ describe('a clip', () => {
     await until(() => said.some((each) => each.startsWith('ended')), 'it continues to the end');
     const order = said.map((each) => each.split(' ')[0]);
     assertEqual(order.slice(0, 4), ['playing', 'waiting', 'canplay', 'playing'], 'events');
+  });
+
+  it('that is replaced on its server while it plays continues with the new version', async () => {
+    const gate = `replaced-${Math.round(performance.timeOrigin)}`;
+    const element = await showLoaded({ src: `${CLIP}?frames=84&replaced=${gate}` });
+    assertEqual(element.duration, 8.4, 'duration');
+    const said: string[] = [];
+    for (const type of ['error', 'generator-error', 'emptied', 'load', 'durationchange'])
+      element.addEventListener(type, () => said.push(type));
+    await fetch(`/net/open/${gate}`);
+    await seek(element, 8.35);
+    await until(() => element.duration === 9.6, 'the version of 12 frames more');
+    assertEqual([element.currentTime, element.loaded], [8.35, true], 'currentTime, loaded');
+    await until(() => spansOf(element).some(([start, end]) => start <= 8.35 && end > 8.35), 'the frames of the seek');
+    await showsAlone(element, 83);
+    await seek(element, 9.55);
+    await showsAlone(element, 95);
+    assertEqual(said, ['durationchange'], 'events');
+  });
+
+  it('whose server gives every answer another version ends in a named error, after a few requests', async () => {
+    const element = await showLoaded({ src: `${CLIP}?frames=84&alternating=17` });
+    const failed = nextEvent<CustomEvent<{ reason: string }>>(element, 'generator-error');
+    element.currentTime = 8.35;
+    assertEqual((await failed).detail.reason, 'network/changed', 'reason');
+    assert(element.loaded, 'the clip stays');
+    const other = show({ src: `${CLIP}?frames=84&alternating=0` });
+    await until(() => other.error !== null, 'an error');
+    assertEqual(other.error!.reason, 'network/changed', 'reason of a clip that never opens');
   });
 
   it('a seek into what is there takes the time of a frame, and no task of the page is long', async () => {

@@ -78,6 +78,13 @@ const SUBMISSIONS_GROWTH = 4;
 const MAX_SUBMISSIONS = 64;
 
 /**
+ * Maximum number of loads of a scene in {@link RENEWAL_MS} because its file was replaced. Servers that do not share
+ * their files may alternate between versions.
+ */
+const MAX_RENEWALS = 3;
+const RENEWAL_MS = 60_000;
+
+/**
  * Controls the life cycle of the element's scene: loads it, replaces it (the latest request wins), recovers after the
  * loss of the device, and releases it. Work for an older request finds its signal aborted and has no effect.
  */
@@ -107,6 +114,9 @@ export class SceneController implements ReactiveController {
    * the driver may have been the cause.
    */
   #submissions = 1;
+  /** Times of the last loads by {@link renew}, in milliseconds of `performance.now()`. */
+  #renewals: number[] = [];
+  #isRenewing = false;
 
   constructor(host: ReactiveControllerHost, of: SceneHost) {
     this.#host = host;
@@ -200,6 +210,33 @@ export class SceneController implements ReactiveController {
     if (this.#isAway) this.#presented = this.#attempt(this.#request!, this.#running.renew(), false, () => undefined);
     this.#isAway = false;
     await this.#presented;
+  }
+
+  /**
+   * Loads the file of the current scene again, because it was replaced on its server. The current scene stays until the
+   * new one is loaded, and the clock goes on.
+   * @param error Reason of the call.
+   * @returns Rejects if the new version cannot be loaded, and with `error` if the file is replaced too often.
+   */
+  async renew(error: unknown): Promise<void> {
+    const [request, scene] = [this.#request, this.#scene];
+    if (this.#isRenewing || this.#state !== 'ready' || !request || !scene || this.isOutgoing) return;
+    const now = performance.now();
+    this.#renewals = this.#renewals.filter((time) => now - time < RENEWAL_MS);
+    if (this.#renewals.length >= MAX_RENEWALS) throw error;
+    this.#renewals.push(now);
+    this.#isRenewing = true;
+    const signal = this.#running.renew();
+    const again: SceneRequest = { ...request, renderer: scene.renderer };
+    try {
+      await this.#open(again, signal, false, () => undefined, true);
+    } catch (reason) {
+      if (signal.aborted) return;
+      if (this.#scene === scene) throw reason;
+      await this.#attempt(again, signal, false, () => undefined);
+    } finally {
+      this.#isRenewing = false;
+    }
   }
 
   /**
@@ -342,12 +379,19 @@ export class SceneController implements ReactiveController {
     }
   }
 
-  async #open(request: SceneRequest, signal: AbortSignal, isNew: boolean, onProgress: ProgressListener): Promise<void> {
+  /** @param keepsCurrent Whether the current scene stays until the new one is uploaded, which takes the memory of both. */
+  async #open(
+    request: SceneRequest,
+    signal: AbortSignal,
+    isNew: boolean,
+    onProgress: ProgressListener,
+    keepsCurrent = false,
+  ): Promise<void> {
     const { services, memoryBudget, core } = this.#of;
     const onPreview =
       isNew && core!.wantsPreviews ? (preview: LoadedGaussians) => this.#showPreview(preview) : undefined;
     const beforeUpload = (byteLength: number): void => {
-      if (signal.aborted) return;
+      if (signal.aborted || keepsCurrent) return;
       const isSmall = this.isPreview && byteLength >= MIN_GROWTH * (this.#scene?.gaussians.byteLength ?? 0);
       // A small preview stays until the complete scene replaces it.
       if (!isSmall) this.#drop(false);

@@ -226,13 +226,25 @@ const ANSWERS = {
 
   /**
    * A clip of one ball that changes its color and place, with a splat that is in every other frame alone; groups of four frames, ten a second. `whole`: without byte ranges; `slow`: each answer is delayed by a number of milliseconds, and as late as `mbps` and at least `padded` bytes make it;
-   * `gate`: data after the first group comes once it is opened; `lost`: a missing group.
+   * `gate`: data after the first group comes once it is opened; `lost`: a missing group; `replaced`: a gate that replaces the file by one of 12 frames more; `alternating`: from this group on, every answer says that it is of another version.
    */
   async clip(context) {
-    const { frames = '12', whole, slow = '0', mbps = '0', padded = '0', lost, gate } = context.query;
+    const {
+      frames = '12',
+      whole,
+      slow = '0',
+      mbps = '0',
+      padded = '0',
+      lost,
+      gate,
+      replaced,
+      alternating,
+    } = context.query;
+    const isReplaced = replaced !== undefined && gateOf(replaced).isOpen;
+    if (replaced !== undefined) context.set('ETag', `"${isReplaced ? 2 : 1}"`);
     // A refusal, too. A 404 would be of the whole file: browsers give it to requests for other ranges.
     context.set('Cache-Control', 'no-store');
-    const { bytes, starts } = await clipOf(Number(frames));
+    const { bytes, starts } = await clipOf(Number(frames) + (isReplaced ? 12 : 0));
     const [, first, last] = /^bytes=(\d+)-(\d+)$/.exec(context.get('Range')) ?? [];
     if (slow !== '0' && Number(first) > 0) {
       const ownBytes = Math.max(Number(padded), Number(last) + 1 - Number(first));
@@ -244,9 +256,17 @@ const ANSWERS = {
       return void (context.status = 416);
     if (first === undefined || whole !== undefined) return void (context.body = Buffer.from(bytes));
     const end = Math.min(bytes.length, Number(last) + 1);
+    const range = { 'Content-Range': `bytes ${first}-${end - 1}/${bytes.length}` };
+    const part = Buffer.from(bytes.subarray(Number(first), end));
+    if (alternating !== undefined) {
+      const tag = Number(first) >= starts[Number(alternating)] ? ++answeredClips : 0;
+      // The runner would have browsers keep the answer, and give parts of it to later requests.
+      context.respond = false;
+      return void context.res.writeHead(206, { ...range, ETag: `"${tag}"`, 'Cache-Control': 'no-store' }).end(part);
+    }
     context.status = 206;
-    context.set('Content-Range', `bytes ${first}-${end - 1}/${bytes.length}`);
-    context.body = Buffer.from(bytes.subarray(Number(first), end));
+    context.set(range);
+    context.body = part;
   },
 
   /** A sequence of two frames for requests with a token, red, or a signature, blue. Other requests fail. */
@@ -544,6 +564,8 @@ function ball(count, color, size = Math.max(0.05, 2 / Math.sqrt(count))) {
 }
 
 const clips = new Map();
+/** Number of answers to requests for a clip whose every answer is of another version. */
+let answeredClips = 0;
 
 /** The clip with a number of frames, and the first byte of each of its groups. */
 async function clipOf(frameCount) {

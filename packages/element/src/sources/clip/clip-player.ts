@@ -1,5 +1,6 @@
 /** Plays clips of moving splats. The module is loaded only for clips. */
 import { clipGroupAt, clipRooms, frameAt, unpackClipIndex, type ClipIndex } from '@gaussian-splat/formats';
+import { GaussianSplatError } from '@gaussian-splat/core';
 import { AnimatedGaussians, pickInitialVariants } from '@gaussian-splat/renderer';
 import { LoadedGaussians } from '../../gpu/loaded-gaussians.js';
 import { images, unlessWrong } from '../../gpu/initial-frames.js';
@@ -76,7 +77,7 @@ export class ClipPlayer implements Timeline {
         onProgress(file ? index.byteLength : cache.loadedBytes, index.byteLength);
         listeners.onInput();
       },
-      onError: (error) => listeners.onError(error),
+      onError: (error) => (isReplaced(error) ? listeners.onReplaced : listeners.onError)(error),
     });
     const first = clipGroupAt(index, frameAt(index, startSeconds));
     let gaussians: AnimatedGaussians | undefined;
@@ -135,6 +136,10 @@ export class ClipPlayer implements Timeline {
   }
 }
 
+/** Returns whether an error says that the file was replaced on its server. */
+const isReplaced = (error: unknown): boolean =>
+  error instanceof GaussianSplatError && error.code === 'network/changed';
+
 /** Returns the content of a `blob:` address; undefined for other addresses. */
 async function localFile(url: string): Promise<Blob | undefined> {
   return url.startsWith('blob:') ? (await fetch(url)).blob() : undefined;
@@ -150,6 +155,9 @@ export const open: OpenSource = async (request, options, acquiring) => {
   // The size of the clip is unknown until its index is loaded, so its limit is reported.
   options.beforeUpload(options.memoryBudget ?? 0);
   const startSeconds = state().timeSeconds;
-  const player = await ClipPlayer.open({ ...options, request, device: lease.device, listeners, loops, startSeconds });
+  const open = (): Promise<ClipPlayer> =>
+    ClipPlayer.open({ ...options, request, device: lease.device, listeners, loops, startSeconds });
+  // The file may be replaced between the requests for its index and its first frames.
+  const player = await open().catch((error: unknown) => (isReplaced(error) ? open() : Promise.reject(error as Error)));
   return new LoadedGaussians(lease, player.gaussians, player.bounds, options.submissions, { live: player });
 };

@@ -25,6 +25,8 @@ export interface DynamicListeners {
   readonly onFallback: (reason: string) => void;
   /** Called when data for the next frame has arrived, such as an image, so that a frame must be requested. */
   readonly onInput: () => void;
+  /** Called when the file has been replaced on its server. The new version is loaded, which then replaces this one. */
+  readonly onReplaced: (error: unknown) => void;
 }
 
 /** Changes the Gaussians of a scene over time: a generator, a sequence of files, or a clip. */

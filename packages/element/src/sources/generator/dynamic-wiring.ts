@@ -19,6 +19,8 @@ export interface DynamicHost {
   readonly shown: readonly LoadedGaussians[];
   requestFrame(): void;
   readonly element: HTMLElement;
+  /** The scene of the entry: see {@link SceneController.renew}. */
+  readonly scene: { renew(error: unknown): Promise<void> };
 }
 
 /** Connects the models of an element, which are generators and post-processors, with its state and its events. */
@@ -114,6 +116,7 @@ export class DynamicWiring implements PostHost {
       onError: (error) => this.#fail(error),
       onFallback: (reason) => this.#fallBack(reason),
       onInput: () => this.requestFrame(),
+      onReplaced: (error) => void this.#host.scene.renew(error).catch((reason: unknown) => this.#fail(reason)),
     };
   }
 
