@@ -3,7 +3,9 @@ import '@gaussian-splat/element';
 import type { GaussianSplatElement } from '@gaussian-splat/element';
 import { executeServerCommand } from '@web/test-runner-commands';
 import { itInLab, someOf } from '../../support/extent-in-pages.js';
-import { assert, assertEqual, COMPASS, FIXTURES, showLoaded, until } from './support/harness.js';
+import { assert, assertEqual, COMPASS, FIXTURES, nextEvent, showLoaded, until } from './support/harness.js';
+import { sendTouch } from './support/screen.js';
+import { tone } from './support/tone.js';
 
 const PATH = `${FIXTURES}path.json`;
 const SIZE = { width: 96, height: 72 };
@@ -157,6 +159,56 @@ describe('record()', () => {
     const { corner, darkest } = colorsOf(player);
     assert(corner > 230 && darkest < 120, `white behind the compass: ${corner}, ${darkest}`);
     player.remove();
+  });
+
+  /** Duration of a video in seconds, from its first frame to its last. */
+  const durationOf = async (video: Blob): Promise<number> => {
+    const player = Object.assign(document.createElement('video'), { muted: true, src: URL.createObjectURL(video) });
+    await nextEvent(player, 'loadedmetadata');
+    // Recorded files do not state their duration: browsers find it by a seek beyond the end.
+    player.currentTime = 1e6;
+    await nextEvent(player, 'seeked');
+    return player.duration;
+  };
+
+  it('is as long as it was asked to be, however long the scene takes for a frame', async () => {
+    const element = await load();
+    for (const mimeType of ['video/webm;codecs=vp9', 'video/mp4'].filter((type) =>
+      MediaRecorder.isTypeSupported(type),
+    )) {
+      let drawn = 0;
+      const slow = (): void => {
+        drawn++;
+        for (const end = performance.now() + 250; performance.now() < end;);
+      };
+      element.addEventListener('camera-change', slow);
+      const video = await element.record({ mimeType, path: 'turntable', duration: 1_500 });
+      element.removeEventListener('camera-change', slow);
+      const seconds = await durationOf(video);
+      assert(drawn > 0 && drawn < 12, `${drawn} frames of the scene`);
+      // A frame of the video, and one of this scene, in which the last one waits.
+      assert(seconds >= 1.5 - 1 / 30 && seconds < 1.5 + 0.3, `${seconds} s of ${mimeType}`);
+    }
+  });
+
+  it('has the sound of the slot, also if it is muted', async () => {
+    const element = await showLoaded({ ...STILL, src: '/net/clip/ball.gsv', loop: '' }, STYLE);
+    const audio = Object.assign(document.createElement('audio'), { src: tone(1.2), slot: 'sound', muted: true });
+    element.append(audio);
+    await sendTouch('touchStart', [{ x: 400, y: 400 }]);
+    await sendTouch('touchEnd', []);
+    await element.play();
+    await until(() => !audio.paused && audio.currentTime > 0, 'the sound');
+    const video = await element.record({ duration: 1_000 });
+    const sound = await new AudioContext().decodeAudioData(await video.arrayBuffer());
+    const loudest = sound.getChannelData(0).reduce((max, value) => Math.max(max, Math.abs(value)), 0);
+    assert(sound.duration > 0.8 && loudest > 0.02, `${sound.duration} s of sound, at most ${loudest}`);
+  });
+
+  it('without a sound has no track for it, and waits for none', async () => {
+    const element = await load();
+    const video = await element.record({ duration: 300 });
+    assert(!/opus|mp4a/.test(video.type), video.type);
   });
 
   it('ends by a signal, and says what it cannot do', async () => {

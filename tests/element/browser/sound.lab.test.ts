@@ -3,35 +3,13 @@ import '@gaussian-splat/element';
 import type { GaussianSplatElement } from '@gaussian-splat/element';
 import { assert, assertEqual, frames, nextEvent, showLoaded, until } from './support/harness.js';
 import { sendTouch } from './support/screen.js';
+import { tone } from './support/tone.js';
 
 const CLIP = '/net/clip/ball.gsv';
-const RATE = 8_000;
 /** On a machine that has nothing else to do. */
 const LIMIT_MS = 2_000;
 /** After its start sound comes into step without a jump that could be heard. */
 const SETTLED_MS = 2_500;
-
-/** A tone as a WAV file of 16 bits. */
-function tone(seconds: number): string {
-  const samples = Math.round(RATE * seconds);
-  const view = new DataView(new ArrayBuffer(44 + 2 * samples));
-  const text = (at: number, value: string): void =>
-    [...value].forEach((letter, k) => view.setUint8(at + k, letter.charCodeAt(0)));
-  text(0, 'RIFF');
-  view.setUint32(4, 36 + 2 * samples, true);
-  text(8, 'WAVEfmt ');
-  view.setUint32(16, 16, true);
-  view.setUint16(20, 1, true);
-  view.setUint16(22, 1, true);
-  view.setUint32(24, RATE, true);
-  view.setUint32(28, 2 * RATE, true);
-  view.setUint16(32, 2, true);
-  view.setUint16(34, 16, true);
-  text(36, 'data');
-  view.setUint32(40, 2 * samples, true);
-  for (let i = 0; i < samples; i++) view.setInt16(44 + 2 * i, 3_000 * Math.sin((2 * Math.PI * 440 * i) / RATE), true);
-  return URL.createObjectURL(new Blob([view], { type: 'audio/wav' }));
-}
 
 const CAPTIONS = `WEBVTT
 

@@ -139,7 +139,8 @@ export abstract class ViewingMethods extends MediaProperties {
 
   /**
    * Records a video of the element in real time: along the camera's `path`, for a `duration`, or until `signal` is
-   * aborted. Afterwards the camera returns to its pose.
+   * aborted. Afterwards the camera returns to its pose. The video has the sound of the child with `slot="sound"`, also if
+   * that is muted, if the browser can capture it (Chromium) and the visitor has interacted with the page.
    * @returns Rejects with an `InvalidStateError` if no scene is shown or another recording has not ended, with a
    * `NotSupportedError` if the browser cannot record this type, and with a `TypeError` if the page has no views to
    * follow, if no option ends the recording, or if the background is not a color.

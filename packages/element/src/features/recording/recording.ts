@@ -42,6 +42,12 @@ interface Paths {
 const FRAME_RATE = 30;
 /** Media types in order of preference. */
 const TYPES = ['video/webm;codecs=vp9', 'video/webm', 'video/mp4'];
+/** Maximum wait for a frame of the page, ms, because hidden pages have none. */
+const FRAME_MS = 250;
+/** Time for encoding the last frame of a video, ms. */
+const TAIL_MS = 250;
+/** Maximum wait for the audio output, ms. It does not start before the visitor interacts with the page. */
+const AUDIO_START_MS = 500;
 
 /** Elements that are recorded. Two recordings would move the same camera, seek the same clock, and share a canvas. */
 const recorded = new WeakSet<HTMLElement>();
@@ -70,38 +76,61 @@ export async function record(host: Viewer, options: RecordOptions): Promise<Blob
     throw new TypeError('record(): expected a path, a duration or a signal that ends the recording, found none');
   const { canvas } = host;
   if (!canvas || host.drawNow() === null) throw nothingToDraw();
-  const { context, copy } = paperFor(host, canvas, options.background);
+  const { context, copy, renew } = paperFor(host, canvas, options.background);
   // The stream begins with the current content of its canvas.
   copy();
-  const recorder = new MediaRecorder(context.canvas.captureStream(frameRate), {
-    mimeType,
-    ...(bitsPerSecond && { videoBitsPerSecond: bitsPerSecond }),
-  });
-  const parts: Blob[] = [];
-  recorder.addEventListener('dataavailable', ({ data }) => parts.push(data));
-  const ended = new Promise<void>((resolve, reject) => {
-    recorder.addEventListener('stop', () => resolve());
-    recorder.addEventListener('error', () => reject(new DOMException('The recording failed', 'EncodingError')));
-  });
   const release = reserve(host, 'record()');
   const before = host.camera.goal;
-  host.onFrame = copy;
+  const sound = await soundOf(host.element);
+  const tracks = [...context.canvas.captureStream(frameRate).getTracks(), ...sound.tracks];
   try {
+    const recorder = new MediaRecorder(new MediaStream(tracks), {
+      mimeType,
+      ...(bitsPerSecond && { videoBitsPerSecond: bitsPerSecond }),
+    });
+    const video = contentOf(recorder);
+    host.onFrame = copy;
     recorder.start();
-    await drive(host, path, duration, signal);
+    // The video begins with its first frame and ends with its last one, whenever the scene draws others.
+    await addFrame(renew);
+    await drive(host, { path, duration, signal, renew });
+    for (const track of sound.tracks) track.stop();
+    await addFrame(renew);
+    // The recorder drops frames that it has not encoded yet.
+    await new Promise((resolve) => setTimeout(resolve, TAIL_MS));
+    if (recorder.state !== 'inactive') recorder.stop();
+    return await video;
   } finally {
     release();
     host.onFrame = undefined;
     if (path) host.camera.moveTo(before);
-    if (recorder.state !== 'inactive') recorder.stop();
+    for (const track of tracks) track.stop();
+    sound.close();
   }
-  await ended;
-  for (const track of recorder.stream.getTracks()) track.stop();
-  return new Blob(parts, { type: recorder.mimeType });
+}
+
+/** Resolves with the video when a recorder stops. */
+function contentOf(recorder: MediaRecorder): Promise<Blob> {
+  const parts: Blob[] = [];
+  recorder.addEventListener('dataavailable', ({ data }) => parts.push(data));
+  const content = new Promise<Blob>((resolve, reject) => {
+    recorder.addEventListener('stop', () => resolve(new Blob(parts, { type: recorder.mimeType })));
+    recorder.addEventListener('error', () => reject(new DOMException('The recording failed', 'EncodingError')));
+  });
+  content.catch(() => undefined);
+  return content;
+}
+
+/** What {@link drive} needs of a recording. `duration` in milliseconds. */
+interface Drive {
+  readonly path: CameraPath | null;
+  readonly duration: number;
+  readonly signal: AbortSignal | undefined;
+  readonly renew: () => void;
 }
 
 /** Requests frames, and moves the camera along `path`, for `duration` milliseconds or until the signal is aborted. */
-function drive(host: Viewer, path: CameraPath | null, duration: number, signal?: AbortSignal): Promise<void> {
+function drive(host: Viewer, { path, duration, signal, renew }: Drive): Promise<void> {
   return new Promise((resolve) => {
     const start = performance.now();
     const end = (): void => {
@@ -121,7 +150,8 @@ function drive(host: Viewer, path: CameraPath | null, duration: number, signal?:
         host.rest();
         host.camera.moveTo(path.at(Math.min(1, (performance.now() - start) / duration)));
       }
-      // Browsers add a frame to the video only if the canvas changes.
+      // A scene that takes longer for a frame than the video has its last frame several times.
+      renew();
       host.requestFrame();
       requestAnimationFrame(step);
     };
@@ -129,15 +159,66 @@ function drive(host: Viewer, path: CameraPath | null, duration: number, signal?:
   });
 }
 
+/** Adds a frame to the video, and waits until the stream has it. */
+async function addFrame(renew: () => void): Promise<void> {
+  renew();
+  await Promise.race([new Promise(requestAnimationFrame), new Promise((resolve) => setTimeout(resolve, FRAME_MS))]);
+  await new Promise((resolve) => setTimeout(resolve));
+}
+
+/** Audio tracks of a recording. `close` frees them. */
+interface RecordedSound {
+  readonly tracks: readonly MediaStreamTrack[];
+  close(): void;
+}
+
+const SILENT: RecordedSound = { tracks: [], close: () => undefined };
+
 /**
- * Creates a canvas with a background, and a function that copies the element's image to it. Videos have no alpha and a
- * constant size.
+ * Returns the sound of the child with `slot="sound"`, at full volume. There is none if the browser cannot capture it, or
+ * does not allow the page to play sound yet.
+ */
+async function soundOf(element: HTMLElement): Promise<RecordedSound> {
+  const child: (HTMLMediaElement & { captureStream?(): MediaStream }) | null = element.querySelector(
+    ':scope > :is(audio, video)[slot=sound]',
+  );
+  if (!child?.captureStream) return SILENT;
+  // Without this context, a sound that rests would keep the recorder waiting.
+  const context = new AudioContext();
+  const close = (): void => void context.close().catch(() => undefined);
+  await Promise.race([context.resume(), new Promise((resolve) => setTimeout(resolve, AUDIO_START_MS))]);
+  if (context.state !== 'running') {
+    close();
+    return SILENT;
+  }
+  try {
+    const output = context.createMediaStreamDestination();
+    const captured = child.captureStream();
+    const connect = (): void => {
+      const [track] = captured.getAudioTracks();
+      if (track) context.createMediaStreamSource(new MediaStream([track])).connect(output);
+    };
+    connect();
+    captured.addEventListener('addtrack', connect);
+    return { tracks: output.stream.getAudioTracks(), close };
+  } catch (error) {
+    console.warn(
+      `record(): expected a sound that the page may read, found ${(error as Error).message}; set crossorigin on the element with slot="sound"`,
+    );
+    close();
+    return SILENT;
+  }
+}
+
+/**
+ * Creates a canvas with a background, a function that copies the element's image to it, and one that makes it a new frame
+ * without a change. Videos have no alpha and a constant size.
  */
 function paperFor(
   host: Viewer,
   { width, height }: HTMLCanvasElement,
   background: string | undefined,
-): { context: CanvasRenderingContext2D; copy: () => void } {
+): { context: CanvasRenderingContext2D; copy: () => void; renew: () => void } {
   const own = getComputedStyle(host.element).backgroundColor;
   const color = background ?? (own === 'rgba(0, 0, 0, 0)' ? 'white' : own);
   if (!CSS.supports('color', color)) throw new TypeError(`record(): expected a CSS color, found "${color}"`);
@@ -151,7 +232,9 @@ function paperFor(
     context.fillRect(0, 0, size.width, size.height);
     context.drawImage(canvas, 0, 0, size.width, size.height);
   };
-  return { context, copy };
+  // Browsers add a frame to the video only if something is drawn on the canvas.
+  const renew = (): void => context.drawImage(context.canvas, 0, 0, 1, 1, 0, 0, 1, 1);
+  return { context, copy, renew };
 }
 
 function typeOf(asked: string | undefined): string {
