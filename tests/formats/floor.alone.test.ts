@@ -302,6 +302,13 @@ test('walk maps whose first line claims more than there is are refused by name',
   }
 });
 
+test('a first line of lists within lists is refused as JSON', () => {
+  for (const depth of [300, 200_000]) {
+    const line = `{"format":"gaussian-splat-walk-map","version":1,"cell":${'['.repeat(depth)}${']'.repeat(depth)}}\n`;
+    assert.throws(() => decodeFloorMap(gzipSync(new TextEncoder().encode(line))), { code: 'decode/corrupt' });
+  }
+});
+
 test('a walk map costs what it weighs', () => {
   const map = { cell: 0.1, corner: [0, 0], width: 4096, depth: 4000, step: 0.3, start: [0, 0, 0], area: 1 } as const;
   const file = encodeFloorMap({ ...map, layers: [new Float32Array(4096 * 4000)] });

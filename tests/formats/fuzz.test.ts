@@ -46,9 +46,7 @@ for (const [reader, own] of Object.entries(readers))
   test(`${reader}: ${COUNT} hostile files cost what they weigh`, async () => {
     const { files, read, refused } = await fuzzReader(reader as Reader, own, { count: COUNT });
     assert.equal(files, COUNT);
-    // No damaged floor of this seed is read; the first test reads a sound one.
-    const isSomeRead = read > 0 || reader === 'floor';
-    assert.ok(isSomeRead && refused > 0, `${read} read, ${refused} refused`);
+    assert.ok(read > 0 && refused > 0, `${read} read, ${refused} refused`);
   });
 
 const CASES = '../shared/cases/attack-4';

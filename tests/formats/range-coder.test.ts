@@ -2,9 +2,12 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import type { Matrix3 } from '@gaussian-splat/core';
+import { LoadBudget } from '@gaussian-splat/formats';
 import { NO_PLANES, PlaneModel, type KnownSplats } from '../../packages/formats/src/clip/code-planes.js';
+import { CODED_MARK, readCodedMotion } from '../../packages/formats/src/clip/coded-motion.js';
 import { BitDecoder, BitEncoder, Contexts } from '../../packages/formats/src/clip/range-coder.js';
 import { HarmonicsTurner } from '../../packages/formats/src/clip/turn-harmonics.js';
+import type { Motion } from '../../packages/formats/src/motion.js';
 import { shRotation } from '../../packages/formats/src/transform/sh-rotation.js';
 import { seededRandom } from '../support/random.js';
 
@@ -108,4 +111,25 @@ test('harmonics turn by a quaternion as by its matrix', () => {
         }
     }
   }
+});
+
+test('codes that take no bytes are charged for the work of a decoder, and end with the file', () => {
+  const read = (splats: number, frames: number): Motion => {
+    const bytes = new Uint8Array(52 + 64).fill(77);
+    const view = new DataView(bytes.buffer);
+    bytes.fill(0, 0, 52);
+    bytes.set([CODED_MARK, 4]);
+    view.setUint32(4, splats, true);
+    view.setUint32(8, frames, true);
+    for (let k = 0; k < 5; k++) {
+      view.setUint16(12 + 8 * k, frames, true);
+      view.setFloat32(16 + 8 * k, 0.01, true);
+    }
+    const cloud = { count: splats, positions: new Float32Array(3 * splats) };
+    return readCodedMotion({ bytes, name: 'm', frames, budget: new LoadBudget(1_000), cloud });
+  };
+  const cpu = process.cpuUsage();
+  assert.throws(() => read(70_000, 30), { code: 'out-of-memory/budget' });
+  assert.throws(() => read(20_000, 32), { code: 'decode/truncated' });
+  assert.ok(process.cpuUsage(cpu).user < 1e6, 'planes beyond the end are not decoded');
 });

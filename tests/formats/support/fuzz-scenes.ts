@@ -259,7 +259,16 @@ export async function otherScenes(): Promise<
     voxels: { kind: 'voxels', scenes: [voxels()] },
     mesh: {
       kind: 'mesh',
-      scenes: [...meshes.map((name) => one('a.glb', MULTIPLIED_MESHES[name](3).file)), one('a.ply', trianglePly())],
+      scenes: [
+        ...meshes.map((name) => one('a.glb', MULTIPLIED_MESHES[name](3).file)),
+        ...['meshopt', 'draco'].map((name) =>
+          one(
+            'a.glb',
+            new Uint8Array(readFileSync(new URL(`../../element/browser/fixtures/${name}.glb`, import.meta.url))),
+          ),
+        ),
+        one('a.ply', trianglePly()),
+      ],
     },
     model: { kind: 'model', scenes: [one('a.onnx', new Uint8Array(readFileSync(fixturePath('packed.onnx'))))] },
   };

@@ -84,6 +84,23 @@ function overlappingZip(count: number): Uint8Array {
 const tiles = (uris: string[]): Uint8Array =>
   json({ asset: {}, geometricError: 1, root: { children: uris.map((uri) => ({ content: { uri } })) } });
 
+/** A stage of OpenUSD that moves a splat by one operation again and again, and the value of the operation. */
+const stage = (n: number, value: string): Uint8Array =>
+  strToU8(`#usda 1.0
+def Xform "A"
+{
+  float xformOp:rotateX${value}
+  uniform token[] xformOpOrder = [${many(n, () => '"xformOp:rotateX"').join(',')}]
+  def ParticleField3DGaussianSplat "B"
+  {
+    float[] opacities = [1]
+    quatf[] orientations = [(1, 0, 0, 0)]
+    point3f[] positions = [(0, 0, 0)]
+    float3[] scales = [(1, 1, 1)]
+  }
+}
+`);
+
 /** Cases by the multiplied part. */
 export const MULTIPLIED: Readonly<Record<string, (factor: number) => Multiplied>> = {
   'frames of a pattern': (n) => ({
@@ -94,6 +111,10 @@ export const MULTIPLIED: Readonly<Record<string, (factor: number) => Multiplied>
   }),
   'frames of a list': (n) => ({
     file: json({ gaussianSplatSequence: 1, framesPerSecond: 24, frames: many(n, () => 'a') }),
+  }),
+  'operations of a stage, each with a long value': (n) => ({ file: stage(n, ` = [ #${'c'.repeat(25 * n)}\n 1 ]`) }),
+  'operations of a stage, each with many samples': (n) => ({
+    file: stage(n, `.timeSamples = { ${many(n, (k) => `${k + 5}: 1`).join(', ')} }`),
   }),
   'names of a streamed SOG': (n) => ({
     file: lodZip(

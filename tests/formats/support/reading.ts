@@ -96,7 +96,9 @@ async function ask(kind: ReaderKind, { name, files }: FuzzScene): Promise<unknow
     case 'manifest':
       return [await runOnPage('manifest', request, signal, listeners)];
     case 'floor':
-      return [await runOnPage('floor', { ...request, options, map: files[name].slice().buffer }, signal, listeners)];
+      return [
+        await runOnPage('floor', { ...request, options, map: new Uint8Array(files[name]).buffer }, signal, listeners),
+      ];
     case 'voxels':
       return [await runOnPage('floor', { ...request, options, voxelUrl: url }, signal, listeners)];
     case 'mesh':

@@ -1,6 +1,6 @@
 /** Reads manifests of streamed scenes. The worker loads this module for the first streamed scene. */
 import { GaussianSplatError } from '@gaussian-splat/core';
-import { fetchScene, LoadBudget } from '@gaussian-splat/formats';
+import { fetchScene, LoadBudget, parseJson } from '@gaussian-splat/formats';
 import { checkManifest, type DetailManifest } from '@gaussian-splat/renderer';
 import { fileName, named, throttled } from './load-helpers.js';
 import type { FileRequest, TaskListeners } from './protocol.js';
@@ -35,8 +35,9 @@ export async function openManifest(
       maxBytes,
       maxSeconds,
     });
-    const { allowed } = new LoadBudget(bytes.length, limits);
-    const manifest = checkManifest(parsed(bytes, url), url, Math.floor(allowed / PAGE_BYTES));
+    const budget = new LoadBudget(bytes.length, limits);
+    const json = parseJson({ bytes, name: url, budget }, MAX_BYTES);
+    const manifest = checkManifest(json, url, Math.floor(budget.allowed / PAGE_BYTES));
     if (manifest.splats > maxSplats) throw tooMany(url, manifest.splats, maxSplats);
     return manifest;
   } catch (error) {
@@ -51,22 +52,4 @@ const tooMany = (where: string, splats: number, max: number): GaussianSplatError
     expected: `at most ${max} splats`,
     found: String(splats),
     remedy: 'use a smaller scene, or raise the limit',
-  });
-
-function parsed(bytes: Uint8Array, where: string): unknown {
-  if (bytes.length > MAX_BYTES) throw wrong(where, `${bytes.length} bytes of it`);
-  try {
-    return JSON.parse(new TextDecoder().decode(bytes));
-  } catch (cause) {
-    throw wrong(where, (cause as Error).message, cause);
-  }
-}
-
-const wrong = (where: string, found: string, cause?: unknown): GaussianSplatError =>
-  new GaussianSplatError('decode/header', {
-    where,
-    expected: `JSON that gaussian-splat detail wrote, of at most ${MAX_BYTES} bytes`,
-    found,
-    remedy: 'check the address, or write the folder again',
-    cause,
   });

@@ -29,6 +29,8 @@ const PLACE_STEPS = 4096;
 const PLACE_UNIT = 512;
 /** Bytes of temporary memory for each splat. */
 const WORK_BYTES = 32;
+/** Bytes charged for each code: 2 of memory, and the work of a decoder that reads almost nothing for it. */
+const CODE_BYTES = 6;
 
 /** Motion that is written: its curves are rounded as `roundCurve` rounds them. */
 export interface WrittenMotion extends Motion {
@@ -90,7 +92,7 @@ export function readCodedMotion({ bytes, name, cloud, frames, budget }: MotionFi
       throw damaged(name, `at most ${frames} curves`, `${rank} for ${attribute}, ${aged} of age`, 'decode/header');
     if (rank > 0 && !(step > 0 && step < Infinity)) throw damaged(name, 'steps above 0', `${step} for ${attribute}`);
     const planes = ANIMATED_ATTRIBUTES[attribute] * rank;
-    budget.take(4 * frames * rank + 2 * splats * planes, name);
+    budget.take(4 * frames * rank + CODE_BYTES * splats * planes, name);
     const codes = Array.from({ length: planes }, () => new Int16Array(splats));
     return [attribute, { rank, aged, step, curves: new Float32Array(frames * rank), codes }];
   });
@@ -125,6 +127,8 @@ function codeMotion(
 function codePlanes(coder: BitCoder, { rank, codes }: AnimatedAttribute, known: KnownSplats): void {
   const model = new PlaneModel(known);
   codes.forEach((plane, at) => {
+    // The caller refuses a file that ends early.
+    if (coder instanceof BitDecoder && coder.left < 0) return;
     const earlier = {
       number: at >= rank ? codes[at - rank] : NO_PLANES.number,
       curve: at % rank > 0 ? codes[at - 1] : NO_PLANES.curve,

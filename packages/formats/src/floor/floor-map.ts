@@ -2,6 +2,7 @@ import { GaussianSplatError } from '@gaussian-splat/core';
 import { gzipSync } from 'fflate';
 import { LoadBudget, type LoadLimits } from '../budget.js';
 import { inflateUpTo } from '../inflate.js';
+import { parseJson } from '../json.js';
 
 /**
  * Walkable floor of a scene: heights of the floor that fit a body, for each cell of a horizontal grid. Coordinates have y up,
@@ -104,7 +105,7 @@ const NO_FLOOR = -0x8000;
 const HEIGHT_UNIT = 0.01;
 /** Maximum uncompressed size of a file in bytes. */
 const MAX_BYTES = 2 ** 26;
-/** Maximum size of the line of JSON that is written, in bytes. */
+/** Maximum size of the line of JSON, in bytes. */
 const MAX_HEAD_BYTES = 1024;
 /** Maximum number of layers of a file. Layers of few cells would take much more memory than their bytes. */
 const MAX_LAYERS = 1024;
@@ -157,7 +158,7 @@ const numbersOf = (value: unknown, count: number): readonly unknown[] =>
 /**
  * Reads a `.floor` file.
  * @param name Name of the file in error messages.
- * @throws GaussianSplatError `decode/corrupt`, `out-of-memory/budget`
+ * @throws GaussianSplatError `decode/corrupt`, `decode/truncated`, `decode/header`, `out-of-memory/budget`
  */
 export function decodeFloorMap(file: Uint8Array, name = 'walk map', limits: LoadLimits = {}): FloorMap {
   const budget = new LoadBudget(file.length, limits);
@@ -180,18 +181,11 @@ export function decodeFloorMap(file: Uint8Array, name = 'walk map', limits: Load
     fail('a gzip file', (error as Error).message);
   }
   const end = bytes.indexOf(10);
-  let head: Partial<Omit<FloorMap, 'layers'>> & {
-    format?: string;
-    version?: number;
-    layers?: number;
-    heightUnit?: number;
-  } = {};
-  try {
-    head = JSON.parse(new TextDecoder().decode(bytes.subarray(0, Math.max(0, end)))) as typeof head;
-  } catch {
-    fail('a line of JSON', 'none');
-  }
-  const { format, version, cell, corner, width, depth, layers, step, start, area, heightUnit } = head ?? {};
+  if (end < 0) fail('a line of JSON', 'none');
+  const head = parseJson({ bytes: bytes.subarray(0, end), name, budget }, MAX_HEAD_BYTES) as Partial<
+    Omit<FloorMap, 'layers'>
+  > & { format?: string; version?: number; layers?: number; heightUnit?: number };
+  const { format, version, cell, corner, width, depth, layers, step, start, area, heightUnit } = head;
   if (format !== FORMAT || version !== VERSION)
     fail(`format ${FORMAT}, version ${VERSION}`, JSON.stringify({ format, version }).slice(0, 200));
   const numbers = [cell, step, area, heightUnit, ...numbersOf(corner, 2), ...numbersOf(start, 3)];

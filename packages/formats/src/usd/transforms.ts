@@ -33,25 +33,35 @@ function localOf(prim: UsdPrim, time: number, name: string): { isAbsolute: boole
   const order = valueAt(prim.attributes.get('xformOpOrder'), time);
   let [isAbsolute, local] = [false, IDENTITY];
   if (!Array.isArray(order)) return { isAbsolute, local };
+  // An order may name an attribute any number of times, and its value may be long.
+  const operations = new Map<string, Affine>();
   for (const word of order as string[]) {
     if (word === '!resetXformStack!') {
       [isAbsolute, local] = [true, IDENTITY];
       continue;
     }
-    const [, invert, attribute, operation] = /^(!invert!)?(xformOp:([^:]+).*)$/.exec(word) ?? [];
-    const value = attribute === undefined ? undefined : valueAt(prim.attributes.get(attribute), time);
-    const own = value === undefined && operation !== undefined ? IDENTITY : operationOf(operation, numbersOf(value));
-    if (!own || !own.every(Number.isFinite))
+    const [, invert, attribute = '', operation = ''] = /^(!invert!)?(xformOp:([^:]+).*)$/.exec(word) ?? [];
+    const known = operations.get(attribute) ?? ownOf(prim, attribute, operation, time);
+    if (!known?.every(Number.isFinite))
       throw damaged(
         `${name}, ${shownPath(prim)}`,
         'transforms by translate, rotate, orient, scale and transform',
         quote(word),
         'decode/unsupported',
       );
+    operations.set(attribute, known);
+    const own = invert ? inverse(known) : known;
     // The first operation of the list is the last one that applies to a point.
-    local = multiply(local, invert ? inverse(own) : own);
+    local = multiply(local, own);
   }
   return { isAbsolute, local };
+}
+
+/** Returns the transform of an attribute, which is none without a value; undefined for unknown operations. */
+function ownOf(prim: UsdPrim, attribute: string, operation: string, time: number): Affine | undefined {
+  if (operation === '') return undefined;
+  const value = valueAt(prim.attributes.get(attribute), time);
+  return value === undefined ? IDENTITY : operationOf(operation, numbersOf(value));
 }
 
 function numbersOf(value: UsdValue | undefined): Numbers {
