@@ -1,5 +1,9 @@
 /** The page's side of `npm run lab -- soak`: what can be done to elements, by name. */
+import { metaQuest3, XRDevice } from '/iwer/iwer.module.min.js';
 import { devices, faults, ledger } from './ledger.js';
+
+/** An emulated headset, before the element asks for one. */
+new XRDevice(metaQuest3).installRuntime({ forceInstall: true });
 
 const { GaussianSplatElement } = await import('/cdn/gaussian-splat.min.js');
 GaussianSplatElement.releaseDelay = 0;
@@ -18,6 +22,8 @@ const SOURCES = [
   '/generators/packed.onnx',
   '/generators/split.onnx',
   '/generators/faulty-run.onnx',
+  '/scenes/vase.gsv',
+  '/scenes/knot/knot.gsv',
 ];
 const QUALITIES = ['reference', 'default', 'balanced', 'fast'];
 const events = {};
@@ -71,6 +77,16 @@ const ACTIONS = {
   play: (element) => void element.play().catch(() => undefined),
   pause: (element) => element.pause(),
   seek: (element, a) => element.setAttribute('time', String(6 * a)),
+  rate: (element, a) => (element.playbackRate = pick([-1, 0.25, 1, 4], a)),
+  record: (element, a) => void element.record({ duration: 100 + 600 * a }).catch(() => undefined),
+  /** Enters VR, and leaves it again, unless something else has ended the session. */
+  session: async (element, a) => {
+    element.setAttribute('vr', '');
+    await delay(300);
+    element.shadowRoot.querySelector('[part=vr-button]')?.click();
+    await delay(200 + 1_500 * a);
+    element.exitXR?.();
+  },
   pose: (element, a, b) => element.setAttribute('pose', `[[${a}, 0, 0], [0, 0, ${b}]]`),
   nonsense: (element, a) => element.setAttribute('camera-orbit', pick(['', 'x y z', '1e999deg 0 0', '<b>'], a)),
   loseDevice: () => devices.at(-1)?.device.destroy(),

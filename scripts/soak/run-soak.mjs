@@ -52,6 +52,8 @@ function randomSource(seed) {
 const server = await serve({
   '/': `${root}demo/dist`,
   '/soak/': `${root}scripts/soak`,
+  '/cdn/': `${root}packages/element/cdn`,
+  '/iwer/': `${root}node_modules/iwer/build`,
   '/fixtures/': `${root}tests/element/browser/fixtures`,
   '/generators/': `${root}tests/fixtures/generators`,
 });

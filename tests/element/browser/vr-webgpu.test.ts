@@ -1,4 +1,7 @@
-/** VR by WebGPU: a fake binding over the emulated headset, and the copy of a WebGPU canvas, each eye against the oracle; and the result if the binding is not granted. */
+/**
+ * VR by WebGPU: a fake binding over the emulated headset, and the copy of a WebGPU canvas, each eye against the oracle; and the result if the binding is not granted.
+ * SECURITY.md: "The page keeps working".
+ */
 import '@gaussian-splat/element';
 import { executeServerCommand } from '@web/test-runner-commands';
 import type { GaussianCloud } from '@gaussian-splat/core';
@@ -260,6 +263,64 @@ describe('VR by WebGPU', () => {
     (headset().layer!.context.getExtension('WEBGL_lose_context') as WEBGL_lose_context).loseContext();
     await until(hasStatus(element, 'failed'), 'status after a loss', LIMIT_MS);
     headset().layer = undefined;
+  });
+
+  for (const [how, grant, attributes] of [
+    ['the textures of the binding', undefined, {}],
+    ['a canvas that is copied', 'not granted', { src: '/net/clip/ball.gsv', loop: '' }],
+  ] as const)
+    it(`the loss of the device ends a session that draws ${how}; the scene returns, and so does the headset`, async () => {
+      headset();
+      binding = fakeBinding('array', 1, grant);
+      element = await showVr('', attributes);
+      const page = element;
+      const drawn = (): boolean => (grant ? headset().layer !== undefined : binding!.frames > 1);
+      buttonOf(page)!.click();
+      await until(drawn, 'a frame in the headset', LIMIT_MS);
+      const said: string[] = [];
+      for (const type of ['contextlost', 'contextrestored', 'error', 'emptied'])
+        page.addEventListener(type, () => said.push(type));
+      devices[devices.length - 1].destroy();
+      await until(hasStatus(page, 'failed'), 'the end of the session', LIMIT_MS);
+      await until(() => said.includes('contextrestored'), 'the scene again', 20_000);
+      assertEqual([said, page.loaded, page.error], [['contextlost', 'contextrestored'], true, null], 'events');
+      headset().layer = undefined;
+      binding.remove();
+      binding = fakeBinding('array', 1, grant);
+      await until(() => buttonOf(page) !== null, 'the button', LIMIT_MS);
+      buttonOf(page)!.click();
+      await until(drawn, 'a frame of the second session', LIMIT_MS);
+      await leave(page);
+    });
+
+  it('a session that WebGL draws goes on without the device', async () => {
+    headset();
+    binding = fakeBinding('array', 1, 'not granted');
+    element = await showVr();
+    const page = element;
+    buttonOf(page)!.click();
+    await until(() => headset().layer !== undefined, 'a WebGL layer', LIMIT_MS);
+    const restored = nextEvent(page, 'contextrestored');
+    devices[devices.length - 1].destroy();
+    await restored;
+    assert(page.loaded && hasStatus(page, 'session-started')(), 'the scene, in the page and in the headset');
+    await leave(page);
+  });
+
+  it('a session that starts while the device is lost fails, or shows the scene that returns', async () => {
+    headset();
+    binding = fakeBinding('array', 1);
+    element = await showVr();
+    const page = element;
+    const restored = nextEvent(page, 'contextrestored');
+    devices[devices.length - 1].destroy();
+    buttonOf(page)!.click();
+    const isSettled = (): boolean =>
+      hasStatus(page, 'failed')() || (hasStatus(page, 'session-started')() && binding!.frames > 1);
+    await until(isSettled, 'a failure, or a frame', LIMIT_MS);
+    await restored;
+    assert(page.loaded && page.error === null, 'the scene is back');
+    if (hasStatus(page, 'session-started')()) await leave(page);
   });
 
   itInLab('sessions that copy a canvas leave none of it in memory', async () => {

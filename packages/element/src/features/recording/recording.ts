@@ -92,8 +92,9 @@ export async function record(host: Viewer, options: RecordOptions): Promise<Blob
     host.onFrame = copy;
     recorder.start();
     // The video begins with its first frame and ends with its last one, whenever the scene draws others.
+    const start = performance.now();
     await addFrame(renew);
-    await drive(host, { path, duration, signal, renew });
+    await drive(host, { path, start, duration, signal, renew });
     for (const track of sound.tracks) track.stop();
     await addFrame(renew);
     // The recorder drops frames that it has not encoded yet.
@@ -121,18 +122,21 @@ function contentOf(recorder: MediaRecorder): Promise<Blob> {
   return content;
 }
 
-/** What {@link drive} needs of a recording. `duration` in milliseconds. */
+/** What {@link drive} needs of a recording. Times in milliseconds; `start` is that of the first frame. */
 interface Drive {
   readonly path: CameraPath | null;
+  readonly start: number;
   readonly duration: number;
   readonly signal: AbortSignal | undefined;
   readonly renew: () => void;
 }
 
-/** Requests frames, and moves the camera along `path`, for `duration` milliseconds or until the signal is aborted. */
-function drive(host: Viewer, { path, duration, signal, renew }: Drive): Promise<void> {
+/**
+ * Requests frames, and moves the camera along `path`, until `duration` milliseconds after the start or until the signal is
+ * aborted.
+ */
+function drive(host: Viewer, { path, start, duration, signal, renew }: Drive): Promise<void> {
   return new Promise((resolve) => {
-    const start = performance.now();
     const end = (): void => {
       clearTimeout(timer);
       signal?.removeEventListener('abort', end);
@@ -141,7 +145,7 @@ function drive(host: Viewer, { path, duration, signal, renew }: Drive): Promise<
     };
     let isOver = false;
     // The end is a timer, because a hidden page has no frames.
-    const timer = duration === Infinity ? undefined : setTimeout(end, duration);
+    const timer = duration === Infinity ? undefined : setTimeout(end, start + duration - performance.now());
     signal?.addEventListener('abort', end);
     if (signal?.aborted) end();
     const step = (): void => {
