@@ -22,7 +22,12 @@ const TIMEOUT = 8;
 /** Minutes between two summaries. */
 const SUMMARY_EVERY = 5;
 /** Messages of a page about files that are damaged or missing on purpose. */
-const EXPECTED = [/truncated\.ply|none\.ply|faulty-run|faulty/i, /404/, /pose expects|camera-orbit/];
+const EXPECTED = [
+  /truncated\.ply|none\.ply|faulty-run|faulty/i,
+  /404/,
+  /pose expects|camera-orbit/,
+  /does not name its axes/,
+];
 
 const { values } = parseArgs({
   options: {

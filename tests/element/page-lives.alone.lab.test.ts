@@ -1,5 +1,5 @@
 /**
- * What happens to pages as a whole: they go to the back-forward cache and return, and their storage is full. The CDN build
+ * Lives of whole pages: they enter the back-forward cache and return, and their storage is full. The CDN build
  * must be there: `npm run build -- --element`.
  * SECURITY.md: "The page keeps working".
  */

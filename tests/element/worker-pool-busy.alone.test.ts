@@ -112,13 +112,18 @@ test('a download of 8 s is not given up for another scene that is read for one s
   assert(workers.length >= 2, 'the other scene has another worker');
 });
 
-const load = (url: string): WorkerRequest => ({ type: 'load', request: { url } }) as unknown as WorkerRequest;
+const load = (url: string, source?: number): WorkerRequest =>
+  ({ type: 'load', request: { url, source } }) as unknown as WorkerRequest;
 
 /** Requests of different scenes that workers read without an end. */
-async function occupy({ pool, workers, pass }: ReturnType<typeof poolOf>, count: number): Promise<AbortController> {
+async function occupy(
+  { pool, workers, pass }: ReturnType<typeof poolOf>,
+  count: number,
+  requestOf = (k: number): WorkerRequest => load(`hostile-${k}`),
+): Promise<AbortController> {
   const abort = new AbortController();
   for (let k = 0; k < count; k++) {
-    void pool.run(load(`hostile-${k}`), abort.signal, never).catch(() => undefined);
+    void pool.run(requestOf(k), abort.signal, never).catch(() => undefined);
     await settle();
     workers.at(-1)!.say({ type: 'reading', id: k });
     await pass(300);
@@ -135,6 +140,12 @@ test('nine scenes that are read without an end do not delay a tenth', async (con
   assert.equal(own.workers.length, 10, 'it has a worker at once');
   own.workers.at(-1)!.say({ type: 'answer', id: 9, answer: 'scene' });
   assert.equal(await answer, 'scene');
+});
+
+test('elements that show the same file do not share its worker time', async (context) => {
+  const own = poolOf(context);
+  await occupy(own, 10, (k) => load('the same', k));
+  assert.equal(own.workers.length, 10, 'each has a worker at once');
 });
 
 test('a scene that has had its time waits for those that have had none', async (context) => {

@@ -194,8 +194,8 @@ describe('record()', () => {
       const seconds = await durationOf(video);
       assert(drawn > 0 && drawn < 12, `${drawn} frames of the scene`);
       // A frame of the video less; two frames of the page more, because the last one waits for that which is drawn.
-      const most = 1.5 + (2 * longest) / 1000;
-      assert(seconds >= 1.5 - 1 / 30 && seconds <= most, `${seconds} s of ${mimeType}, at most ${most}`);
+      const max = 1.5 + (2 * longest) / 1000;
+      assert(seconds >= 1.5 - 1 / 30 && seconds <= max, `${seconds} s of ${mimeType}, at most ${max}`);
     }
   });
 

@@ -293,7 +293,7 @@ describe('VR by WebGPU', () => {
       await leave(page);
     });
 
-  it('a session that WebGL draws goes on without the device', async () => {
+  it('a session that WebGL draws continues without the device', async () => {
     headset();
     binding = fakeBinding('array', 1, 'not granted');
     element = await showVr();

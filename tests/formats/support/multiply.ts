@@ -27,6 +27,8 @@ type Json = Record<string, unknown>;
 
 class Multiplier {
   readonly #random: Random;
+  /** Values that are multiplied already. Changes within them would multiply with their copies. */
+  readonly #grown = new WeakSet<object>();
 
   constructor(random: Random) {
     this.#random = random;
@@ -123,12 +125,14 @@ class Multiplier {
       if (keys.length === 0) return;
       const key = this.pick(keys) as keyof typeof node;
       const value = node[key] as unknown;
-      const isTree = typeof value === 'object' && value !== null;
+      const isTree = typeof value === 'object' && value !== null && !this.#grown.has(value);
       if (isTree && this.below(4) > 0) {
         node = value as Json;
         continue;
       }
-      (node as Json)[key] = this.below(6) === 0 ? this.pick(ODD) : this.#multiplied(value);
+      const changed = this.below(6) === 0 ? this.pick(ODD) : this.#multiplied(value);
+      if (typeof changed === 'object' && changed !== null) this.#grown.add(changed);
+      (node as Json)[key] = changed;
       return;
     }
   }

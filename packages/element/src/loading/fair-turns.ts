@@ -1,3 +1,4 @@
+import type { FileRequest } from './protocol.js';
 import type { WorkerRequest } from './worker-messages.js';
 import type { Job, WorkerSlot } from './worker-slot.js';
 
@@ -8,7 +9,7 @@ const TURN_MS = 2_000;
 
 /**
  * Divides the workers of a page among its scenes, so that scenes that are read for a long time delay no other. Sources are
- * the addresses of scenes: parts of a clip, and boxes of a streamed scene, belong to the same one.
+ * elements and children: parts of a clip, and boxes of a streamed scene, belong to the same one.
  */
 export class FairTurns {
   /** Reading time of each source, ms. */
@@ -49,9 +50,9 @@ export class FairTurns {
   }
 }
 
-/** Returns the address of a request; its type if it has none. */
+/** Returns the source of a request: its number, else its address, else its type. */
 function sourceOf(asked: WorkerRequest): string {
-  const { request } = asked as { readonly request?: { readonly url?: string; readonly place?: object } };
+  const { request } = asked as { readonly request?: Partial<FileRequest> & { readonly place?: object } };
   const place = request?.place as { readonly url?: string } | undefined;
-  return request?.url ?? place?.url ?? asked.type;
+  return String(request?.source ?? request?.url ?? place?.url ?? asked.type);
 }

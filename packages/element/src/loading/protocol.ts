@@ -15,6 +15,11 @@ export interface FileRequest {
   /** Fetch's credentials mode, from the `crossorigin` attribute. */
   readonly credentials: RequestCredentials;
   readonly limits?: SceneLimits | undefined;
+  /**
+   * Number of the element or child that requests the file, whose requests share worker time. Those without a number share
+   * that of their address.
+   */
+  readonly source?: number | undefined;
   /** Parameters for decoding a coded file of pages; absent for other files. */
   readonly coded?: CodedFile | undefined;
 }

@@ -12,6 +12,7 @@ import { LatestTask } from './latest-task.js';
 import { isSameContract } from '../loading/same-contract.js';
 import type { Services } from './element-host.js';
 import { timerMs } from './attribute.js';
+import { Renewals } from './renewals.js';
 
 /**
  * State of the requested scene. `empty`: no scene is requested. `waiting`: loading may not start yet, for example
@@ -77,12 +78,8 @@ const MIN_GROWTH = 4;
 const SUBMISSIONS_GROWTH = 4;
 const MAX_SUBMISSIONS = 64;
 
-/**
- * Maximum number of loads of a scene in {@link RENEWAL_MS} because its file was replaced. Servers that do not share
- * their files may alternate between versions.
- */
-const MAX_RENEWALS = 3;
-const RENEWAL_MS = 60_000;
+/** Number of sources of the page until now. */
+let sources = 0;
 
 /**
  * Controls the life cycle of the element's scene: loads it, replaces it (the latest request wins), recovers after the
@@ -114,9 +111,9 @@ export class SceneController implements ReactiveController {
    * the driver may have been the cause.
    */
   #submissions = 1;
-  /** Times of the last loads by {@link renew}, in milliseconds of `performance.now()`. */
-  #renewals: number[] = [];
-  #isRenewing = false;
+  /** Number of this source for {@link SceneRequest.source}. */
+  readonly #source = ++sources;
+  readonly #renewals = new Renewals();
 
   constructor(host: ReactiveControllerHost, of: SceneHost) {
     this.#host = host;
@@ -213,30 +210,13 @@ export class SceneController implements ReactiveController {
   }
 
   /**
-   * Loads the file of the current scene again, because it was replaced on its server. The current scene stays until the
-   * new one is loaded, and the clock goes on.
-   * @param error Reason of the call.
-   * @returns Rejects if the new version cannot be loaded, and with `error` if the file is replaced too often.
+   * Loads the file of the current scene again, which was replaced on its server. The current scene stays until the new one
+   * is loaded, and the clock continues. Rejects if that fails, and with `error` if the file is replaced too often.
    */
   async renew(error: unknown): Promise<void> {
     const [request, scene] = [this.#request, this.#scene];
-    if (this.#isRenewing || this.#state !== 'ready' || !request || !scene || this.isOutgoing) return;
-    const now = performance.now();
-    this.#renewals = this.#renewals.filter((time) => now - time < RENEWAL_MS);
-    if (this.#renewals.length >= MAX_RENEWALS) throw error;
-    this.#renewals.push(now);
-    this.#isRenewing = true;
-    const signal = this.#running.renew();
-    const again: SceneRequest = { ...request, renderer: scene.renderer };
-    try {
-      await this.#open(again, signal, false, () => undefined, true);
-    } catch (reason) {
-      if (signal.aborted) return;
-      if (this.#scene === scene) throw reason;
-      await this.#attempt(again, signal, false, () => undefined);
-    } finally {
-      this.#isRenewing = false;
-    }
+    if (this.#state === 'ready' && request && scene && !this.isOutgoing)
+      await this.#renewals.run(error, () => this.#openAgain(request, scene));
   }
 
   /**
@@ -294,12 +274,19 @@ export class SceneController implements ReactiveController {
     if (kindOf(request).name !== 'file') return;
     const { shPrecision, shDegree } = scene.gaussians;
     if (request.sh === 'auto' || request.sh === shPrecision || shDegree === 0) return;
+    await this.#openAgain(request, scene).catch(() => undefined);
+  }
+
+  /** Loads a scene in place of the current one. Rejects if that fails and the current one is still there. */
+  async #openAgain(request: SceneRequest, current: LoadedGaussians): Promise<void> {
     const signal = this.#running.renew();
-    const again: SceneRequest = { ...request, renderer: scene.renderer };
+    const again: SceneRequest = { ...request, renderer: current.renderer };
     try {
       await this.#open(again, signal, false, () => undefined);
-    } catch {
-      if (!signal.aborted && this.#scene !== scene) await this.#attempt(again, signal, false, () => undefined);
+    } catch (error) {
+      if (signal.aborted) return;
+      if (this.#scene === current) throw error;
+      await this.#attempt(again, signal, false, () => undefined);
     }
   }
 
@@ -379,24 +366,19 @@ export class SceneController implements ReactiveController {
     }
   }
 
-  /** @param keepsCurrent Whether the current scene stays until the new one is uploaded, which takes the memory of both. */
-  async #open(
-    request: SceneRequest,
-    signal: AbortSignal,
-    isNew: boolean,
-    onProgress: ProgressListener,
-    keepsCurrent = false,
-  ): Promise<void> {
+  async #open(request: SceneRequest, signal: AbortSignal, isNew: boolean, onProgress: ProgressListener): Promise<void> {
     const { services, memoryBudget, core } = this.#of;
     const onPreview =
       isNew && core!.wantsPreviews ? (preview: LoadedGaussians) => this.#showPreview(preview) : undefined;
     const beforeUpload = (byteLength: number): void => {
-      if (signal.aborted || keepsCurrent) return;
+      // The file of a renewal may be replaced again, so that the current scene stays until the new one is loaded.
+      if (signal.aborted || this.#renewals.isRunning) return;
       const isSmall = this.isPreview && byteLength >= MIN_GROWTH * (this.#scene?.gaussians.byteLength ?? 0);
       // A small preview stays until the complete scene replaces it.
       if (!isSmall) this.#drop(false);
     };
     this.#setReleasable(true);
+    request = { ...request, source: this.#source };
     const scene = await openScene(request, {
       device: services.sharedDevice,
       loader: services.sceneLoader,

@@ -122,7 +122,7 @@ function contentOf(recorder: MediaRecorder): Promise<Blob> {
   return content;
 }
 
-/** What {@link drive} needs of a recording. Times in milliseconds; `start` is that of the first frame. */
+/** Parameters of {@link drive}. Times in milliseconds; `start` is that of the first frame. */
 interface Drive {
   readonly path: CameraPath | null;
   readonly start: number;

@@ -60,16 +60,16 @@ export class ClipPlayer implements Timeline {
    */
   static async open(options: ClipOptions): Promise<ClipPlayer> {
     const { device, loader, request, signal, onProgress, memoryBudget, startSeconds, listeners } = options;
-    const { url, credentials, limits } = request;
+    const { url, credentials, limits, source } = request;
     const whole = await localFile(url);
-    const opened = await loader.ask('clip', { url, credentials, limits, whole }, signal);
+    const opened = await loader.ask('clip', { url, credentials, limits, source, whole }, signal);
     const index = unpackClipIndex(opened.index);
     const file = opened.file ?? (opened.isPartial ? whole : new Blob([await loader.fetchFile(request, signal)]));
     const cache = new GroupCache(index, {
       fetchPart: (group, part, aborted) => {
         const { groups, shDegree, origin } = index;
         const frames = group === STILL ? 1 : groups[group].frames;
-        const place = { url, credentials, limits, whole: file, tag: opened.tag };
+        const place = { url, credentials, limits, source, whole: file, tag: opened.tag };
         const own = { part: partsIn(index, group)[part], group, frames, shDegree, origin };
         return loader.ask('clip-part', { ...place, ...own }, aborted);
       },
@@ -137,8 +137,7 @@ export class ClipPlayer implements Timeline {
 }
 
 /** Returns whether an error says that the file was replaced on its server. */
-const isReplaced = (error: unknown): boolean =>
-  error instanceof GaussianSplatError && error.code === 'network/changed';
+const isReplaced = (error: unknown): boolean => error instanceof GaussianSplatError && error.code === 'network/changed';
 
 /** Returns the content of a `blob:` address; undefined for other addresses. */
 async function localFile(url: string): Promise<Blob | undefined> {

@@ -16,11 +16,11 @@ import { Model } from './model.js';
  */
 export function fetchMesh(
   loader: SceneLoader,
-  { url, credentials, limits }: FileRequest,
+  { url, credentials, limits, source }: FileRequest,
   signal: AbortSignal,
   onProgress: ProgressListener = () => undefined,
 ): Promise<LoadedMesh> {
-  const request = { url, credentials, limits };
+  const request = { url, credentials, limits, source };
   return loader.ask('mesh', request, signal, { onProgress }).catch(async (error: unknown) => {
     // The worker that bundlers build as a single file for strict pages contains no decoders.
     if (!isMissingDecoder(error)) throw error;

@@ -111,7 +111,8 @@ const openPages: Open = async (request, device, { loader, signal, onProgress }, 
     isDecoded: true,
     fetchPage: async (page, aborted, coded) => {
       const part = fileRequest(page, request, limits.origins);
-      return allowance.note(part.url, loader.fetchFile({ ...part, limits: allowance.of(part.url), coded }, aborted));
+      const own = { ...part, limits: allowance.of(part.url), source: request.source, coded };
+      return allowance.note(part.url, loader.fetchFile(own, aborted));
     },
   });
 };
@@ -124,7 +125,8 @@ const openBoxes: Open = async (request, device, { loader, signal, onProgress }, 
     const [file, first, count] = runs.subarray(3 * (firstRuns[page.box] + page.level));
     const part = `${page.box} ${page.level}`;
     const place = { url, path: files[file], first, count };
-    const box = { ...place, page, scene: levels.scene, credentials, limits: allowance.of(part) };
+    const own = { credentials, limits: allowance.of(part), source: request.source };
+    const box = { ...place, ...own, page, scene: levels.scene };
     return new Uint32Array(await allowance.note(part, loader.ask('box', box, aborted)));
   });
   return StreamedGaussians.openSource(device, source, pool);
