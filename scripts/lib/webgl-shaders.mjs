@@ -16,7 +16,7 @@ export const WEBGL_SHADERS = fileURLToPath(new URL('../../packages/renderer/src/
 
 /** GLSL that replaces WebGPU's buffers. */
 const REPLACED = { 'shared/stored_gaussian': 'webgl/textured_gaussian' };
-const STAGES = ['project', 'quads', 'hosted_quads', 'compose', 'probe', 'probe_surface'];
+const STAGES = ['project', 'quads', 'hosted_quads', 'compose', 'probe', 'probe_cross', 'probe_surface'];
 /** Functions that a stage takes unchanged from WebGPU's. */
 const SHARED = ['full_screen'];
 const ENTRIES = [

@@ -222,6 +222,35 @@ describe('hotspots', () => {
     await until(() => Math.abs(opacity(front) - 0.6) < 0.01, 'the custom property');
   });
 
+  it('read WebGL frames without a wait for the GPU', async () => {
+    const { readPixels } = WebGL2RenderingContext.prototype;
+    const reads = { later: 0, waiting: 0 };
+    WebGL2RenderingContext.prototype.readPixels = function (this: WebGL2RenderingContext, ...args: unknown[]) {
+      // An offset into a buffer of pixels is a number; memory of the page makes the thread wait.
+      reads[typeof args[6] === 'number' ? 'later' : 'waiting']++;
+      Reflect.apply(readPixels, this, args);
+    };
+    try {
+      const element = await compass({ renderer: 'webgl' });
+      label(element, 'front', '0m 0m 1m');
+      label(element, 'back', '0m 0m -1m');
+      const sees = (name: string): boolean | undefined => element.queryHotspot(`hotspot-${name}`)?.visible;
+      await until(
+        () => sees('front') === true && sees('back') === false,
+        'the label behind the white ball to be hidden',
+      );
+      element.cameraOrbit = '180deg 90deg 8m';
+      await until(() => sees('front') === false && sees('back') === true, 'both to change places');
+      const point = await element.positionFromPoint(100, 80);
+      near(point?.z ?? NaN, -1, 0.3, 'the ball that is near');
+      await element.updateStats();
+      assert(reads.later > 2, `reads of the labels and the pick: ${reads.later}`);
+      assertEqual(reads.waiting, 0, 'reads that wait');
+    } finally {
+      WebGL2RenderingContext.prototype.readPixels = readPixels;
+    }
+  });
+
   it('that are added, or move, while nothing else moves are checked, too', async () => {
     const element = await compass();
     const sees = (name: string, expected: boolean, what: string): Promise<void> =>

@@ -48,7 +48,7 @@ it('WebGL: points of a frame of fewer pixels are those of the displayed frame', 
   const aside = { x: camera.width - center.x, y: camera.height - center.y };
   for (const resolutionScale of [1, 0.5, 0.25]) {
     renderer.render({ camera, accumulation: 'rgba16float', shDegree: 0, resolutionScale });
-    const [hit, missed] = renderer.probe([center, aside]);
+    const [hit, missed] = await renderer.probe([center, aside]);
     assert(hit.opacity > 0.9 && Math.abs(hit.depth! - z) < 0.05, `at ${resolutionScale}: ${JSON.stringify(hit)}`);
     assert(missed.opacity === 0, `beside it, at ${resolutionScale}: ${JSON.stringify(missed)}`);
   }

@@ -196,11 +196,16 @@ export class WebGlBackend implements Backend {
   async probe(points: readonly ProbePoint[]): Promise<ProbeAnswer[]> {
     // Each race stays in the memory of its promises, and labels ask ten times a second.
     if (!this.#isShown) await Promise.race([this.#shown, this.place.lost]);
-    return this.place.isLost || this.#isDestroyed ? [] : this.scene.frames.probe(points);
+    if (this.place.isLost || this.#isDestroyed) return [];
+    // A context that is lost meanwhile has no frame either.
+    return this.scene.frames.probe(points).catch((error: unknown) => {
+      if (this.scene.lease.gl.isContextLost()) return [];
+      throw error;
+    });
   }
 
   async readCounts(): Promise<ReadCounts> {
-    return { drawn: this.scene.frames.countDrawn(), left: 0, contributing: null };
+    return { drawn: await this.scene.frames.countDrawn(), left: 0, contributing: null };
   }
 
   destroy(): void {

@@ -6,6 +6,7 @@ import {
   composeFragment,
   composeVertex,
   fullScreenVertex,
+  probeCrossFragment,
   probeFragment,
   probeSurfaceFragment,
   ProbeView,
@@ -16,19 +17,27 @@ import {
 } from './shaders.js';
 
 const SPLAT_TEXTURES = ['shapes', 'paints', 'order'];
-const SURFACE_TEXTURES = ['geometry', 'order', 'asked'];
+const PROBE_TEXTURES = [...SPLAT_TEXTURES, 'asked', 'ranges'];
+const CROSS_TEXTURES = ['runs', 'ranges'];
+const SURFACE_TEXTURES = ['geometry', 'order', 'asked', 'ranges'];
 /** Milliseconds between two queries of the status of a compilation. */
 const POLL_MS = 4;
 
 const known = new WeakMap<WebGL2RenderingContext, GlPrograms>();
+
+/** Programs that find splats at points: see the shaders of the same names in `shaders/webgl`. */
+export interface ProbePrograms {
+  readonly runs: GlProgram<typeof ProbeView>;
+  readonly cross: GlProgram<typeof ProbeView>;
+  readonly surface: GlProgram<typeof layouts.View>;
+}
 
 export class GlPrograms {
   readonly project: GlProgram<typeof layouts.View>;
   readonly quads: GlProgram<typeof QuadsView>;
   readonly compose: GlProgram<typeof layouts.Compose>;
   readonly #gl: WebGL2RenderingContext;
-  #probe: GlProgram<typeof ProbeView> | undefined;
-  #surface: GlProgram<typeof layouts.View> | undefined;
+  #probe: ProbePrograms | undefined;
 
   private constructor(gl: WebGL2RenderingContext) {
     this.#gl = gl;
@@ -49,19 +58,16 @@ export class GlPrograms {
     return programs;
   }
 
-  /** Program that measures depth at points of a frame. @throws GaussianSplatError `unsupported/webgl` */
-  get probe(): GlProgram<typeof ProbeView> {
-    this.#probe ??= new GlProgram(this.#gl, [fullScreenVertex, probeFragment], ProbeView, SPLAT_TEXTURES);
-    this.#probe.check();
+  /** Programs that find splats at points of a frame. @throws GaussianSplatError `unsupported/webgl` */
+  get probe(): ProbePrograms {
+    const gl = this.#gl;
+    this.#probe ??= {
+      runs: new GlProgram(gl, [fullScreenVertex, probeFragment], ProbeView, PROBE_TEXTURES),
+      cross: new GlProgram(gl, [fullScreenVertex, probeCrossFragment], ProbeView, CROSS_TEXTURES),
+      surface: new GlProgram(gl, [fullScreenVertex, probeSurfaceFragment], layouts.View, SURFACE_TEXTURES),
+    };
+    for (const program of Object.values(this.#probe) as ProbePrograms[keyof ProbePrograms][]) program.check();
     return this.#probe;
-  }
-
-  /** Program that finds the surfaces of single splats. @throws GaussianSplatError `unsupported/webgl` */
-  get surface(): GlProgram<typeof layouts.View> {
-    const texts = [fullScreenVertex, probeSurfaceFragment] as const;
-    this.#surface ??= new GlProgram(this.#gl, texts, layouts.View, SURFACE_TEXTURES);
-    this.#surface.check();
-    return this.#surface;
   }
 
   /** Resolves when {@link check} would return at once. Other tasks run meanwhile. */

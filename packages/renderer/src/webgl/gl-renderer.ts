@@ -16,6 +16,7 @@ import { makeTarget, makeTexture, requireMemory } from './gl.js';
 import { sizeOf, type GlGaussians } from './gl-gaussians.js';
 import { probeSplats } from './gl-probe.js';
 import { GlPrograms } from './gl-programs.js';
+import { readTexels } from './read-texels.js';
 import { SH_PRECISION } from '../pack/words.js';
 
 const { QUAD_BATCH } = constants;
@@ -208,34 +209,30 @@ export class GlRenderer {
   }
 
   /**
-   * Probes points of the last frame, as `Viewpoint.probe` does. Waits for the GPU: call it for clicks and labels, not
-   * for every frame.
+   * Probes points of the last frame, as `Viewpoint.probe` does. Later frames may be drawn before the answer arrives.
+   * Rejects if the context is lost.
    * @returns An answer for each point; empty before the first frame.
    */
-  probe(points: readonly ProbePoint[]): ProbeAnswer[] {
+  async probe(points: readonly ProbePoint[]): Promise<ProbeAnswer[]> {
     if (this.#view === undefined || this.#last === undefined) return [];
-    const gl = this.#gl;
     const { camera, drawn } = this.#last;
     const [across, down] = [drawn.width / camera.width, drawn.height / camera.height];
     const inDrawn = points.map(({ x, y, depth }) => ({ x: across * x, y: down * y, depth }));
-    const { probe: program, surface } = this.#programs;
-    const useSurface = (asked: WebGLTexture): void =>
-      surface.use(this.#view!, [this.#gaussians.geometry, this.#order, asked]);
-    const source = { gl, program, textures: this.#splatTextures, count: this.#count, useSurface };
+    const source = {
+      gl: this.#gl,
+      programs: this.#programs.probe,
+      view: this.#view,
+      textures: this.#splatTextures,
+      order: this.#order,
+      geometry: this.#gaussians.geometry,
+      count: this.#count,
+    };
     return probeSplats(source, inDrawn);
   }
 
-  /**
-   * Returns the number of splats drawn in the last frame. Reads all splats back: call it for panels, not for every
-   * frame.
-   */
-  countDrawn(): number {
-    const gl = this.#gl;
-    const [width, rows] = sizeOf(gl, this.#gaussians.facts.count);
-    const words = new Uint32Array(4 * width * rows);
-    gl.bindFramebuffer(gl.FRAMEBUFFER, this.#splats);
-    gl.readBuffer(gl.COLOR_ATTACHMENT1);
-    gl.readPixels(0, 0, width, rows, gl.RGBA_INTEGER, gl.UNSIGNED_INT, words);
+  /** Returns the number of splats drawn in the last frame. Reads all splats back: call it for panels. */
+  async countDrawn(): Promise<number> {
+    const words = await readTexels(this.#gl, this.#splats, sizeOf(this.#gl, this.#gaussians.facts.count), 1);
     let count = 0;
     // The last word of a splat is its opacity.
     for (let at = 3; at < words.length; at += 4) if (words[at] !== 0) count++;
