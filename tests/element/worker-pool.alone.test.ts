@@ -27,7 +27,9 @@ test('a load that is canceled while its worker is late never reaches the worker,
   const settle = (): Promise<void> => new Promise((resolve) => setImmediate(resolve));
   const over = new AbortController();
   const here = (): Promise<never> => Promise.reject(new Error('not on the main thread'));
-  const loading = pool.run({ type: 'load' } as WorkerRequest, over.signal, here).catch((error: unknown) => error);
+  const loading = pool
+    .run({ type: 'load', request: {} } as WorkerRequest, over.signal, here)
+    .catch((error: unknown) => error);
   context.mock.timers.tick(2_000);
   await settle();
   over.abort();

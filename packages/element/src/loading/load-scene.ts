@@ -13,7 +13,15 @@ import {
 import { fileName, named, throttled } from './load-helpers.js';
 import type { LargePly } from './large-ply.js';
 import { ProgressSum } from './progress-sum.js';
-import type { LoadedFacts, LoadedScene, LoadedSequence, SceneRequest, SentScene, TaskListeners } from './protocol.js';
+import {
+  HANDED_ON,
+  type LoadedFacts,
+  type LoadedScene,
+  type LoadedSequence,
+  type SceneRequest,
+  type SentScene,
+  type TaskListeners,
+} from './protocol.js';
 
 /** Delay of the first preview after the start of the load, ms. Shorter downloads need no preview. */
 const PREVIEW_AFTER_MS = 300;
@@ -39,7 +47,7 @@ export async function loadScene(
   signal: AbortSignal,
   listeners: TaskListeners,
 ): Promise<LoadedScene | SentScene | LoadedSequence> {
-  const { onProgress, onPreview, onPart, onReading } = listeners;
+  const { onProgress, onPreview, onPart, onReading, handOn } = listeners;
   try {
     const { url, credentials } = request;
     const name = fileName(url);
@@ -95,12 +103,14 @@ export async function loadScene(
         await (await previews.get().catch(none))?.onArrival(bytes, total);
       return false;
     };
-    let bytes = await fetchScene(url, { ...options(), onArrival });
+    const handed = await request.downloaded?.arrayBuffer().catch(none);
+    let bytes: Uint8Array = handed ? new Uint8Array(handed) : await fetchScene(url, { ...options(), onArrival });
     const ply = await shared.ply;
     const joined = await ply?.finish();
     if (joined) return joined;
     // The bytes of a file that turned out to be unusual were not kept. The browser's cache usually has them.
     if (ply?.hasTaken) bytes = await fetchScene(url, options());
+    if (!handed && handOn?.(bytes)) throw HANDED_ON;
     onReading?.(true);
     if (isSequence(bytes)) {
       const { parseSequence } = await loadModule('the code that reads sequences', () => import('./sequence-of.js'));
@@ -131,6 +141,7 @@ export async function loadScene(
     return packLevels(cloud, request.sh);
   } catch (error) {
     signal.throwIfAborted();
+    if (error === HANDED_ON) throw error;
     throw named(error, fileName(request.url));
   }
 }

@@ -41,6 +41,8 @@ export interface SceneRequest extends FileRequest {
   readonly levels?: boolean;
   /** Whether the file is shown as triangle meshes, without splats. */
   readonly isMesh?: boolean | undefined;
+  /** Content of the file, if another worker has downloaded it. Other files are still found beside `url`. */
+  readonly downloaded?: Blob | undefined;
   /** Renderer of the scene; default: WebGPU. */
   readonly renderer?: RendererChoice;
   /** Whether a streamed SOG scene is loaded completely, in its finest level. */
@@ -107,6 +109,9 @@ export type PreviewListener = (preview: LoadedScene) => void;
  */
 export type ProgressListener = (loaded: number, total: number | undefined, share?: number) => void;
 
+/** Thrown by a task that another worker continues. It is no error, and is not reported. */
+export const HANDED_ON = Symbol('handed on');
+
 /** Functions that a task of the worker calls. Only loads of scenes call more than `onProgress`. */
 export interface TaskListeners {
   readonly onProgress: ProgressListener;
@@ -119,6 +124,11 @@ export interface TaskListeners {
    * responds again.
    */
   readonly onReading?: (isReading: boolean) => void;
+  /**
+   * Offers a downloaded file to another worker. Returns whether that worker reads it; then the task must end with
+   * {@link HANDED_ON}.
+   */
+  readonly handOn?: (bytes: Uint8Array) => boolean;
   /**
    * Requests other workers for packing.
    * @param max Maximum number of workers.

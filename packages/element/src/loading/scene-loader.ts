@@ -30,7 +30,7 @@ export class SceneLoader {
     this.#pool = new WorkerPool(
       this.spawn,
       () => this.#code(),
-      (reason) => void this.#warn(reason, locationOf()),
+      (reason, isLate) => void this.#warn(reason, locationOf(), isLate),
       () => !spawn && locationOf() === null && ++this.#way < WORKER_SOURCES.length,
     );
   }
@@ -40,10 +40,10 @@ export class SceneLoader {
     return location === null ? WORKER_SOURCES[this.#way]() : spawnAt(new URL(location, document.baseURI));
   }
 
-  async #warn(reason: string, location: string | null): Promise<void> {
+  async #warn(reason: string, location: string | null, isLate: boolean): Promise<void> {
     try {
       const { warnOfRefusal } = await import('./refusal.js');
-      warnOfRefusal(reason, this.#violated, location);
+      warnOfRefusal(reason, this.#violated, location, isLate);
     } catch {
       console.warn(reason);
     }
@@ -88,8 +88,8 @@ export class SceneLoader {
     options: Parameters<WorkerPool['run']>[3] = {},
   ): Promise<AnswerOf<T>> {
     const { onProgress = () => undefined, onPreview } = options;
-    const here = async (): Promise<AnswerOf<T>> =>
-      (await this.#code()).runOnPage(type, request, signal, { onProgress, onPreview });
+    const here = async (asked: WorkerRequest): Promise<AnswerOf<T>> =>
+      (await this.#code()).runOnPage(type, asked.request as RequestOf<T>, signal, { onProgress, onPreview });
     const run = (asked: RequestOf<T>): Promise<AnswerOf<T>> =>
       this.#pool.run({ type, request: asked } as WorkerRequest, signal, here, options);
     return origin === 'null' ? withFile(request).then(run) : run(request);

@@ -4,11 +4,14 @@
  */
 import type { BlockBuffers } from '@gaussian-splat/renderer/tools';
 import { named } from './load-helpers.js';
-import { buffersOf, type FileRequest, type ScenePart, type TaskListeners } from './protocol.js';
+import { buffersOf, HANDED_ON, type FileRequest, type ScenePart, type TaskListeners } from './protocol.js';
 import type { PageMessage, TaskMessage, WorkerMessage } from './worker-messages.js';
 import { runOnPage, runTask, WORKER_TASKS, type WorkerTask } from './worker-tasks.js';
 
 export { runOnPage };
+
+/** Smallest file that is handed on while the worker downloads others, bytes: smaller ones are read in milliseconds. */
+const MIN_HANDED_BYTES = 1 << 18;
 
 /** The members of a worker's global scope that are used here; TypeScript's DOM types lack them. */
 interface WorkerScope {
@@ -27,6 +30,8 @@ interface Work {
 
 function serve(scope: WorkerScope): void {
   const running = new Map<number, Work>();
+  /** Functions that release the locks of this thread, by their names. */
+  const locks = new Map<string, () => void>();
 
   const listenersOf = (id: number, work: Work, { wantsPreviews, wantsParts }: TaskMessage): TaskListeners => ({
     onProgress: (loaded, total) => scope.postMessage({ type: 'progress', id, loaded, total }),
@@ -35,6 +40,11 @@ function serve(scope: WorkerScope): void {
       : undefined,
     onPart: wantsParts ? (part) => sendPart(id, work, part) : undefined,
     onReading: (isReading) => scope.postMessage({ type: isReading ? 'reading' : 'rested', id }),
+    handOn: (bytes) => {
+      const isBusy = running.size > 1 && bytes.length >= MIN_HANDED_BYTES;
+      if (isBusy) scope.postMessage({ type: 'downloaded', id, file: new Blob([bytes as Uint8Array<ArrayBuffer>]) });
+      return isBusy;
+    },
     askForHelp: (max, onHelper) => {
       work.onHelper = onHelper;
       scope.postMessage({ type: 'help', id, max });
@@ -59,11 +69,11 @@ function serve(scope: WorkerScope): void {
    */
   async function run(message: TaskMessage): Promise<void> {
     const { id, type } = message;
-    const work: Work = { abort: new AbortController(), taken: [] };
+    const work = running.get(id)!;
     const { signal } = work.abort;
     const { transfer, isResponsive } = WORKER_TASKS[type] as WorkerTask<never, unknown>;
-    running.set(id, work);
     try {
+      signal.throwIfAborted();
       if (!isResponsive) scope.postMessage({ type: 'reading', id });
       const answer: unknown = await runTask(
         type,
@@ -73,15 +83,31 @@ function serve(scope: WorkerScope): void {
       );
       if (!signal.aborted) scope.postMessage({ type: 'answer', id, answer }, transfer?.(answer));
     } catch (error) {
-      if (!signal.aborted) scope.postMessage({ type: 'error', id, error: named(error, 'scene worker').toData() });
+      if (!signal.aborted && error !== HANDED_ON)
+        scope.postMessage({ type: 'error', id, error: named(error, 'scene worker').toData() });
     } finally {
       running.delete(id);
       scope.postMessage({ type: 'rested', id });
     }
   }
 
+  function hold(name: string): void {
+    const released = new Promise<void>((resolve) => locks.set(name, resolve));
+    const onHeld = (): Promise<void> => {
+      scope.postMessage({ type: 'holds', name });
+      return released;
+    };
+    // Pages without an origin have no locks.
+    navigator.locks
+      .request(name, onHeld)
+      .catch(() => undefined)
+      .finally(() => locks.delete(name));
+  }
+
   scope.addEventListener('message', ({ data }) => {
-    if (data.type === 'ping') scope.postMessage({ type: 'pong' });
+    if (data.type === 'hold') hold(data.name);
+    else if (data.type === 'release') locks.get(data.name)?.();
+    else if (data.type === 'ping') scope.postMessage({ type: 'pong' });
     else if (data.type === 'cancel') running.get(data.id)?.abort.abort();
     else if (data.type === 'taken') running.get(data.id)?.taken.shift()?.(data.buffers);
     else if (data.type === 'helper') running.get(data.id)?.onHelper?.(data.port);
@@ -90,7 +116,12 @@ function serve(scope: WorkerScope): void {
       serveWith(import('./sort-splats.js'), ({ sortSplats }) => sortSplats(data.port, data.positions, data.areas));
     else if (data.type === 'run-on-cpu')
       serveWith(import('@gaussian-splat/generator'), ({ handleCpuRun }) => handleCpuRun(data));
-    else void run(data);
+    // A request that was canceled while this thread was busy is dropped, and fetches nothing.
+    else {
+      const { id } = data;
+      running.set(id, { abort: new AbortController(), taken: [] });
+      setTimeout(() => void run(data));
+    }
   });
   scope.postMessage({ type: 'ready' });
 }

@@ -22,6 +22,9 @@ export type TaskMessage = WorkerRequest & {
 export type PageMessage =
   | TaskMessage
   | { readonly type: 'cancel'; readonly id: number }
+  /** The worker holds the Web Lock of this name until it is told to release it, or its thread ends. */
+  | { readonly type: 'hold'; readonly name: string }
+  | { readonly type: 'release'; readonly name: string }
   /** Requests a `pong`, which shows that the worker responds. */
   | { readonly type: 'ping' }
   /** The next part of a scene was used. `buffers`: those of its splats, which are transferred back. */
@@ -44,10 +47,14 @@ export type WorkerMessage =
   /** The worker's script has started. */
   | { readonly type: 'ready' }
   | { readonly type: 'pong' }
+  /** The worker holds a lock, so that the page can wait for its release. */
+  | { readonly type: 'holds'; readonly name: string }
   /** The worker starts reading for a request, and may not answer messages for a long time. */
   | { readonly type: 'reading'; readonly id: number }
   /** The worker has finished reading for a request, or the request was canceled. */
   | { readonly type: 'rested'; readonly id: number }
+  /** The file of a request is downloaded, and another worker must read it, because this one is downloading others. */
+  | { readonly type: 'downloaded'; readonly id: number; readonly file: Blob }
   /** Other workers can help to pack the scene of a request; `max` is their maximum number. */
   | { readonly type: 'help'; readonly id: number; readonly max: number }
   | { readonly type: 'progress'; readonly id: number; readonly loaded: number; readonly total: number | undefined }

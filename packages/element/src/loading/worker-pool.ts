@@ -2,7 +2,7 @@ import { GaussianSplatError, Lazy } from '@gaussian-splat/core';
 import { FairTurns } from './fair-turns.js';
 import { buffersOf, type PartListener } from './protocol.js';
 import type { WorkerMessage, WorkerRequest } from './worker-messages.js';
-import { WorkerSlot, type Job } from './worker-slot.js';
+import { isDownloaded, WorkerSlot, type Job } from './worker-slot.js';
 
 /** Time for which an idle worker is kept, ms, because pages with several elements load one scene after another. */
 const IDLE_MS = 5_000;
@@ -23,8 +23,8 @@ const SILENT = 5;
 /** Silence after which a request restarts, however long its worker had worked for it before, ms. */
 const MAX_WAIT_MS = 10_000;
 /**
- * Number of missed pings after which a worker counts as dead, even while it reads, because browsers do not report dead
- * workers.
+ * Number of missed pings after which a worker counts as dead, even while it reads, in browsers that do not report that
+ * a worker has ended.
  */
 const DEAD = 600;
 /**
@@ -54,13 +54,19 @@ const AFTER_DEATH = 2;
 
 const help = new Lazy('the code that starts workers', () => import('./start-helpers.js'));
 
-/** Called with the reason for which work runs on the main thread. */
-export type Refusal = (reason: string) => void;
+/** Time after which a worker that reads counts as slow, ms. Slow ones do not keep downloaded scenes waiting. */
+const SLOW_MS = 2_000;
 
 /**
- * The workers of a page. One worker serves all loads while it responds. It does not respond while it reads a large or a
- * hostile scene, or if it has died. Its other loads then restart in another worker. Canceled work that does not stop is
- * ended with its worker.
+ * Called with the reason for which work runs on the main thread.
+ * @param isLate Whether a worker has only not started in time.
+ */
+export type Refusal = (reason: string, isLate: boolean) => void;
+
+/**
+ * The workers of a page. One worker downloads all scenes. It reads its last one, and hands the others on, because it
+ * does not respond while it reads. Silence alone ends nothing: a busy machine gives workers no time. Only loads that wait
+ * behind a long reading restart in another worker. Canceled work that does not stop is ended with its worker.
  */
 export class WorkerPool {
   readonly #spawn: () => Worker;
@@ -109,7 +115,7 @@ export class WorkerPool {
   async run<T>(
     request: WorkerRequest,
     signal: AbortSignal,
-    here: () => Promise<T>,
+    here: (request: WorkerRequest) => Promise<T>,
     { transfer, ...listeners }: Pick<Job, 'onProgress' | 'onPreview' | 'onPart' | 'transfer'> = {},
   ): Promise<T> {
     signal.throwIfAborted();
@@ -137,18 +143,30 @@ export class WorkerPool {
    */
   #place(job: Job): void {
     if (job.signal.aborted) return;
-    if (this.#isRefused) return job.resolve(job.here());
+    if (this.#isRefused) return job.resolve(job.here(job.request));
     const slots = [...this.#slots];
     const late = slots.find(({ isLate }) => isLate);
-    if (late) return void this.#doWithout(late, job);
+    // Another worker that has started does the work of a late one.
+    if (late && !slots.some(({ isReady }) => isReady)) return void this.#doWithout(late, job);
     const free = slots.find((slot) => slot.missed < BUSY && slot.mayTake(job));
-    const max = MAX_WORKERS + (this.#turns.isNew(job) ? MAX_NEW_WORKERS : 0);
-    const slot = free ?? (slots.length < max ? this.#start() : undefined);
+    const slot = free ?? (this.#mayStart(job) ? this.#start() : undefined);
     // No worker could be created, which `#start` has reported.
-    if (this.#isRefused) return job.resolve(job.here());
+    if (this.#isRefused) return job.resolve(job.here(job.request));
     if (!slot) return void this.#queue.push(job);
     slot.take(job);
     this.#watch();
+  }
+
+  /**
+   * Returns whether a request gets a new worker. Downloaded scenes are read by as many workers as the machine has cores,
+   * slow ones not counted.
+   */
+  #mayStart(job: Job): boolean {
+    const slots = [...this.#slots];
+    if (slots.length >= MAX_WORKERS + (this.#turns.isNew(job) ? MAX_NEW_WORKERS : 0)) return false;
+    const isQuick = ({ jobs, missed }: WorkerSlot): boolean =>
+      missed * TICK_MS < SLOW_MS && [...jobs.values()].some(isDownloaded);
+    return !isDownloaded(job) || slots.filter(isQuick).length < Math.max(2, navigator.hardwareConcurrency);
   }
 
   #watch(): void {
@@ -184,7 +202,7 @@ export class WorkerPool {
       this.#refuse(error instanceof Error ? error.message : String(error));
       return undefined;
     }
-    const slot = new WorkerSlot(worker);
+    const slot: WorkerSlot = new WorkerSlot(worker, () => this.#crash(slot, 'a worker that the browser ended'));
     this.#slots.add(slot);
     worker.addEventListener('message', ({ data }: MessageEvent<WorkerMessage>) => this.#receive(slot, data));
     worker.addEventListener('error', (event) => {
@@ -202,18 +220,29 @@ export class WorkerPool {
       slot.begin();
       this.#hasStarted = true;
       this.#watch();
-      return this.#rest(slot, IDLE_MS);
+      this.#rest(slot, IDLE_MS);
+      return this.#placeQueued();
     }
-    if (message.type === 'pong') return;
+    if (message.type === 'pong') return void (slot.heardAt = slot.pingedAt);
+    if (message.type === 'holds') return slot.held(message.name);
     if (message.type === 'reading') return void (slot.reading = message.id);
     if (message.type === 'rested') return void (slot.reading = slot.reading === message.id ? undefined : slot.reading);
     const job = slot.jobs.get(message.id);
     if (message.type === 'progress') job?.onProgress?.(message.loaded, message.total);
     else if (message.type === 'preview') job?.onPreview?.(message.scene);
     else if (message.type === 'part') void this.#pass(slot, message.id, job?.onPart?.(message.part));
+    else if (message.type === 'downloaded') this.#handOn(slot, job, message.file);
     else if (message.type === 'answer') job?.resolve(message.answer);
     else if (message.type === 'error') job?.reject(GaussianSplatError.fromData(message.error));
     else if (job) this.#help(slot, job.id, message.max).catch(() => undefined);
+  }
+
+  /** Assigns a downloaded scene to another worker. */
+  #handOn(slot: WorkerSlot, job: Job | undefined, downloaded: Blob): void {
+    if (!job) return;
+    slot.drop(job);
+    job.request = { ...job.request, request: { ...job.request.request, downloaded } } as WorkerRequest;
+    this.#place(job);
   }
 
   /** Returns the buffers of a part to the worker when the part has been used. */
@@ -254,10 +283,9 @@ export class WorkerPool {
    */
   #late(slot: WorkerSlot): void {
     slot.isLate = true;
-    for (const job of slot.jobs.values()) {
-      slot.jobs.delete(job.id);
-      void this.#doWithout(slot, job);
-    }
+    const jobs = [...slot.jobs.values()];
+    for (const job of jobs) slot.drop(job);
+    for (const job of jobs) this.#place(job);
     this.#placeQueued();
   }
 
@@ -271,15 +299,15 @@ export class WorkerPool {
       await this.#prepare();
       await new Promise((resolve) => setTimeout(resolve, GRACE_MS));
       if (slot.isReady) return this.#place(job);
-      this.#warn('its script does not arrive');
-      job.resolve(job.here());
+      this.#warn(`none has started within ${START_MS / 1000} s`, true);
+      job.resolve(job.here(job.request));
     } catch (error) {
       job.reject(error);
     }
   }
 
-  #warn(reason: string): void {
-    if (!this.#hasWarned) this.#onRefused(reason);
+  #warn(reason: string, isLate = false): void {
+    if (!this.#hasWarned) this.#onRefused(reason, isLate);
     this.#hasWarned = true;
   }
 
@@ -290,8 +318,11 @@ export class WorkerPool {
       isIdle = false;
       if (slot.missed > 0 && slot.reader) this.#turns.count(slot.reader, TICK_MS);
       if (slot.missed >= SILENT) this.#reassignJobs(slot);
-      if (slot.missed++ === 0) slot.post({ type: 'ping' });
+      if (slot.missed++ > 0) continue;
+      slot.pingedAt = performance.now();
+      slot.post({ type: 'ping' });
     }
+    this.#placeQueued();
     this.#yieldTurn();
     if (!isIdle) return;
     clearInterval(this.#clock);
@@ -300,6 +331,7 @@ export class WorkerPool {
 
   /** Ends a worker that has read for longer than its turn, if a new scene waits. Its requests wait for another turn. */
   #yieldTurn(): void {
+    if (this.#slots.size < MAX_WORKERS + MAX_NEW_WORKERS) return;
     const [next] = this.#turns.sort(this.#queue);
     const slot = next && this.#turns.slotFor(next, this.#slots, ({ missed }) => missed * TICK_MS);
     if (!slot) return;
@@ -313,22 +345,24 @@ export class WorkerPool {
   }
 
   /**
-   * Restarts the requests of an unresponsive worker in other workers, except the load that it reads. The worker is
-   * ended if it is dead, or reads a canceled load.
+   * Restarts requests of a silent worker in other workers: those that wait behind a scene that it reads, those that it
+   * has not received, or all if it reads a canceled one. The worker is ended in the last case. Silence alone means that
+   * the machine gives it no time. If the end of workers is not reported, nothing but time is left to judge by.
    */
   #reassignJobs(slot: WorkerSlot): void {
-    const isDead = slot.missed >= DEAD;
-    const reader = isDead ? undefined : slot.reader;
     const silentMs = slot.missed * TICK_MS;
-    const isLeft = isDead || (slot.reading !== undefined && !reader);
-    const mayMove = (job: Job): boolean => isLeft || hasWaited(job, silentMs);
-    const jobs = [...slot.jobs.values()].filter((job) => job !== reader && mayMove(job));
-    const isEmpty = jobs.length === slot.jobs.size;
-    const stuckWorker = slot.reader;
-    if (!reader && isEmpty) this.#end(slot);
-    for (const job of jobs)
-      if (job === stuckWorker) this.#move(slot, job, AFTER_DEATH, stopped('a worker that did not respond'));
-      else this.#move(slot, job, 1, starved());
+    const isDead = slot.missed >= DEAD && !slot.reportsEnd;
+    const { reader } = slot;
+    const isReading = slot.reading !== undefined;
+    const isLeft = isDead || (isReading && !reader);
+    const mayMove = (job: Job): boolean =>
+      job !== reader && (isReading || slot.heardAt < job.sentAt) && hasWaited(job, silentMs);
+    const jobs = [...slot.jobs.values()].filter((job) => isLeft || mayMove(job));
+    if (isLeft || (jobs.length > 0 && jobs.length === slot.jobs.size)) this.#end(slot);
+    for (const job of jobs) {
+      const moves = isDead && job === reader ? AFTER_DEATH : 1;
+      this.#move(slot, job, isDead ? moves : Math.min(moves, MAX_MOVES - job.moves), silent(silentMs, job === reader));
+    }
     this.#placeQueued();
   }
 
@@ -345,15 +379,15 @@ export class WorkerPool {
   }
 
   /**
-   * Handles a worker that died after its start, most likely because memory ran out. The load that it was reading, or
-   * its only load, is rejected. The other loads restart.
+   * Handles a worker that died after its start, most likely because memory ran out. Its loads restart. The one that it
+   * was reading, or its only one, restarts once.
    */
   #crash(slot: WorkerSlot, message: string): void {
     const jobs = [...slot.jobs.values()];
-    const stuckWorker = slot.reader ?? (jobs.length === 1 ? jobs[0] : undefined);
+    const suspect = slot.reader ?? (jobs.length === 1 ? jobs[0] : undefined);
     this.#end(slot);
     for (const job of jobs)
-      this.#move(slot, job, job === stuckWorker ? MAX_MOVES + 1 : 1, stopped(message || 'a worker that stopped'));
+      this.#move(slot, job, job === suspect ? AFTER_DEATH : 1, stopped(message || 'a worker that stopped'));
     this.#placeQueued();
   }
 
@@ -374,13 +408,13 @@ function hasWaited({ sentAt, moves, transfer }: Job, silentMs: number): boolean 
   return !transfer && moves < MAX_MOVES && silentMs >= Math.max(minMs, Math.min(MAX_WAIT_MS, workedMs));
 }
 
-/** Returns the error for a request that no worker began to read, because the machine gave workers no time. */
-function starved(): GaussianSplatError {
+/** Returns the error for a request whose workers did not respond, in browsers that do not report the end of a worker. */
+function silent(ms: number, isReading: boolean): GaussianSplatError {
   return new GaussianSplatError('network/interrupted', {
     where: 'scene worker',
-    expected: 'a worker that responds within a minute',
-    found: 'none, and no scene that it was reading',
-    remedy: 'load the scene again when the machine is less busy',
+    expected: 'a worker that responds, or a browser that reports its end',
+    found: `none for ${ms / 1000} s, ${isReading ? 'while it read the scene' : 'and no scene that it was reading'}`,
+    remedy: 'load the scene again when the machine is less busy, or use a smaller one',
   });
 }
 
