@@ -11,6 +11,7 @@ import {
   checkHands,
   checkLostContext,
   checkPages,
+  checkPainted,
   checkParts,
   checkScenes,
   checkThrown,
@@ -34,9 +35,18 @@ const SCENES = {
   'a post-processor': { src: '/scenes/skull.spz', postprocess: '/generators/post.onnx', 'control-gain': '0.2' },
 };
 
-const status = await withSite(async (origin) => {
+/** Firefox hides the device then: textures have 2048 texels a side at most, and canvases are read as noise. */
+const HIDDEN = { 'privacy.resistFingerprinting': true };
+const UNCOVERED = [
+  'Firefox on Windows, macOS and Android, whose WebGPU is on',
+  'a GPU: llvmpipe and lavapipe draw',
+  'VR and AR, sound, recording',
+];
+
+const status = await withSite(UNCOVERED, async (origin) => {
   await withFirefox(origin, { preferences: { 'webgl.disabled': true } }, checkWithoutWebGpu);
   await withDisplay((env) => withFirefox(origin, { env, isHeadless: false }, checkWithWebGl));
+  await withDisplay((env) => withFirefox(origin, { env, isHeadless: false, preferences: HIDDEN }, checkHidden));
   await withFirefox(origin, { preferences: WEBGPU }, checkWithWebGpu);
   // In a browser of its own, and some time after the screenshot: Firefox 153 does not draw again with another device when the first is destroyed right after that.
   await withFirefox(origin, { preferences: WEBGPU }, checkRecovery);
@@ -62,6 +72,19 @@ async function checkWithWebGl(tab, version, origin) {
   await checkPolicies(tab);
   await checkPages(tab, 'firefox');
   await checkThrown(tab);
+}
+
+async function checkHidden(tab, version) {
+  await tab.open('/engines/page.html');
+  const size = await tab.evaluate(
+    `(() => { const gl = document.createElement('canvas').getContext('webgl2'); return gl.getParameter(gl.MAX_TEXTURE_SIZE); })()`,
+  );
+  console.log(`Firefox ${version} with resistFingerprinting: textures of ${size} texels a side`);
+  for (const [name, attributes] of Object.entries(WEBGL_SCENES))
+    await check(`the screen has ${name}`, async () => {
+      await tab.evaluate(`show(${JSON.stringify({ ...attributes, loading: 'eager' })}).then(() => true)`);
+      return checkPainted(tab);
+    });
 }
 
 async function checkWithoutWebGpu(tab, version) {

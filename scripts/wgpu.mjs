@@ -31,6 +31,9 @@ const deno = ensureDeno();
 console.log(`Deno ${DENO}, ${existsSync(LAVAPIPE) ? 'lavapipe' : "the machine's own GPU"}`);
 const failed = files.filter((file) => !runFile(file));
 console.log(`${files.length - failed.length} of ${files.length} files are as they should be`);
+console.log(
+  'Not covered: the element and its pages, stages (tests/stages), Firefox itself, a GPU where lavapipe draws, and rows that say skipped or known.',
+);
 process.exit(failed.length > 0 ? 1 : 0);
 
 /** Whether a file holds on wgpu, or fails as is known. */

@@ -222,6 +222,24 @@ describe('hotspots', () => {
     await until(() => Math.abs(opacity(front) - 0.6) < 0.01, 'the custom property');
   });
 
+  it('that are used lie over their neighbors', async () => {
+    // The label under the mouse would be in use, too.
+    await sendMouse({ type: 'move', position: [400, 400] });
+    const element = await compass();
+    const first = label(element, 'first', '0m 0m 1m');
+    const second = label(element, 'second', '0m 0.02m 1m');
+    for (const { style } of [first, second]) style.cssText = 'width: 60px; height: 30px';
+    await until(() => second.getBoundingClientRect().width > 0 && hit() === second, 'the second over the first');
+    function hit(): Element | null {
+      const { left, top, width, height } = first.getBoundingClientRect();
+      return document.elementFromPoint(left + width / 2, top + height / 2);
+    }
+    first.focus();
+    await until(() => hit() === first, 'the label with the focus over the other');
+    first.blur();
+    await until(() => hit() === second, 'the order of before');
+  });
+
   it('read WebGL frames without a wait for the GPU', async () => {
     const { readPixels } = WebGL2RenderingContext.prototype;
     const reads = { later: 0, waiting: 0 };

@@ -22,7 +22,7 @@ export type TaskMessage = WorkerRequest & {
 export type PageMessage =
   | TaskMessage
   | { readonly type: 'cancel'; readonly id: number }
-  /** The worker holds the Web Lock of this name until it is told to release it, or its thread ends. */
+  /** The worker holds the Web Lock of this name until the page releases it, or its thread ends. */
   | { readonly type: 'hold'; readonly name: string }
   | { readonly type: 'release'; readonly name: string }
   /** Requests a `pong`, which shows that the worker responds. */
