@@ -4,7 +4,7 @@
  * And for bundlers, in the package: the worker as text, a module for each chunk, and as one file (src/loading/worker-sources.ts); and the element as
  * short as for CDNs, for those that build for production.
  */
-import { cpSync, mkdirSync, rmSync, writeFileSync } from 'node:fs';
+import { cpSync, mkdirSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { createRequire } from 'node:module';
 import { dirname, join } from 'node:path';
 import { fileURLToPath } from 'node:url';
@@ -42,13 +42,13 @@ const shortText = {
 
 /** three.js, as much of it as meshes need, is one file of the CDN build. The package's own module is that file, whose types stay with the sources. */
 const THREE = 'three.js of the CDN build';
-let threeFile = '';
+const THREE_OF_PACKAGE = path('./dist/sources/mesh/three.js');
 const threeOfPackage = {
   name: 'three-of-package',
   writeBundle(_, bundle) {
-    threeFile = Object.values(bundle).find(({ isEntry }) => isEntry).fileName;
-    mkdirSync(path('./dist/sources/mesh'), { recursive: true });
-    writeFileSync(path('./dist/sources/mesh/three.js'), `export * from '../../../cdn/${threeFile}';\n`);
+    const { fileName } = Object.values(bundle).find(({ isEntry }) => isEntry);
+    mkdirSync(dirname(THREE_OF_PACKAGE), { recursive: true });
+    writeFileSync(THREE_OF_PACKAGE, `export * from '../../../cdn/${fileName}';\n`);
     cpSync(path('./src/sources/mesh/three.d.ts'), path('./dist/sources/mesh/three.d.ts'));
   },
 };
@@ -138,68 +138,81 @@ const output = {
   chunkFileNames: (chunk) => `readers/${nameOf(chunk)}-[hash].js`,
 };
 
-export default [
-  {
-    // A package of 24 MB otherwise. Without a map: three.js has sources of its own.
-    input: { three: path('./scripts/three.mjs') },
-    plugins: [emptyFirst, nodeResolve({ exportConditions: ['production', 'browser'] }), shortText, threeOfPackage],
-    output: {
-      dir: path('./cdn'),
-      format: 'es',
-      entryFileNames: '[name]-[hash].js',
-      chunkFileNames: '[name]-[hash].js',
+/**
+ * Parts of the build, which `--configPart` names: `three` comes first, because the others need its file. `page` and `worker`
+ * may run at the same time.
+ */
+const PARTS = {
+  three: [
+    {
+      // A package of 24 MB otherwise. Without a map: three.js has sources of its own.
+      input: { three: path('./scripts/three.mjs') },
+      plugins: [emptyFirst, nodeResolve({ exportConditions: ['production', 'browser'] }), shortText, threeOfPackage],
+      output: {
+        dir: path('./cdn'),
+        format: 'es',
+        entryFileNames: '[name]-[hash].js',
+        chunkFileNames: '[name]-[hash].js',
+      },
     },
-  },
-  {
-    input: { 'gaussian-splat.min': path('./dist/index.js') },
-    // If workers are forbidden, the element imports the worker's module, which is the same file, not a copy.
-    external: (id) => id.endsWith('scene-worker.js'),
-    // The code for generators is a separate chunk, loaded for the first generator. It loads the runtime from its own
-    // folder.
-    preserveEntrySignatures: 'allow-extension',
-    plugins: [workerBeside, threeBeside, ...plugins, copyOthers],
-    // Code that two chunks share, and that is smaller than a request for it, is added to a chunk that the page always
-    // loads.
-    output: {
-      ...output,
-      chunkFileNames: (chunk) => `${nameOf(chunk)}-[hash].js`,
-      paths: (id) => (id === THREE ? `./${threeFile}` : './scene-worker.js'),
-      experimentalMinChunkSize: 500,
+  ],
+  page: [
+    {
+      input: { 'gaussian-splat.min': path('./dist/index.js') },
+      // If workers are forbidden, the element imports the worker's module, which is the same file, not a copy.
+      external: (id) => id.endsWith('scene-worker.js'),
+      // The code for generators is a separate chunk, loaded for the first generator. It loads the runtime from its own
+      // folder.
+      preserveEntrySignatures: 'allow-extension',
+      plugins: [workerBeside, threeBeside, ...plugins, copyOthers],
+      // Code that two chunks share, and that is smaller than a request for it, is added to a chunk that the page always
+      // loads.
+      output: {
+        ...output,
+        chunkFileNames: (chunk) => `${nameOf(chunk)}-[hash].js`,
+        paths: (id) =>
+          id === THREE ? `./${/three-[^']+/.exec(readFileSync(THREE_OF_PACKAGE, 'utf8'))[0]}` : './scene-worker.js',
+        experimentalMinChunkSize: 500,
+      },
     },
-  },
-  {
-    input: { 'scene-worker': path('./dist/loading/scene-worker.js') },
-    // The page imports `runOnPage` from it, so its exports stay; readers import what they share with it from it.
-    preserveEntrySignatures: 'allow-extension',
-    plugins,
-    output: [output, { dir: path('./dist/loading'), format: 'cjs', plugins: [workerAsText] }],
-  },
-  {
-    input: {
-      index: path('./dist/index.js'),
-      element: path('./dist/viewer/element.js'),
-      scenes: path('./dist/scenes.js'),
+    {
+      input: {
+        index: path('./dist/index.js'),
+        element: path('./dist/viewer/element.js'),
+        scenes: path('./dist/scenes.js'),
+      },
+      // Imports for nothing but their effects, which these do not have, would make bundlers warn.
+      treeshake: { moduleSideEffects: (_, isExternal) => !isExternal },
+      // Lit and the errors' class may be the app's own, too.
+      external: (id) => /^(lit|@lit|@gaussian-splat\/core(\/contract|\/onnx|\/fetch)?$)/.test(id) || KEPT.test(id),
+      plugins,
+      output: {
+        ...{ dir: path('./dist'), format: 'es', experimentalMinChunkSize: 500, hoistTransitiveImports: false },
+        entryFileNames: 'production/[name].js',
+        chunkFileNames: (chunk) => `production/${nameOf(chunk)}.js`,
+      },
     },
-    // Imports for nothing but their effects, which these do not have, would make bundlers warn.
-    treeshake: { moduleSideEffects: (_, isExternal) => !isExternal },
-    // Lit and the errors' class may be the app's own, too.
-    external: (id) => /^(lit|@lit|@gaussian-splat\/core(\/contract|\/onnx|\/fetch)?$)/.test(id) || KEPT.test(id),
-    plugins,
-    output: {
-      ...{ dir: path('./dist'), format: 'es', experimentalMinChunkSize: 500, hoistTransitiveImports: false },
-      entryFileNames: 'production/[name].js',
-      chunkFileNames: (chunk) => `production/${nameOf(chunk)}.js`,
+  ],
+  worker: [
+    {
+      input: { 'scene-worker': path('./dist/loading/scene-worker.js') },
+      // The page imports `runOnPage` from it, so its exports stay; readers import what they share with it from it.
+      preserveEntrySignatures: 'allow-extension',
+      plugins,
+      output: [output, { dir: path('./dist/loading'), format: 'cjs', plugins: [workerAsText] }],
     },
-  },
-  {
-    input: path('./dist/loading/scene-worker.js'),
-    plugins: [withoutDecoders, ...plugins],
-    output: { file: path('./dist/loading/scene-worker.bundle.js'), format: 'es', inlineDynamicImports: true },
-  },
-  {
-    // All in one module, for `gaussian-splat page --single`.
-    input: path('./dist/index.js'),
-    plugins: [withoutDecoders, ...sources, shortText],
-    output: { file: path('../cli/dist/single.js'), format: 'es', inlineDynamicImports: true },
-  },
-];
+    {
+      input: path('./dist/loading/scene-worker.js'),
+      plugins: [withoutDecoders, ...plugins],
+      output: { file: path('./dist/loading/scene-worker.bundle.js'), format: 'es', inlineDynamicImports: true },
+    },
+    {
+      // All in one module, for `gaussian-splat page --single`.
+      input: path('./dist/index.js'),
+      plugins: [withoutDecoders, ...sources, shortText],
+      output: { file: path('../cli/dist/single.js'), format: 'es', inlineDynamicImports: true },
+    },
+  ],
+};
+
+export default ({ configPart }) => PARTS[configPart];
