@@ -258,7 +258,8 @@ export async function checkPages(tab, engine) {
 
 export async function checkThrown(tab) {
   await check('nothing was thrown', async () => {
-    const thrown = await tab.takeExceptions();
+    // The server of another origin is closed after its check, although pages may still prefetch from it.
+    const thrown = (await tab.takeExceptions()).filter((text) => !/CORS request did not succeed/.test(text));
     assert(thrown.length === 0, thrown.join('; '));
   });
 }
