@@ -24,6 +24,7 @@ import {
   type VoxelFiles,
   type FloorMap,
 } from '@gaussian-splat/formats/floor';
+import { capturedHouse, floorsOfHouse, isBlockedInHouse, type CaptureOptions } from '../support/captured-house.js';
 import { needsSharedData, sharedFile } from '../support/data.js';
 import { isLab, onlyInLab } from '../support/extent.js';
 
@@ -165,6 +166,97 @@ test('the spoilt room: jitter, faint splats and floaters let no one out', () => 
   const map = makeFloorMap(cloudOf(ROOM, random(3)), { frame: FRAME, near: [0, 1.5, 2] });
   assert.ok(map.area > 40, `${map.area} m²`);
   assert.equal(wander(map, isOutside).out, 0);
+});
+
+/** How phones capture: 2 cm of noise, opacities of 0.05 to 1, 15 % of the splats missing. */
+const CAPTURE = { noise: 0.02, faintest: 0.05, missing: 0.15 } as const;
+const CAPTURES: Readonly<Record<string, CaptureOptions>> = {
+  clean: {},
+  'clean, with a garden': { hasGarden: true },
+  captured: CAPTURE,
+  '0.5 % floaters': { ...CAPTURE, floaters: 0.005 },
+  '2 % floaters': { ...CAPTURE, floaters: 0.02 },
+  haze: { ...CAPTURE, haze: 600 },
+  'haze and floaters': { ...CAPTURE, haze: 600, floaters: 0.02 },
+  '1 % far': { ...CAPTURE, far: 0.01 },
+  '3 % far': { ...CAPTURE, far: 0.03 },
+  '15 % far': { ...CAPTURE, far: 0.15 },
+  'all of it, tilted': { ...CAPTURE, hasGarden: true, floaters: 0.005, haze: 150, ghosts: 0.3, far: 0.05, tilt: 0.26 },
+};
+/** Names of the captures of `npm test`; the laboratory has all. */
+const EACH_TIME = ['captured', '2 % floaters', 'all of it, tilted'];
+
+/** Returns the rows of a frame whose up axis is tilted about z, radians. */
+const tiltedFrame = (tilt: number): FloorOptions['frame'] => [
+  [Math.cos(tilt), Math.sin(tilt), 0],
+  [-Math.sin(tilt), Math.cos(tilt), 0],
+  [0, 0, 1],
+];
+
+/** Square meters of the floor of the house that a map has, its gallery, what is no floor; heights' errors in meters, sorted. */
+function houseIn(map: FloorMap): { area: number; gallery: number; wrong: number; errors: number[] } {
+  const found = { area: 0, gallery: 0, wrong: 0, errors: [] as number[] };
+  const cell = map.cell ** 2;
+  for (const layer of map.layers)
+    layer.forEach((height, i) => {
+      if (Number.isNaN(height)) return;
+      const x = map.corner[0] + ((i % map.width) + 0.5) * map.cell;
+      const z = map.corner[1] + (Math.floor(i / map.width) + 0.5) * map.cell;
+      const off = (at: number, to: number): number =>
+        Math.min(...floorsOfHouse(at, to).map((floor) => Math.abs(floor - height)));
+      const error = off(x, z);
+      // The edge of a floor may be off by one and a half cells.
+      const around = [-1, 0, 1].flatMap((i) =>
+        [-1, 0, 1].map((k) => off(x + 1.5 * i * map.cell, z + 1.5 * k * map.cell)),
+      );
+      if (Math.min(...around) > 0.2 || isBlockedInHouse([x, height, z], 0.1)) found.wrong += cell;
+      else if (error < Infinity) found.errors.push(error);
+      found.area += cell;
+      if (height > 2.3) found.gallery += cell;
+    });
+  found.errors.sort((a, b) => a - b);
+  return found;
+}
+
+/** Square meters on which a body of 20 cm fits, on all floors of the house. */
+function areaOfHouse(): number {
+  let area = 0;
+  for (let x = -2.975; x < 9; x += 0.05)
+    for (let z = -2.475; z < 2.5; z += 0.05)
+      for (const y of floorsOfHouse(x, z)) if (!isBlockedInHouse([x, y, z], 0.2)) area += 0.05 ** 2;
+  return area;
+}
+
+for (const [name, options] of Object.entries(CAPTURES))
+  test(`a house, ${name}: all of its floor and nothing else`, { skip: !EACH_TIME.includes(name) && onlyInLab }, () => {
+    const { tilt = 0 } = options;
+    const map = makeFloorMap(capturedHouse(options), { frame: tiltedFrame(tilt), near: [2, 1.6, -1.5], height: 1.7 });
+    const { area, gallery, wrong, errors } = houseIn(map);
+    const [half, high] = [0.5, 0.95].map((share) => 100 * errors[Math.floor(share * errors.length)]);
+    console.log(
+      `${name}: ${area.toFixed(1)} of ${areaOfHouse().toFixed(1)} m², gallery ${gallery.toFixed(1)}, no floor ${wrong.toFixed(2)}; heights off by ${half.toFixed(1)} cm, 95 % within ${high.toFixed(1)} cm`,
+    );
+    assert.ok(Math.abs(area / areaOfHouse() - 1) < 0.06, `${area} of ${areaOfHouse()} m²`);
+    assert.ok(gallery > 3.8, `${gallery} m² of the gallery`);
+    assert.ok(wrong < 0.25, `${wrong} m² are no floor`);
+    assert.ok(half < 1, `heights are off by ${half} cm`);
+    assert.ok(name.startsWith('clean') || high < 2, `95 % of the heights are within ${high} cm`);
+  });
+
+test('a box, a chair and a table in a row are not climbed, and the edge of a hole stops the body', () => {
+  const map = makeFloorMap(capturedHouse({ ...CAPTURE, hasChain: true }), {
+    ...{ frame: tiltedFrame(0), near: [2, 1.6, -1.5], height: 1.7 },
+  });
+  for (const [x, z] of [
+    [0, 0],
+    [0.8, 0],
+    [1.2, 0],
+  ] as const)
+    // prettier-ignore
+    for (const near of [0.25, 0.5, 0.75]) assert.equal(floorAt(map, x, z, near), undefined, `at ${x}, ${z}`);
+  const stopped = stepOn(map, [-1.8, 0, -0.2], 0, 1.6);
+  assert.ok(stopped[2] < 0.95, `walked to z = ${stopped[2]}, into the hole`);
+  assert.equal(floorAt(map, -1.8, 1.4, 0), undefined);
 });
 
 test('a path does not leave one side of the map to enter it at the other', async () => {

@@ -2,7 +2,9 @@ import type { GaussianCloud, Vector3 } from '@gaussian-splat/core';
 import { grouped } from '../bytes.js';
 import { extinctionOf, type ExtinctionGrid, type GridOptions, type VoxelGrid } from './extinction.js';
 import { FloorWork, tooLarge } from './floor-work.js';
-import { solidsOf } from './solids.js';
+import { refinedHeights } from './heights.js';
+import { LEVEL, reachable } from './pieces.js';
+import { solidsOf, widened } from './solids.js';
 import type { FloorMap } from './floor-map.js';
 
 export interface FloorOptions extends GridOptions {
@@ -12,14 +14,22 @@ export interface FloorOptions extends GridOptions {
   readonly radius?: number;
   /** Maximum height of a step up or down in meters; default 0.3. */
   readonly step?: number;
-  /** Point near the start of the walk, in meters with y up. Default: infinitely high above the center of the scene. */
+  /** Point above the start of the walk, in meters with y up. Default: infinitely high above the center of the scene. */
   readonly near?: Vector3;
 }
 
-/** Maximum width in meters of gaps in the floor that are bridged. */
+/** Distance in meters from a gap in the floor to the floor on two opposite sides, so that the gap is bridged. */
 const BRIDGE = 0.3;
+/** Depths in meters below a floor at which a solid surface makes a gap a pit, which is not bridged. */
+const [PIT_TOP, PIT_BOTTOM] = [0.5, 3];
+/** Minimum vertical optical depth of a faint floor: mean over the square around a body, within three voxels. */
+const FAINT_DEPTH = 0.2;
 /** Maximum number of cells along the radius of a body. With smaller voxels, only some cells under it are examined. */
 const MAX_RADIUS = 8;
+/** Optical depth below which a column has no surface of its own. */
+const EMPTY_DEPTH = 0.05;
+/** Minimum fraction of the optical depth within a step above and below a faint floor that is within its three voxels. */
+const FAINT_SHARE = 0.4;
 /** Horizontal distances in meters of the floor from the point `near`: the first with a large floor is used. */
 const REACHES = [0.3, 1, 3] as const;
 /** Minimum area in m² of a floor that is preferred to farther ones. */
@@ -44,6 +54,7 @@ export function makeFloorMap(cloud: GaussianCloud, options: FloorOptions): Floor
 
 /** A grid with or without the optical depth of its voxels. */
 type FloorGrid = VoxelGrid & Partial<ExtinctionGrid>;
+const isExtinction = (grid: FloorGrid): grid is ExtinctionGrid => grid.vertical !== undefined;
 
 /**
  * Finds the walkable floor as {@link makeFloorMap} does, but from solid voxels. If `grid` has no optical depths, a surface
@@ -68,6 +79,21 @@ interface Body {
   readonly height: number;
   readonly radius: number;
   readonly step: number;
+}
+
+/** Heights in meters of all surfaces of a column with free height above, from the top down. */
+interface Floors {
+  readonly solid: readonly number[];
+  /** Surfaces that only together with those of other columns are opaque. */
+  readonly faint: readonly number[];
+}
+
+/** Returns the nearest height to `y`; undefined if all are farther than `reach`. */
+function nearestOf(heights: readonly number[], y: number, reach: number): number | undefined {
+  let best: number | undefined;
+  for (const height of heights)
+    if (Math.abs(height - y) <= Math.min(reach, Math.abs((best ?? Infinity) - y))) best = height;
+  return best;
 }
 
 /** A connected floor: cells, as indices x + nx · z, and the height in meters of each. */
@@ -103,12 +129,13 @@ class FloorFinder {
   readonly #grid: FloorGrid;
   readonly #solid: Uint8Array;
   readonly #body: Body;
-  /** For each column, heights in meters of all surfaces with free height above, from the top down. */
-  readonly #floors: readonly (readonly number[])[];
+  readonly #floors: readonly Floors[];
   /** For each column, heights in meters that already belong to a region. */
   readonly #seen: number[][];
   readonly #disc: readonly (readonly [x: number, z: number])[];
   readonly #work: FloorWork;
+  /** Vertical optical depths, mean over the square around a body. */
+  readonly #wide: Float32Array | undefined;
   /** Number of cells of all regions. */
   #cells = 0;
 
@@ -118,12 +145,17 @@ class FloorFinder {
     this.#body = body;
     this.#work = work;
     const [nx, , nz] = grid.size;
+    if (isExtinction(grid)) this.#wide = widened(grid, Math.ceil(body.radius / grid.voxel), work);
     requireAtMost(nx * nz, MAX_FLOORS, 'columns');
     let count = 0;
     this.#floors = Array.from({ length: nx * nz }, (_, c) => {
-      const heights = this.#floorsOf(c % nx, Math.floor(c / nx));
-      requireAtMost((count += heights.length), MAX_FLOORS, 'surfaces with free height above');
-      return heights;
+      const floors = this.#floorsOf(c % nx, Math.floor(c / nx));
+      requireAtMost(
+        (count += floors.solid.length + floors.faint.length),
+        MAX_FLOORS,
+        'surfaces with free height above',
+      );
+      return floors;
     });
     this.#seen = this.#floors.map(() => []);
     this.#disc = discOf(Math.ceil(body.radius / grid.voxel));
@@ -132,8 +164,8 @@ class FloorFinder {
   find(near: Vector3): FloorMap {
     const [nx] = this.#grid.size;
     const regions: Region[] = [];
-    this.#floors.forEach((heights, c) => {
-      for (const height of heights) {
+    this.#floors.forEach(({ solid, faint }, c) => {
+      for (const height of [...solid, ...faint]) {
         if (this.#isSeen(c, height) || this.#isBlocked(c % nx, Math.floor(c / nx), height)) continue;
         regions.push(this.#fill(c, height, near));
       }
@@ -146,44 +178,81 @@ class FloorFinder {
       (near[1] === Infinity ? [] : REACHES)
         .map((each) => below.filter((region) => region.distance <= each && isLarge(region)))
         .find((found) => found.length > 0) ?? below.filter(({ distance }) => distance <= reach);
-    return this.#mapOf(largestOf(reached) ?? lowestOf(regions));
+    const region = largestOf(reached) ?? lowestOf(regions);
+    if (region.cells.length === 0) return this.#mapOf(region);
+    const { cells, nearest } = region;
+    const heights = isExtinction(this.#grid) ? refinedHeights(this.#grid, region, this.#work) : region.heights;
+    const from = { start: nearest, nx, step: this.#body.step, area: this.#grid.voxel ** 2 };
+    const isFree = cells.map((c, k) => k === nearest || !this.#isBlocked(c % nx, Math.floor(c / nx), heights[k]));
+    const kept = reachable({ cells, heights }, from, isFree, this.#work);
+    return this.#mapOf({
+      cells: kept.map((index) => cells[index]),
+      heights: kept.map((index) => heights[index]),
+      nearest: kept.indexOf(nearest),
+    });
   }
 
   /**
-   * Returns the heights in meters of the floors of a column, from the top down. A surface is at the peak of the optical
-   * depth, which a parabola through three voxels interpolates.
+   * Returns the heights in meters of the floors of a column, from the top down: solid surfaces, and between them the most
+   * opaque places under a whole body, because a floor may be faint. A surface is at the peak of the optical depth, which a parabola
+   * through three voxels interpolates.
    */
-  #floorsOf(x: number, z: number): number[] {
-    const { values, size, corner, voxel } = this.#grid;
+  #floorsOf(x: number, z: number): Floors {
+    const { size, corner, voxel } = this.#grid;
     const [nx, ny] = size;
-    this.#work.take(ny);
     const needed = Math.ceil(this.#body.height / voxel);
+    const reach = Math.ceil(this.#body.step / voxel);
     const column = x + nx * ny * z;
-    const heights: number[] = [];
+    const { vertical } = this.#grid;
+    const wide = this.#wide;
+    const depthAt = (depths: Float32Array | undefined, y: number): number =>
+      depths === undefined || y < 0 || y >= ny ? 0 : depths[column + nx * y];
+    const sumAt = (depths: Float32Array | undefined, y: number): number =>
+      depthAt(depths, y - 1) + depthAt(depths, y) + depthAt(depths, y + 1);
+    const heightOf = (depths: Float32Array | undefined, peak: number): number => {
+      const [under, here, over] = [-1, 0, 1].map((k) => depthAt(depths, peak + k));
+      const bend = under - 2 * here + over;
+      const shift = bend < 0 ? Math.min(0.5, Math.max(-0.5, (under - over) / (2 * bend))) : 0;
+      return corner[1] + voxel * (peak + 0.5 + shift);
+    };
+    const isFaint = (y: number): boolean => {
+      const sum = sumAt(wide, y);
+      if (sum < FAINT_DEPTH) return false;
+      this.#work.take(2 * reach);
+      let around = depthAt(wide, y);
+      for (let k = 1; k <= reach; k++) {
+        if (sumAt(wide, y + k) > sum || sumAt(wide, y - k) >= sum) return false;
+        around += depthAt(wide, y - k) + depthAt(wide, y + k);
+      }
+      // Haze and floaters are everywhere; a floor is at one height.
+      if (sum < FAINT_SHARE * around) return false;
+      // Beyond the edge of a hole, the square around a body still has some of the floor.
+      return sumAt(vertical, y) >= EMPTY_DEPTH || !this.#isPit(x, z, corner[1] + voxel * (y + 0.5));
+    };
+    this.#work.take(ny);
+    const [solid, faint]: [number[], number[]] = [[], []];
     for (let y = ny - 2, free = needed; y >= 0; y--) {
       if (this.#solid[column + nx * y] === 0) {
+        if (free >= needed && wide !== undefined && isFaint(y)) faint.push(heightOf(wide, y));
         free++;
         continue;
       }
-      if (free >= needed && values === undefined) heights.push(corner[1] + voxel * (y + 0.5));
-      else if (free >= needed && values !== undefined) {
+      if (free >= needed) {
         let peak = y;
-        for (let below = y - 1; below >= Math.max(1, y - 2) && this.#solid[column + nx * below] === 1; below--)
-          if (values[column + nx * below] > values[column + nx * peak]) peak = below;
-        const at = column + nx * peak;
-        const [under, here, over] = [values[at - nx] ?? 0, values[at], values[at + nx]];
-        const bend = under - 2 * here + over;
-        const shift = bend < 0 ? Math.min(0.5, Math.max(-0.5, (under - over) / (2 * bend))) : 0;
-        heights.push(corner[1] + voxel * (peak + 0.5 + shift));
+        for (let below = y - 1; below >= Math.max(1, y - 2); below--)
+          if (depthAt(vertical, below) > depthAt(vertical, peak)) peak = below;
+        solid.push(heightOf(vertical, peak));
       }
       free = 0;
     }
-    return heights;
+    return { solid, faint };
   }
 
+  /** Returns the floor of a column that is nearest to a height: a solid one within a step, or a faint one at its level. */
   #near(c: number, y: number): number | undefined {
-    this.#work.take(1 + this.#floors[c].length);
-    return this.#floors[c].find((height) => Math.abs(height - y) <= this.#body.step);
+    this.#work.take(1 + this.#floors[c].solid.length + this.#floors[c].faint.length);
+    const { solid, faint } = this.#floors[c];
+    return nearestOf(solid, y, this.#body.step) ?? nearestOf(faint, y, LEVEL);
   }
 
   #isSeen(c: number, height: number): boolean {
@@ -193,13 +262,24 @@ class FloorFinder {
 
   /** Returns the mean height of floors on two opposite sides of a gap; undefined if there are none. */
   #bridged(x: number, z: number, y: number): number | undefined {
+    if (this.#isPit(x, z, y)) return undefined;
     const gap = Math.ceil(BRIDGE / this.#grid.voxel);
     for (const [dx, dz] of DIRECTIONS) {
       const before = this.#firstFloor(x, z, -dx, -dz, y, gap);
       const after = before === undefined ? undefined : this.#firstFloor(x, z, dx, dz, y, gap);
-      if (before !== undefined && after !== undefined) return (before + after) / 2;
+      if (before !== undefined && after !== undefined && Math.abs(before - after) <= LEVEL) return (before + after) / 2;
     }
     return undefined;
+  }
+
+  #isPit(x: number, z: number, y: number): boolean {
+    const { size, corner, voxel } = this.#grid;
+    const [nx, ny] = size;
+    const levelOf = (height: number): number => Math.max(0, Math.round((height - corner[1]) / voxel - 0.5));
+    const [low, high] = [levelOf(y - PIT_BOTTOM), Math.min(ny, levelOf(y - PIT_TOP))];
+    this.#work.take(Math.max(1, high - low));
+    for (let k = low; k < high; k++) if (this.#solid[x + nx * (k + ny * z)] === 1) return true;
+    return false;
   }
 
   #firstFloor(x: number, z: number, dx: number, dz: number, y: number, gap: number): number | undefined {
@@ -242,7 +322,9 @@ class FloorFinder {
       const [c, y] = [cells[index], heights[index]];
       const [x, z] = [c % nx, Math.floor(c / nx)];
       const distance = Math.hypot(x + 0.5 - nearX, z + 0.5 - nearZ);
-      if (distance < shortest) [shortest, nearest] = [distance, index];
+      // The floor under the point, not the ceiling above it.
+      const isHigher = distance === shortest && y > heights[nearest];
+      if (y <= near[1] && (distance < shortest || isHigher)) [shortest, nearest] = [distance, index];
       for (const [dx, dz] of SIDES) {
         const [i, j] = [x + dx, z + dz];
         if (i < 0 || j < 0 || i >= nx || j >= nz) continue;
@@ -260,7 +342,7 @@ class FloorFinder {
   }
 
   /** Converts a region to a map, cropped to the rectangle of its cells. */
-  #mapOf({ cells, heights, nearest }: Region): FloorMap {
+  #mapOf({ cells, heights, nearest }: Pick<Region, 'cells' | 'heights' | 'nearest'>): FloorMap {
     const { size, corner, voxel } = this.#grid;
     const [nx] = size;
     let [x0, x1, z0, z1] = [Infinity, -1, Infinity, -1];
