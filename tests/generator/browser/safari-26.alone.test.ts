@@ -9,8 +9,8 @@ import { isLab } from '../../support/extent-in-pages.js';
 import { CAMERA } from './support.js';
 
 const FAMILIES = [
-  ...['classic-view', 'scaffold', 'octree-round', 'hexplane', 'avatar', 'feed-forward-1'],
-  ...(isLab ? ['octree-progressive', 'octree-ceil', 'feed-forward-2'] : []),
+  ...['scaffold', 'octree-round', 'hexplane'],
+  ...(isLab ? ['classic-view', 'avatar', 'feed-forward-1', 'octree-progressive', 'octree-ceil', 'feed-forward-2'] : []),
 ];
 /** Runs after which memory is compared; the first ones fill the caches of the runtime. */
 const [FIRST_RUNS, RUNS] = [50, isLab ? 10_000 : 100];

@@ -97,9 +97,9 @@ function serve(scope: WorkerScope): void {
       scope.postMessage({ type: 'holds', name });
       return released;
     };
-    // Pages without an origin have no locks.
-    navigator.locks
-      .request(name, onHeld)
+    // Pages without an origin have no locks, and their workers do not even have the object.
+    (navigator as Partial<Navigator>).locks
+      ?.request(name, onHeld)
       .catch(() => undefined)
       .finally(() => locks.delete(name));
   }
