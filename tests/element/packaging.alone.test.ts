@@ -49,7 +49,7 @@ test(
 
 /** Code that only some pages need, identified by words that occur nowhere else. */
 const ELSEWHERE: Readonly<Record<string, string>> = {
-  'manifests of streamed scenes': 'JSON that gaussian-splat detail wrote',
+  'manifests of streamed scenes': 'gaussian-splat-detail',
   'pages of streamed scenes': 'gs.requests.staging',
   'the stage that records their page requests': 'page_feedback',
   sequences: 'a path with {0001} in it',
