@@ -1,5 +1,6 @@
 /** Several scenes on a machine that reads slowly: what the server is asked for. */
 import { GaussianSplatElement } from '@gaussian-splat/element';
+import { itInLab } from '../../support/extent-in-pages.js';
 import { assert, assertEqual, show, until } from './support/harness.js';
 
 type SceneLoader = (typeof GaussianSplatElement)['sceneLoader'];
@@ -72,7 +73,7 @@ describe('scenes that are read for seconds', () => {
     assert(workers.length > 1 && workers.length <= 7, `${workers.length} workers`);
   });
 
-  it('are asked for once each, although the browser ends a worker that reads', async () => {
+  itInLab('are asked for once each, although the browser ends a worker that reads', async () => {
     const folder = `ended-${performance.timeOrigin}`;
     const elements = await showSeveral(folder, 4);
     // The first worker downloads; what it downloads for others would be lost.
