@@ -7,6 +7,18 @@ import { bringTabsToLife } from './site/tabs.js';
 const byId = (id) => document.getElementById(id);
 const hero = byId('hero');
 const status = byId('own-status');
+/** Name of the visitor's own file; undefined while the scene is the page's. */
+let own;
+const quoted = (text) => text.replaceAll('&', '&amp;').replaceAll('"', '&quot;').replaceAll('<', '&lt;');
+/** Attributes of the scene that is shown: a file of the visitor is to lie beside the copied page. */
+const sceneTag = (src) =>
+  own ? `src="${encodeURIComponent(own)}" alt="${quoted(own)}"` : `src="${src}" alt="A skull"`;
+
+async function copied(html) {
+  byId('snippet').textContent = html;
+  const said = await copy(html);
+  byId('copied').textContent = own ? `${said} Put ${own} beside your page, and serve both.` : said;
+}
 
 bringTabsToLife(document.querySelector('.tabs'));
 
@@ -22,29 +34,28 @@ byId('copy-page').addEventListener('click', async () => {
 <html lang="en">
 <meta charset="utf-8" />
 <meta name="viewport" content="width=device-width, initial-scale=1" />
-<title>A skull</title>
+<title>${own ? quoted(own) : 'A skull'}</title>
 <script type="module" src="${address('cdn/gaussian-splat.min.js')}"></script>
-<gaussian-splat src="${address('scenes/skull.spz')}" alt="A skull" camera-controls auto-rotate
+<gaussian-splat ${sceneTag(address('scenes/skull.spz'))} camera-controls auto-rotate
 ${view.join('\n')}
   style="display: block; width: 100%; height: 90vh"></gaussian-splat>
 </html>
 `;
-  byId('snippet').textContent = html;
-  byId('copied').textContent = await copy(html);
+  await copied(html);
 });
 
 byId('copy-view').addEventListener('click', async () => {
   const view = Object.entries(viewOf(hero)).map(([name, value]) => `  ${name}="${value}"`);
   const size = '  style="width: 100%; height: auto; aspect-ratio: 4 / 3"';
-  const tag = ['<gaussian-splat src="skull.spz" alt="A skull" camera-controls', ...view, size].join('\n');
+  const tag = [`<gaussian-splat ${sceneTag('skull.spz')} camera-controls`, ...view, size].join('\n');
   const html = `<script type="module" src="cdn/gaussian-splat.min.js"></script>\n${tag}></gaussian-splat>`;
-  byId('snippet').textContent = html;
-  byId('copied').textContent = await copy(html);
+  await copied(html);
 });
 
 takeFiles(document.documentElement, (file) => {
   for (const name of ['camera-orbit', 'camera-target', 'field-of-view', 'max-camera-orbit']) hero.removeAttribute(name);
-  hero.alt = file.name;
+  own = file.name;
+  hero.alt = own;
   hero.src = addressOf(file);
   status.textContent = `Loading ${file.name} …`;
   hero.scrollIntoView({ block: 'nearest' });

@@ -1,8 +1,9 @@
 /** The first page: tabs, the copied view, errors for people. Its scene is a small one here; pages.test.ts waits for the real one. */
 import assert from 'node:assert/strict';
 import { after, before, describe, it } from 'node:test';
+import { join } from 'node:path';
 import { checkPage } from './page-check.js';
-import { isBuilt, openSite, withCompass, type OpenSite, type Visit } from './support.js';
+import { isBuilt, openSite, root, withCompass, type OpenSite, type Visit } from './support.js';
 
 interface Splat extends HTMLElement {
   readonly loaded: boolean;
@@ -93,4 +94,26 @@ describe('the first page', { skip: isBuilt ? false : 'no site: npm run build' },
   });
 
   it('is a page as every other', () => checkPage(only));
+
+  it('copies the name of the file that a visitor has opened', async () => {
+    const { tab } = only;
+    await tab.click('#tab-html');
+    await tab.setInputFiles('input[type=file]', join(root, 'tests/element/browser/fixtures/compass.ply'));
+    await tab.waitForFunction(
+      () => /\d splats/.test(document.querySelector('#own-status')!.textContent!),
+      undefined,
+      TIMEOUT,
+    );
+    for (const button of ['#copy-view', '#copy-page']) {
+      await tab.click(button);
+      await tab.waitForFunction(
+        () => /Put compass.ply beside/.test(document.querySelector('#copied')!.textContent!),
+        undefined,
+        TIMEOUT,
+      );
+      const html = (await tab.locator('#snippet').textContent())!;
+      assert.match(html, /src="compass\.ply" alt="compass\.ply"/);
+      assert.doesNotMatch(html, /skull/);
+    }
+  });
 });
