@@ -126,8 +126,16 @@ class Making:
         self.tell(held, figures, cap, antialiased, len(images), shown)
         return None
 
+    def still(self, camera) -> np.ndarray:
+        """A held-out image (H, W, 3) uint8: the phone's lens and film, a still hand, the mean exposure, no noise."""
+        import phone
+
+        light = phone.spread(self.renderer.light(camera, self.options.held_samples), phone.blur(0, 0), self.torch)
+        image = phone.shown(light * self.stage.exposure, self.torch)
+        return (image * 255 + 0.5).clamp(0, 255).cpu().numpy().astype(np.uint8)
+
     def picture_held(self, views) -> dict:
-        """Held-out images: mean exposure, more samples, no noise of a sensor; depth and ids of each."""
+        """Held-out images, depth and ids of each."""
         import phone
 
         poses, pixels, coded, depths, ids = [], [], [], [], []
@@ -136,17 +144,10 @@ class Making:
             where, things = self.renderer.geometry(camera)
             if (
                 len(pixels) == self.options.held
-                or np.percentile(np.linalg.norm(where - eye, axis=2)[things < 255], 8) < 0.3
+                or np.percentile(np.linalg.norm(where - eye, axis=2)[things < 255], 8) < 0.5
             ):
                 continue
-            light = self.renderer.light(camera, self.options.held_samples)
-            image = (
-                (phone.shown(light * self.stage.exposure, self.torch) * 255 + 0.5)
-                .clamp(0, 255)
-                .cpu()
-                .numpy()
-                .astype(np.uint8)
-            )
+            image = self.still(camera)
             z = ((where - eye) @ (np.asarray(target) - eye)) / np.linalg.norm(np.asarray(target) - eye)
             depths.append(
                 np.where(things < 255, np.clip(z * 500, 0, 65535), 0).astype(np.uint16)[

@@ -36,7 +36,7 @@ def make(making) -> None:
                 points.append(found[0])
                 colors.append(found[1])
         shots.append(row)
-        truths.append([_plain(making, eye, target) for eye, target in held])
+        truths.append([making.still(making.aim(eye, target)) for eye, target in held])
         if frame % 6 == 0:
             making.say(f"frame {frame} filmed")
     folder = options.out / "held"
@@ -48,19 +48,6 @@ def make(making) -> None:
         return
     poses, held_poses = [pose_of(*v) for v in views], [pose_of(*v) for v in held]
     _train(making, shots, truths, poses, held_poses, np.concatenate(points), np.concatenate(colors), held)
-
-
-def _plain(making, eye, target):
-    import phone
-
-    light = making.renderer.light(making.aim(eye, target), making.options.held_samples)
-    return (
-        (phone.shown(light * making.stage.exposure, making.torch) * 255 + 0.5)
-        .clamp(0, 255)
-        .cpu()
-        .numpy()
-        .astype(np.uint8)
-    )
 
 
 def _train(making, shots, truths, poses, held_poses, points, colors, held) -> None:

@@ -79,10 +79,7 @@ def take(light, exposure: float, random, xp, draw):
     `draw(shape)` gives normal numbers.
     """
     angle, length = random.random() * np.pi, random.exponential(0.5)
-    light = light * exposure
-    light = sum(
-        weight * xp.roll(light, (int(y), int(x)), (0, 1)) for (y, x), weight in blur(angle, min(length, 2.5)).items()
-    )
+    light = spread(light * exposure, blur(angle, min(length, 2.5)), xp)
     image = display(light) if xp is np else shown(light, xp)
     image = image + draw(image.shape) * (0.006 + 0.008 * xp.sqrt(image))
     pixels = np.asarray(
@@ -96,6 +93,11 @@ def shown(light, xp):
     light = light.clamp(min=0)
     film = (light * (2.51 * light + 0.03) / (light * (2.43 * light + 0.59) + 0.14)).clamp(0, 1)
     return xp.where(film <= 0.0031308, 12.92 * film, 1.055 * film.clamp(min=1e-8) ** (1 / 2.4) - 0.055)
+
+
+def spread(light, weights: dict, xp):
+    """Light, blurred by weights of shifts."""
+    return sum(weight * xp.roll(light, (int(y), int(x)), (0, 1)) for (y, x), weight in weights.items())
 
 
 def blur(angle: float, length: float) -> dict:

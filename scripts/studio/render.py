@@ -1,8 +1,9 @@
-"""Path traced images of a stage: linear light, denoised with what the geometry knows."""
+"""Path traced images of a stage: linear light, denoised."""
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
+from pyoidn import denoise
 
 
 def sensor(field_of_view: float, width: int, height: int, eye, target):
@@ -51,16 +52,16 @@ class Renderer:
         self.scene = mi.load_dict(
             {**stage.write(folder), "integrator": {"type": "path", "max_depth": stage.depth}}, optimize=False
         )
-        kinds = "albedo:albedo,normal:sh_normal,depth:depth,shape:shape_index"
+        kinds = "albedo:albedo,normal:sh_normal"
         self.features = mi.load_dict({"type": "aov", "aovs": kinds})
         self.seed, self.things = 0, None
 
     def light(self, camera, samples: int):
-        """Denoised linear light (H, W, 3), as xp's array."""
-        self.seed += 3
-        halves = [self._take(camera, samples // 2, None, self.seed + k) for k in (0, 1)]
-        guide = self._take(camera, 8, self.features, self.seed + 2)
-        return denoised(self.xp, halves, guide[..., :3], guide[..., 3:6], guide[..., 6])
+        """Denoised linear light (H, W, 3), as xp's array. Open Image Denoise reads albedo and normals beside the color."""
+        self.seed += 2
+        color = self._take(camera, samples, None, self.seed)
+        guide = self._take(camera, 16, self.features, self.seed + 1)
+        return denoise(color, guide[..., :3], guide[..., 3:6], hdr=True)
 
     def _take(self, camera, samples, integrator, seed):
         image = mi.render(
@@ -94,44 +95,3 @@ class Renderer:
             number = int(np.array(dr.reinterpret_array(mi.UInt32, mi.ShapePtr(shape))).ravel()[0])
             table[number] = ids[int(shape.id().removeprefix("part"))]
         return table
-
-
-def denoised(xp, halves, albedo, normal, depth, levels: int = 5):
-    """An edge-stopping wavelet filter of two independent halves: noise is known by how they differ."""
-    base = xp.clip(albedo, 0.03, None) if xp is np else albedo.clamp(min=0.03)
-    a, b = (half / base for half in halves)
-    mean = (a + b) / 2
-    noise = (((a - b) / 2) ** 2).sum(-1)
-    for _ in range(2):
-        noise = _blur(xp, noise)
-    mean = _without_fireflies(xp, mean)
-    slope = _blur(xp, xp.abs(depth - xp.roll(depth, (1, 1), (0, 1)))) + 0.002 * depth + 1e-4
-    for level in range(levels):
-        step = 1 << level
-        total, weights, spread = mean * 0, noise * 0, noise * 0
-        scale = 6.0 * xp.sqrt(_blur(xp, noise)) + 1e-4
-        for dy in (-2, -1, 0, 1, 2):
-            for dx in (-2, -1, 0, 1, 2):
-                by = lambda v: xp.roll(v, (dy * step, dx * step), (0, 1))  # noqa: B023, E731
-                kernel = (6, 4, 1)[abs(dy)] * (6, 4, 1)[abs(dx)]
-                near = ((by(normal) - normal) ** 2).sum(-1) * 24 + xp.abs(by(depth) - depth) / (slope * step * 4)
-                near = near + ((by(albedo) - albedo) ** 2).sum(-1) * 60
-                w = kernel * xp.exp(-near - xp.abs(by(mean) - mean).sum(-1) / scale)
-                total, weights, spread = total + w[..., None] * by(mean), weights + w, spread + w * w * by(noise)
-        mean, noise = total / weights[..., None], spread / weights**2
-    return mean * base
-
-
-def _blur(xp, image):
-    return (
-        sum((2 - abs(y)) * (2 - abs(x)) * xp.roll(image, (y, x), (0, 1)) for y in (-1, 0, 1) for x in (-1, 0, 1)) / 16
-    )
-
-
-def _without_fireflies(xp, image):
-    """Cuts a pixel to twice the largest of the means of its neighbors on four sides."""
-    around = [
-        xp.roll(image, shift, (0, 1)) for shift in ((0, 1), (0, -1), (1, 0), (-1, 0), (2, 0), (0, 2), (-2, 0), (0, -2))
-    ]
-    limit = 2.5 * sum(around) / len(around) + 0.02
-    return xp.minimum(image, limit)

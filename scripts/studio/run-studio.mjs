@@ -15,9 +15,12 @@ if (names.length === 0 || unknown.length > 0) {
   console.error(`expected names of scenes (${SCENES.join(', ')}), found ${unknown.join(', ') || 'none'}`);
   process.exit(2);
 }
-const needed = spawnSync(python, ['-c', 'import mitsuba, gsplat, torch, scipy, PIL; assert torch.cuda.is_available()']);
+const needed = spawnSync(python, [
+  '-c',
+  'import mitsuba, pyoidn, gsplat, torch, scipy, PIL; assert torch.cuda.is_available()',
+]);
 if (needed.status !== 0) {
-  console.error(`expected an NVIDIA GPU and mitsuba, gsplat, torch, scipy and pillow in ${python}, found:
+  console.error(`expected an NVIDIA GPU and mitsuba, pyoidn, gsplat, torch, scipy and pillow in ${python}, found:
 ${needed.error ?? needed.stderr}Install them there, or name another Python: PYTHON=... npm run lab -- studio ${names.join(' ')}`);
   process.exit(1);
 }

@@ -37,11 +37,14 @@ class Images:
 
 
 def start(points, colors):
-    """Parameters of a splat at each point, as large as the way to its neighbors."""
+    """Parameters of a splat at each point, a tenth of the way to its neighbors in size.
+
+    MCMC's noise grows with the square of the size: it scatters splats that begin as large as that way.
+    """
     from scipy.spatial import cKDTree
 
     distance, _ = cKDTree(points).query(points, 4, workers=8)
-    size = np.log(np.clip(distance[:, 1:].mean(1), 1e-4, None)).astype(np.float32)
+    size = np.log(np.clip(0.1 * distance[:, 1:].mean(1), 1e-4, None)).astype(np.float32)
     count = len(points)
     values = {
         "means": torch.from_numpy(points.astype(np.float32)),
@@ -119,7 +122,7 @@ def train(
         goal = images[k]
         image, info = draw(splats, images, k, min(int(part * 8), 3), antialiased)
         exposure = tone[k] - tone.mean(0) + NEUTRAL  # the mean over all images is fixed, or splats and exposures drift apart
-        image = image * exposure[:, 0] + exposure[:, 1]
+        image = (image * exposure[:, 0] + exposure[:, 1]).clamp(max=1)  # a sensor shows nothing brighter
         loss = 0.8 * (image - goal).abs().mean() + 0.2 * (1 - similarity(image, goal))
         loss = loss + 0.01 * splats["opacities"].sigmoid().mean() + 0.01 / reach * splats["scales"].exp().mean()
         loss.backward()
