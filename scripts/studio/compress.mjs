@@ -1,5 +1,5 @@
 /** `node scripts/studio/compress.mjs MADE DATA SCENES`: what `make.py` left in the folder MADE becomes a scene of the studio: images and references in DATA, the scene in SCENES. */
-import { copyFileSync, mkdirSync, readdirSync, readFileSync, writeFileSync } from 'node:fs';
+import { copyFileSync, mkdirSync, readFileSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { encodingsFor } from '@gaussian-splat/optimize';
 import { readScene } from '@gaussian-splat/formats';
@@ -16,5 +16,6 @@ mkdirSync(scenes, { recursive: true });
 writeFileSync(join(scenes, `${truth.name}.spz`), scene);
 for (const name of ['truth.json', 'views.json', 'depth.bin.gz', 'mesh.bin.gz'])
   copyFileSync(join(made, name), join(out, name));
-for (const name of readdirSync(join(made, 'held'))) copyFileSync(join(made, 'held', name), join(out, 'images', name));
+for (const { image } of JSON.parse(readFileSync(join(made, 'views.json'), 'utf8')).views)
+  copyFileSync(join(made, 'held', image), join(out, 'images', image));
 console.log(`${truth.name}: ${cloud.count} splats as ${encoding.title}, ${(scene.length / 1e6).toFixed(2)} MB`);

@@ -9,6 +9,7 @@ import importlib
 import inspect
 import json
 import os
+import re
 import time
 from pathlib import Path
 
@@ -109,10 +110,6 @@ class Making:
         if self.options.look:
             return None
         images, poses, points, colors = self.picture_training(views)
-        for number in range(0, len(images), max(1, len(images) // 16)):
-            (self.options.out / "held" / f"trained-{number:03}.webp").write_bytes(
-                phone.coded(images[number], "WEBP", 82)
-            )
         from train import Images, measure, train
 
         cap, antialiased = SCENES[self.options.name]
@@ -122,8 +119,7 @@ class Making:
         figures = self.keep(
             splats, lambda s: measure(s, Images(held["pixels"], held["poses"], self.focal), antialiased)
         )
-        shown = {f"trained-{number:03}": poses[number] for number in range(0, len(images), max(1, len(images) // 16))}
-        self.tell(held, figures, cap, antialiased, len(images), shown)
+        self.tell(held, figures, cap, antialiased, len(images))
         return None
 
     def still(self, camera) -> np.ndarray:
@@ -229,7 +225,7 @@ class Making:
         self.say(f"archive {len(data) / 1e6:.1f} MB")
         return figures | {"splats": len(values["means"])}
 
-    def tell(self, held, figures, cap, antialiased, count, trained=None, more=None) -> None:
+    def tell(self, held, figures, cap, antialiased, count, more=None) -> None:
         """Writes truth, cameras of images, depth and ids, the mesh."""
         out = self.options.out
         truth = self.stage.truth() | {
@@ -246,14 +242,14 @@ class Making:
             **(more or {}),
         }
         names = held.get("names") or [f"{number:02}" for number in range(len(held["poses"]))]
-        poses = dict(zip(names, held["poses"], strict=True)) | (trained or {})
-        views = [self.view(name, pose) for name, pose in poses.items()]
+        views = [self.view(name, pose) for name, pose in zip(names, held["poses"], strict=True)]
         (out / "views.json").write_text(json.dumps({"views": views}))
         write_binary(out / "depth.bin.gz", held["depths"].astype("<u2"), held["ids"])
         mesh = self.stage.mesh()
         truth["mesh"] = {"points": len(mesh[0]), "triangles": len(mesh[1])}
         write_binary(out / "mesh.bin.gz", *mesh)
-        (out / "truth.json").write_text(json.dumps(truth, indent=1))
+        lines = json.dumps(truth, indent=2)
+        (out / "truth.json").write_text(re.sub(r"\[[^\[\]{}]*\]", lambda list: " ".join(list[0].split()).replace("[ ", "[").replace(" ]", "]"), lines) + "\n")
         self.say("done")
 
     def view(self, name: str, pose) -> dict:

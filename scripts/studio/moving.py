@@ -118,7 +118,7 @@ def _train(making, shots, truths, poses, held_poses, points, colors, held) -> No
         "ids": np.stack(ids),
         "names": [f"00-{k}" for k in range(len(held_poses))],
     }
-    making.tell(told, figures, cap, False, len(shots) * len(poses), None, more)
+    making.tell(told, figures, cap, False, len(shots) * len(poses), more)
 
 
 def _follow(torch, splats, images, chosen, names, seconds: float) -> None:

@@ -105,7 +105,7 @@ class Stage:
         rectangle = lambda r: [round(float(v), 3) for v in (r[0], r[1], -r[3], -r[2])]  # noqa: E731
         return {
             "name": self.name,
-            "unit": "metre",
+            "unit": "meter",
             "up": [0, -1, 0],
             "floors": [{"x0x1z0z1": rectangle(f), "y": round(-float(f[4]), 4)} for f in self.floors],
             "taken": [rectangle(f) for f in self.taken],

@@ -53,7 +53,7 @@ export interface StudioTruth {
   };
 }
 
-/** A camera and the name of its image; names of images that the scene was trained on begin with `trained-`. */
+/** A camera and the name of its image. */
 export interface StudioView {
   readonly name: string;
   readonly camera: Camera;
@@ -78,8 +78,6 @@ export interface StudioScene {
   readonly truth: StudioTruth;
   /** Views of images that the scene was not trained on. */
   readonly held: readonly StudioView[];
-  /** Some of the views that it was trained on. */
-  readonly trained: readonly StudioView[];
   /** The image of a view: [height, width, 3], 0 to 1. */
   image(view: StudioView): Promise<Float32Array>;
   /** Depth and ids of a held-out view. */
@@ -94,20 +92,16 @@ export async function studio(name: StudioName): Promise<StudioScene> {
   const file = `${SCENES}${name}.spz`;
   const truth = jsonOf<StudioTruth>(`${folder}truth.json`);
   const { views } = jsonOf<{ views: (CalibratedView & { name: string })[] }>(`${folder}views.json`);
-  const all = views.map((view) => ({
+  const held = views.map((view) => ({
     name: view.name,
     camera: cameraFromCalibration({ ...view, near: 0.05 }, `${name} ${view.name}`),
   }));
   const known = new Map<number, StudioDepths>();
-  const [held, trained] = [false, true].map((isTrained) =>
-    all.filter((view) => view.name.startsWith('trained-') === isTrained),
-  );
   return {
     name,
     file,
     truth,
     held,
-    trained,
     cloud: await readScene(new Uint8Array(readFileSync(file)), { name: `${name}.spz` }),
     image: (view) => imageOf(`${folder}images/${view.name}.webp`),
     depths: (view) => {
