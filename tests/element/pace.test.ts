@@ -2,6 +2,7 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import fc from 'fast-check';
+import { someOf } from '../support/extent.js';
 import { DisplayInterval, QUALITY_LEVELS, nextQuality, INITIAL_QUALITY } from '../support/element/quality.js';
 import { COSTS, LEVELS, p95, restlessWindows, reversals, run } from '../support/pace-gpu.js';
 
@@ -196,7 +197,7 @@ test('where the lowest levels are no faster and still too slow, the level turns 
   let [restless, all] = [0, 0];
   for (const shares of [...measured, ...floors]) {
     for (const lowest of [1.06, 1.12, 1.2, 1.4, 1.7, 2.2]) {
-      for (let seed = 1; seed <= 8; seed++) {
+      for (const seed of someOf([1, 2, 3, 4, 5, 6, 7, 8], 2)) {
         const load = lowest / Math.min(...shares);
         const gpu = {
           hertz: 60,

@@ -39,7 +39,7 @@ if (!hasSharedData) {
   test('reference views', { skip: needsSharedData }, () => undefined);
 } else {
   const clouds = new Map<string, ReturnType<typeof readScene>>();
-  for (const [i, view] of someOf(referenceViews(), 2).entries()) {
+  for (const [i, view] of someOf(referenceViews(), 1).entries()) {
     for (const mode of isFull ? MODES : [MODES[i % 2]]) {
       test(`${view.name}, ${mode}`, async () => {
         if (!clouds.has(view.file)) clouds.set(view.file, readScene(sharedFile(view.file), { name: view.file }));
