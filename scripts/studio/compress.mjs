@@ -8,7 +8,7 @@ const [made, data, scenes] = process.argv.slice(2);
 const truth = JSON.parse(readFileSync(join(made, 'truth.json'), 'utf8'));
 const read = await readScene(readFileSync(join(made, 'scene.ply')), { name: 'scene.ply' });
 const cloud = { ...read, antialiased: truth.training.antialiased };
-const [, encoding] = encodingsFor('scene.spz', cloud);
+const [encoding] = encodingsFor('scene.spz', cloud);
 const scene = await encoding.write({ cloud, degrees: new Uint8Array(cloud.count).fill(cloud.shDegree) });
 const out = join(data, truth.name);
 mkdirSync(join(out, 'images'), { recursive: true });

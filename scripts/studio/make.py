@@ -22,7 +22,7 @@ os.environ.setdefault("TORCH_CUDA_ARCH_LIST", "9.0")
 SCENES = {
     "apartment": (320_000, False),
     "product": (160_000, False),
-    "garden": (360_000, False),
+    "garden": (450_000, False),
     "hall": (260_000, True),
     "walker": (90_000, False),
 }
