@@ -18,6 +18,7 @@ const SECTIONS = [
         'loading',
         'labels',
         'animation',
+        'changing-scenes',
         'styling',
         'events',
       ].map(guide),
