@@ -32,10 +32,16 @@ const all = async (stream: ReadableStream<Uint8Array>, maxBytes?: number): Promi
   return updates;
 };
 
-const streamOf = (bytes: Uint8Array, size: number): ReadableStream<Uint8Array> =>
-  ReadableStream.from(
-    Array.from({ length: Math.ceil(bytes.length / size) }, (_, k) => bytes.slice(k * size, (k + 1) * size)),
-  ) as ReadableStream<Uint8Array>;
+function streamOf(bytes: Uint8Array, size: number): ReadableStream<Uint8Array> {
+  let at = 0;
+  return new ReadableStream({
+    pull: (controller) => {
+      if (at >= bytes.length) return controller.close();
+      controller.enqueue(bytes.slice(at, at + size));
+      at += size;
+    },
+  });
+}
 
 test('a whole scene is read as it was written, without copies of its arrays', () => {
   const update = sceneOf(5, { raw: true, filter: 'mip', step: 4_000_000_000, origin: [1e6 + 0.25, -2, 3] });

@@ -17,7 +17,9 @@ import { CHUNK_NUMBERS, GEOMETRY_WORDS, shWords } from './pack/words.js';
 /** Options of {@link DynamicGaussians.create}. `antialiased` is false by default. */
 export interface DynamicGaussiansOptions extends Partial<FilterRule> {
   /** Upper limit of the GPU memory of the scene in bytes; default: no limit but the device's. */
-  readonly memoryBudget?: number;
+  readonly memoryBudget?: number | undefined;
+  /** World position of the local point (0, 0, 0) of the positions. Default (0, 0, 0). */
+  readonly origin?: Vector3 | undefined;
 }
 
 const ORIGIN: Vector3 = [0, 0, 0];
@@ -76,10 +78,10 @@ export class DynamicGaussians extends SceneBuffers {
     device: GPUDevice,
     memory: GpuMemory,
     layout: GaussianLayout,
-    { antialiased = false, filterVariance, memoryBudget }: DynamicGaussiansOptions,
+    { antialiased = false, filterVariance, memoryBudget, origin = ORIGIN }: DynamicGaussiansOptions,
   ) {
     const { capacity, shDegree = 0 } = layout;
-    super(memory, { shDegree, antialiased, filterVariance, origin: ORIGIN }, capacity);
+    super(memory, { shDegree, antialiased, filterVariance, origin }, capacity);
     memory.reserve(whatOf(layout), capacity * bytesPerSplat(shDegree, this.shPrecision), memoryBudget);
     this.#device = device;
     this.layout = layout;

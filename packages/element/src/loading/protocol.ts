@@ -52,6 +52,8 @@ export interface SceneRequest extends FileRequest {
    * fits.
    */
   readonly streamBytes?: number;
+  /** The property `splats` of the element; absent for a source with an address. */
+  readonly splats?: unknown;
   /** The contract of a generator, if the page provides one, as an address, as JSON text, or as an object. */
   readonly contract?: unknown;
   /**

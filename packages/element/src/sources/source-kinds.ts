@@ -8,6 +8,7 @@ import type { OpenOptions, SourceKind } from './source-kind.js';
 
 /** All kinds of sources. A source is of the first kind that matches its request. */
 const SOURCE_KINDS: readonly SourceKind[] = [
+  { name: 'splats', matches: ({ splats }) => splats, load: () => import('./splats/open-splats.js') },
   { name: 'mesh', matches: ({ isMesh }) => isMesh, load: () => import('./mesh/open-mesh.js') },
   {
     name: 'generator',

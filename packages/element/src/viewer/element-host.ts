@@ -26,6 +26,8 @@ export interface Source {
   /** URLs of further models, separated by spaces: each receives the Gaussians of the previous one. null for none. */
   readonly chain: string | null;
   readonly postprocess: string | null;
+  /** Arrays that the page shows instead of a file, or their sender; null for none. */
+  readonly splats?: unknown;
   /** Whether the file is shown as triangle meshes, without splats. */
   readonly isMesh?: boolean;
 }

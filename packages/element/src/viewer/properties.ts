@@ -3,6 +3,7 @@ import { LitElement, type PropertyDeclarations } from 'lit';
 import { declarations, type AttributeProperties } from './attributes.js';
 import { ALL_ATTRIBUTES, flags } from './element-attributes.js';
 import type { GaussianSplatEventMap } from './events.js';
+import type { Splats } from '../sources/splats/splat-input.js';
 import type { ControlValues } from '../sources/generator/values.js';
 
 /** Events of the element, and the standard events of every element, such as `click` and `keydown`. */
@@ -15,6 +16,7 @@ type ElementEvents = GaussianSplatEventMap & Omit<HTMLElementEventMap, keyof Gau
 export class SplatProperties extends LitElement {
   static override properties: PropertyDeclarations = {
     ...declarations(ALL_ATTRIBUTES),
+    splats: { attribute: false },
     inputValues: { attribute: false },
     splatShader: { attribute: false },
     revealProgress: { attribute: false },
@@ -23,6 +25,13 @@ export class SplatProperties extends LitElement {
     currentTime: { attribute: false, noAccessor: true },
     playbackRate: { attribute: false, noAccessor: true },
   };
+
+  /**
+   * Splats that the page shows instead of `src`: arrays, a `GaussianCloud`, or their sender, which is the address of a
+   * WebSocket, a WebSocket, or a stream of bytes; null for none. Other splats replace them without a reload. Assign a
+   * new object to change values.
+   */
+  declare splats: Splats | null;
 
   /**
    * Values of a generator's inputs by input name; they take precedence over the attributes `control-NAME`. Assign a new

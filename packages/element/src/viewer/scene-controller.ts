@@ -165,7 +165,9 @@ export class SceneController implements ReactiveController {
 
   /** Returns whether a request, null for no scene, is for another scene than the last request. */
   isOther(request: SceneRequest | null): boolean {
-    return request === null ? this.#request !== null : !isSame(request, this.#request);
+    if (request === null) return this.#request !== null;
+    // Other arrays replace those that are shown without a load, unless that has failed.
+    return !isSame(request, this.#request) || (!!this.#error && request.splats !== this.#request?.splats);
   }
 
   /**

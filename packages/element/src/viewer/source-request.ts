@@ -32,13 +32,13 @@ export class Addresses {
   readonly #chain = new Named();
   readonly #postprocess = new Named();
 
-  /** Returns the request for the element's scene; null if `src` is missing or empty. */
+  /** Returns the request for the element's scene; null without `splats`, and if `src` is missing or empty. */
   request(
-    { src, contract, chain, isMesh }: Source,
+    { src, contract, chain, isMesh, splats }: Source,
     { crossorigin, quality, detail, renderer }: Pick<Attributes, 'crossorigin' | 'quality' | 'detail' | 'renderer'>,
     modifier: UrlModifier,
   ): SceneRequest | null {
-    const [url] = this.#src.of(src ? [src] : [], modifier);
+    const [url] = splats ? ['splats:'] : this.#src.of(src ? [src] : [], modifier);
     if (url === undefined) return null;
     return {
       url,
@@ -48,6 +48,7 @@ export class Addresses {
       isWhole: !detail || detail === 'off',
       renderer,
       isMesh,
+      splats,
       contract,
       chain: this.#chain.of(listed(chain), modifier),
     };

@@ -18,6 +18,7 @@ const CHILDREN = 'splat-scene, splat-mesh';
 const NAMES: Partial<Record<Content, string>> = {
   children: 'a <splat-scene> or <splat-mesh>',
   mesh: 'a mesh',
+  splats: 'arrays of the property splats',
   generator: 'a generator',
   clip: 'a clip',
   sequence: 'a sequence of scenes',

@@ -8,4 +8,4 @@ export {
   type SplatUpdate,
   type UpdateSize,
 } from './splat-update.js';
-export { decodeUpdate, encodeUpdate, updatesIn, type UpdateLimits } from './messages.js';
+export { decodeUpdate, encodeUpdate, updatesIn, type UpdateOptions } from './messages.js';

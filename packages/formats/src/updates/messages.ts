@@ -15,10 +15,12 @@ const [IS_RANGE, IS_RAW, ANTIALIASED, MIP] = [1, 2, 4, 8];
 /** Default maximum of the bytes of one update. */
 const MAX_BYTES = 2 ** 31;
 
-/** Limits of updates from a sender that is not trusted. */
-export interface UpdateLimits {
+/** Options of {@link updatesIn}. */
+export interface UpdateOptions {
   /** Maximum number of bytes of one update. Default 2 GiB. */
   readonly maxBytes?: number | undefined;
+  /** Ends the loop and cancels the stream when it is aborted. */
+  readonly signal?: AbortSignal | undefined;
 }
 
 /**
@@ -82,19 +84,23 @@ export function decodeUpdate(message: ArrayBuffer | Uint8Array<ArrayBuffer>): Sp
  */
 export async function* updatesIn(
   stream: ReadableStream<Uint8Array>,
-  { maxBytes = MAX_BYTES }: UpdateLimits = {},
+  { maxBytes = MAX_BYTES, signal }: UpdateOptions = {},
 ): AsyncGenerator<SplatUpdate, void> {
   const reader = stream.getReader();
   const parts = new Parts(maxBytes);
+  const cancel = (): Promise<void> => reader.cancel().catch(() => undefined);
+  signal?.addEventListener('abort', cancel, { once: true });
   try {
     for (;;) {
       const { done, value } = await reader.read();
+      if (signal?.aborted) return;
       if (done) return parts.end();
       yield* parts.add(value);
     }
   } finally {
+    signal?.removeEventListener('abort', cancel);
     // Has no effect on a stream that has ended.
-    await reader.cancel().catch(() => undefined);
+    await cancel();
     reader.releaseLock();
   }
 }

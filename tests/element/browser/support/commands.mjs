@@ -5,6 +5,7 @@ import { join } from 'node:path';
 import { setTimeout as delay } from 'node:timers/promises';
 import { promisify } from 'node:util';
 import { gpuEnvironment } from '../../../../scripts/lib/gpu-environment.mjs';
+import { endTraining, startTraining, trainingLog } from './training-server.mjs';
 
 /** Commands that tests need from the browser and that a page cannot run: real touches, a real wheel, screenshots. */
 export function pageCommands() {
@@ -19,6 +20,11 @@ export function pageCommands() {
 }
 
 const ACTIONS = {
+  /** A server of changing splats: see training-server.mjs. */
+  'start-training': (_, options) => startTraining(options),
+  'training-log': (_, url) => trainingLog(url),
+  'end-training': (_, options) => endTraining(options),
+
   /** Touch points of one event: [] lifts all fingers. */
   'send-touch': (page, { type, points, ms }) =>
     devtools(page, 'Input.dispatchTouchEvent', { type, touchPoints: points, timestamp: ms && ms / 1000 }).then(

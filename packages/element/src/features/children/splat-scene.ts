@@ -1,6 +1,7 @@
 import type { PropertyDeclarations } from 'lit';
 import type { Source } from '../../viewer/element-host.js';
 import { CONTROL_PREFIX, readControls, readNumbers, type ControlValues } from '../../sources/generator/values.js';
+import type { SplatMethods, Splats } from '../../sources/splats/splat-input.js';
 import type { GeneratorInput } from '../../sources/generator/inputs.js';
 import type { DynamicState } from '../../sources/generator/dynamic-model.js';
 import type { PropertiesOf } from '../../viewer/attribute.js';
@@ -40,6 +41,7 @@ type Properties = PropertiesOf<typeof SCENE_ATTRIBUTES>;
 export class SplatSceneElement extends SplatChild {
   static override properties: PropertyDeclarations = {
     ...childDeclarations(SCENE_ATTRIBUTES),
+    splats: { attribute: false },
     inputValues: { attribute: false },
   };
 
@@ -51,11 +53,16 @@ export class SplatSceneElement extends SplatChild {
   declare chain: Properties['chain'];
   declare pose: Properties['pose'];
 
+  /** Splats that the page shows instead of `src`, as on `<gaussian-splat>`; null for none. */
+  declare splats: Splats | null;
+
   /**
    * Values of a generator's controls by the names of its inputs. They override the attributes `control-NAME`. Set a new
    * object to change values.
    */
   declare inputValues: ControlValues | null;
+  /** Replaces values of some of these splats, as on `<gaussian-splat>`; undefined before they are shown. */
+  declare updateSplats: SplatMethods['updateSplats'];
   protected readonly table = SCENE_ATTRIBUTES;
   #dynamicValues: Omit<DynamicState, 'timeSeconds'> | undefined;
   #observer: MutationObserver | undefined;
@@ -75,7 +82,7 @@ export class SplatSceneElement extends SplatChild {
 
   /** @internal */
   get source(): Source {
-    return { src: this.src, contract: this.contract, chain: this.chain, postprocess: null };
+    return { src: this.src, splats: this.splats, contract: this.contract, chain: this.chain, postprocess: null };
   }
 
   override connectedCallback(): void {
