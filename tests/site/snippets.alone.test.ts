@@ -42,6 +42,8 @@ declare global {
   const ref: React.RefObject<GaussianSplatElement | null>;
   const camera: core.Camera;
   const cloud: core.GaussianCloud;
+  const { positions, scales, rotations, opacities, sh }: core.GaussianCloud;
+  const response: Response & { readonly body: ReadableStream<Uint8Array<ArrayBuffer>> };
   const bounds: ReturnType<typeof core.boundsOf>;
   const header: OnnxHeader;
   const contract: Contract;

@@ -103,6 +103,38 @@ describe('the property splats', () => {
     await turns(element, isBlue, 'blue harmonics');
   });
 
+  it('is shown with WebGL 2: other arrays, more of them, ranges and errors, without a gap', async () => {
+    const element = await shown(ball(500, RED), { renderer: 'webgl' });
+    await turns(element, isRed, 'red splats');
+    assertEqual(element.stats!.renderer, 'webgl', 'renderer');
+    element.cameraOrbit = '30deg 80deg 4m';
+    element.jumpCameraToGoal();
+    const orbit = String(element.getCameraOrbit());
+    element.splats = {
+      ...ball(3_000, GREEN),
+      opacities: new Float32Array(3_000).fill(3),
+      raw: true,
+      scales: new Float32Array(9_000).fill(-2.3),
+    };
+    // Each frame has the splats of one state or of the other.
+    await until(async () => {
+      const screen = await screenOf(element);
+      const [red, green] = [screen.middleOf(isRed)?.count ?? 0, screen.middleOf(isGreen)?.count ?? 0];
+      assert(red + green > 200, `${red} red and ${green} green pixels`);
+      return green > 200;
+    }, 'green splats');
+    assertEqual([element.stats!.splats, String(element.getCameraOrbit())], [3_000, orbit], 'splats, camera');
+    const { scene } = element.stats!.bytes;
+    await element.updateSplats!(0, { colors: ball(3_000, BLUE).colors });
+    await turns(element, isBlue, 'blue splats');
+    assertEqual(element.stats!.bytes.scene, scene, 'bytes');
+    const empty = nextEvent<CustomEvent<ElementError>>(element, 'generator-error');
+    element.splats = { ...ball(10, RED), positions: new Float32Array(30).fill(NaN) };
+    assert(/a splat that can be drawn/.test((await empty).detail.message), 'NaN everywhere');
+    element.splats = ball(300, GREEN);
+    await turns(element, isGreen, 'green splats after an error');
+  });
+
   it('updates a range, and leaves the arrays of the page as they are', async () => {
     const given = ball(400, RED);
     const element = await shown(given);
@@ -237,7 +269,7 @@ describe('a feed of splats', () => {
 
   it('is a WebSocket of the page, whose server may send more than is shown', async () => {
     const url = await executeServerCommand<string, object>('start-training', {
-      ...{ count: 2_000, everyMs: 1, greenAt: 200, pushes: true },
+      ...{ count: 2_000, everyMs: 4, greenAt: 80, pushes: true },
     });
     const socket = new WebSocket(url);
     await nextEvent(socket, 'open');

@@ -69,6 +69,10 @@ export const WORKER_TASKS = {
     load: async () => (await loadModule('the code that reads models', () => import('./open-model.js'))).openModel,
     transfer: ({ whole }) => (whole ? [whole.buffer as ArrayBuffer] : []),
   }),
+  splats: task({
+    load: async () => (await loadModule('the code that packs arrays', () => import('./pack-splats.js'))).packSplats,
+    transfer: ({ packed }) => buffersOf(packed),
+  }),
   floor: task({
     load: async () =>
       (await loadModule('the code that finds the floor', () => import('../floor/make-floor.js'))).makeFloor,

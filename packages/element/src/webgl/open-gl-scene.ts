@@ -1,4 +1,5 @@
 /** Opens scenes with WebGL 2. Loaded for pages without WebGPU, or with `renderer="webgl"`. */
+import { loadModule } from '@gaussian-splat/core';
 import { faultsOf } from '@gaussian-splat/renderer/tools';
 import { glBytes } from '@gaussian-splat/renderer/webgl';
 import type { LoadedGaussians } from '../gpu/loaded-gaussians.js';
@@ -18,7 +19,6 @@ const CHILDREN = 'splat-scene, splat-mesh';
 const NAMES: Partial<Record<Content, string>> = {
   children: 'a <splat-scene> or <splat-mesh>',
   mesh: 'a mesh',
-  splats: 'arrays of the property splats',
   generator: 'a generator',
   clip: 'a clip',
   sequence: 'a sequence of scenes',
@@ -50,6 +50,10 @@ export async function openGlScene(
   };
   try {
     requireDrawable();
+    if (request.splats) {
+      const { openGlSplats } = await loadModule('the code that shows arrays', () => import('./gl-splats.js'));
+      return await openGlSplats(lease, options, openOptions(options, signal));
+    }
     const previews = new Previews(options);
     const scene = await loader
       .ask('load', request, signal, { onProgress, onPreview: options.onPreview && previews.show })

@@ -45,7 +45,7 @@ interface CopySurface extends Surface {
 
 /** Draws one scene file with WebGL, or as much of a streamed scene as fits into memory. A worker sorts its splats. */
 export class WebGlBackend implements Backend {
-  static readonly can = (content: Content): boolean => content === 'file' || content === 'stream';
+  static readonly can = (content: Content): boolean => ['file', 'stream', 'splats'].includes(content);
   readonly can = WebGlBackend.can;
   readonly filter = undefined;
   readonly isPrepared = true;
@@ -53,7 +53,11 @@ export class WebGlBackend implements Backend {
   readonly place: DeviceOwner;
   /** Functions that draw the sky and the shadow, in this order, into the context's canvas beneath the splats. */
   readonly beneath: { sky?: Beneath | undefined; shadow?: Beneath | undefined } = {};
-  readonly #sorter: DepthSorter;
+  #sorter: DepthSorter;
+  /** Content of the scene that the sorter sorts. */
+  #content: GlLoaded['content'];
+  readonly #events: BackendEvents;
+  #resolveOrdered: () => void = () => undefined;
   readonly #overdraw = new OverdrawLimit();
   /** View that the order on the GPU was sorted for; undefined before the first order. */
   #sorted: OrderView | undefined;
@@ -82,22 +86,39 @@ export class WebGlBackend implements Backend {
   constructor(scene: GlLoaded, events: BackendEvents) {
     this.scene = scene;
     this.place = scene.place;
-    let resolveOrdered: () => void;
-    this.#ordered = new Promise((resolve) => (resolveOrdered = resolve));
+    this.#events = events;
+    this.#content = scene.content;
+    this.#ordered = new Promise((resolve) => (this.#resolveOrdered = resolve));
     this.#shown = new Promise((resolve) => (this.#resolveShown = resolve));
     void this.#shown.then(() => (this.#isShown = true));
-    const { positions, areas, spawn } = scene;
-    this.#sorter = new DepthSorter({
+    this.#sorter = this.#newSorter();
+  }
+
+  #newSorter(): DepthSorter {
+    const { content, spawn } = this.scene;
+    const { positions, areas } = content;
+    return new DepthSorter({
       ...{ positions, areas, spawn },
       onOrder: (sorted) => {
+        if (content !== this.#content) return;
         // The first order is drawn by the caller that waits for it.
         const isDue = this.#isOwed || this.#sorted !== undefined;
         this.#isOwed = false;
         this.#setOrder(sorted);
-        resolveOrdered();
-        if (isDue) events.onIncomplete();
+        this.#resolveOrdered();
+        if (isDue) this.#events.onIncomplete();
       },
     });
+  }
+
+  /** Sorts the splats that have replaced those of the last frame. That frame stays until their first order. */
+  #followScene(): void {
+    if (this.#content === this.scene.content) return;
+    this.#content = this.scene.content;
+    const before = this.#sorter;
+    this.#sorter = this.#newSorter();
+    before.destroy();
+    this.#sorted = this.#asked = undefined;
   }
 
   get device(): GPUDevice {
@@ -137,6 +158,7 @@ export class WebGlBackend implements Backend {
 
   render(frame: CanvasFrame, _: string, onTime?: (time: WorkTime) => void): void {
     if (this.place.isLost) return;
+    this.#followScene();
     const view = this.#viewOf(frame);
     if (this.#sorted === undefined || !isSameImage(view, this.#sorted)) {
       // A script that reads the image in the same task cannot wait for the worker.

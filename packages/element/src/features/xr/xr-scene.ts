@@ -80,13 +80,13 @@ export async function openXrScene(
   signal: AbortSignal,
 ): Promise<XrScene> {
   if (!isOwn && shown instanceof GlLoaded) {
-    const { textures, positions } = shown;
+    const { textures, positions } = shown.content;
     const renderer = new GlRenderer(gl, textures);
     return { renderer, positions, origin: textures.facts.origin, destroy: () => renderer.destroy() };
   }
   const inLevels = { ...request, levels: false, isWhole: false };
   const { name } = kindOf(inLevels);
-  if (!WebGlBackend.can(name)) throw unsupported('the file of a scene', `a ${name}`);
+  if (name === 'splats' || !WebGlBackend.can(name)) throw unsupported('the file of a scene', `a ${name}`);
   const streamBytes = name === 'stream' ? STREAM_BYTES[isHandheld() ? 'handheld' : 'computer'] : undefined;
   const asked = { ...inLevels, streamBytes };
   const { packed } = await loader.load(asked, signal, () => undefined);

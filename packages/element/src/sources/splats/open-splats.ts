@@ -1,5 +1,5 @@
 /** Shows the arrays of the property `splats`. The module is loaded only for them. */
-import { boundsOf, GaussianSplatError } from '@gaussian-splat/core';
+import { boundsOf } from '@gaussian-splat/core';
 import { ARRAYS, numbersOf, type ArrayName } from '@gaussian-splat/formats/updates';
 import { ArrayGaussians, pickInitialVariants, type ArrayLayout } from '@gaussian-splat/renderer';
 import { LoadedGaussians } from '../../gpu/loaded-gaussians.js';
@@ -9,7 +9,7 @@ import type { SceneBounds } from '../../viewer/camera/settings.js';
 import type { DynamicListeners, Timeline } from '../generator/dynamic-model.js';
 import type { OpenOptions, OpenSource } from '../source-kind.js';
 import { SplatInput, type ChangedRange, type SplatSink, type SplatState } from './splat-input.js';
-import { sampleOf, unusableRows } from './rows.js';
+import { nothingToDraw, sampleOf, unusableRows } from './rows.js';
 
 /** Opens the splats that the property of an element contains, or that its feed sends first. */
 export const open: OpenSource = async (_, options, acquiring) => {
@@ -157,11 +157,3 @@ const allocate = (state: SplatState, { device, memoryBudget }: PlayerOptions): P
   ArrayGaussians.create(device, state.count, layoutOf(state), { memoryBudget });
 
 const boundsOfState = (state: SplatState): SceneBounds => ({ ...boundsOf(sampleOf(state)), up: state.up });
-
-const nothingToDraw = (count: number): GaussianSplatError =>
-  new GaussianSplatError('argument/cloud', {
-    where: 'splats',
-    expected: 'a splat that can be drawn',
-    found: `${count} splats with values that are not finite, or without a rotation`,
-    remedy: 'check the learning rates of the training: its values may have become NaN',
-  });

@@ -1,4 +1,4 @@
-import type { GaussianCloud } from '@gaussian-splat/core';
+import { GaussianSplatError, type GaussianCloud } from '@gaussian-splat/core';
 import type { SplatState } from './splat-input.js';
 
 /** Maximum number of splats in a sample. */
@@ -42,3 +42,12 @@ export function sampleOf(state: SplatState): Pick<GaussianCloud, 'count' | 'posi
   }
   return { count, positions: places.subarray(0, 3 * count), opacities: visible.subarray(0, count), origin };
 }
+
+/** Returns the error for a scene whose splats are all unusable. */
+export const nothingToDraw = (count: number): GaussianSplatError =>
+  new GaussianSplatError('argument/cloud', {
+    where: 'splats',
+    expected: 'a splat that can be drawn',
+    found: `${count} splats with values that are not finite, or without a rotation`,
+    remedy: 'check the learning rates of the training: its values may have become NaN',
+  });
