@@ -37,7 +37,6 @@ export { deviceDescriptor } from './requirements.js';
 export { Viewpoint, type ViewpointOptions } from './viewpoint.js';
 export { Placement, World, type Box, type Placed } from './world.js';
 export { SceneDepth, type HostDepth, type SceneDepthOptions } from './scene-depth.js';
-export { ArrayGaussians, type ArrayLayout } from './array-gaussians.js';
 export { SequenceGaussians } from './sequence-gaussians.js';
 export type { FrameStats } from './frame-stats.js';
 export type { Variants } from './variants.js';

@@ -51,6 +51,7 @@ export { levelSource, packLevelPage } from './streaming/level-source.js';
 export { readPacked } from './pack/packed-scene.js';
 export type { PackedGaussians, PackedHead, PackOptions } from './pack/pack.js';
 export { sceneBytes, type PackedPortion } from './gaussian-buffers.js';
+export { ArrayGaussians, type ArrayLayout } from './array-gaussians.js';
 export { boundsOfWorld } from './world-bounds.js';
 export { type Threads } from './stages/stage.js';
 export { bytesPerSplat, type Reservation } from './memory-ledger.js';

@@ -1,7 +1,7 @@
 import type { SplatShader } from '@gaussian-splat/renderer/modifiers';
 import type { ReactiveControllerHost, ReactiveElement } from 'lit';
 import type { SharedDevice } from '../gpu/shared-device.js';
-import type { SceneLimits } from '../loading/protocol.js';
+import type { SceneLimits, SceneRequest } from '../loading/protocol.js';
 import type { SceneLoader } from '../loading/scene-loader.js';
 
 /** Services shared by all elements of a page. */
@@ -20,14 +20,12 @@ export interface Services {
 }
 
 /** The source that the element's attributes request. */
-export interface Source {
+export interface Source extends Pick<SceneRequest, 'splats'> {
   readonly src: string | Blob | null;
   readonly contract: unknown;
   /** URLs of further models, separated by spaces: each receives the Gaussians of the previous one. null for none. */
   readonly chain: string | null;
   readonly postprocess: string | null;
-  /** Arrays that the page shows instead of a file, or their sender; null for none. */
-  readonly splats?: unknown;
   /** Whether the file is shown as triangle meshes, without splats. */
   readonly isMesh?: boolean;
 }

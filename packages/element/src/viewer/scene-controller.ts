@@ -163,11 +163,10 @@ export class SceneController implements ReactiveController {
     return new Promise((resolve) => this.#waiters.push(resolve));
   }
 
-  /** Returns whether a request, null for no scene, is for another scene than the last request. */
+  /** Returns whether a request, null for no scene, is for another scene than the last one, or other arrays than those that failed. */
   isOther(request: SceneRequest | null): boolean {
-    if (request === null) return this.#request !== null;
-    // Other arrays replace those that are shown without a load, unless that has failed.
-    return !isSame(request, this.#request) || (!!this.#error && request.splats !== this.#request?.splats);
+    if (this.#error && request?.splats !== this.#request?.splats) return true;
+    return request === null ? this.#request !== null : !isSame(request, this.#request);
   }
 
   /**

@@ -47,8 +47,7 @@ export class Addresses {
       levels: typeof detail === 'number' && detail > 0,
       isWhole: !detail || detail === 'off',
       renderer,
-      isMesh,
-      splats,
+      ...{ isMesh, splats },
       contract,
       chain: this.#chain.of(listed(chain), modifier),
     };

@@ -1,7 +1,8 @@
 /** Shows the arrays of the property `splats`. The module is loaded only for them. */
 import { boundsOf } from '@gaussian-splat/core';
 import { ARRAYS, numbersOf, type ArrayName } from '@gaussian-splat/formats/updates';
-import { ArrayGaussians, pickInitialVariants, type ArrayLayout } from '@gaussian-splat/renderer';
+import { pickInitialVariants } from '@gaussian-splat/renderer';
+import { ArrayGaussians, type ArrayLayout } from '@gaussian-splat/renderer/tools';
 import { LoadedGaussians } from '../../gpu/loaded-gaussians.js';
 import { limitScenes } from '../../gpu/memory-budget.js';
 import { images, unlessWrong } from '../../gpu/initial-frames.js';
