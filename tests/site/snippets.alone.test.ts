@@ -43,6 +43,7 @@ declare global {
   const camera: core.Camera;
   const cloud: core.GaussianCloud;
   const { positions, scales, rotations, opacities, sh }: core.GaussianCloud;
+  const element: GaussianSplatElement & { updateSplats(first: number, arrays: object): Promise<void> };
   const response: Response & { readonly body: ReadableStream<Uint8Array<ArrayBuffer>> };
   const bounds: ReturnType<typeof core.boundsOf>;
   const header: OnnxHeader;

@@ -1,6 +1,8 @@
 /** Arrays of a page instead of a file: whole scenes, ranges, growth, feeds, errors, and what none of it costs. */
 import '@gaussian-splat/element';
 import type { ElementError, GaussianSplatElement } from '@gaussian-splat/element';
+import type { GaussianCloud } from '@gaussian-splat/core';
+import { SplatGroups } from '@gaussian-splat/formats/groups';
 import { encodeUpdate, type SplatUpdate } from '@gaussian-splat/formats/updates';
 import { executeServerCommand } from '@web/test-runner-commands';
 import { assert, assertEqual, delay, frames, nextEvent, show, until } from './support/harness.js';
@@ -212,6 +214,52 @@ describe('the property splats', () => {
     await turns(element, isGreen, 'green splats');
     assertEqual(element.stats!.splats, 310, 'splats');
   });
+});
+
+describe('groups of splats', () => {
+  for (const renderer of ['webgpu', 'webgl'])
+    it(`are picked, hidden and tinted by name: ${renderer}`, async () => {
+      // Two balls, whose splats alternate in the arrays.
+      const [left, right] = [ball(300, RED, -0.8), ball(300, [0.3, 0.4, 1], 0.8)];
+      const mixed = (
+        name: 'positions' | 'scales' | 'rotations' | 'opacities' | 'colors',
+        stride: number,
+      ): Float32Array =>
+        Float32Array.from({ length: 600 * stride }, (_, at) => {
+          const i = Math.floor(at / stride);
+          return (i % 2 === 0 ? left : right)[name]![stride * Math.floor(i / 2) + (at % stride)];
+        });
+      const cloud: GaussianCloud = {
+        ...{ count: 600, origin: [0, 0, 0], shDegree: 0, antialiased: false, droppedCount: 0 },
+        ...{ positions: mixed('positions', 3), scales: mixed('scales', 3), rotations: mixed('rotations', 4) },
+        ...{ opacities: mixed('opacities', 1), sh: mixed('colors', 3).map((c) => (c - 0.5) / 0.28209479177387814) },
+      };
+      const ids = Int32Array.from({ length: 600 }, (_, i) => (i % 2 === 0 ? 4 : 9));
+      const groups = new SplatGroups(cloud, ids, { 4: 'left', 9: 'right' });
+      const element = await shown(cloud, { renderer });
+      await turns(element, isBlue, 'blue splats');
+      const { x, y } = element.getBoundingClientRect();
+      const picked = async (isColor: typeof isRed): Promise<string | undefined> => {
+        const middle = (await screenOf(element)).middleOf(isColor)!;
+        const hit = await element.positionFromPoint(x + middle.x, y + middle.y);
+        return groups.of(hit?.splat)?.name;
+      };
+      assertEqual([await picked(isRed), await picked(isBlue)].join(), 'left,right', 'groups of the hits');
+      await element.updateSplats!(0, groups.arraysFor({ hide: ['right'] }));
+      await until(async () => (await screenOf(element)).middleOf(isBlue) === null, 'a hidden group');
+      await element.updateSplats!(0, groups.arraysFor({ only: ['right'], tint: { right: [0, 1, 0] } }));
+      // Its luma is 0.42.
+      const isTinted: typeof isRed = ([r, g, b]) => g > 85 && g < 130 && r < 50 && b < 50;
+      await turns(element, isTinted, 'a tinted group');
+      assertEqual(
+        [await picked(isTinted), (await screenOf(element)).middleOf(isRed)].join(),
+        'right,',
+        'the tinted group',
+      );
+      await element.updateSplats!(0, groups.arraysFor({}));
+      await until(async () => (await screenOf(element)).middleOf(isRed) !== null, 'all groups');
+      assert((await screenOf(element)).middleOf(isBlue), 'the color of the file');
+    });
 });
 
 describe('a feed of splats', () => {

@@ -71,7 +71,7 @@ export const WORKER_TASKS = {
   }),
   splats: task({
     load: async () => (await loadModule('the code that packs arrays', () => import('./pack-splats.js'))).packSplats,
-    transfer: ({ packed }) => buffersOf(packed),
+    transfer: ({ packed, rows }) => buffersOf(packed, { rows }),
   }),
   floor: task({
     load: async () =>

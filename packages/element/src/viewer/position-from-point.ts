@@ -80,7 +80,11 @@ function whose(
     }) ?? element;
   if (splat) {
     const { placement, index } = splat;
-    return { element: childOf((member) => member.placement === placement), splat: index, mesh: null, material: null };
+    // WebGL draws one scene, whose splats have no placement.
+    const of = (member: WorldEntry): boolean => !placement || member.placement === placement;
+    const live = sources.members.find(of)?.scene.live;
+    const row = index === null ? null : (live?.rowOf?.(index) ?? index);
+    return { element: childOf((member) => member.placement === placement), splat: row, mesh: null, material: null };
   }
   const [origin, direction] = [eye, subtract(place, eye)].map((v) => toViewer(camera.viewerFrame, v));
   const length = Math.hypot(...direction);

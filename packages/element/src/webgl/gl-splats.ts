@@ -1,5 +1,5 @@
 /** Shows the arrays of the property `splats` with WebGL 2. The module is loaded only for them. */
-import type { LoadedScene } from '../loading/protocol.js';
+import type { PackedSplats } from '../loading/pack-splats.js';
 import type { SceneLoader } from '../loading/scene-loader.js';
 import { nothingToDraw } from '../sources/splats/rows.js';
 import { SplatInput, type SplatSink, type SplatState } from '../sources/splats/splat-input.js';
@@ -16,7 +16,7 @@ export async function openGlSplats(lease: GlLease, options: OpenOptions, upload:
   const input = SplatInput.of(element);
   const state = await input.first(signal);
   const first = await pack(loader, state, signal);
-  const player = new GlSplatsPlayer(input, first.bounds, { lease, loader, listeners, upload });
+  const player = new GlSplatsPlayer(input, first, { lease, loader, listeners, upload });
   beforeUpload(first.packed.geometry.byteLength);
   player.scene = await GlLoaded.open(lease, first, upload, player);
   input.attach(player, state);
@@ -24,7 +24,7 @@ export async function openGlSplats(lease: GlLease, options: OpenOptions, upload:
 }
 
 /** Packs a state in the worker. */
-async function pack(loader: SceneLoader, state: SplatState, signal: AbortSignal): Promise<LoadedScene> {
+async function pack(loader: SceneLoader, state: SplatState, signal: AbortSignal): Promise<PackedSplats> {
   const scene = await loader.ask('splats', state, signal);
   signal.throwIfAborted();
   if (scene.packed.count === 0 && state.count > 0) throw nothingToDraw(state.count);
@@ -43,15 +43,17 @@ class GlSplatsPlayer implements Timeline, SplatSink {
   readonly duration = NaN;
   isReady = false;
   bounds: SceneBounds;
+  #rows: Uint32Array;
   /** Scene that shows the splats. Its creator sets this property once. */
   scene: GlLoaded | undefined;
   readonly #input: SplatInput;
   readonly #options: PlayerOptions;
   readonly #life = new AbortController();
 
-  constructor(input: SplatInput, bounds: SceneBounds, options: PlayerOptions) {
+  constructor(input: SplatInput, { bounds, rows }: PackedSplats, options: PlayerOptions) {
     this.#input = input;
     this.bounds = bounds;
+    this.#rows = rows;
     this.#options = options;
   }
 
@@ -59,6 +61,10 @@ class GlSplatsPlayer implements Timeline, SplatSink {
   request(): void {
     this.isReady = true;
     this.#input.proceed();
+  }
+
+  rowOf(index: number): number {
+    return this.#rows[index];
   }
 
   async show(state: SplatState): Promise<void> {
@@ -70,6 +76,7 @@ class GlSplatsPlayer implements Timeline, SplatSink {
       const content = await GlLoaded.contentOf(lease, scene, { ...upload, signal });
       this.scene!.replace(content);
       this.bounds = scene.bounds;
+      this.#rows = scene.rows;
       listeners.onInput();
     } catch (error) {
       // A scene that was removed meanwhile shows no state.

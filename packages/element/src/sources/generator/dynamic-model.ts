@@ -53,6 +53,8 @@ export interface Timeline {
   loadedUntil?(timeSeconds: number): number;
   /** Time ranges in seconds whose frames are loaded; absent if all frames are. */
   readonly buffered?: readonly (readonly [start: number, end: number])[];
+  /** Returns the index in the arrays of the page of a splat on the GPU; absent if they are equal. */
+  rowOf?(index: number): number;
   close(): void;
 }
 
