@@ -196,6 +196,33 @@ describe('the property splats', () => {
     );
   });
 
+  it('is a property of <splat-scene>, too, within the limits of the page', async () => {
+    const element = show({ alt: 'splats' });
+    const child = document.createElement('splat-scene');
+    child.splats = ball(300, GREEN);
+    element.append(child);
+    await turns(element, isGreen, 'green splats');
+    child.splats = ball(310, BLUE);
+    await turns(element, isBlue, 'blue splats');
+    await child.updateSplats!(0, { colors: ball(310, RED).colors });
+    await turns(element, isRed, 'red splats');
+    const type = element.constructor as typeof GaussianSplatElement;
+    type.sceneLimits = { maxSplats: 100, maxBytes: 10_000 };
+    try {
+      const other = show({ alt: 'splats' });
+      const failed = nextEvent<CustomEvent<ElementError>>(other, 'error');
+      other.splats = ball(101, RED);
+      assertEqual((await failed).detail.reason, 'out-of-memory/budget', 'too many splats');
+      const refused = nextEvent<CustomEvent<ElementError>>(other, 'error');
+      other.splats = new Response(encodeUpdate(ball(200, RED))).body;
+      assert(/10000 bytes/.test((await refused).detail.message), 'a message that is too long');
+      other.splats = ball(100, GREEN);
+      await turns(other, isGreen, 'a scene within the limits');
+    } finally {
+      type.sceneLimits = {};
+    }
+  });
+
   it('is shown instead of src, and gives it back', async () => {
     const element = await shown(ball(300, GREEN), { src: '/tests/element/browser/fixtures/compass.splat' });
     await turns(element, isGreen, 'green splats');

@@ -1,5 +1,6 @@
 /** Shows the arrays of the property `splats` with WebGL 2. The module is loaded only for them. */
 import type { PackedSplats } from '../loading/pack-splats.js';
+import type { SceneRequest } from '../loading/protocol.js';
 import type { SceneLoader } from '../loading/scene-loader.js';
 import { nothingToDraw } from '../sources/splats/rows.js';
 import { SplatInput, type SplatSink, type SplatState } from '../sources/splats/splat-input.js';
@@ -10,11 +11,16 @@ import { GlLoaded, type GlUploadOptions } from './gl-loaded.js';
 import type { GlLease } from './gl-session.js';
 
 /** Opens the splats of an element. Rejects as `open` of open-splats.ts does. */
-export async function openGlSplats(lease: GlLease, options: OpenOptions, upload: GlUploadOptions): Promise<GlLoaded> {
+export async function openGlSplats(
+  lease: GlLease,
+  { limits }: SceneRequest,
+  options: OpenOptions,
+  upload: GlUploadOptions,
+): Promise<GlLoaded> {
   const { loader, live, beforeUpload, signal } = options;
   const { element, listeners } = live();
   const input = SplatInput.of(element);
-  const state = await input.first(signal);
+  const state = await input.first(signal, limits);
   const first = await pack(loader, state, signal);
   const player = new GlSplatsPlayer(input, first, { lease, loader, listeners, upload });
   beforeUpload(first.packed.geometry.byteLength);

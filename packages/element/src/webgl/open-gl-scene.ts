@@ -52,7 +52,7 @@ export async function openGlScene(
     requireDrawable();
     if (request.splats) {
       const { openGlSplats } = await loadModule('the code that shows arrays', () => import('./gl-splats.js'));
-      return await openGlSplats(lease, options, openOptions(options, signal));
+      return await openGlSplats(lease, request, options, openOptions(options, signal));
     }
     const previews = new Previews(options);
     const scene = await loader

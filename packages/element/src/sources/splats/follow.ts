@@ -10,6 +10,8 @@ export interface FeedListener {
   readonly add: (update: SplatUpdate) => Promise<boolean>;
   /** Called for an update that cannot be shown, and when the feed is interrupted. */
   readonly fail: (error: unknown) => void;
+  /** Maximum number of bytes of a message of a stream; undefined for the default of `updatesIn`. */
+  readonly maxBytes?: number | undefined;
 }
 
 export const isFeed = (value: unknown): value is SplatFeed =>
@@ -33,11 +35,11 @@ export function follow(feed: SplatFeed, listener: FeedListener, signal: AbortSig
 
 async function followStream(
   stream: ReadableStream<Uint8Array>,
-  { add, fail }: FeedListener,
+  { add, fail, maxBytes }: FeedListener,
   signal: AbortSignal,
 ): Promise<void> {
   // Updates are read while earlier ones wait, so that the newest is shown next.
-  for await (const update of updatesIn(stream, { signal })) add(update).catch(fail);
+  for await (const update of updatesIn(stream, { signal, maxBytes })) add(update).catch(fail);
 }
 
 function followSocket(feed: string | URL | WebSocket, { add, fail }: FeedListener, signal: AbortSignal): void {

@@ -13,11 +13,11 @@ import { SplatInput, type ChangedRange, type SplatSink, type SplatState } from '
 import { nothingToDraw, sampleOf, unusableRows } from './rows.js';
 
 /** Opens the splats that the property of an element contains, or that its feed sends first. */
-export const open: OpenSource = async (_, options, acquiring) => {
+export const open: OpenSource = async ({ limits }, options, acquiring) => {
   const { signal, beforeUpload, memoryBudget, submissions, live } = options;
   const { element, listeners } = live();
   const input = SplatInput.of(element);
-  const state = await input.first(signal);
+  const state = await input.first(signal, limits);
   const lease = await acquiring;
   signal.throwIfAborted();
   limitScenes(lease.device, memoryBudget);

@@ -14,6 +14,7 @@ import {
   type SplatUpdate,
 } from '@gaussian-splat/formats/updates';
 import type { ReactiveControllerHost } from 'lit';
+import type { SceneLimits } from '../../loading/protocol.js';
 import { follow, isFeed, type SplatFeed } from './follow.js';
 
 /** Values of the property `splats`. */
@@ -94,6 +95,8 @@ export class SplatInput {
   #waiters: Waiter[] = [];
   #isBusy = false;
   #sink: SplatSink | undefined;
+  /** Limits of the scene, and of each message. */
+  #limits: SceneLimits = {};
   /** Settles the promise of {@link first}. */
   #first: { readonly resolve: (state: SplatState) => void; readonly reject: (error: unknown) => void } | undefined;
 
@@ -112,7 +115,8 @@ export class SplatInput {
   }
 
   /** Fulfills with the newest state, as soon as there is one. Rejects if there will be none, or with the signal's reason. */
-  async first(signal: AbortSignal): Promise<SplatState> {
+  async first(signal: AbortSignal, limits: SceneLimits = {}): Promise<SplatState> {
+    this.#limits = limits;
     try {
       return await new Promise((resolve, reject) => {
         this.#first = { resolve, reject };
@@ -164,7 +168,8 @@ export class SplatInput {
     const fail = (error: unknown): void => this.#fail(error);
     if (isFeed(splats)) {
       this.#feed = new AbortController();
-      follow(splats, { add: (update) => this.add(update), fail }, this.#feed.signal);
+      const { maxBytes } = this.#limits;
+      follow(splats, { add: (update) => this.add(update), fail, maxBytes }, this.#feed.signal);
     } else this.add({ ...splats, first: undefined }).catch(fail);
   }
 
@@ -188,6 +193,8 @@ export class SplatInput {
 
   #replace(update: SplatUpdate & Partial<GaussianCloud>): void {
     const { count, shDegree } = checkUpdate(update);
+    const { maxSplats = Infinity } = this.#limits;
+    if (count > maxSplats) throw tooMany(maxSplats, count);
     const { raw = false, filter = 'classic', antialiased, filterVariance, origin = [0, 0, 0], hints } = update;
     const rule = antialiased === undefined ? SPLAT_FILTERS[filter] : { antialiased, filterVariance };
     const arrays = Object.fromEntries(ARRAYS.flatMap((name) => (update[name] ? [[name, update[name]]] : [])));
@@ -256,6 +263,14 @@ export class SplatInput {
     else this.#sink?.fail(error);
   }
 }
+
+const tooMany = (max: number, count: number): GaussianSplatError =>
+  new GaussianSplatError('out-of-memory/budget', {
+    where: 'splats',
+    expected: `at most ${max} splats, the sceneLimits of the page`,
+    found: `${count}`,
+    remedy: 'show fewer splats, or raise sceneLimits.maxSplats',
+  });
 
 const unfit = (name: string, expected: string, found: string): GaussianSplatError =>
   new GaussianSplatError('argument/cloud', {
