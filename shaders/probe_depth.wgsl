@@ -36,16 +36,22 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
   runs[lane] = light;
   runs_in_front[lane] = light_in_front;
   workgroupBarrier();
-  if (lane != 0u) { return; }
-  var in_front = 1.0;
-  for (var run = 0u; run < PROBE_LANES; run++) { in_front *= runs_in_front[run]; }
-  var answer = ProbeAnswer(vec3f(0.0), 0.0, vec3u(0u), in_front, vec3u(0u));
-  for (var level = 0u; level < PROBE_LEVELS; level++) { find(&answer, point, level, length); }
-  answers[at] = answer;
+  if (lane == 0u) {
+    var left = 1.0;
+    var in_front = 1.0;
+    for (var run = 0u; run < PROBE_LANES; run++) {
+      left *= runs[run];
+      in_front *= runs_in_front[run];
+    }
+    answers[at].thickness = 0.0;
+    answers[at].opacity = 1.0 - left;
+    answers[at].in_front = in_front;
+  }
+  if (lane < PROBE_LEVELS) { find(at, point, lane, length); }
 }
 
 // The first splat, from near to far, behind which less than a fraction of the light is left.
-fn find(answer: ptr<function, ProbeAnswer>, point: ProbePoint, level: u32, length: u32) {
+fn find(at: u32, point: ProbePoint, level: u32, length: u32) {
   let share = light_left(level);
   var total = 1.0;
   var before = 1.0;
@@ -57,14 +63,18 @@ fn find(answer: ptr<function, ProbeAnswer>, point: ProbePoint, level: u32, lengt
     }
     total *= runs[run];
   }
-  (*answer).opacity = 1.0 - total;
+  var depth = 0.0;
+  var slot = 0u;
   for (var rank = crossing * length; rank < min((crossing + 1u) * length, plan.visible); rank++) {
     let s = splats[order[rank]];
     before *= passes(s, point);
     if (before < share) {
-      (*answer).depths[level] = splat_depth(s);
-      (*answer).slots[level] = order[rank];
-      return;
+      depth = splat_depth(s);
+      slot = order[rank];
+      break;
     }
   }
+  answers[at].depths[level] = depth;
+  answers[at].slots[level] = slot;
+  answers[at].stored[level] = 0u;
 }

@@ -26,6 +26,7 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
   let splat = survivors[slot];
   answers[at].stored[level] = splat + 1u;
   let g = unpack_gaussian(gaussian_at(splat - view.first_group * CULL_GROUP));
-  let depth = surface_depth(view, g, points[at].pixel);
-  if (depth > 0.0) { answers[at].depths[level] = depth; }
+  let surface = surface_at(view, g, points[at].pixel);
+  if (surface.depth > 0.0) { answers[at].depths[level] = surface.depth; }
+  if (level == PROBE_MIDDLE) { answers[at].thickness = surface.thickness; }
 }

@@ -7,8 +7,9 @@ struct DensestDepth {
   // Depth of the center, and the standard deviation of the densest depth over the screen, in world units.
   center: f32,
   spread: f32,
-  // Standard deviation of the Gaussian along the camera's axis.
+  // Standard deviation of the Gaussian along the camera's axis, and along a ray.
   sigma: f32,
+  thickness: f32,
 }
 
 // `filter_variance` in px² widens the Gaussian on the screen: pass that of the view for the splat as drawn.
@@ -44,15 +45,20 @@ fn pixel_depth_of(view: View, g: Gaussian, filter_variance: f32) -> DensestDepth
 
   var depth = PixelDepth(by_pixel, p.z, 0.0);
   if (!is_parallel) { depth = PixelDepth(-by_pixel / (p.z * p.z), 1.0 / p.z, along_ray / (p.z * p.z)); }
-  return DensestDepth(depth, p.z, sqrt(spread), length(row_z));
+  return DensestDepth(depth, p.z, sqrt(spread), length(row_z), sqrt(along_ray));
 }
 
 // Minimum screen variance of a Gaussian in px², so that a disc seen edge-on has a densest point, too.
 const SURFACE_VARIANCE = 1e-3;
 
-// Densest depth, in world units, of the unfiltered Gaussian along the ray of a pixel: at most 3 standard deviations
-// from its center.
-fn surface_depth(view: View, g: Gaussian, pixel: vec2f) -> f32 {
+struct SurfaceDepth {
+  // World units along the optical axis, and the standard deviation along it.
+  depth: f32,
+  thickness: f32,
+}
+
+// Densest depth of the unfiltered Gaussian along the ray of a pixel: at most 3 standard deviations from its center.
+fn surface_at(view: View, g: Gaussian, pixel: vec2f) -> SurfaceDepth {
   let found = pixel_depth_of(view, g, SURFACE_VARIANCE);
   let e = project_ellipse(view, g);
   let offset = pixel - e.center;
@@ -64,5 +70,5 @@ fn surface_depth(view: View, g: Gaussian, pixel: vec2f) -> f32 {
     let v = (offset.y - e.slope * offset.x) / e.sigma_v;
     depth = select(max(1.0 - found.depth.bend * (u * u + v * v), 0.0) / max(linear, 1e-30), 0.0, linear <= 0.0);
   }
-  return clamp(depth, max(found.center - reach, view.near), found.center + reach);
+  return SurfaceDepth(clamp(depth, max(found.center - reach, view.near), found.center + reach), found.thickness);
 }

@@ -1,5 +1,6 @@
 // Finds the run behind which less than a fraction of the light is left: one fragment for each point and fraction. The last row
 // has the light that all splats of a point leave, and those in front of its depth.
+#import shared/probe_levels
 #import webgl/probe_range
 #import shared/full_screen
 
@@ -9,18 +10,10 @@
 @group(0) @binding(1) var runs: texture_2d<u32>;
 @group(0) @binding(2) var ranges: texture_2d<u32>;
 
-// Fractions of the light that are left behind the near, the middle and the far depth of an answer.
-const SHARES = 3u;
-
-fn share_of(row: u32) -> f32 {
-  if (row == 0u) { return 0.9; }
-  return select(0.1, 0.5, row == 1u);
-}
-
 @fragment
 fn fragment(@builtin(position) position: vec4f) -> @location(0) vec4u {
   let place = vec2u(position.xy);
-  let is_sum = place.y == SHARES;
+  let is_sum = place.y == PROBE_LEVELS;
   var range = range_of(probed.whole);
   let is_first = range.end > 0u;
   var row = place.x;
@@ -32,7 +25,7 @@ fn fragment(@builtin(position) position: vec4f) -> @location(0) vec4u {
   }
   let run = run_of(range);
   let used = (range.end - range.first + run - 1u) / run;
-  let share = share_of(place.y);
+  let share = light_left(place.y);
   var light = range.light;
   var light_in_front = 1.0;
   var at = used;

@@ -22,6 +22,6 @@ fn fragment(@builtin(position) position: vec4f) -> @location(0) vec4u {
   if (range.first == range.end) { return vec4u(0u); }
   let question = bitcast<vec4f>(textureLoad(asked, vec2u(place.x, 0u), 0));
   let i = textureLoad(order, texel_of(range.first), 0).x;
-  let depth = surface_depth(view, unpack_gaussian(gaussian_at(i)), question.xy);
-  return vec4u(bitcast<u32>(depth), i, 1u, 0u);
+  let surface = surface_at(view, unpack_gaussian(gaussian_at(i)), question.xy);
+  return vec4u(bitcast<u32>(surface.depth), i, 1u, bitcast<u32>(surface.thickness));
 }

@@ -1,6 +1,7 @@
 /** The position of a person in a headset: turns, steps and jumps on the floor alone. */
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
+import { Leaving } from '../../packages/element/dist/features/xr/leaving.js';
 import { VrRig } from '../../packages/element/dist/features/xr/vr-rig.js';
 
 /** A floor of 4 x 4 m around the origin, at 1 m. */
@@ -21,8 +22,8 @@ interface Stick {
   readonly ray?: readonly number[];
 }
 
-function rigAt(heading = 0, stepsOnly = false, onLeave = (): void => undefined, hasMap = true, floor = map) {
-  const rig = new VrRig({ eye: [0, 2.6, 0], heading, toViewer: identity, isFloor: true, stepsOnly }, onLeave);
+function rigAt(heading = 0, stepsOnly = false, hasMap = true, floor = map) {
+  const rig = new VrRig({ eye: [0, 2.6, 0], heading, toViewer: identity, isFloor: true, stepsOnly });
   if (hasMap) rig.map = floor as never;
   /** Position of the head in the space of the session. */
   const place = { x: 0.1, y: 1.6, z: 0.2 };
@@ -76,13 +77,13 @@ test('walking stays on the floor, and not at all for those who ask for less moti
   let at: number[] = [];
   for (let i = 0; i < 100; i++) at = frame([{ handedness: 'left', axes: [0, 0, 1, -0.3] }]);
   assert.ok(Math.abs(at[0]) < 2 && Math.abs(at[2]) < 2 && Math.abs(at[1] - 2.6) < 1e-3, String(at));
-  near(rigAt(0, true).frame([{ handedness: 'left', axes: [0, 0, 0, -1] }]), [0, 2.6, 0]);
+  near(rigAt(0, true).frame([{ handedness: 'left', axes: [0, 0, 0, -1], ray: rayTo(0) }]), [0, 2.6, 0]);
 });
 
 test('the eyes reach their height above a step, also when the stick comes to rest on it', () => {
   const height = (i: number): number => (Math.floor(i / side) < 30 ? 1.25 : 1);
   const steps = { ...map, layers: [Float32Array.from({ length: side * side }, (_, i) => height(i))] };
-  const { frame } = rigAt(0, false, undefined, true, steps);
+  const { frame } = rigAt(0, false, true, steps);
   let at = frame();
   while (at[2] > -0.5) at = frame([{ handedness: 'left', axes: [0, 0, 0, -1] }], 0.02);
   assert.ok(at[1] < 2.8, `on the way up, at ${at[1]}`);
@@ -145,7 +146,7 @@ test('a hand beside a controller of the same side does not release its trigger',
 });
 
 test('a map that comes late leaves people where they have gone, and holds from there', () => {
-  const { rig, frame } = rigAt(0, false, undefined, false);
+  const { rig, frame } = rigAt(0, false, false);
   frame();
   const ahead = [{ handedness: 'left', axes: [0, 0, 0, -1] }];
   let at: number[] = [];
@@ -172,7 +173,7 @@ const at = (...place: number[]): number[] => [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0
 
 test('both grips move, turn and scale the scene, whose points stay under the hands', () => {
   for (const stepsOnly of [false, true]) {
-    const { rig, frame, place } = rigAt(0.3, stepsOnly, undefined, false);
+    const { rig, frame, place } = rigAt(0.3, stepsOnly, false);
     /** Converts a point of the session's space to the scene. */
     const sceneOf = (m: Float64Array, [x, y, z]: number[]): number[] => {
       const p = [x - m[3], y - m[7], z - m[11]];
@@ -243,12 +244,90 @@ test('in a scene of a twentieth of its size, each aim at the floor meets it', ()
   }
 });
 
-test('the button that leaves is held for a second', () => {
-  let left = 0;
-  const { frame } = rigAt(0, false, () => left++);
-  for (let i = 0; i < 8; i++) frame([{ handedness: 'right', pressed: [5] }]);
-  frame([{ handedness: 'right' }]);
-  assert.equal(left, 0);
-  for (let i = 0; i < 12; i++) frame([{ handedness: 'right', pressed: [5] }]);
-  assert.equal(left, 1);
+test('a stick that is pushed forward aims, and goes there when it is let go; the left one walks', () => {
+  const { rig, frame } = rigAt();
+  const right = (x: number, y: number): number[] => frame([{ handedness: 'right', axes: [0, 0, x, y], ray: rayTo(0) }]);
+  frame();
+  right(0, -0.9);
+  assert.ok(rig.target && Math.abs(rig.target[2] + 1.5) < 0.06, String(rig.target));
+  right(0, -0.4);
+  assert.ok(rig.target, 'still aims on its way back');
+  near(right(0, 0), [0, 2.6, -1.5], 0.06);
+  assert.equal(rig.target, undefined);
+  near(right(0, 0), [0, 2.6, -1.5], 0.06);
+  // A stick to the side turns alone.
+  right(0.9, -0.8);
+  assert.equal(rig.target, undefined);
+  const steps = rigAt(0, true);
+  const left = (y: number): number[] => steps.frame([{ handedness: 'left', axes: [0, 0, 0, y], ray: rayTo(0) }]);
+  steps.frame();
+  left(-1);
+  near(left(0), [0, 2.6, -1.5], 0.06);
+});
+
+interface Input {
+  readonly gamepad?: object;
+  readonly targetRayMode?: string;
+}
+
+function session(inputs: Input[]) {
+  const target = Object.assign(new EventTarget(), {
+    inputSources: inputs,
+    left: 0,
+    end: () => (target.left++, Promise.resolve()),
+  });
+  const leaving = new Leaving(target as never, new AbortController().signal);
+  const send = (type: string, inputSource: Input) =>
+    target.dispatchEvent(Object.assign(new Event(type), { inputSource }));
+  const wait = (frames: number): void => {
+    for (let i = 0; i < frames; i++) leaving.advance(0.1);
+  };
+  return { target, leaving, send, wait };
+}
+
+test('the button that leaves is held for a second, and ends the session once', () => {
+  const pad = { buttons: Array.from({ length: 6 }, () => ({ pressed: false })) };
+  const { target, wait } = session([{ gamepad: pad }]);
+  const press = (pressed: boolean) => (pad.buttons[5].pressed = pressed);
+  press(true);
+  wait(8);
+  press(false);
+  wait(1);
+  press(true);
+  wait(8);
+  assert.equal(target.left, 0);
+  wait(20);
+  assert.equal(target.left, 1);
+});
+
+test('both hands that pinch for two seconds leave, and go nowhere; two fingers on a screen do not', () => {
+  const hands = [{ targetRayMode: 'tracked-pointer' }, { targetRayMode: 'tracked-pointer' }];
+  const { target, leaving, send, wait } = session(hands);
+  send('selectstart', hands[0]);
+  wait(30);
+  assert.ok(target.left === 0 && !leaving.isGesture, 'one hand aims');
+  send('selectstart', hands[1]);
+  wait(10);
+  send('selectend', hands[0]);
+  wait(1);
+  assert.ok(target.left === 0 && leaving.isGesture, 'the other hand, until it opens');
+  send('selectend', hands[1]);
+  wait(1);
+  assert.ok(!leaving.isGesture);
+  hands.forEach((hand) => send('selectstart', hand));
+  wait(21);
+  assert.equal(target.left, 1);
+  const fingers = [{ targetRayMode: 'screen' }, { targetRayMode: 'screen' }];
+  const phone = session(fingers);
+  fingers.forEach((finger) => phone.send('selectstart', finger));
+  phone.wait(50);
+  assert.equal(phone.target.left, 0);
+
+  const { rig, frame } = rigAt();
+  const hand: Stick = { handedness: 'right', axes: null, ray: rayTo(0) };
+  frame([hand]);
+  rig.aim(hand as never);
+  frame([hand]);
+  rig.choose(hand as never, true);
+  near(frame([hand]), [0, 2.6, 0]);
 });

@@ -1,12 +1,12 @@
 import type { FrameBindings, Stages } from './bindings.js';
 import { recordSurvivors } from './frame.js';
 import { probeDepth, probeSurface, probeSurfaceQuantized } from './generated/probe-shaders.js';
-import { layouts } from './generated/shaders.js';
+import { constants, layouts } from './generated/shaders.js';
 import { BUFFER_USAGE, kernelOf, type ShaderDescription } from './gpu/kernel.js';
 import { GpuMemory } from './gpu/memory.js';
 import { readBack } from './gpu/read-back.js';
 import { Stage } from './stages/stage.js';
-import type { ProbedSplat } from './probed-splat.js';
+import { depthsOf, type ProbedSplat } from './probed-splat.js';
 
 /** A point of the last drawn image to probe. */
 export interface ProbePoint {
@@ -41,6 +41,13 @@ export interface ProbeAnswer {
    * transmitted. `far - near` is the thickness of the surface.
    */
   readonly far: number | null;
+  /**
+   * [16] depths like {@link depth}, behind which less than 0.9, 0.8, ... 0.1 of the light is left, then 0.05 and its
+   * halves. 0 if more is transmitted.
+   */
+  readonly layers: Float32Array;
+  /** Standard deviation of the splat at {@link depth} along the ray, in world units; 0 if there is none. */
+  readonly thickness: number;
   /** Transmittance, 0..1, of the splats in front of {@link ProbePoint.depth}. 1 if nothing hides this depth. */
   readonly transmittance: number;
   /** The splat at {@link ProbeAnswer.depth}. Null if there is no such depth, or if a mesh is nearer. */
@@ -59,9 +66,7 @@ export interface ProbeSource {
 export const probeDepthStage = (device: GPUDevice): Stage<typeof probeDepth> => new Stage(device, probeDepth);
 
 const { storage, copySource, copyDestination } = BUFFER_USAGE;
-const WORDS_PER_ANSWER = layouts.ProbeAnswer.size / 4;
-/** Word of an answer that contains the index of the splat at its middle depth, plus one; 0 if there is none. */
-const STORED_AT = layouts.ProbeAnswer.fields.stored.offset / 4 + 1;
+const { PROBE_LEVELS, PROBE_MIDDLE } = constants;
 
 /**
  * Probes points of the last frame, drawn by any rasterizer. Reads back from the GPU: call it for clicks and labels, not
@@ -122,14 +127,17 @@ function recordSurfaces(
 }
 
 function readAnswers(found: ArrayBuffer, points: number, splatOf: (stored: number) => ProbedSplat): ProbeAnswer[] {
-  const [values, words] = [new Float32Array(found), new Uint32Array(found)];
+  const { size, fields } = layouts.ProbeAnswer;
+  const view = new DataView(found);
   return Array.from({ length: points }, (_, i) => {
-    const at = i * WORDS_PER_ANSWER;
-    const [near, depth, far, opacity, , , , transmittance] = values.subarray(at);
-    const [nearest, surface, farthest] = [near, depth, far].map((value) => (value > 0 ? value : null));
-    const stored = words[at + STORED_AT];
-    const splat = surface === null || stored === 0 ? null : splatOf(stored - 1);
-    return { opacity, depth: surface, near: nearest, far: farthest, transmittance, splat };
+    const at = i * size;
+    const valueOf = ({ offset }: { readonly offset: number }): number => view.getFloat32(at + offset, true);
+    const layers = new Float32Array(found, at + fields.depths.offset, PROBE_LEVELS);
+    const stored = view.getUint32(at + fields.stored.offset + 4 * PROBE_MIDDLE, true);
+    const transmittance = valueOf(fields.in_front);
+    const thickness = valueOf(fields.thickness);
+    const splat = stored === 0 ? null : splatOf(stored - 1);
+    return { opacity: valueOf(fields.opacity), ...depthsOf(layers), layers, thickness, transmittance, splat };
   });
 }
 

@@ -1,6 +1,9 @@
 /** The ruler: by mouse and by keyboard alone, its length, its texts, and the announcements of a screen reader. */
 import '@gaussian-splat/element';
 import type { GaussianSplatElement } from '@gaussian-splat/element';
+import { insideOf } from './support/inside.js';
+import { toScene } from '../../support/element/camera.js';
+import { edges } from '../../support/element/parts.js';
 import { sendKeys } from '@web/test-runner-commands';
 import { assert, assertEqual, atRest, delay, nextEvent, showLoaded, until } from './support/harness.js';
 
@@ -19,6 +22,27 @@ function floor(): string {
   return `${URL.createObjectURL(new Blob([rows]))}#floor.splat`;
 }
 
+/** The inside of a cube from -2 to 2, of flat splats, as a `.splat`. */
+function room(): string {
+  const side = 41;
+  const count = 6 * side * side;
+  const rows = new Float32Array(8 * count);
+  const bytes = new Uint8Array(rows.buffer);
+  for (let i = 0; i < count; i++) {
+    const face = Math.floor(i / side ** 2);
+    const [u, v] = [(i % side) / 10 - 2, (Math.floor(i / side) % side) / 10 - 2];
+    const axis = face % 3;
+    const across = [(axis + 1) % 3, (axis + 2) % 3];
+    const place = [0, 0, 0];
+    [place[axis], place[across[0]], place[across[1]]] = [face < 3 ? -2 : 2, u, v];
+    const size = [0.07, 0.07, 0.07];
+    size[axis] = 0.003;
+    rows.set([...place, ...size], 8 * i);
+    bytes.set([90 + 20 * face, 140, 120, 255, 255, 128, 128, 128], 32 * i + 24);
+  }
+  return `${URL.createObjectURL(new Blob([rows]))}#room.splat`;
+}
+
 const button = (element: GaussianSplatElement): HTMLButtonElement | null =>
   element.shadowRoot!.querySelector('[part=measure-button]');
 const label = (element: GaussianSplatElement): string =>
@@ -30,6 +54,7 @@ interface Measured {
   readonly length: number;
   readonly meters: number | null;
   readonly uncertainty: number;
+  readonly perpendicular: number | null;
 }
 
 const FROM_ABOVE = {
@@ -117,6 +142,72 @@ describe('measure', () => {
     await element.updateComplete;
     assertEqual(element.shadowRoot!.querySelector('.ruler'), null, 'the ruler');
     assertEqual(element.shadowRoot!.activeElement, button(element), 'focus');
+  });
+
+  it('keeps the length when an end is behind the camera, and says how far parallel walls are apart', async () => {
+    const element = await ruler({
+      src: room(),
+      'camera-orbit': '0deg 90deg 1m',
+      'max-camera-orbit': 'auto auto 2m',
+      unit: '1m',
+    });
+    button(element)!.click();
+    const view = element.shadowRoot!.querySelector<HTMLElement>('#view')!;
+    const click = (x: number, y: number): void => {
+      const { left, top } = view.getBoundingClientRect();
+      const place = { clientX: left + x, clientY: top + y, bubbles: true };
+      view.dispatchEvent(new PointerEvent('pointerdown', place));
+      view.dispatchEvent(new MouseEvent('click', place));
+    };
+    click(120, 100);
+    await until(() => element.shadowRoot!.querySelector('.ruler circle') !== null, 'the first end');
+    element.setAttribute('camera-orbit', '180deg 90deg 1m');
+    await atRest(element);
+    const measured = nextEvent<CustomEvent<Measured>>(element, 'measure');
+    click(200, 100);
+    const { detail } = await measured;
+    assert(Math.abs(detail.perpendicular! - 4) < 0.05, `${detail.perpendicular} m between walls of 4 m`);
+    assert(detail.length > 4.02 && detail.length < 5, `${detail.length}`);
+    assert(/ · ⊥ 4\.0\d m$/.test(label(element)), label(element));
+    assert(element.shadowRoot!.querySelectorAll('.ruler circle').length === 1, 'one end is behind the camera');
+    assert(element.shadowRoot!.querySelector('.ruler line'), 'no line');
+    const [box, around] = ['[part=measure-label]', '#view'].map((each) =>
+      element.shadowRoot!.querySelector(each)!.getBoundingClientRect(),
+    );
+    assert(box.width > 0 && box.left >= around.left && box.right <= around.right, `${box.left} to ${box.right}`);
+    assert(box.top >= around.top && box.bottom <= around.bottom, `${box.top} to ${box.bottom}`);
+  });
+
+  it('sets an end on the edge of two walls, and in the corner of three', async () => {
+    const element = await ruler({ src: room(), 'camera-orbit': '45deg 55deg 2m', 'max-camera-orbit': 'auto auto 2m' });
+    button(element)!.click();
+    const view = element.shadowRoot!.querySelector<HTMLElement>('#view')!;
+    const { left, top } = view.getBoundingClientRect();
+    const core = insideOf(element);
+    // The view looks down into the corner at (-2, -2, -2) of viewer space.
+    const at = (p: readonly [number, number, number]): { x: number; y: number } => {
+      const camera = core.drawnFrom!;
+      const [x, y, z] = toScene(core.frame, p);
+      const row = (r: number): number => [x, y, z, 1].reduce((s, v, k) => s + v * camera.worldToCamera[4 * r + k], 0);
+      const share = view.clientWidth / camera.width;
+      return {
+        x: share * ((camera.fx * row(0)) / row(2) + camera.cx),
+        y: share * ((camera.fy * row(1)) / row(2) + camera.cy),
+      };
+    };
+    for (const [place, aside, what] of [
+      [[-2, -2, -2], [4, 3], 'corner'],
+      [[-2, -2, -0.8], [0, -6], 'edge'],
+    ] as const) {
+      const { x, y } = at(place);
+      const point = await core.positionFromPoint(left + x + aside[0], top + y + aside[1], edges);
+      assert(point, `nothing at the ${what}`);
+      const off =
+        what === 'corner' ? Math.hypot(point.x + 2, point.y + 2, point.z + 2) : Math.hypot(point.x + 2, point.y + 2);
+      assert(off < 0.06, `${what}: ${off} m off, at ${point.toString()}`);
+      const plain = await element.positionFromPoint(left + x + aside[0], top + y + aside[1]);
+      assert(Math.hypot(plain!.x - point.x, plain!.y - point.y, plain!.z - point.z) > 0.02, `${what}: not moved`);
+    }
   });
 
   it('is put away by Escape without closing the dialog around the scene', async () => {

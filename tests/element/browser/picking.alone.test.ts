@@ -18,6 +18,7 @@ import {
   until,
 } from './support/harness.js';
 import { isGreen, isRed, screenOf, Taps } from './support/screen.js';
+import { roughPlane } from '../../support/rough-plane.js';
 
 const STILL = { 'interpolation-decay': '0', 'interaction-prompt': 'none' };
 
@@ -92,6 +93,39 @@ describe('positionFromPoint', () => {
       }
       errors.sort((a, b) => a - b);
       assert(errors[15] < 0.01 && errors[28] < 0.02, `median ${errors[15]} m, 95 % ${errors[28]} m`);
+    });
+
+  for (const renderer of ['webgpu', 'webgl'])
+    it(`${renderer}: a pick on a rough plane is on the plane of its splats, within the stated interval`, async () => {
+      document.body.style.margin = '0';
+      const plane = roughPlane({ noise: 0.02, shape: 'flat', lean: 0, distance: 0 });
+      const bytes = new DataView(new ArrayBuffer(32 * plane.count));
+      for (let i = 0; i < plane.count; i++) {
+        const numbers = [...plane.positions.subarray(3 * i, 3 * i + 3), ...plane.scales.subarray(3 * i, 3 * i + 3)];
+        numbers.forEach((value, k) => bytes.setFloat32(32 * i + 4 * k, value, true));
+        const turn = [...plane.rotations.subarray(4 * i, 4 * i + 4)].map((v) => Math.round(128 + 127 * v));
+        [150, 150, 150, 255 * plane.opacities[i], ...turn].forEach((v, k) => bytes.setUint8(32 * i + 24 + k, v));
+      }
+      const src = `${URL.createObjectURL(new Blob([bytes.buffer]))}#plane.splat`;
+      const camera = { 'camera-orbit': '0deg 90deg 3m', 'camera-target': '0m 0m 0m', 'field-of-view': '45deg' };
+      const element = await showLoaded({ src, renderer, ...camera, ...STILL }, 'width: 240px; height: 180px');
+      await atRest(element);
+      const points = [];
+      for (let i = 0; i < 25; i++) {
+        const point = await element.positionFromPoint(80 + 20 * (i % 5), 50 + 20 * Math.floor(i / 5));
+        assert(point, `nothing at point ${i}`);
+        points.push(point);
+      }
+      // The line of sight is nearly the z axis. Files of this type have y down, so z is turned, too.
+      const errors = points.map(({ z }) => Math.abs(z)).sort((a, b) => a - b);
+      const held = points.filter(({ z, uncertainty }) => Math.abs(z) <= uncertainty).length;
+      const [half, interval] = [errors[12], points.map((p) => p.uncertainty).sort((a, b) => a - b)[12]];
+      assert(half < 0.015, `median error ${half} m`);
+      assert(held >= 17 && interval < 0.08, `${held} of 25 within ± ${interval} m`);
+      assert(
+        points.every(({ normal }) => normal.z > 0.7),
+        points.map(({ normal }) => normal.z.toFixed(2)).join(),
+      );
     });
 
   it('finds it as well in an element with a border that transforms have scaled', async () => {

@@ -4,7 +4,8 @@ import { check, randomSource, type Bench, type StageCase } from '../../support/g
 
 const ALPHA_MIN = 1 / 255;
 const ALPHA_MAX = 0.999;
-const WORDS = layouts.ProbeAnswer.size / 4;
+const { size, fields } = layouts.ProbeAnswer;
+const WORDS = size / 4;
 
 interface Splat {
   readonly x: number;
@@ -64,10 +65,10 @@ function alphaAt(splat: Splat, { x, y }: Point): number {
   return alpha < ALPHA_MIN ? 0 : alpha;
 }
 
-/** Fractions of the light that are left behind the three depths of an answer. */
-const LEFT = [0.9, 0.5, 0.1];
+/** Fractions of the light that are left behind the layers of an answer. */
+const LEFT = Array.from({ length: 16 }, (_, k) => (k < 9 ? 0.9 - 0.1 * k : 0.1 * 0.5 ** (k - 8)));
 
-/** Opacity, depths or 0, transmittance in front of the point, and how near the light comes to each of the three shares. */
+/** Opacity, depths or 0, transmittance in front of the point, and how near the light comes to each of the shares. */
 function twin(
   nearToFar: readonly Splat[],
   point: Point,
@@ -115,12 +116,12 @@ async function checkProbe(bench: Bench, count: number, maxOpacity: number): Prom
     const { opacity, depths, inFront, margins } = twin(nearToFar, point);
     const near = (actual: number, expected: number, what: string): void =>
       check(Math.abs(actual - expected) < 1e-5, `${what} of point ${i}: ${actual}, expected ${expected}`);
-    near(found[WORDS * i + 3], opacity, 'opacity');
+    near(found[WORDS * i + fields.opacity.offset / 4], opacity, 'opacity');
     // If the light comes within a rounding of a fraction, float32 may name the next splat.
     depths.forEach((depth, k) => {
       if (margins[k] > 1e-5) near(found[WORDS * i + k], depth, `depth at ${LEFT[k]}`);
     });
-    near(found[WORDS * i + 7], inFront, 'transmittance in front');
+    near(found[WORDS * i + fields.in_front.offset / 4], inFront, 'transmittance in front');
   });
 }
 

@@ -23,6 +23,7 @@ export { ATTRIBUTES, credentialsOf, type RawAttributes } from '../../../packages
 export { ALL_ATTRIBUTES, readAttributes } from '../../../packages/element/src/viewer/element-attributes.js';
 export { LatestTask } from '../../../packages/element/src/viewer/latest-task.js';
 export { PlaybackController, type PlaybackEvent } from '../../../packages/element/src/viewer/playback-controller.js';
+export { edges } from '../../../packages/element/src/features/ruler/edges.js';
 export { boxOf } from '../../../packages/element/src/viewer/scene-queries.js';
 export { SourceController, type SourceHost } from '../../../packages/element/src/viewer/source-controller.js';
 export { statsOf, type StatsContext } from '../../../packages/element/src/viewer/stats.js';

@@ -228,7 +228,7 @@ export const ATTRIBUTES = {
   /**
    * The words of the element in the language of the page: JSON or, as a property, an object. Keys: `front`, `upper-front`, `lower-front`, the same three
    * of `right`, `back` and `left`; `scene`, `role`, `interaction-prompt`, `keys-orbit`, `keys-fly`, `keys-walk`, `keys-views`; `views`, `next-view`, `previous-view`;
-   * `vr`, `ar`, `exit-ar`, `ar-simplified`, `measure`, `measure-keys`, `measure-first`, `measure-none`;
+   * `vr`, `ar`, `exit-ar`, `ar-simplified`, `measure`, `measure-keys`, `measure-first`, `measure-none`, `measure-unclear`;
    * `controls-panel`, `controls-reset`, `controls-time`, `controls-joint`, `controls-group`;
    * `show` (`…` stands for `alt`), `loading`, `blocked`, `reset`, `pause`, `play`, `details`; and `error-` before each `error.code`. Without it the words are
    * those of the language that `lang` names: English, German, Spanish, French, Japanese, Korean, Portuguese, Russian or Chinese.

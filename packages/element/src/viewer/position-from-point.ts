@@ -1,5 +1,11 @@
 import { subtract, type Camera, type Vector3 } from '@gaussian-splat/core';
-import type { ProbeAnswer, ProbePoint } from '@gaussian-splat/renderer/tools';
+import {
+  pickedSurface,
+  surfacePoints,
+  type PickedSurface,
+  type ProbeAnswer,
+  type ProbePoint,
+} from '@gaussian-splat/renderer/tools';
 import { boxPoints } from './camera/box-points.js';
 import { toViewer } from './camera/orbit.js';
 import { unproject } from './camera/projection.js';
@@ -27,6 +33,27 @@ export interface QueryHost {
   readonly surface: HTMLElement | null;
 }
 
+/** A surface and its place in the image, which may be beside the point that was picked. */
+export interface AimedSurface extends PickedSurface {
+  /** Pixels from the left and top edge of the frame. */
+  readonly x: number;
+  readonly y: number;
+}
+
+/** Chooses a surface near a point by more rays. */
+export interface Aim {
+  /** Returns more points to probe. `pixel` is the size of a CSS pixel in pixels of the frame. */
+  points(x: number, y: number, pixel: number): readonly ProbePoint[];
+  /** Returns the surface to use in place of the one at the point. */
+  choose(
+    camera: Camera,
+    at: AimedSurface,
+    points: readonly ProbePoint[],
+    answers: readonly ProbeAnswer[],
+    pixel: number,
+  ): AimedSurface;
+}
+
 /**
  * Returns the visible surface under a point of the page and the element that contains the surface. Reads back from the
  * GPU asynchronously.
@@ -37,6 +64,7 @@ export async function positionFromPoint(
   host: QueryHost,
   clientX: number,
   clientY: number,
+  aim?: Aim,
 ): Promise<PickedPoint | null> {
   const { camera, view, drawnFrom: drawn, surface } = host;
   const { backend } = view;
@@ -45,17 +73,29 @@ export async function positionFromPoint(
   const [x, y] = [share.x * drawn.width, share.y * drawn.height];
   if (!(x >= 0 && y >= 0 && x < drawn.width && y < drawn.height)) return null;
   try {
-    const [answer] = await host.probe([{ x, y }]);
-    if (!answer || answer.depth === null) return null;
+    const pixel = drawn.width / surface.clientWidth;
+    const around = surfacePoints(drawn, x, y);
+    const more = aim?.points(x, y, pixel) ?? [];
+    const answers = await host.probe([...around, ...more]);
+    const [answer] = answers;
+    const met = pickedSurface(drawn, around, answers.slice(0, around.length));
+    if (!met) return null;
     // The splats of the shadow belong to no element.
     const placement = answer.splat?.placement;
     if (placement && !host.sources.members.some((member) => member.placement === placement)) return null;
-    const { near, depth, far } = answer;
-    const at = (z: number): Vector3 => unproject(drawn, { x, y, depth: z });
-    const uncertainty = far === null ? Infinity : distance(at(near ?? depth), at(far)) / 2;
-    const [eye, place] = [at(0), at(depth)];
-    const point = new ScenePoint(...toViewer(camera.viewerFrame, place), uncertainty);
-    return Object.assign(point, { distance: distance(eye, place), ...whose(host, answer, eye, place) });
+    const own = { ...met, x, y };
+    const found = aim?.choose(drawn, own, more, answers.slice(around.length), pixel) ?? own;
+    const at = (depth: number): Vector3 => unproject(drawn, { ...found, depth });
+    const [eye, place] = [at(0), at(found.depth)];
+    const far = distance(eye, place);
+    const { worldToCamera: m } = drawn;
+    const [a, b, c] = found.normal;
+    const [nx, ny, nz] = toViewer(
+      camera.viewerFrame,
+      [0, 1, 2].map((k) => a * m[k] + b * m[4 + k] + c * m[8 + k]) as unknown as Vector3,
+    );
+    const point = new ScenePoint(...toViewer(camera.viewerFrame, place), (found.uncertainty * far) / found.depth);
+    return Object.assign(point, { normal: { x: nx, y: ny, z: nz }, distance: far, ...whose(host, answer, eye, place) });
   } catch (error) {
     // The loss of a device is reported by its scene.
     if (await isGone(backend)) return null;

@@ -7,6 +7,7 @@ import type { CameraAction } from './camera/gestures.js';
 import type { ViewerFrame } from './camera/orbit.js';
 import { frameOf } from './camera/settings.js';
 import type { PickedPoint } from './camera/values.js';
+import type { Aim } from './position-from-point.js';
 import { CameraController } from './camera-controller.js';
 import { Features, type FeatureTable } from './features.js';
 import { prefersReducedMotion, reducedMotion } from './motion.js';
@@ -237,9 +238,9 @@ export class Viewer implements SourceOwner {
   }
 
   /** Returns the visible surface under a point of the page, in CSS pixels: see the element's method of this name. */
-  async positionFromPoint(clientX: number, clientY: number): Promise<PickedPoint | null> {
+  async positionFromPoint(clientX: number, clientY: number, aim?: Aim): Promise<PickedPoint | null> {
     const { positionFromPoint } = await queries.get();
-    return positionFromPoint(this, clientX, clientY);
+    return positionFromPoint(this, clientX, clientY, aim);
   }
 
   /** Fulfills when no source is loading and no code for attributes or children is pending. Never rejects. */

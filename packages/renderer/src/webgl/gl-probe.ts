@@ -4,23 +4,31 @@
  * same frame, and only the answers are read back.
  */
 import type { ProbeAnswer, ProbePoint } from '../depth-probe.js';
-import type { layouts } from '../generated/shaders.js';
+import { constants, type layouts } from '../generated/shaders.js';
 import type { StructValues } from '../gpu/struct.js';
 import type { ProbePrograms } from './gl-programs.js';
+import { depthsOf } from '../probed-splat.js';
 import { makeTarget, makeTexture } from './gl.js';
 import { readTexels } from './read-texels.js';
 
 /** Number of runs of a range, as in `shaders/webgl/probe_range.wgsl`; each run is one fragment. */
 const RUNS = 1024;
-/** Maximum number of points in one pass. */
-const MAX_POINTS = 256;
-/** Fractions of the light that `shaders/webgl/probe_cross.wgsl` searches for: near, middle and far depth. */
-const SHARES = 3;
+/** Fractions of the light that `shaders/webgl/probe_cross.wgsl` searches for. */
+const { PROBE_LEVELS, PROBE_MIDDLE } = constants;
+/** Maximum number of points in one pass, which has a row of a texture for each point and fraction. */
+const MAX_POINTS = 1024 / PROBE_LEVELS;
 /** Replaces infinities, because GLSL compilers may assume that there are none. */
 const MAX_FLOAT32 = 3.4e38;
 
 /** Answer for a frame without splats. */
-const NOTHING: ProbeAnswer = { opacity: 0, transmittance: 1, near: null, depth: null, far: null, splat: null };
+const NOTHING: ProbeAnswer = {
+  ...depthsOf(new Float32Array(PROBE_LEVELS)),
+  layers: new Float32Array(PROBE_LEVELS),
+  opacity: 0,
+  thickness: 0,
+  transmittance: 1,
+  splat: null,
+};
 
 export interface GlProbeSource {
   readonly gl: WebGL2RenderingContext;
@@ -50,7 +58,7 @@ export async function probeSplats(source: GlProbeSource, points: readonly ProbeP
 async function probeGroup(source: GlProbeSource, points: readonly ProbePoint[]): Promise<ProbeAnswer[]> {
   const { gl } = source;
   const made: { texture: WebGLTexture; target?: WebGLFramebuffer }[] = [];
-  const size = [points.length, SHARES + 1] as const;
+  const size = [points.length, PROBE_LEVELS + 1] as const;
   try {
     const words = readTexels(gl, draw(source, points, made), size);
     return answersOf(await words, points.length);
@@ -99,25 +107,26 @@ function draw(
   for (let [span, isFirst] = [count, true]; isFirst || span > 1; isFirst = false) {
     // The whole range, with all of its light.
     const whole = isFirst ? [0, count, new Uint32Array(Float32Array.of(1).buffer)[0], 0] : [0, 0, 0, 0];
-    const rows = isFirst ? points.length : SHARES * points.length;
+    const rows = isFirst ? points.length : PROBE_LEVELS * points.length;
     const from = ranges;
     const runs = fill(RUNS, rows, () => programs.runs.use({ whole }, [...textures, asked, from])).texture;
     const use = (): void => programs.cross.use({ whole }, [runs, from]);
-    ranges = fill(points.length, SHARES + 1, use).texture;
+    ranges = fill(points.length, PROBE_LEVELS + 1, use).texture;
     span = Math.ceil(span / RUNS);
   }
   const use = (): void => programs.surface.use(view, [geometry, order, asked, ranges]);
-  return fill(points.length, SHARES + 1, use).target;
+  return fill(points.length, PROBE_LEVELS + 1, use).target;
 }
 
 function answersOf(words: Uint32Array, points: number): ProbeAnswer[] {
   const numbers = new Float32Array(words.buffer);
   const at = (row: number, point: number): number => 4 * (row * points + point);
   return Array.from({ length: points }, (_, i) => {
-    const depth = (row: number): number | null => (words[at(row, i) + 2] === 0 ? null : numbers[at(row, i)]);
-    const [near, middle, far] = [depth(0), depth(1), depth(2)];
-    const [light, lightInFront] = numbers.subarray(at(SHARES, i));
-    const splat = middle === null ? null : { placement: undefined, index: words[at(1, i) + 1] };
-    return { opacity: 1 - light, transmittance: lightInFront, near, depth: middle, far, splat };
+    const layers = Float32Array.from({ length: PROBE_LEVELS }, (_, row) => numbers[at(row, i)]);
+    const [light, transmittance] = numbers.subarray(at(PROBE_LEVELS, i));
+    const [, index, isFound] = words.subarray(at(PROBE_MIDDLE, i));
+    const thickness = numbers[at(PROBE_MIDDLE, i) + 3];
+    const splat = isFound === 0 ? null : { placement: undefined, index };
+    return { opacity: 1 - light, ...depthsOf(layers), layers, thickness, transmittance, splat };
   });
 }

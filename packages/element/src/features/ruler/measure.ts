@@ -1,12 +1,14 @@
+import type { Camera, Vector3 } from '@gaussian-splat/core';
 import { css, type ReactiveController, type ReactiveControllerHost } from 'lit';
 import { buttonBarOf } from '../../viewer/button-bar.js';
 import { project } from '../../viewer/camera/projection.js';
 import { toScene } from '../../viewer/camera/orbit.js';
-import type { ScenePoint } from '../../viewer/camera/values.js';
+import type { PickedPoint } from '../../viewer/camera/values.js';
 import type { Viewer } from '../../viewer/viewer.js';
 import { adoptStyles } from '../../viewer/styles.js';
 import { languageOf } from '../../viewer/strings.js';
 import { unitOf } from '../../viewer/unit.js';
+import { edges } from './edges.js';
 import type { MeasureDetail } from './row.js';
 
 const WORDS = {
@@ -14,6 +16,7 @@ const WORDS = {
   'measure-keys': 'Press Enter to set each end of the ruler; the arrow keys turn the view. Escape puts the ruler away.',
   'measure-first': 'First end set',
   'measure-none': 'No surface here',
+  'measure-unclear': 'No clear surface here',
 };
 
 const STYLES = css`
@@ -60,6 +63,8 @@ const SVG = 'http://www.w3.org/2000/svg';
 const DRAG = 5;
 /** Number of significant digits of a length. */
 const DIGITS = 3;
+/** Minimum cosine of the angle of two surfaces that count as parallel: 12 degrees. */
+const PARALLEL = Math.cos((12 * Math.PI) / 180);
 
 /** A ruler: two ends on surfaces of the scene, a line, and its length with its uncertainty. */
 export class Measure implements ReactiveController {
@@ -69,7 +74,7 @@ export class Measure implements ReactiveController {
   readonly #button: HTMLButtonElement;
   readonly #drawing: SVGSVGElement;
   readonly #label: HTMLElement;
-  #ends: readonly ScenePoint[] = [];
+  #ends: readonly PickedPoint[] = [];
   /** URL of the scene that the ends belong to. */
   #url = '';
   #listening: AbortController | undefined;
@@ -199,15 +204,16 @@ export class Measure implements ReactiveController {
 
   async #setEnd(clientX: number, clientY: number): Promise<void> {
     const signal = this.#listening?.signal;
-    const point = await this.#core.positionFromPoint(clientX, clientY);
+    const point = await this.#core.positionFromPoint(clientX, clientY, edges);
     if (!signal || signal.aborted) return;
     if (point === null) return this.#say(this.#word('measure-none'));
     // A third point starts a new measurement.
     this.#ends = this.#ends.length === 1 ? [this.#ends[0], point] : [point];
     this.#draw();
     const measured = this.#measured();
-    if (!measured) return this.#say(this.#word('measure-first'));
-    this.#say(textOf(measured));
+    const unclear = Number.isFinite(point.uncertainty) ? '' : `. ${this.#word('measure-unclear')}`;
+    if (!measured) return this.#say(this.#word('measure-first') + unclear);
+    this.#say(textOf(measured) + unclear);
     this.#element.dispatchEvent(new CustomEvent('measure', { detail: measured }));
   }
 
@@ -217,7 +223,8 @@ export class Measure implements ReactiveController {
     const length = Math.hypot(to.x - from.x, to.y - from.y, to.z - from.z);
     const uncertainty = Math.hypot(from.uncertainty, to.uncertainty);
     const unit = unitOf(this.#core);
-    return { from, to, length, uncertainty, meters: unit === undefined ? null : length * unit, unit: unit ?? null };
+    const meters = unit === undefined ? null : length * unit;
+    return { from, to, length, uncertainty, perpendicular: perpendicularOf(from, to), meters, unit: unit ?? null };
   }
 
   /** Draws the ruler at the projections of its ends in the last frame. */
@@ -228,20 +235,33 @@ export class Measure implements ReactiveController {
     if (!camera || !surface) return;
     const [width, height] = [surface.clientWidth, surface.clientHeight];
     if (this.#hasKeyboard && surface.matches(':focus')) this.#add('circle', { cx: width / 2, cy: height / 2, r: 10 });
-    const ends = this.#ends.map(({ x, y, z }) => {
-      const at = project(camera, toScene(frame, [x, y, z]));
-      return { x: (at.x * width) / camera.width, y: (at.y * height) / camera.height, isAhead: at.depth > 0 };
-    });
-    if (ends.some(({ isAhead }) => !isAhead)) return;
-    const [a, b] = ends;
-    if (b) this.#add('line', { x1: a.x, y1: a.y, x2: b.x, y2: b.y });
-    for (const { x, y } of ends) this.#add('circle', { cx: x, cy: y, r: 4 });
+    const places = this.#ends.map(({ x, y, z }) => toScene(frame, [x, y, z]));
+    const inBox = (point: Vector3): readonly [number, number] => {
+      const at = project(camera, point);
+      return [(at.x * width) / camera.width, (at.y * height) / camera.height];
+    };
+    for (const place of places) {
+      if (!isAhead(camera, place)) continue;
+      const [cx, cy] = inBox(place);
+      this.#add('circle', { cx, cy, r: 4 });
+    }
+    const line = shownPart(camera, places)?.map(inBox);
+    if (!line) return;
+    const [[x1, y1], [x2, y2]] = line;
+    this.#add('line', { x1, y1, x2, y2 });
     const measured = this.#measured();
     if (!measured) return;
     this.#label.hidden = false;
     this.#label.textContent = textOf(measured);
-    this.#label.style.left = `${(a.x + b.x) / 2}px`;
-    this.#label.style.top = `${(a.y + b.y) / 2 - 18}px`;
+    // The middle of the line, or of its visible end.
+    const within = (at: number, size: number, margin: number): number =>
+      Math.max(Math.min(margin, size / 2), Math.min(size - margin, at));
+    const [x, y] = [
+      (within(x1, width, 0) + within(x2, width, 0)) / 2,
+      (within(y1, height, 0) + within(y2, height, 0)) / 2,
+    ];
+    this.#label.style.left = `${within(x, width, this.#label.offsetWidth / 2)}px`;
+    this.#label.style.top = `${within(y - 18, height, this.#label.offsetHeight / 2)}px`;
   };
 
   #add(name: string, attributes: Readonly<Record<string, number>>): void {
@@ -251,16 +271,45 @@ export class Measure implements ReactiveController {
   }
 }
 
+const isAhead = (camera: Camera, point: Vector3): boolean => project(camera, point).depth > 0;
+
+/** Returns the ends of the part of a line that is before the camera; undefined if none is. */
+function shownPart(camera: Camera, [a, b]: readonly Vector3[]): readonly [Vector3, Vector3] | undefined {
+  if (!b) return undefined;
+  const [from, to] = [a, b].map((point) => project(camera, point).depth);
+  if (from <= 0 && to <= 0) return undefined;
+  // Just before the eye, the line goes on far beyond the image.
+  const cut = 0.01 * Math.max(from, to);
+  const at = (share: number): Vector3 => [0, 1, 2].map((k) => a[k] + share * (b[k] - a[k])) as unknown as Vector3;
+  const crossing = (): Vector3 => at((cut - from) / (to - from));
+  return [from < cut ? crossing() : a, to < cut ? crossing() : b];
+}
+
+/** Returns the distance of two surfaces at right angles to them; null unless they are parallel. */
+function perpendicularOf(from: PickedPoint, to: PickedPoint): number | null {
+  const [a, b] = [from.normal, to.normal];
+  const cosine = a.x * b.x + a.y * b.y + a.z * b.z;
+  if (Math.abs(cosine) < PARALLEL) return null;
+  const sign = Math.sign(cosine);
+  const n = [a.x + sign * b.x, a.y + sign * b.y, a.z + sign * b.z];
+  const way = [to.x - from.x, to.y - from.y, to.z - from.z];
+  return Math.abs(n[0] * way[0] + n[1] * way[1] + n[2] * way[2]) / Math.hypot(...n);
+}
+
 /**
- * Returns a text such as `1.24 m ± 0.01 m`, both numbers with the same decimals. If `unit` is null, the numbers are in
- * units of the scene and have no suffix.
+ * Returns a text such as `1.24 m ± 0.01 m`, both numbers with the same decimals, and the distance of parallel surfaces,
+ * such as `⊥ 1.20 m`, if it differs by more than the uncertainty. If `unit` is null, the numbers are in units of the scene
+ * and have no suffix.
  */
-function textOf({ length, uncertainty, unit }: MeasureDetail): string {
+function textOf({ length, uncertainty, perpendicular, unit }: MeasureDetail): string {
   const factor = unit ?? 1;
   const suffix = unit === null ? '' : ' m';
   const value = length * factor;
   const decimals = Math.max(0, DIGITS - 1 - Math.floor(Math.log10(Math.max(value, 1e-3))));
   const number = (each: number): string => `${each.toFixed(decimals)}${suffix}`;
   const off = Number.isFinite(uncertainty) ? number(Math.max(uncertainty * factor, 10 ** -decimals)) : '?';
-  return `${number(value)} ± ${off}`;
+  const isOblique = perpendicular !== null && length - perpendicular > uncertainty && length > 0;
+  // Two points of one surface have no distance at right angles to it.
+  const isApart = isOblique && perpendicular > uncertainty;
+  return `${number(value)} ± ${off}${isApart ? ` · ⊥ ${number(perpendicular * factor)}` : ''}`;
 }

@@ -1,5 +1,5 @@
 import { flag } from '../../viewer/attribute.js';
-import type { ScenePoint } from '../../viewer/camera/values.js';
+import type { PickedPoint } from '../../viewer/camera/values.js';
 import type { FeatureRow } from '../../viewer/features.js';
 
 export const RULER_ATTRIBUTES = {
@@ -13,12 +13,20 @@ type Table = typeof RULER_ATTRIBUTES;
 
 export interface MeasureDetail {
   /** Start of the ruler in viewer space. */
-  readonly from: ScenePoint;
-  readonly to: ScenePoint;
+  readonly from: PickedPoint;
+  readonly to: PickedPoint;
   /** Length in units of the scene. */
   readonly length: number;
-  /** Uncertainty of the length, in units of the scene. */
+  /**
+   * Half of the interval that contains the length in 68 % of the cases or more, in units of the scene. Infinity if an
+   * end is on no single surface.
+   */
   readonly uncertainty: number;
+  /**
+   * Distance of the two surfaces at right angles to them, in units of the scene, for example the height of a room; null
+   * unless they are parallel within 12 degrees.
+   */
+  readonly perpendicular: number | null;
   /** Length in meters; null unless the attribute `unit` defines the unit. */
   readonly meters: number | null;
   /** Meters per unit of the scene; null if unknown. */

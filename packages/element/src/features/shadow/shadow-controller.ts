@@ -17,6 +17,8 @@ import { packSplats } from '../../shared/splat-file.js';
  * the interval to the time of an update.
  */
 const [MIN_MS, SHARE] = [500, 10];
+/** Minimum ratio after an edit, such as a moved cut, for which somebody waits. */
+const EDIT_SHARE = 1;
 /**
  * Height of the camera above the ground, in radii of the subject, below which the shadow fades out. From below the
  * ground the shadow is invisible.
@@ -46,7 +48,10 @@ export class ShadowController implements ReactiveController, Feature {
   #key = '';
   #shown: Shown | undefined;
   #isBusy = false;
-  #notBefore = -Infinity;
+  /** Time of the last shadow and of its making, milliseconds, and the motion that it shows. */
+  #madeAt = -Infinity;
+  #makingMs = 0;
+  #motion = '';
   #timer: ReturnType<typeof setTimeout> | undefined;
   readonly #gl = new Lazy(
     'the code of shadows',
@@ -110,21 +115,31 @@ export class ShadowController implements ReactiveController, Feature {
     return [...places, sources.meshes.value?.version, intensity, softness].join('|');
   }
 
+  /** Text that changes when a scene moves without anybody's doing: a generator, a clip. */
+  #motionKey(): string {
+    return this.#core.sources.members.map(({ placement: { scene } }) => scene.version).join();
+  }
+
   #warn({ message }: Error): void {
     this.#core.warn(`<gaussian-splat> shadow: ${message}`);
   }
 
   #renew(backend: Backend, key: string, now: number): void {
-    if (now < this.#notBefore) {
+    const motion = this.#motionKey();
+    const share = motion === this.#motion ? EDIT_SHARE : SHARE;
+    const wait = Math.max(share * this.#makingMs, share === SHARE ? MIN_MS : 0);
+    const notBefore = this.#madeAt + wait;
+    if (now < notBefore) {
       // When a motion has ended, the shadow must show its last pose.
       this.#timer ??= setTimeout(() => {
         this.#timer = undefined;
         this.#core.requestFrame();
-      }, this.#notBefore - now);
+      }, notBefore - now);
       return;
     }
     this.#isBusy = true;
     this.#key = key;
+    this.#motion = motion;
     const begin = performance.now();
     this.#make(backend)
       .catch((error: Error) => {
@@ -132,7 +147,8 @@ export class ShadowController implements ReactiveController, Feature {
       })
       .finally(() => {
         this.#isBusy = false;
-        this.#notBefore = performance.now() + Math.max(MIN_MS, SHARE * (performance.now() - begin));
+        this.#madeAt = performance.now();
+        this.#makingMs = this.#madeAt - begin;
         this.#core.requestFrame();
       });
   }

@@ -7,6 +7,7 @@ import { readShadow, shadowSplats, takeShadow } from '../../shared/shadow-map.js
 import { alphaOfScene } from '../../shared/take-alpha-gl.js';
 import { fingersOn, type Fingers, type Plane } from './fingers.js';
 import { GlDrawing } from './gl-drawing.js';
+import { Leaving } from './leaving.js';
 import { placeOf } from './marker-splats.js';
 import type { XrScene } from './xr-scene.js';
 import { SimplifiedModel } from './simplified-model.js';
@@ -117,6 +118,8 @@ class ArGuide implements XrGuide {
   /** Seconds with hits of other surfaces than the wanted ones. */
   #waited = 0;
   #fingers: Fingers | undefined;
+  /** Headsets show no overlay, so their inputs leave. */
+  readonly #leaving: Leaving;
   #placed: Float64Array | undefined;
 
   constructor(core: Viewer, of: XrStarted, overlay: ArOverlay) {
@@ -129,6 +132,7 @@ class ArGuide implements XrGuide {
         '<gaussian-splat> ar-scale="fixed": expected the attribute unit, such as unit="1m"; the object is 0.5 to 1 m large.',
       );
     this.#unit = unit ?? 1;
+    this.#leaving = new Leaving(of.session, of.signal);
     overlay.show();
     of.signal.addEventListener('abort', () => {
       overlay.hide();
@@ -141,6 +145,7 @@ class ArGuide implements XrGuide {
   }
 
   place(frame: XrFrame, pose: XrPose, seconds: number): Float64Array | null {
+    this.#leaving.advance(seconds);
     const found = this.#drawing.scene;
     if (!found) return null;
     if (!this.#footprint) {

@@ -10,9 +10,7 @@ const TURN = Math.PI / 6;
 /** Deflection of a stick, 0..1, below which it is ignored, and deflection above which it causes a snap turn. */
 const [DEAD_ZONE, TURN_ZONE] = [0.2, 0.7];
 /** Indices of a controller's buttons in the mapping `xr-standard`. */
-const [TRIGGER, SQUEEZE, LEAVE] = [0, 1, 5];
-/** Seconds for which the exit button must be held. */
-const LEAVE_SECONDS = 1;
+const [TRIGGER, SQUEEZE] = [0, 1];
 /** Maximum distance of a teleport, and length of the steps along its ray, meters. */
 const [REACH, RAY_STEP] = [12, 0.05];
 /** Minimum and maximum size of the scene, as a factor of its true size. */
@@ -21,14 +19,13 @@ const [MIN_SCALE, MAX_SCALE] = [0.05, 20];
 const STRAYED = 0.05;
 
 /**
- * State of an input in the previous frame: `turn` and `trigger` are pressed, `leave` is the seconds of the exit button,
- * and `target` is the place on the floor that a held trigger aims at.
+ * State of an input in the previous frame: `turn` is pressed, `trigger` aims, and `target` is the place on the floor
+ * that it aims at.
  */
 interface Held {
   input: XrInput;
   turn: boolean;
   trigger: boolean;
-  leave: number;
   target: Vector3 | undefined;
 }
 
@@ -52,7 +49,6 @@ export interface VrStart {
  */
 export class VrRig {
   readonly #start: VrStart;
-  readonly #onLeave: () => void;
   #held = new Map<string, Held>();
   /** Inputs without a trigger button, such as hands, that are selecting. */
   readonly #selecting = new Set<XrInput>();
@@ -70,9 +66,8 @@ export class VrRig {
   /** Destination of a teleport, viewer space in meters; undefined if the user does not aim at the floor. */
   target: Vector3 | undefined;
 
-  constructor(start: VrStart, onLeave: () => void) {
+  constructor(start: VrStart) {
     this.#start = start;
-    this.#onLeave = onLeave;
     this.#heading = start.heading;
   }
 
@@ -95,11 +90,14 @@ export class VrRig {
     this.#selecting.add(input);
   }
 
-  /** Teleports to the place that such an input aimed at in the last frame, at its event `selectend`. */
-  choose(input: XrInput): void {
+  /**
+   * Teleports to the place that such an input aimed at in the last frame, at its event `selectend`.
+   * @param isGesture Whether the pinch was part of a gesture of both hands, which aims at nothing.
+   */
+  choose(input: XrInput, isGesture = false): void {
     const held = [...this.#held.values()].find((each) => each.input === input);
     if (!this.#selecting.delete(input) || !held || hasTrigger(input)) return;
-    if (held.target && this.#pose) this.#jump(held.target, this.#pose);
+    if (held.target && this.#pose && !isGesture) this.#jump(held.target, this.#pose);
     held.trigger = false;
   }
 
@@ -118,7 +116,7 @@ export class VrRig {
     this.#held = new Map();
     [...frame.session.inputSources].forEach((input, i) => {
       const key = `${i} ${input.handedness}`;
-      const known = before.get(key) ?? { turn: false, trigger: false, leave: 0, target: undefined };
+      const known = before.get(key) ?? { turn: false, trigger: false, target: undefined };
       const held = { ...known, input };
       this.#held.set(key, held);
       this.#read(frame, space, pose, held, seconds);
@@ -171,11 +169,6 @@ export class VrRig {
     const [x, y] = [pad.axes[2] ?? pad.axes[0] ?? 0, pad.axes[3] ?? pad.axes[1] ?? 0];
     if (handedness === 'left') this.#stride(x, y, pose, seconds);
     else this.#turnBy(x, pose, held);
-    held.leave = pad.buttons[LEAVE]?.pressed ? held.leave + seconds : 0;
-    if (held.leave >= LEAVE_SECONDS) {
-      held.leave = 0;
-      this.#onLeave();
-    }
   }
 
   /**
@@ -272,15 +265,23 @@ export class VrRig {
     return this.#body;
   }
 
-  /** Aims while the trigger is held, and teleports when it is released. */
+  /** Aims while the trigger is held or the stick is pushed forward, and teleports when they are released. */
   #aim(frame: XrFrame, space: XrSpace, pose: XrPose, held: Held): void {
     const { input } = held;
-    const isHeld = input.gamepad?.buttons[TRIGGER]?.pressed ?? this.#selecting.has(input);
+    const isPressed = input.gamepad?.buttons[TRIGGER]?.pressed ?? this.#selecting.has(input);
+    const isHeld = isPressed || this.#isPushed(held);
     const ray = isHeld || held.trigger ? frame.getPose(input.targetRaySpace, space) : undefined;
     held.target = ray ? this.#hit(ray) : undefined;
     if (isHeld) this.target = held.target ?? this.target;
     else if (held.trigger && held.target) this.#jump(held.target, pose);
     held.trigger = isHeld;
+  }
+
+  /** Whether a stick is pushed forward that does not walk: then it aims until it is back in its middle. */
+  #isPushed({ input: { gamepad, handedness }, trigger }: Held): boolean {
+    if (!gamepad || (handedness === 'left' && !this.#start.stepsOnly)) return false;
+    const [x, y] = [gamepad.axes[2] ?? gamepad.axes[0] ?? 0, gamepad.axes[3] ?? gamepad.axes[1] ?? 0];
+    return trigger ? y < -DEAD_ZONE : y < -TURN_ZONE && -y > Math.abs(x);
   }
 
   #jump(to: Vector3, pose: XrPose): void {

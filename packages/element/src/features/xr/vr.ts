@@ -9,6 +9,7 @@ import { mapUrlOf, openFloor } from '../../floor/floor-source.js';
 import { GlDrawing } from './gl-drawing.js';
 import { GpuDrawing, gpuOf } from './gpu-drawing.js';
 import { BindingTarget, CopyTarget } from './gpu-targets.js';
+import { Leaving } from './leaving.js';
 import { placeOf, ring } from './marker-splats.js';
 import { VrRig } from './vr-rig.js';
 import { gpuBindingClass, type XrInput, type XrInputEvent, type XrSession } from './webxr.js';
@@ -86,16 +87,14 @@ async function drawingOf(core: Viewer, session: XrSession, source: XrShown): Pro
 function guideOf(core: Viewer, { session, space, spaceType, signal, drawing }: XrStarted): XrGuide {
   const unit = unitOf(core) ?? 1;
   const { goal } = core.camera;
-  const rig = new VrRig(
-    {
-      eye: eyeOfPose(goal).map((value) => value * unit) as unknown as Vector3,
-      heading: goal.theta,
-      toViewer: metersOf(core.frame, unit),
-      isFloor: spaceType === 'local-floor',
-      stepsOnly: prefersReducedMotion(),
-    },
-    () => void session.end().catch(() => undefined),
-  );
+  const rig = new VrRig({
+    eye: eyeOfPose(goal).map((value) => value * unit) as unknown as Vector3,
+    heading: goal.theta,
+    toViewer: metersOf(core.frame, unit),
+    isFloor: spaceType === 'local-floor',
+    stepsOnly: prefersReducedMotion(),
+  });
+  const leaving = new Leaving(session, signal);
   findFloor(core, unit, signal).then(
     (map) => map && !signal.aborted && (rig.map = map),
     () => undefined,
@@ -104,13 +103,16 @@ function guideOf(core: Viewer, { session, space, spaceType, signal, drawing }: X
   const listen = (type: 'selectstart' | 'selectend', react: (input: XrInput) => void): void =>
     session.addEventListener(type, (event) => react((event as XrInputEvent).inputSource), { signal });
   listen('selectstart', (input) => rig.aim(input));
-  listen('selectend', (input) => rig.choose(input));
+  listen('selectend', (input) => rig.choose(input, leaving.isGesture));
   const marker = drawing.marker(ring(), signal);
   return {
     background: BACKGROUND,
-    place: (frame, pose, seconds) => rig.place(frame, pose, space, seconds),
+    place: (frame, pose, seconds) => {
+      leaving.advance(seconds);
+      return rig.place(frame, pose, space, seconds);
+    },
     drawAbove: (eye) => {
-      const place = rig.targetInSpace;
+      const place = leaving.isGesture ? undefined : rig.targetInSpace;
       if (place) marker.draw(eye, placeOf(place));
     },
   };

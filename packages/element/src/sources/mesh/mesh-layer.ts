@@ -182,9 +182,12 @@ export class MeshLayer {
       const mesh = depthOf(stored[i]);
       const { depth: asked } = points[i];
       if (asked !== undefined) return mesh < asked ? { ...answer, transmittance: 0 } : answer;
-      if (mesh >= (answer.depth ?? Infinity)) return { ...answer, far: Math.min(answer.far ?? mesh, mesh) };
+      const layers = answer.layers.map((depth) =>
+        depth > 0 && depth < mesh ? depth : Number.isFinite(mesh) ? mesh : 0,
+      );
+      if (mesh >= (answer.depth ?? Infinity)) return { ...answer, layers, far: Math.min(answer.far ?? mesh, mesh) };
       const near = Math.min(answer.near ?? mesh, mesh);
-      return { ...answer, near, depth: mesh, far: mesh, transmittance: 0, splat: null };
+      return { ...answer, layers, thickness: 0, near, depth: mesh, far: mesh, transmittance: 0, splat: null };
     });
   }
 
