@@ -28,7 +28,10 @@ async function picks(cloud: GaussianCloud, camera: Camera, reach: readonly [numb
   const renderer = new Renderer(device);
   await capture(device, renderer, { gaussians, camera });
   const random = randomSource(5);
-  const places = Array.from({ length: 60 }, () => [200 + reach[0] * (random() - 0.5), 150 + reach[1] * (random() - 0.5)] as const);
+  const places = Array.from(
+    { length: 60 },
+    () => [200 + reach[0] * (random() - 0.5), 150 + reach[1] * (random() - 0.5)] as const,
+  );
   const found: Pick[] = [];
   for (const [x, y] of places) {
     const points = surfacePoints(camera, x, y);

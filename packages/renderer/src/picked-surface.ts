@@ -40,6 +40,34 @@ export interface PickedSurface {
   readonly normal: Vector3;
 }
 
+/** The surface at a point, in the world of the camera. */
+export interface PickedPlace {
+  /** World units. */
+  readonly position: Vector3;
+  /** Unit normal of the surface, towards the camera. */
+  readonly normal: Vector3;
+  /** Distance from the camera, in world units. */
+  readonly distance: number;
+  /** {@link PickedSurface.uncertainty}, along the line of sight. */
+  readonly uncertainty: number;
+}
+
+/** Converts a surface at a point of the image, in pixels, to the world. */
+export function placeOfSurface(
+  { worldToCamera: m, fx, fy, cx, cy, orthographic }: Camera,
+  x: number,
+  y: number,
+  { depth, normal, uncertainty }: PickedSurface,
+): PickedPlace {
+  const turned = (v: Vector3): Vector3 =>
+    [0, 1, 2].map((k) => m[k] * v[0] + m[4 + k] * v[1] + m[8 + k] * v[2]) as unknown as Vector3;
+  const stretch = orthographic ? 1 : depth;
+  const [across, down] = [(stretch * (x - cx)) / fx, (stretch * (y - cy)) / fy];
+  const distance = orthographic ? depth : Math.hypot(across, down, depth);
+  const position = turned([across - m[3], down - m[7], depth - m[11]]);
+  return { position, normal: turned(normal), distance, uncertainty: (uncertainty * distance) / depth };
+}
+
 /** Fraction of the light that is left behind a layer of a probe: `light_left` of `shaders/shared/probe_levels.wgsl`. */
 const lightLeft = (level: number): number => (level < 9 ? (9 - level) / 10 : 0.1 * 2 ** (8 - level));
 

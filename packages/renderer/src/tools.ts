@@ -41,7 +41,13 @@ export {
   widenReach,
 } from './streaming/quantized-geometry.js';
 export { type ProbeAnswer, type ProbePoint } from './depth-probe.js';
-export { pickedSurface, surfacePoints, type PickedSurface } from './picked-surface.js';
+export {
+  pickedSurface,
+  placeOfSurface,
+  surfacePoints,
+  type PickedPlace,
+  type PickedSurface,
+} from './picked-surface.js';
 export { type ProbedSplat } from './probed-splat.js';
 export { type GaussianBlock, type PageRequests } from './gaussian-scene.js';
 export { QueueClock, type WorkTime } from './gpu/queue-clock.js';

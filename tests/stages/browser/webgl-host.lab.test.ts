@@ -164,6 +164,22 @@ describe("splats in a host's frame", () => {
       assert(splats.draw(camera, { x: X, y: Y }), 'not sorted');
       assertEqual(stateOf(gl, known), drawn, 'state after a frame');
       const found = read(gl, X, Y, camera);
+      const own = gl.createBuffer();
+      const asked = splats.pick(camera.width / 2, camera.height / 2);
+      assertEqual(stateOf(gl, known), drawn, 'state after the question of a pick');
+      gl.bindBuffer(gl.PIXEL_PACK_BUFFER, own);
+      const [place, beside] = [await asked, await splats.pick(-50, -50)];
+      assert(gl.getParameter(gl.PIXEL_PACK_BUFFER_BINDING) === own, 'the buffer of the host');
+      gl.bindBuffer(gl.PIXEL_PACK_BUFFER, null);
+      assertEqual(beside, null, 'a pick beside the scene');
+      const m = camera.worldToCamera;
+      const [px, py, pz] = [0, 1, 2].map((r) =>
+        place!.position.reduce((sum, v, k) => sum + m[4 * r + k] * v, m[4 * r + 3]),
+      );
+      assert(pz > camera.near && Math.abs(px / pz) < 1e-6 && Math.abs(py / pz) < 1e-6, `${px}, ${py}, ${pz}`);
+      assert(Math.abs(place!.distance - Math.hypot(px, py, pz)) < 1e-6 * pz, `${place!.distance} away`);
+      const nearest = depths.reduce((best, depth) => Math.min(best, depth), Infinity);
+      assert(pz >= nearest - 0.5 && place!.uncertainty >= 0, `${pz}, splats from ${nearest} on`);
       assertEqual(gl.getError(), gl.NO_ERROR, 'errors');
 
       const front = Array.from({ length: cloud.count }, (_, i) => i).filter((i) => depths[i] <= middle);

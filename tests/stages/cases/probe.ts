@@ -68,7 +68,7 @@ function alphaAt(splat: Splat, { x, y }: Point): number {
 /** Fractions of the light that are left behind the layers of an answer. */
 const LEFT = Array.from({ length: 16 }, (_, k) => (k < 9 ? 0.9 - 0.1 * k : 0.1 * 0.5 ** (k - 8)));
 
-/** Opacity, depths or 0, transmittance in front of the point, and how near the light comes to each of the shares. */
+/** Opacity, depths or 0, transmittance in front of the point, and how near the light comes to each fraction. */
 function twin(
   nearToFar: readonly Splat[],
   point: Point,

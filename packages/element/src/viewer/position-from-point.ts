@@ -1,6 +1,7 @@
 import { subtract, type Camera, type Vector3 } from '@gaussian-splat/core';
 import {
   pickedSurface,
+  placeOfSurface,
   surfacePoints,
   type PickedSurface,
   type ProbeAnswer,
@@ -85,17 +86,11 @@ export async function positionFromPoint(
     if (placement && !host.sources.members.some((member) => member.placement === placement)) return null;
     const own = { ...met, x, y };
     const found = aim?.choose(drawn, own, more, answers.slice(around.length), pixel) ?? own;
-    const at = (depth: number): Vector3 => unproject(drawn, { ...found, depth });
-    const [eye, place] = [at(0), at(found.depth)];
-    const far = distance(eye, place);
-    const { worldToCamera: m } = drawn;
-    const [a, b, c] = found.normal;
-    const [nx, ny, nz] = toViewer(
-      camera.viewerFrame,
-      [0, 1, 2].map((k) => a * m[k] + b * m[4 + k] + c * m[8 + k]) as unknown as Vector3,
-    );
-    const point = new ScenePoint(...toViewer(camera.viewerFrame, place), (found.uncertainty * far) / found.depth);
-    return Object.assign(point, { normal: { x: nx, y: ny, z: nz }, distance: far, ...whose(host, answer, eye, place) });
+    const { position, normal, distance, uncertainty } = placeOfSurface(drawn, found.x, found.y, found);
+    const eye = unproject(drawn, { x: found.x, y: found.y, depth: 0 });
+    const [nx, ny, nz] = toViewer(camera.viewerFrame, normal);
+    const point = new ScenePoint(...toViewer(camera.viewerFrame, position), uncertainty);
+    return Object.assign(point, { normal: { x: nx, y: ny, z: nz }, distance, ...whose(host, answer, eye, position) });
   } catch (error) {
     // The loss of a device is reported by its scene.
     if (await isGone(backend)) return null;
@@ -134,5 +129,3 @@ function whose(
   const { member: owner, mesh, material } = hit;
   return { element: childOf((member) => member === owner), splat: null, mesh, material };
 }
-
-const distance = (a: Vector3, b: Vector3): number => Math.hypot(...subtract(a, b));

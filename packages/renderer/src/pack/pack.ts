@@ -117,7 +117,7 @@ export function usableIndices(cloud: GaussianCloud): Uint32Array {
 
 /**
  * Writes the geometry words of the splats `kept`.
- * @param words Zeroed memory with `stride` words for each splat, the first of which are written.
+ * @param words Zeroed memory with `stride` words for each splat. The first ones are written.
  * @returns `words`; by default [kept, 8]
  */
 export function packGeometry(

@@ -1,5 +1,6 @@
 import { GaussianSplatError, type Camera } from '@gaussian-splat/core';
 import { deviceReading, type DepthPlanes } from '../depth-reading.js';
+import { pickedSurface, placeOfSurface, surfacePoints, type PickedPlace } from '../picked-surface.js';
 import { cameraValues } from '../view.js';
 import { GlProgram, makeTarget, makeTexture, requireMemory } from './gl.js';
 import type { PackedGaussians } from '../pack/pack.js';
@@ -188,6 +189,7 @@ export class HostedSplats {
   #sorted: OrderView | undefined;
   #sortedAt = -Infinity;
   #sortMs = 0;
+  #camera: Camera | undefined;
 
   /** @internal */
   constructor(host: GlHost, renderer: GlRenderer, gaussians: GlGaussians, sorter: SplatOrder) {
@@ -210,7 +212,25 @@ export class HostedSplats {
     const isSorted = this.#sort(camera);
     const request = { camera, accumulation: 'rgba16float', shDegree: 3, resolutionScale: 1, ...how } as const;
     this.#host.draw(this.#renderer, request, frame);
+    this.#camera = camera;
     return isSorted;
+  }
+
+  /**
+   * Returns the visible surface at a point of the last frame, in the space of the scene. The host's own objects hide
+   * nothing. The thread does not wait for the GPU.
+   * @param x Pixels from the left edge of the camera's image.
+   * @param y Pixels from its top edge.
+   * @returns null outside the scene, on parts less than half opaque, and before the first frame. Rejects if the context
+   * is lost.
+   */
+  async pick(x: number, y: number): Promise<PickedPlace | null> {
+    const camera = this.#camera;
+    if (!camera) return null;
+    const points = surfacePoints(camera, x, y);
+    const answers = await this.#host.run(() => this.#renderer.probe(points));
+    const surface = pickedSurface(camera, points, answers);
+    return surface && placeOfSurface(camera, x, y, surface);
   }
 
   destroy(): void {

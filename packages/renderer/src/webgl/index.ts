@@ -11,6 +11,7 @@ export {
   type GlQuads,
   type GlQuadsFrame,
 } from './gl-renderer.js';
+export type { PickedPlace } from '../picked-surface.js';
 export { OverdrawLimit } from '../overdraw.js';
 export { areasIn } from './splat-areas.js';
 export { DATA_WIDTH, SOURCE_DIGEST } from './shaders.js';

@@ -22,9 +22,11 @@ export async function readTexels(
   gl.bindBuffer(gl.PIXEL_PACK_BUFFER, null);
   try {
     await drawn(gl);
+    // A host may have bound a buffer of its own meanwhile.
+    const bound = gl.getParameter(gl.PIXEL_PACK_BUFFER_BINDING) as WebGLBuffer | null;
     gl.bindBuffer(gl.PIXEL_PACK_BUFFER, buffer);
     gl.getBufferSubData(gl.PIXEL_PACK_BUFFER, 0, words);
-    gl.bindBuffer(gl.PIXEL_PACK_BUFFER, null);
+    gl.bindBuffer(gl.PIXEL_PACK_BUFFER, bound);
     return words;
   } finally {
     gl.deleteBuffer(buffer);

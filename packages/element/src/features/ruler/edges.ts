@@ -19,7 +19,7 @@ interface Plane {
 }
 
 /**
- * Where an end of the ruler is set: on the plane around it, and at an edge or corner of such planes that is near. The
+ * Sets an end of the ruler on the plane around it, and on an edge or corner of such planes nearby. The
  * planes are those that most rays of a grid meet.
  */
 export const edges: Aim = {

@@ -278,7 +278,7 @@ function shownPart(camera: Camera, [a, b]: readonly Vector3[]): readonly [Vector
   if (!b) return undefined;
   const [from, to] = [a, b].map((point) => project(camera, point).depth);
   if (from <= 0 && to <= 0) return undefined;
-  // Just before the eye, the line goes on far beyond the image.
+  // A point just before the eye is far outside the image.
   const cut = 0.01 * Math.max(from, to);
   const at = (share: number): Vector3 => [0, 1, 2].map((k) => a[k] + share * (b[k] - a[k])) as unknown as Vector3;
   const crossing = (): Vector3 => at((cut - from) / (to - from));

@@ -17,7 +17,7 @@ import { packSplats } from '../../shared/splat-file.js';
  * the interval to the time of an update.
  */
 const [MIN_MS, SHARE] = [500, 10];
-/** Minimum ratio after an edit, such as a moved cut, for which somebody waits. */
+/** Minimum ratio after an edit, such as a moved cut. */
 const EDIT_SHARE = 1;
 /**
  * Height of the camera above the ground, in radii of the subject, below which the shadow fades out. From below the
@@ -115,7 +115,7 @@ export class ShadowController implements ReactiveController, Feature {
     return [...places, sources.meshes.value?.version, intensity, softness].join('|');
   }
 
-  /** Text that changes when a scene moves without anybody's doing: a generator, a clip. */
+  /** Returns a text that changes with each run of a generator and each frame of a clip. */
   #motionKey(): string {
     return this.#core.sources.members.map(({ placement: { scene } }) => scene.version).join();
   }

@@ -56,8 +56,8 @@ export class ScenePoint {
   readonly z: number;
   /**
    * Half of an interval along the line of sight, in units of viewer space, that contains the surface in 68 % of the
-   * cases or more: small on a smooth surface, large on a rough one and at edges. Infinity if no single surface is there:
-   * at glass, in haze, before the sky, and on a splat that nothing surrounds.
+   * cases or more: small on a smooth surface, large on a rough one and at edges. Infinity if the splats show no single surface:
+   * at glass, in haze, and on a splat that nothing surrounds.
    */
   readonly uncertainty: number;
 
@@ -71,7 +71,7 @@ export class ScenePoint {
 export interface PickedPoint extends ScenePoint {
   /** The `<splat-scene>` or `<splat-mesh>` at the point, or the `<gaussian-splat>` itself for its own scene. */
   readonly element: Element;
-  /** Unit normal of the surface in viewer space, towards the camera. Of rough surfaces it is off by some 10 degrees. */
+  /** Unit normal of the surface in viewer space, towards the camera. Of rough surfaces it is off by about 10 degrees. */
   readonly normal: { readonly x: number; readonly y: number; readonly z: number };
   /** Distance from the eye, in units of viewer space. */
   readonly distance: number;
