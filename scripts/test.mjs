@@ -2,7 +2,7 @@
  * `npm test`: installs missing parts (Node packages, a Chromium), builds, and tests the whole product: real Chromium with WebGPU and, beside it, the tests that draw in Node
  * (stages on Dawn, images against the oracle), the tests that need no GPU, types and style. Other ways to call it:
  * `npm test -- PATTERN` the Node test files whose path contains it; `-- --package NAME` the tests of one package; `-- --changed [COMMIT]` those of the packages that changed since a commit (else
- * since this branch left `main`) and of all that depend on them; `-- --full` whole lists, of which otherwise a part is tested.
+ * since this branch left `main`) and of all that depend on them; `-- --full` tests whole lists, not a part of them.
  * `npm run test:lab` is `--lab`: the laboratory's breadth, which the product does not depend on.
  */
 import { changedPackages, withDependants } from './lib/changed-packages.mjs';

@@ -89,7 +89,7 @@ export class Generator {
   }
 
   /**
-   * Fetches a generator, or a chain of generators of which each receives the Gaussians of the previous one, and checks
+   * Fetches a generator, or a chain of generators, each with the Gaussians of the previous one, and checks
    * them. The runtime is not fetched yet.
    * @throws ContractError, GaussianSplatError: see `openModel`; ContractError `contract/chain` for models that do not
    * match, or whose last one writes no Gaussians.

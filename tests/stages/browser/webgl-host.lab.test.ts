@@ -176,7 +176,11 @@ describe("splats in a host's frame", () => {
       const [px, py, pz] = [0, 1, 2].map((r) =>
         place!.position.reduce((sum, v, k) => sum + m[4 * r + k] * v, m[4 * r + 3]),
       );
-      assert(pz > camera.near && Math.abs(px / pz) < 1e-6 && Math.abs(py / pz) < 1e-6, `${px}, ${py}, ${pz}`);
+      const off = [
+        (camera.fx * px) / pz + camera.cx - camera.width / 2,
+        (camera.fy * py) / pz + camera.cy - camera.height / 2,
+      ];
+      assert(pz > camera.near && off.every((pixels) => Math.abs(pixels) < 1e-6), `${off} pixels, ${pz} away`);
       assert(Math.abs(place!.distance - Math.hypot(px, py, pz)) < 1e-6 * pz, `${place!.distance} away`);
       const nearest = depths.reduce((best, depth) => Math.min(best, depth), Infinity);
       assert(pz >= nearest - 0.5 && place!.uncertainty >= 0, `${pz}, splats from ${nearest} on`);
@@ -223,4 +227,37 @@ describe("splats in a host's frame", () => {
       splats.destroy();
       gl.getExtension('WEBGL_lose_context')?.loseContext();
     });
+
+  it('are sorted by a worker of the page, in the order of the main thread', async () => {
+    const gl = context(camera.width, camera.height, { antialias: false, depth: true });
+    const host = new GlHost(gl);
+    const code = new URL('../../../packages/renderer/dist/webgl/index.js', import.meta.url).href;
+    const lines = [
+      `import { sortSplats } from '${code}';`,
+      'onmessage = ({ data: { port, positions } }) => sortSplats(port, positions);',
+    ];
+    const script = URL.createObjectURL(new Blob(lines, { type: 'text/javascript' }));
+    const worker = new Worker(script, { type: 'module' });
+    const splats = await host.load(packGaussians(cloud), { worker });
+    gl.clearColor(0, 0, 0, 1);
+    const paint = (): boolean => {
+      gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
+      return splats.draw(camera, { depth: null });
+    };
+    assert(!paint(), 'an order before the worker has answered');
+    const end = performance.now() + 20_000;
+    while (!paint()) {
+      assert(performance.now() < end, 'an order of the worker');
+      await new Promise((resolve) => setTimeout(resolve, 20));
+    }
+    const found = read(gl, 0, 0, camera);
+    const expected = await alone(cloud, camera, 0);
+    const off = found.reduce((max, value, i) => Math.max(max, Math.abs(value - expected[i])), 0);
+    assert(off <= 1 && found.some((value, i) => i % 4 < 3 && value > 50), `${off} of 255`);
+    assert(paint(), 'the same view is sorted once');
+    worker.terminate();
+    splats.destroy();
+    host.destroy();
+    gl.getExtension('WEBGL_lose_context')?.loseContext();
+  });
 });

@@ -18,7 +18,7 @@ export const glBytes = ({ count, geometry, sh }: PackedGaussians): number =>
   geometry.byteLength + sh.byteLength + 4 * FRAME_WORDS * count;
 
 /** Returns [N, 3] positions of packed splats, relative to the origin of their scene. */
-export function positionsIn(geometry: Uint32Array): Float32Array {
+export function positionsIn(geometry: Uint32Array): Float32Array<ArrayBuffer> {
   const numbers = new Float32Array(geometry.buffer, geometry.byteOffset, geometry.length);
   const positions = new Float32Array((3 * geometry.length) / GEOMETRY_WORDS);
   for (let at = 0, from = 0; at < positions.length; at += 3, from += GEOMETRY_WORDS) {

@@ -8,6 +8,7 @@ import { GlGaussians, positionsIn, type RunGl } from './gl-gaussians.js';
 import { GlRenderer, type GlFrameRequest, type GlFrameTarget, type GlQuads, type GlQuadsFrame } from './gl-renderer.js';
 import { borrowState } from './gl-state.js';
 import { DATA_WIDTH, hostedQuadsFragment, hostedQuadsVertex, HostedView } from './shaders.js';
+import type { SortAnswer, SortRequest } from './sort-splats.js';
 import { isSameView, orderView, SplatOrder, type OrderView } from './splat-order.js';
 
 /** Sorts that take more than these milliseconds do not run for each frame. They use at most this fraction of the time. */
@@ -22,6 +23,14 @@ export interface GlHostFrame extends Omit<GlFrameTarget, 'keeps'>, DepthPlanes {
    * the rectangle. Null: no depth.
    */
   readonly depth?: 'framebuffer' | WebGLTexture | null | undefined;
+}
+
+export interface GlHostOptions {
+  /**
+   * Worker of the page that sorts, in place of the main thread: it calls `sortSplats` for each message. It may serve any
+   * number of scenes. Until its first order the scene is not drawn.
+   */
+  readonly worker?: Worker;
 }
 
 /** Depth texture of a host, and the frame and the request that it is for. */
@@ -91,12 +100,14 @@ export class GlHost {
    * @throws GaussianSplatError `out-of-memory/*` if memory is insufficient; `unsupported/webgl` if the browser does not
    * compile the shaders.
    */
-  async load(packed: PackedGaussians): Promise<HostedSplats> {
+  async load(packed: PackedGaussians, { worker }: GlHostOptions = {}): Promise<HostedSplats> {
     const gaussians = await GlGaussians.upload(this.#gl, packed, this.run);
     try {
       await this.run(() => GlRenderer.prepare(this.#gl));
       const renderer = this.run(() => new GlRenderer(this.#gl, gaussians));
-      return new HostedSplats(this, renderer, gaussians, new SplatOrder(positionsIn(packed.geometry)));
+      const positions = positionsIn(packed.geometry);
+      const sorter = worker ? portOf(worker, positions) : new SplatOrder(positions);
+      return new HostedSplats(this, renderer, gaussians, sorter);
     } catch (error) {
       gaussians.destroy();
       throw error;
@@ -184,20 +195,27 @@ export class HostedSplats {
   readonly #host: GlHost;
   readonly #renderer: GlRenderer;
   readonly #gaussians: GlGaussians;
-  readonly #sorter: SplatOrder;
-  readonly #order: Uint32Array;
+  /** Sorts on the main thread, or by the messages of a worker. */
+  readonly #sorter: SplatOrder | MessagePort;
+  /** Empty while the worker has it. */
+  #order: Uint32Array<ArrayBuffer>;
   #sorted: OrderView | undefined;
   #sortedAt = -Infinity;
   #sortMs = 0;
   #camera: Camera | undefined;
 
   /** @internal */
-  constructor(host: GlHost, renderer: GlRenderer, gaussians: GlGaussians, sorter: SplatOrder) {
+  constructor(host: GlHost, renderer: GlRenderer, gaussians: GlGaussians, sorter: SplatOrder | MessagePort) {
     this.#host = host;
     this.#renderer = renderer;
     this.#gaussians = gaussians;
     this.#sorter = sorter;
     this.#order = new Uint32Array(DATA_WIDTH * Math.max(1, Math.ceil(gaussians.facts.count / DATA_WIDTH)));
+    if (sorter instanceof SplatOrder) return;
+    sorter.onmessage = ({ data: { view, order, count } }: MessageEvent<SortAnswer>) => {
+      this.#order = order;
+      this.#take(view, count);
+    };
   }
 
   /**
@@ -234,6 +252,7 @@ export class HostedSplats {
   }
 
   destroy(): void {
+    if (!(this.#sorter instanceof SplatOrder)) this.#sorter.close();
     this.#renderer.destroy();
     this.#gaussians.destroy();
   }
@@ -241,15 +260,33 @@ export class HostedSplats {
   #sort(camera: Camera): boolean {
     const view = orderView(camera, this.#gaussians.facts.origin);
     if (this.#sorted && isSameView(view, this.#sorted)) return true;
+    if (!(this.#sorter instanceof SplatOrder)) {
+      const order = this.#order;
+      if (order.length > 0) this.#sorter.postMessage({ view, order } satisfies SortRequest, [order.buffer]);
+      this.#order = NO_ORDER;
+      return false;
+    }
     const begin = performance.now();
     if (this.#sortMs > QUICK_SORT_MS && begin - this.#sortedAt < this.#sortMs / SORT_SHARE) return false;
-    const count = this.#sorter.sort(view, this.#order);
-    this.#host.run(() => this.#renderer.setOrder(this.#order, count));
-    this.#sorted = view;
+    this.#take(view, this.#sorter.sort(view, this.#order));
     this.#sortedAt = performance.now();
     this.#sortMs = this.#sortedAt - begin;
     return true;
   }
+
+  #take(view: OrderView, count: number): void {
+    this.#host.run(() => this.#renderer.setOrder(this.#order, count));
+    this.#sorted = view;
+  }
+}
+
+const NO_ORDER = new Uint32Array(0);
+
+/** Gives positions to a worker, and returns the port for its orders. */
+function portOf(worker: Worker, positions: Float32Array<ArrayBuffer>): MessagePort {
+  const { port1, port2 } = new MessageChannel();
+  worker.postMessage({ port: port2, positions }, [port2, positions.buffer]);
+  return port1;
 }
 
 /** Returns the formats that the depth buffer of the bound framebuffer may have, the most likely one first. */

@@ -5,7 +5,7 @@ const LEAVE = 5;
 /** Seconds for which the button, or the pinch of both hands, must be held. */
 const [BUTTON_SECONDS, HANDS_SECONDS] = [1, 2];
 
-/** The inputs of a session that select, and the gestures by which visitors of a headset leave it. */
+/** The inputs of a session that select, and the gestures that end it in a headset. */
 export class Leaving {
   readonly #session: XrSession;
   /** Hands, which report no buttons, that pinch. */

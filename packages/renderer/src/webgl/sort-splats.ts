@@ -1,0 +1,37 @@
+/** Sorts the splats of one scene for each view of the WebGL renderer, in a worker that is started for this purpose. */
+import { SplatOrder, type OrderView } from './splat-order.js';
+
+export interface SortRequest {
+  readonly view: OrderView;
+  /** Buffer for the order, one index for each splat. It is transferred to the worker and back. */
+  readonly order: Uint32Array<ArrayBuffer>;
+}
+
+export interface SortAnswer extends SortRequest {
+  readonly count: number;
+  /** Sum over the splats of the fraction of the image that each covers; 0 if it is not computed. */
+  readonly covered: number;
+  /** Duration of sorting, ms. */
+  readonly milliseconds: number;
+}
+
+/**
+ * Sorts the splats for each request from a port.
+ * @param positions [N, 3] positions of the splats.
+ * @param areas [N] areas of the splats; undefined if their coverage is not needed.
+ *
+ * ```js
+ * // The worker of a page, for `GlHost.load(packed, { worker })`:
+ * onmessage = ({ data: { port, positions } }) => sortSplats(port, positions);
+ * ```
+ */
+export function sortSplats(port: MessagePort, positions: Float32Array, areas?: Float32Array): void {
+  const splats = new SplatOrder(positions, areas);
+  port.onmessage = ({ data: { view, order } }: MessageEvent<SortRequest>) => {
+    const begin = performance.now();
+    const count = splats.sort(view, order);
+    const { covered } = splats;
+    const answer: SortAnswer = { view, order, count, covered, milliseconds: performance.now() - begin };
+    port.postMessage(answer, [order.buffer]);
+  };
+}
