@@ -6,7 +6,8 @@ import { BUFFER_USAGE, kernelOf, type ShaderDescription } from './gpu/kernel.js'
 import { GpuMemory } from './gpu/memory.js';
 import { readBack } from './gpu/read-back.js';
 import { Stage } from './stages/stage.js';
-import { depthsOf, type ProbedSplat } from './probed-splat.js';
+import { depthsOf } from './probe-depths.js';
+import type { ProbedSplat } from './probed-splat.js';
 
 /** A point of the last drawn image to probe. */
 export interface ProbePoint {

@@ -1,8 +1,4 @@
-import type { ProbeAnswer } from './depth-probe.js';
-import { constants } from './generated/shaders.js';
 import type { Placement } from './world.js';
-
-const { PROBE_MIDDLE } = constants;
 
 /** A splat that a probe found, and its scene. */
 export interface ProbedSplat {
@@ -13,10 +9,4 @@ export interface ProbedSplat {
    * scene with levels of detail, because its splats represent several.
    */
   readonly index: number | null;
-}
-
-/** Returns the depths of an answer that have names. */
-export function depthsOf(layers: Float32Array): Pick<ProbeAnswer, 'near' | 'depth' | 'far'> {
-  const [near, depth, far] = [0, PROBE_MIDDLE, 2 * PROBE_MIDDLE].map((level) => layers[level] || null);
-  return { near, depth, far };
 }

@@ -7,7 +7,7 @@ import type { ProbeAnswer, ProbePoint } from '../depth-probe.js';
 import { constants, type layouts } from '../generated/shaders.js';
 import type { StructValues } from '../gpu/struct.js';
 import type { ProbePrograms } from './gl-programs.js';
-import { depthsOf } from '../probed-splat.js';
+import { depthsOf } from '../probe-depths.js';
 import { makeTarget, makeTexture } from './gl.js';
 import { readTexels } from './read-texels.js';
 
