@@ -1,4 +1,21 @@
 /** Implementation of `gaussian-splat check MODEL [--contract CONTRACT.json] [--run]`, by @gaussian-splat/check. */
 import { main } from '@gaussian-splat/check';
+import { parseSceneOptions, runCommand, SeveralInputs } from './lib/command.mjs';
 
-process.exit(await main(process.argv.slice(2)));
+const flag = { type: 'boolean' };
+const OPTIONS = { contract: { type: 'string' }, out: { type: 'string' }, run: flag, draft: flag };
+
+/** Returns the arguments of one model, whose faults the checker reports. */
+function parse(args) {
+  try {
+    parseSceneOptions(args, OPTIONS);
+  } catch (error) {
+    if (error instanceof SeveralInputs) throw error;
+  }
+  return args;
+}
+
+await runCommand('', parse, async (args) => process.exit(await main(args)), {
+  name: 'check',
+  accepts: (path) => /\.onnx$/i.test(path),
+});

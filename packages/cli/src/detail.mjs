@@ -16,7 +16,7 @@ import {
   DEFAULT_STEPS,
   writePages,
 } from '@gaussian-splat/optimize/pages';
-import { parseSceneOptions, runCommand, sayWarnings, UsageError } from './lib/command.mjs';
+import { parseSceneOptions, report, runCommand, sayWarnings, UsageError } from './lib/command.mjs';
 import { deflate, deflateQuickly } from './lib/encoders.mjs';
 import { dealViews, parseViews } from './lib/given-views.mjs';
 import { obstacleToFolder, writeWhole } from './lib/output-file.mjs';
@@ -53,8 +53,6 @@ function parseOptions(args) {
   if (values.out === undefined) throw new UsageError('--out is missing');
   const out = resolve(values.out);
   const scene = resolve(parsed.scene);
-  if (existsSync(scene) && statSync(scene).isDirectory())
-    throw new UsageError(`${parsed.scene} is a folder, not a scene`);
   const obstacle = obstacleToFolder(out);
   if (obstacle) throw new UsageError(`--out: ${obstacle}`);
   if (existsSync(out) && !isEmpty(out) && !isUnfinished(out)) throw new UsageError(`--out: ${values.out} is not empty`);
@@ -167,6 +165,7 @@ async function main({ scene, out, degree, geometry, minPsnr, scored, given, colu
   const { manifest, bytes } = writeFolder(out, tree, choice, places);
   const pages = manifest.instances.reduce((sum, { tree: t }) => sum + manifest.trees[t].pages.length, 0);
   const files = manifest.trees.reduce((sum, t) => sum + t.pages.length, 0);
+  report({ splats: manifest.splats, psnr: choice?.psnr });
   const perSplat = isTiled ? '' : `, ${(bytes / manifest.splats).toFixed(2)} bytes a splat`;
   const unusable = cloud.droppedCount > 0 ? `, ${cloud.droppedCount} unusable ones of the file left out,` : '';
   console.log(
@@ -183,4 +182,4 @@ async function main({ scene, out, degree, geometry, minPsnr, scored, given, colu
     );
 }
 
-await runCommand(USAGE, parseOptions, main);
+await runCommand(USAGE, parseOptions, main, { name: 'detail', endings: [''] });

@@ -9,7 +9,7 @@ import {
   voxelTreePath,
 } from '@gaussian-splat/formats/floor';
 import { basename, dirname, join, resolve } from 'node:path';
-import { CommandError, parseSceneOptions, runCommand, sayWarnings, UsageError } from './lib/command.mjs';
+import { CommandError, parseSceneOptions, report, runCommand, sayWarnings, UsageError } from './lib/command.mjs';
 import { readWhole } from './lib/input-file.mjs';
 import { checkOutput, writeWhole } from './lib/output-file.mjs';
 
@@ -95,6 +95,7 @@ async function floorOfScene(scene, up, options) {
   const openFile = (part) => readWhole(join(dirname(scene), part));
   const cloud = await readScene(await readWhole(scene), { name: basename(scene), openFile });
   sayWarnings(basename(scene), cloud);
+  report({ splats: cloud.count });
   return makeFloorMap(cloud, { ...options, frame: frameOf(up ?? cloud.hints?.up ?? AXES['-y']) });
 }
 
@@ -113,4 +114,8 @@ async function main({ scene, out, up, options }) {
   );
 }
 
-await runCommand(USAGE, parseOptions, main);
+await runCommand(USAGE, parseOptions, main, {
+  name: 'floor',
+  endings: ['.floor'],
+  accepts: (path, isScene) => isScene(path) || isVoxelPath(path),
+});

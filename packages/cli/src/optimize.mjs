@@ -18,7 +18,8 @@ import {
   RefiningEvaluator,
 } from '@gaussian-splat/optimize';
 import { inline } from '@gaussian-splat/optimize/parts';
-import { parseSceneOptions, runCommand, sayWarnings, UsageError } from './lib/command.mjs';
+import { writeCatalogue } from './lib/catalogue.mjs';
+import { parseSceneOptions, report as reportFigures, runCommand, sayWarnings, UsageError } from './lib/command.mjs';
 import { encodeWebp } from './lib/encoders.mjs';
 import { filesBeside } from './lib/files-beside.mjs';
 import { checkPython, Gate, neededDecibels } from './lib/gate/gate.mjs';
@@ -201,6 +202,7 @@ async function writeFormat({ scene, out, threads }) {
   sayWarnings(scene, cloud, lossesIn(out, cloud));
   const { bytes, encoding } = await changeFormat(cloud, { name: out, pool, encodeWebp });
   writeOut(out, bytes);
+  reportFigures({ splats: cloud.count });
   const [oldBytes, seconds] = [await bytesOf(scene), ((performance.now() - begun) / 1000).toFixed(1)];
   const share = ((100 * bytes.length) / oldBytes).toFixed(1);
   console.log(`splats       ${cloud.count}, all of the scene${cloud.droppedCount > 0 ? `; ${cloud.droppedCount} unusable ones of the file left out` : ''}
@@ -275,6 +277,7 @@ async function reduceScene({
   const { minPsnr, tries, ...result } = await search();
   writeOut(out, result.bytes);
   const { splats, coefficients } = result;
+  reportFigures({ splats: splats.after, psnr: result.psnr });
   const spent = { read, prepare, ...result.seconds, total: seconds() };
   const share = ({ before, after }) => `${((100 * after) / Math.max(1, before)).toFixed(1)} %`;
   const [oldBytes, newBytes] = [await bytesOf(scene), result.bytes.length];
@@ -297,4 +300,13 @@ seconds      ${times.join(', ')}`);
   if (report) writeWhole(report, JSON.stringify(figures, null, 2));
 }
 
-await runCommand(USAGE, parseOptions, main);
+await runCommand(USAGE, parseOptions, main, {
+  name: 'optimize',
+  endings: ['.sog', '.glb', '.spz', '.ply', '.usdz', '.usdc', '/lod-meta.json'],
+  single: ['report'],
+  finish: (folder, rows) =>
+    writeCatalogue(
+      folder,
+      rows.map((row) => ({ ...row, src: row.error ? undefined : row.out })),
+    ),
+});

@@ -7,8 +7,17 @@
 import { cpSync, existsSync, mkdirSync, readFileSync, statSync } from 'node:fs';
 import { createRequire } from 'node:module';
 import { basename, dirname, extname, join, relative, resolve } from 'node:path';
-import { fileURLToPath } from 'node:url';
-import { CommandError, parseCommandLine, runCommand, sayWarnings, UsageError } from './lib/command.mjs';
+import { addressOf, CDN, copyElement, escaped, writeCatalogue } from './lib/catalogue.mjs';
+import {
+  CommandError,
+  isCollection,
+  parseCommandLine,
+  report,
+  runCommand,
+  sayWarnings,
+  SeveralInputs,
+  UsageError,
+} from './lib/command.mjs';
 import { filesBeside } from './lib/files-beside.mjs';
 import { obstacleToFolder, writeWhole } from './lib/output-file.mjs';
 import { serve } from './lib/server.mjs';
@@ -22,22 +31,24 @@ const USAGE = `usage: gaussian-splat page SCENE... FOLDER [options]
   --usdz        also writes the splats as OpenUSD (.usdz) into the folder, for programs that read ParticleField3DGaussianSplat
   --port N      port of the server that shows the page (default 8000, or a free one if it is taken)
   --no-serve    ends when the page is written
+  --catalogue   lists the scenes, and shows one at a time; the default for a folder or a pattern
+  --scene-only  reads and copies the scenes, without the element and a page
 `;
-const elementFile = (path) => fileURLToPath(new URL(path, import.meta.resolve('@gaussian-splat/element/package.json')));
-const CDN = elementFile('cdn');
 /** Module with the element and all of its late-loaded chunks. */
 const ELEMENT = new URL('../dist/single.js', import.meta.url);
 const SCRIPT = '<script type="module" src="cdn/gaussian-splat.min.js"></script>';
 
-async function makePage({ scenes, folder, port, isServed, isSingle, hasUsdz }) {
+async function makePage({ scenes, folder, port, isServed, isSingle, isSceneOnly, hasUsdz }) {
   const page = join(folder, 'index.html');
   const tags = [];
   for (const scene of scenes) tags.push(await tagShowing(scene));
   mkdirSync(folder, { recursive: true });
-  if (isSingle) await writeSingle(scenes[0], tags[0], page);
+  if (isSceneOnly)
+    for (const [k, scene] of scenes.entries()) report({ source: await copyScene(scene, folder), tag: tags[k] });
+  else if (isSingle) await writeSingle(scenes[0], tags[0], page);
   else await writeFolder(scenes, tags, folder, page);
   for (const scene of hasUsdz ? scenes : []) await writeUsdz(scene, folder);
-  console.log(`\nThe page is ${isSingle ? page : `in ${folder}`}`);
+  if (!isSceneOnly) console.log(`\nThe page is ${isSingle ? page : `in ${folder}`}`);
   if (isServed) await show(folder, port);
 }
 
@@ -108,15 +119,18 @@ async function writeSingle(scene, tag, page) {
 function parseOptions(args) {
   const flag = { type: 'boolean', default: false };
   const options = { port: { type: 'string', default: '8000' }, 'no-serve': flag, single: flag, usdz: flag };
+  Object.assign(options, { catalogue: flag, 'scene-only': flag });
   const parsed = parseCommandLine(args, options);
   if (parsed === undefined) return undefined;
   const { values, positionals } = parsed;
   if (positionals.length < 2) throw new UsageError('A scene and a folder are needed');
+  const inputs = positionals.slice(0, -1);
+  if (values.catalogue || inputs.some(isCollection))
+    throw new SeveralInputs(inputs, { ...values, out: positionals.at(-1) }, options);
   const paths = positionals.map((path) => resolve(path));
   const [folder, scenes] = [paths.pop(), paths];
   for (const scene of scenes) {
     if (!existsSync(scene)) throw new UsageError(`There is no file ${scene}`);
-    if (!statSync(scene).isFile()) throw new UsageError(`${scene} is a folder: name the scene's file in it`);
   }
   // Scenes of several files are copied with their folders.
   const nameOf = (scene) => (/\.(json|gltf)$/i.test(scene) ? basename(dirname(scene)) : '') + basename(scene);
@@ -134,19 +148,11 @@ function parseOptions(args) {
     scenes,
     folder,
     port,
-    isServed: !values['no-serve'] && !values.single,
+    isServed: !values['no-serve'] && !values.single && !values['scene-only'],
+    isSceneOnly: values['scene-only'],
     isSingle: values.single,
     hasUsdz: values.usdz,
   };
-}
-
-/** Copies the element without source maps, and without ONNX Runtime (43 MB) unless a scene is a generator. */
-function copyElement(target, withRuntime) {
-  const isNeeded = (path) => {
-    const inside = relative(CDN, path);
-    return !inside.endsWith('.map') && (withRuntime || !inside.startsWith('onnxruntime'));
-  };
-  cpSync(CDN, target, { recursive: true, filter: isNeeded });
 }
 
 /** Copies ONNX Runtime, which the published element does not contain: it is a dependency of the checker. */
@@ -209,10 +215,8 @@ const plainTitleOf = (scene) => (isJson(scene) ? basename(dirname(scene)) : base
 
 /** Returns the title of a page: the name of the scene's file, or of the folder of a JSON file. */
 function titleOf(scene) {
-  return plainTitleOf(scene).replaceAll('&', '&amp;').replaceAll('"', '&quot;').replaceAll('<', '&lt;');
+  return escaped(plainTitleOf(scene));
 }
-
-const addressOf = (source) => source.split('/').map(encodeURIComponent).join('/');
 
 /** Returns the HTML that shows a scene, or a mesh, which is a child of the element. */
 function elementOf(tag, title, src = '', attributes = '') {
@@ -252,4 +256,20 @@ async function show(folder, port) {
   await new Promise((resolve) => server.once('close', resolve));
 }
 
-await runCommand(USAGE, parseOptions, makePage);
+/** Writes the page of a batch, with ONNX Runtime if a scene needs it. */
+async function finishCatalogue(folder, rows) {
+  const shown = rows.map((row) => ({ ...row, src: row.error ? undefined : `${row.out}/${row.source}` }));
+  writeCatalogue(folder, shown);
+  if (shown.some(({ src }) => src && isModel(src))) await copyRuntime(join(folder, 'cdn/onnxruntime'));
+}
+
+await runCommand(USAGE, parseOptions, makePage, {
+  name: 'page',
+  endings: [''],
+  single: ['single'],
+  own: ['catalogue', 'no-serve', 'port'],
+  accepts: (path, isScene) => isScene(path) || /\.(onnx|gsv|4dgs)$/i.test(path),
+  argumentsFor: (scene, out) => [scene, out, '--scene-only'],
+  finish: finishCatalogue,
+  afterwards: (folder, values) => (values['no-serve'] ? undefined : show(folder, Number(values.port ?? 8000))),
+});

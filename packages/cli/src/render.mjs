@@ -2,7 +2,7 @@
 import { basename, resolve } from 'node:path';
 import { cameraFromCalibration } from '@gaussian-splat/core';
 import { isClip } from './lib/clip-frame.mjs';
-import { parseSceneOptions, runCommand, sayWarnings, UsageError } from './lib/command.mjs';
+import { parseSceneOptions, report, runCommand, sayWarnings, UsageError } from './lib/command.mjs';
 import {
   DRAW_OPTIONS,
   encodePng,
@@ -91,6 +91,7 @@ async function render(options) {
 
   if (options.out) writeWhole(resolve(options.out), encodePng(toBytes(pixels), camera.width, camera.height));
   if (options.float) writeWhole(resolve(options.float), new Uint8Array(pixels.buffer));
+  report({ splats: cloud.count });
   const { width, height } = camera;
   console.log(
     `${options.scene}: ${cloud.count} splats, SH degree ${cloud.shDegree}, ${mode}; ` +
@@ -99,4 +100,4 @@ async function render(options) {
   );
 }
 
-await runCommand(USAGE, parseOptions, render);
+await runCommand(USAGE, parseOptions, render, { name: 'render', endings: ['.png'], single: ['float'] });

@@ -1,9 +1,9 @@
 /** Implementation of `gaussian-splat sequence`: converts a sequence of scene files to a clip. */
-import { existsSync } from 'node:fs';
+import { existsSync, readFileSync } from 'node:fs';
 import { basename, dirname, join, resolve } from 'node:path';
 import { framePath, parseSequence, readScene } from '@gaussian-splat/formats';
 import { deviceDescriptor, pickInitialVariants } from '@gaussian-splat/renderer';
-import { CommandError, parseSceneOptions, runCommand, UsageError } from './lib/command.mjs';
+import { CommandError, parseSceneOptions, report, runCommand, UsageError } from './lib/command.mjs';
 import { codeClip, drawOn } from '@gaussian-splat/optimize';
 import { openClipStore } from './lib/clip-store.mjs';
 import { encodeWebp } from './lib/encoders.mjs';
@@ -76,6 +76,7 @@ async function main({ manifest, out, minPsnr, isDemanded, maxMbps, framesPerGrou
   });
   writeWhole(out, clip.bytes);
   store.remove();
+  report({ splats: clip.splats, psnr: clip.psnr });
   const sourceBytes = [...sizes.values()].reduce((sum, bytes) => sum + bytes, 0);
   const seconds = frameCount / framesPerSecond;
   const megabytes = (bytes) => `${(bytes / 1e6).toFixed(2)} MB`;
@@ -92,4 +93,8 @@ async function main({ manifest, out, minPsnr, isDemanded, maxMbps, framesPerGrou
     );
 }
 
-await runCommand(USAGE, parseOptions, main);
+await runCommand(USAGE, parseOptions, main, {
+  name: 'sequence',
+  endings: ['.gsv'],
+  accepts: (path) => /\.json$/i.test(path) && readFileSync(path, 'utf8').includes('"gaussianSplatSequence"'),
+});

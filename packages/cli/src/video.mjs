@@ -5,7 +5,7 @@
 import { existsSync, mkdirSync, readdirSync, statSync } from 'node:fs';
 import { join, resolve } from 'node:path';
 import { camerasAlong } from '@gaussian-splat/element/camera-path.js';
-import { parseSceneOptions, runCommand, sayWarnings, UsageError } from './lib/command.mjs';
+import { parseSceneOptions, report, runCommand, sayWarnings, UsageError } from './lib/command.mjs';
 import {
   DRAW_OPTIONS,
   encodePng,
@@ -14,6 +14,7 @@ import {
   readDrawOptions,
   toBytes,
 } from './lib/draw-scene.mjs';
+import { isClip } from './lib/clip-frame.mjs';
 import { checkVideo, isVideo, keepsAlpha, openVideo } from './lib/ffmpeg.mjs';
 import { readJson } from './lib/input-file.mjs';
 import { checkOutput, obstacleToFolder, writeWhole } from './lib/output-file.mjs';
@@ -171,10 +172,15 @@ async function video(options) {
     await output.abort();
     throw error;
   }
+  report({ splats: cloud.count });
   console.log(
     `${options.out}: ${cameras.length} frames of ${width}x${height}, ${+(cameras.length / frameRate).toFixed(2)} s; ` +
       `${cloud.count} splats by ${renderer.viewpoint.rasterizer} in ${renderer.accumulation} on ${renderer.adapterName}`,
   );
 }
 
-await runCommand(USAGE, parseOptions, video);
+await runCommand(USAGE, parseOptions, video, {
+  name: 'video',
+  endings: ['.webm', '.mp4'],
+  accepts: (path, isScene) => isScene(path) || isClip(path),
+});

@@ -1,4 +1,5 @@
 /** Common parts of the commands for one scene: options, usage errors, and exit codes. */
+import { existsSync, statSync } from 'node:fs';
 import { parseArgs } from 'node:util';
 import { GaussianSplatError } from '@gaussian-splat/core';
 
@@ -37,18 +38,35 @@ function joinValues(args, options) {
   return joined;
 }
 
+/** Inputs of a command line that names several files, a folder or a pattern: `runCommand` runs each file alone. */
+export class SeveralInputs extends Error {
+  constructor(inputs, values, options) {
+    super(`expected one file, found ${inputs.join(' ')}`);
+    this.inputs = inputs;
+    const isGiven = ([name, value]) => value !== options[name]?.default;
+    this.values = Object.fromEntries(Object.entries(values).filter(isGiven));
+  }
+}
+
 /**
  * Parses the command line of a command for one scene: see {@link parseCommandLine}.
  * @returns The values, and the path of the scene; undefined if help is requested.
- * @throws UsageError for unknown options, and for no scene or several.
+ * @throws UsageError for unknown options, and for no scene. SeveralInputs for several, a folder, or a pattern.
  */
 export function parseSceneOptions(args, options) {
-  const parsed = parseCommandLine(args, options);
+  const all = { ...options, as: { type: 'string' } };
+  const parsed = parseCommandLine(args, all);
   if (parsed === undefined) return undefined;
   const { values, positionals } = parsed;
-  if (positionals.length !== 1) throw new UsageError(`expected one SCENE, found ${positionals.length}`);
+  if (positionals.length === 0) throw new UsageError('expected a SCENE, found none');
+  if (positionals.length > 1 || isCollection(positionals[0])) throw new SeveralInputs(positionals, values, all);
+  if (values.as !== undefined) throw new UsageError('--as: expected with several files, whose outputs it names');
   return { values, scene: positionals[0] };
 }
+
+/** Whether an input is a folder or a pattern such as `scenes/*.ply`, rather than a file. */
+export const isCollection = (input) =>
+  existsSync(input) ? statSync(input).isDirectory() : /[*?]/.test(input) && !URL.canParse(input);
 
 /**
  * Prints the unused parts of a scene file to the error stream.
@@ -61,26 +79,55 @@ export function sayWarnings(scene, { warnings = [] }, losses = []) {
 /** Whether it is a file system error: ENOENT, EACCES, ENOSPC. Its message is clear enough for users. */
 const isOfFiles = ({ code, syscall }) => syscall !== undefined || /^E[A-Z]+$/.test(code);
 
+const figures = {};
+
+/** Adds figures of the file that was read or written to the row of a batch: `splats`, `psnr`. */
+export const report = (found) => Object.assign(figures, found);
+
+/** Sends the result to the process that runs a batch, if this is one of its commands. */
+const send = (message) => new Promise((resolve) => (process.send ? process.send(message, resolve) : resolve()));
+
 /**
  * Runs a command and ends the process, which Dawn would keep alive: exit code 0, 2 for an invalid command line, 1 for
  * other errors.
  * @param usage {string}
  * @param parse {(args: string[]) => object | undefined} Undefined if help is requested.
  * @param main {(options: object) => Promise<void>}
+ * @param batch How the command runs for several files: see `runBatch` of batch.mjs.
  */
-export async function runCommand(usage, parse, main) {
+export async function runCommand(usage, parse, main, batch) {
   try {
     const options = parse(process.argv.slice(2));
-    if (options === undefined) console.log(usage);
+    if (options === undefined) console.log(usage + SEVERAL);
     else await main(options);
+    await send({ figures });
     process.exit(0);
   } catch (error) {
-    if (error instanceof UsageError) console.error(`${error.message}\n\n${usage}`);
+    const shown = error instanceof SeveralInputs ? await runSeveral(error, batch) : error;
+    const { message, code } = shown;
+    await send({ error: { message, code } });
+    if (shown instanceof UsageError) console.error(`${message}\n\n${usage}${SEVERAL}`);
     // File system errors contain the file name, except for reading a folder.
-    else if (error.code === 'EISDIR') console.error(`${error.message}: expected a file, found a folder`);
-    else if (error instanceof GaussianSplatError || error instanceof CommandError || isOfFiles(error))
-      console.error(error.message);
-    else console.error(error);
-    process.exit(error instanceof UsageError ? 2 : 1);
+    else if (code === 'EISDIR') console.error(`${message}: expected a file, found a folder`);
+    else if (shown instanceof GaussianSplatError || shown instanceof CommandError || isOfFiles(shown))
+      console.error(message);
+    else console.error(shown);
+    process.exit(shown instanceof UsageError ? 2 : 1);
+  }
+}
+
+const SEVERAL = `
+Several files, a folder, or a pattern such as "scenes/**/*.ply" in place of SCENE: --out names a folder for all outputs,
+--as their extension. A file with an error does not stop the others; results.json has the table, and a second run
+continues. Exit status 1 if a file has an error.
+`;
+
+/** Runs a command for several files, and ends the process. @returns The error of a run that could not begin. */
+async function runSeveral({ inputs, values }, batch) {
+  try {
+    const { runBatch } = await import('./batch.mjs');
+    process.exit(await runBatch(batch, inputs, values));
+  } catch (error) {
+    return error;
   }
 }
