@@ -1,14 +1,12 @@
 /**
- * Implementation of `gaussian-splat detail`: reads a scene, builds its levels of detail, and writes them as pages with
- * a manifest.
+ * Implementation of `gaussian-splat detail`: reads a scene of any size, builds its levels of detail by cells, and writes
+ * them as pages with a manifest.
  */
-import { existsSync, mkdirSync, readdirSync, rmSync, statSync, writeFileSync } from 'node:fs';
-import { dirname, join, resolve } from 'node:path';
-import { readScene, toDegree, upright, uprightRotation } from '@gaussian-splat/formats';
+import { existsSync, mkdirSync, readdirSync, readFileSync, rmdirSync, rmSync, statSync, writeFileSync } from 'node:fs';
+import { join, resolve } from 'node:path';
 import { deviceDescriptor, pickInitialVariants } from '@gaussian-splat/renderer';
 import { lossesIn } from '@gaussian-splat/optimize';
 import {
-  buildDetailTree,
   codingFor,
   cutPages,
   findPageSteps,
@@ -17,10 +15,21 @@ import {
   writePages,
 } from '@gaussian-splat/optimize/pages';
 import { parseSceneOptions, report, runCommand, sayWarnings, UsageError } from './lib/command.mjs';
+import {
+  buildPart,
+  finishBuild,
+  isUnfinished,
+  joinParts,
+  openBuild,
+  parseMemory,
+  UNFINISHED,
+  usualCoding,
+  wholeTree,
+} from './lib/detail/build.mjs';
+import { inputsOf } from './lib/detail/inputs.mjs';
 import { deflate, deflateQuickly } from './lib/encoders.mjs';
 import { dealViews, parseViews } from './lib/given-views.mjs';
 import { obstacleToFolder, writeWhole } from './lib/output-file.mjs';
-import { readWhole } from './lib/input-file.mjs';
 
 const USAGE = `usage: gaussian-splat detail SCENE --out FOLDER [options]
 
@@ -33,6 +42,11 @@ const USAGE = `usage: gaussian-splat detail SCENE --out FOLDER [options]
   --exact         the same with centers, shapes and opacities as float32 keeps them, in three to four times the bytes
   --tile AxB      A times B copies of the scene on a plane, to try large scenes; they share their files
   --spacing LEN   world units between copies; default: 2.5 times the radius of the scene
+  --memory SIZE   such as 2GB, the most that the command takes; default: half of the machine's. Larger scenes are built in cells, on the disk of FOLDER
+  --part I/N      builds one of N parts of the cells, into the same FOLDER, on any machine that sees it; ended parts are not built again
+  --join          builds the levels above the parts, and writes detail.json
+
+SCENE may be a list of files: {"scenes": [{"file": "a.ply", "transform": [16 numbers, column by column]}, ...]}
 `;
 
 function parseOptions(args) {
@@ -47,6 +61,7 @@ function parseOptions(args) {
     'score-views': text,
     quantized: { type: 'boolean' },
     exact: { type: 'boolean' },
+    ...{ memory: text, part: text, join: { type: 'boolean' } },
   });
   if (parsed === undefined) return undefined;
   const { values } = parsed;
@@ -76,6 +91,9 @@ function parseOptions(args) {
   const scored = Number(values['score-views'] ?? 216);
   if (!(Number.isInteger(scored) && scored >= 24 && scored <= 2000))
     throw new UsageError(`--score-views: expected a whole number from 24 to 2000, found "${values['score-views']}"`);
+  const isInParts = values.part !== undefined || values.join === true;
+  if (values.part !== undefined && values.join) throw new UsageError('expected either --part or --join');
+  if (isInParts && values.tile !== undefined) throw new UsageError('--tile: expected without --part and --join');
   const views = values.views === undefined ? undefined : resolve(values.views);
   return {
     ...{ scene, out, degree, scored },
@@ -86,16 +104,20 @@ function parseOptions(args) {
     columns: Number(tile[1]),
     rows: Number(tile[2]),
     spacing,
+    memory: parseMemory(values.memory),
+    part: values.part === undefined ? undefined : parsePart(values.part),
+    isJoining: values.join === true,
   };
 }
 
 const isEmpty = (folder) => readdirSync(folder).length === 0;
 
-/** Whether the folder contains an interrupted run: our pages without the manifest, which is written last. */
-function isUnfinished(folder) {
-  const pages = join(folder, 'pages');
-  if (readdirSync(folder).join() !== 'pages' || !statSync(pages).isDirectory()) return false;
-  return readdirSync(pages).every((name) => /^(scene|top|part)-\d{5,}\.bin$/.test(name));
+/** Reads I/N. @throws UsageError */
+function parsePart(text) {
+  const [index, of] = /^(\d+)\/(\d+)$/.exec(text)?.slice(1).map(Number) ?? [];
+  if (!(index >= 1 && index <= of && of <= 100_000))
+    throw new UsageError(`--part: expected I/N with I from 1 to N, such as 1/4, found "${text}"`);
+  return { index, of };
 }
 
 /** A device, or undefined with a message if none is available for measuring. */
@@ -112,9 +134,8 @@ async function deviceToMeasure() {
   }
 }
 
-/** Coding of the files, and its accuracy; undefined for uncompressed files. */
-async function chooseCoding({ tree, cloud, minPsnr, scored, views }) {
-  if (minPsnr === undefined) return undefined;
+/** Coding of the files of a scene in one tree, and its accuracy. */
+async function measuredCoding({ tree, cloud, minPsnr, scored, views }) {
   const device = await deviceToMeasure();
   if (device === undefined) return { coding: codingFor(DEFAULT_STEPS, tree), deflate };
   const { steps, ...found } = await findPageSteps({
@@ -124,53 +145,81 @@ async function chooseCoding({ tree, cloud, minPsnr, scored, views }) {
   return { coding: codingFor(steps, tree), deflate, ...found };
 }
 
-/**
- * Writes pages first, then their manifest: a folder without one is not a scene. If writing fails, the pages are
- * removed.
- */
-function writeFolder(out, tree, coded, places) {
-  const pages = join(out, 'pages');
-  if (existsSync(out) && isUnfinished(out)) rmSync(pages, { recursive: true });
-  mkdirSync(pages, { recursive: true });
-  try {
-    let bytes = 0;
-    const put = (path, file) => {
-      writeFileSync(join(out, path), file);
-      bytes += file.length;
-    };
-    const manifest = writePages(tree, { coded, places, put });
-    writeWhole(join(out, 'detail.json'), JSON.stringify(manifest));
-    return { manifest, bytes };
-  } catch (error) {
-    rmSync(pages, { recursive: true, force: true });
-    throw error;
-  }
+/** File of an unfinished build with the coding of a scene of one cell, and its accuracy. */
+const CODING = 'coding.json';
+
+/** Returns the function that `buildPart` calls for the coding of a cell. Cells of a larger scene have the usual one. */
+function codingOf(build, { minPsnr, scored, given }) {
+  const { cells, folder, spool } = build;
+  if (minPsnr === undefined || cells.count > 1) return async () => usualCoding(minPsnr);
+  return async (tree, cloud) => {
+    const views = given && dealViews(given.views, given.path, spool.turn).dealt;
+    const choice = await measuredCoding({ tree, cloud, minPsnr, scored, views });
+    const { coding, psnr, worstPsnr } = choice;
+    writeWhole(join(folder, CODING), JSON.stringify({ coding, psnr, worstPsnr }));
+    return choice;
+  };
 }
 
-async function main({ scene, out, degree, geometry, minPsnr, scored, given, columns, rows, spacing }) {
-  const openFile = (path) => readWhole(join(dirname(scene), path));
-  const read = await readScene(await readWhole(scene), { name: scene, openFile });
-  sayWarnings(scene, read, lossesIn('detail.json', read));
-  // Pages store no up direction, so the scene is rotated to the default, (0, -1, 0).
-  const cloud = upright(toDegree(Math.min(degree, read.shDegree), read));
-  const views = given && dealViews(given.views, given.path, uprightRotation(read)).dealt;
+/** Returns the coding that the parts of a build have had. */
+function chosenCoding({ folder }, minPsnr) {
+  const path = join(folder, CODING);
+  return existsSync(path) ? { ...JSON.parse(readFileSync(path, 'utf8')), deflate } : usualCoding(minPsnr);
+}
+
+/** Writes a scene of one cell several times. @returns The manifest. */
+async function writeCopies(build, options) {
+  const { columns, rows, spacing } = options;
+  const { cells, out, folder } = build;
+  const { tree, cloud } = cells.count === 1 ? wholeTree(build) : {};
+  if (tree === undefined || tree.levels.length === 1) {
+    rmSync(folder, { recursive: true });
+    if (isEmpty(out)) rmdirSync(out);
+    const expected = tree ? 'a scene of more than 256 splats' : 'a scene that fits into --memory';
+    throw new UsageError(`--tile: expected ${expected}`);
+  }
+  const coded = await codingOf(build, options)(tree, cloud);
+  const places = placesOnGrid(columns, rows, spacing ?? 2.5 * tree.bounds.radius);
+  const put = (path, file) => writeFileSync(join(out, path), file);
+  mkdirSync(join(out, 'pages'), { recursive: true });
+  return writePages(tree, { coded, places, put });
+}
+
+async function main(options) {
+  const { scene, out, degree, geometry, minPsnr, scored, given, columns, rows, memory, part, isJoining } = options;
+  const inputs = inputsOf(scene);
+  // Pages without a plan are those of another program.
+  if (existsSync(out) && !existsSync(join(out, UNFINISHED)))
+    rmSync(join(out, 'pages'), { recursive: true, force: true });
   const start = performance.now();
-  const tree = buildDetailTree(cloud, { geometry });
-  const built = performance.now();
+  const facts = [minPsnr ?? null, scored, given?.views ?? null];
+  const build = await openBuild(out, inputs, { degree, geometry, memory, facts });
+  const { cells, spool } = build;
+  sayWarnings(scene, spool, lossesIn('detail.json', { ...spool.rule, warnings: spool.warnings }));
+  if (cells.count > 1)
+    console.log(
+      `${spool.count} splats in ${cells.count} cells of ${cells.range(0).end}, for ${gigabytes(memory)} of memory`,
+    );
+  if (given && cells.count > 1) throw new UsageError('--views: expected a scene that fits into --memory');
   const isTiled = columns * rows > 1;
-  if (isTiled && tree.levels.length === 1) throw new UsageError('--tile: expected a scene of more than 256 splats');
-  const places = isTiled ? placesOnGrid(columns, rows, spacing ?? 2.5 * tree.bounds.radius) : undefined;
-  const choice = await chooseCoding({ tree, cloud, minPsnr, scored, views });
-  const coded = performance.now();
-  const { manifest, bytes } = writeFolder(out, tree, choice, places);
+  let manifest = isTiled ? await writeCopies(build, options) : undefined;
+  if (!isTiled && !isJoining) {
+    const onCell = (done, all) => cells.count > 1 && console.log(`  ${done} of ${all} cells, ${memoryUsed()}`);
+    await buildPart(build, part ?? { index: 1, of: 1 }, { codingOf: codingOf(build, options), onCell });
+  }
+  if (part) return console.log(`part ${part.index} of ${part.of} in ${seconds(start)} s, ${memoryUsed()}: ${out}`);
+  const choice = minPsnr === undefined ? undefined : chosenCoding(build, minPsnr);
+  manifest ??= joinParts(build, choice);
+  finishBuild(build, manifest);
+  const files = manifest.trees.flatMap((tree) => tree.pages.map(({ file }) => file));
+  const bytes = files.reduce((sum, file) => sum + statSync(join(out, file)).size, 0);
   const pages = manifest.instances.reduce((sum, { tree: t }) => sum + manifest.trees[t].pages.length, 0);
-  const files = manifest.trees.reduce((sum, t) => sum + t.pages.length, 0);
   report({ splats: manifest.splats, psnr: choice?.psnr });
   const perSplat = isTiled ? '' : `, ${(bytes / manifest.splats).toFixed(2)} bytes a splat`;
-  const unusable = cloud.droppedCount > 0 ? `, ${cloud.droppedCount} unusable ones of the file left out,` : '';
+  const unusable = spool.droppedCount > 0 ? `, ${spool.droppedCount} unusable ones of the file left out,` : '';
   console.log(
-    `${manifest.splats} splats${unusable} in ${pages} pages (${files} files, ${(bytes / 1e6).toFixed(1)} MB${perSplat}); levels in ` +
-      `${((built - start) / 1000).toFixed(1)} s, pages in ${((performance.now() - coded) / 1000).toFixed(1)} s: ${join(out, 'detail.json')}`,
+    `${manifest.splats} splats${unusable} in ${pages} pages (${files.length} files, ${(bytes / 1e6).toFixed(1)} MB${perSplat}) ` +
+      `in ${seconds(start)} s, ${memoryUsed()}: ${join(out, 'detail.json')}`,
   );
   if (choice?.psnr !== undefined)
     console.log(
@@ -182,4 +231,9 @@ async function main({ scene, out, degree, geometry, minPsnr, scored, given, colu
     );
 }
 
-await runCommand(USAGE, parseOptions, main, { name: 'detail', endings: [''] });
+const gigabytes = (bytes) => `${(bytes / 1e9).toFixed(2)} GB`;
+const seconds = (start) => ((performance.now() - start) / 1000).toFixed(1);
+/** Returns the peak memory of the process. */
+const memoryUsed = () => `${gigabytes(1024 * process.resourceUsage().maxRSS)} of memory at most`;
+
+await runCommand(USAGE, parseOptions, main, { name: 'detail', endings: [''], single: ['part', 'join'] });

@@ -16,9 +16,9 @@ export {
 export { packFiller, packLevelGeometry, packLevelSh } from './levels/pack-level.js';
 export { chunksOf, emptyLevel, FACTOR_NUMBERS, leafLevel, shNumbers, type SplatLevel } from './levels/splat-level.js';
 export { CHUNK_NUMBERS } from './pack/words.js';
-export { isOfPlanes, sampleAxis } from './pack/morton.js';
+export { codesAlong, curveThrough, isOfPlanes, sampleAxis, type Curve } from './pack/morton.js';
 export { AuxiliaryOutputs } from './rasterizers/auxiliary-outputs.js';
-export { packedOrder } from './pack/pack.js';
+export { packedOrder, usableIndices } from './pack/pack.js';
 export { recentered } from './pack/recenter.js';
 export { type ShPrecision } from './pack/words.js';
 export { choosePrecision, noiseIn, SCALE_BIAS, SCALE_STEPS } from './pack/sh.js';

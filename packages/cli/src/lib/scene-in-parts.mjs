@@ -26,7 +26,7 @@ function readRows(path, { head, ranges }, parts, to, pool) {
  * Returns the location of the rows of a file, and the bytes before them. Undefined if the file is incomplete, invalid, or
  * cannot be read in ranges; reading the whole file then reports its faults.
  */
-async function rangesOf(path) {
+export async function rangesOf(path) {
   const { beginning, size } = readBeginning(path);
   const ranges = await splatRanges(beginning, path).catch(() => undefined);
   if (ranges?.rows === undefined) return undefined;

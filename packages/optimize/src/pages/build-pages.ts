@@ -3,7 +3,6 @@ import { boundsOf, validateCloud, type GaussianCloud } from '@gaussian-splat/cor
 import {
   boundLevel,
   CENTER_ROUNDING,
-  choosePrecision,
   CHUNK_NUMBERS,
   type ChunkErrors,
   chunksOf,
@@ -14,8 +13,7 @@ import {
   leafErrors,
   leafLevel,
   levelsAbove,
-  noiseIn,
-  packedOrder,
+  usableIndices,
   packFiller,
   packLevelGeometry,
   packLevelSh,
@@ -24,11 +22,20 @@ import {
   pageLayout,
   parentErrors,
   QUANTIZED_CHUNK_WORDS,
-  recentered,
   type SplatLevel,
   widenReach,
 } from '@gaussian-splat/renderer/tools';
-import { shellOrder } from './shell-order.js';
+import {
+  countShells,
+  keysOf,
+  orderBy,
+  planScene,
+  positionsFrom,
+  sampleOf,
+  takeRows,
+  type ScenePlan,
+} from './scene-plan.js';
+import { placeShells } from './shell-order.js';
 
 const { CULL_GROUP } = constants;
 
@@ -44,10 +51,11 @@ export interface BuiltPage {
 }
 
 /** Levels of detail of a scene, or of a part of it, before the division into pages. Level 0 is the finest. */
-export interface DetailTree extends Pick<
-  DetailManifest,
-  'splats' | 'shPrecision' | 'geometry' | 'antialiased' | 'filterVariance' | 'order' | 'origin' | 'bounds'
-> {
+export interface DetailTree extends Omit<ScenePlan, 'curve' | 'shells'> {
+  /** Number of splats without padding. */
+  readonly splats: number;
+  /** Whether the finest level of the tree merges splats of finer levels, which are in other trees. */
+  readonly isMerged?: boolean | undefined;
   readonly levels: readonly SplatLevel[];
   /** Rows of the struct `Chunk` for each level. */
   readonly chunks: readonly Float32Array[];
@@ -69,31 +77,36 @@ export interface DetailTreeOptions {
 export function buildDetailTree(given: GaussianCloud, { geometry }: DetailTreeOptions = {}): DetailTree {
   validateCloud(given);
   const standing = upright(given);
-  const cloud = recentered(standing);
-  const kept = packedOrder(cloud);
-  const { antialiased, filterVariance, origin, hints } = cloud;
-  const shPrecision = choosePrecision(noiseIn(cloud, kept), kept.length);
-  const leaves = leavesOf(cloud, kept, geometry);
-  const facts = {
-    splats: kept.length,
-    shPrecision,
-    geometry,
-    antialiased,
-    filterVariance,
-    order: hints?.order,
-    origin,
-    bounds: boundsOf(standing),
-  };
-  return { ...treeOf([leaves, ...levelsAbove(leaves)], geometry), ...facts };
+  const usable = usableIndices(standing);
+  const plan = planScene(sampleOf(standing, usable), boundsOf(standing), geometry);
+  const cloud = { ...standing, origin: plan.origin, positions: positionsFrom(plan.origin, standing) };
+  const { order, fillers } = orderOf(plan, cloud.positions, usable);
+  const leaves = leafLevel(cloud, order);
+  for (const { first, end } of fillers) leaves.opacities.fill(0, first, end);
+  return treeOfPlan(plan, [leaves, ...levelsAbove(leaves)], { splats: usable.length });
 }
 
-/** Returns the finest level. For quantized geometry, {@link shellOrder} limits the extent of its chunks. */
-function leavesOf(cloud: GaussianCloud, kept: Uint32Array, geometry: DetailTree['geometry']): SplatLevel {
-  if (geometry === undefined) return leafLevel(cloud, kept);
-  const { order, fillers } = shellOrder(cloud.positions, kept);
-  const leaves = leafLevel(cloud, order);
-  for (const place of fillers) leaves.opacities[place] = 0;
-  return leaves;
+/** Returns the splats in the order of a plan, with padding splats, which repeat the splat before them. */
+function orderOf(plan: ScenePlan, positions: Float32Array, usable: Uint32Array) {
+  const keys = keysOf(plan, takeRows(positions, 3, usable));
+  const { end, fillers } = placeShells(countShells(keys));
+  const sorted = orderBy(keys);
+  const order = new Uint32Array(end);
+  let [from, at] = [0, 0];
+  for (const gap of [...fillers, { first: end, end }]) {
+    for (; at < gap.first; at++) order[at] = usable[sorted[from++]];
+    for (; at < gap.end; at++) order[at] = order[at - 1];
+  }
+  return { order, fillers };
+}
+
+/** Returns the tree of a scene, or of a part of it, with the facts of the scene. */
+export function treeOfPlan(
+  plan: ScenePlan,
+  levels: readonly SplatLevel[],
+  { splats, isMerged, errors }: { splats: number; isMerged?: boolean; errors?: ChunkErrors },
+): DetailTree {
+  return { ...treeOf(levels, plan.geometry, errors), ...plan, splats, isMerged };
 }
 
 /** Computes bounds and errors of levels. @param leaves Errors of the finest level; by default computed. */
@@ -115,7 +128,7 @@ export function treeOf(
  * @param withTop Whether pages include the coarsest chunk. If false, it belongs to another tree, and the first page begins
  * with its children.
  */
-export function cutPages({ levels }: Pick<DetailTree, 'levels'>, withTop = true): BuiltPage[] {
+export function cutPages({ levels }: { levels: readonly Pick<SplatLevel, 'count'>[] }, withTop = true): BuiltPage[] {
   const pages: BuiltPage[] = [];
   const below = (level: number, chunks: readonly number[]): number[] =>
     level < 0

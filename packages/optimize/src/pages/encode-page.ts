@@ -10,7 +10,6 @@ import {
   FACTOR_NUMBERS,
   FILE_FLOATS,
   interleaved,
-  isOfPlanes,
   MIN_OPACITY_STEP,
   MIDDLE,
   type PageCoding,
@@ -71,12 +70,15 @@ export interface WrittenCoding extends PageCoding {
   readonly place: number;
 }
 
-/** Returns the coding with the nearest steps that the files of a tree can represent. */
-export function codingFor(steps: PageSteps, tree: DetailTree): WrittenCoding {
+/**
+ * Returns the coding with the nearest steps that the files of a tree can represent.
+ * @param tree Undefined for a scene in several trees, whose steps of sizes are at least the default ones.
+ */
+export function codingFor(steps: PageSteps, tree?: DetailTree): WrittenCoding {
   const odd = 2 * Math.round((1 / steps.direction - 1) / 2) + 1;
   const scale = Math.round(SCALE_STEPS * (Math.log2(127 * steps.harmonics) + SCALE_BIAS));
   return {
-    size: Math.min(1, Math.max(1 / 48, minSizeStep(tree), steps.size)),
+    size: Math.min(1, Math.max(1 / 48, tree ? minSizeStep(tree) : DEFAULT_STEPS.size, steps.size)),
     directions: Math.min(255, Math.max(3, odd)),
     opacity: Math.min(512, Math.max(MIN_OPACITY_STEP, Math.round(QUANTIZED_OPAQUE * steps.opacity))),
     color: steps.color,
@@ -136,7 +138,6 @@ export class PageEncoder {
   readonly #tree: DetailTree;
   readonly #coding: WrittenCoding;
   readonly #deflate: Deflate;
-  readonly #keepsOrder: boolean;
   readonly #rounder: HarmonicRounder;
   readonly #weights: SplatWeights;
 
@@ -146,10 +147,8 @@ export class PageEncoder {
     this.#tree = tree;
     this.#coding = coding;
     this.#deflate = deflate;
-    // Scenes of planes keep the order of the file; see mortonOrder.
-    this.#keepsOrder = isOfPlanes(leaves.positions);
     this.#rounder = new HarmonicRounder(shNumbers(leaves.shDegree) / 3, seen);
-    this.#weights = new SplatWeights(leaves, seen?.energies);
+    this.#weights = new SplatWeights(leaves, tree.reference, seen?.energies);
   }
 
   /** Returns the encoded file of a page. */
@@ -179,8 +178,12 @@ export class PageEncoder {
     return joined(headOf(counts, floats, { chunks, shDegree }), planes, this.#deflate);
   }
 
+  #isFinest(level: SplatLevel): boolean {
+    return level === this.#tree.levels[0] && !this.#tree.isMerged;
+  }
+
   #octavesOf(level: SplatLevel): Octaves {
-    return level === this.#tree.levels[0] ? FINEST : COARSE;
+    return this.#isFinest(level) ? FINEST : COARSE;
   }
 
   /** Writes splats to planes. @returns Maximum reach of the splats in units of the scene, as in boundLevel. */
@@ -220,7 +223,7 @@ export class PageEncoder {
     const rounder = this.#rounder;
     const number = numberOf(level, i);
     const first = shNumbers(level.shDegree) * number;
-    const seenAs = level === this.#tree.levels[0] ? number : undefined;
+    const seenAs = this.#isFinest(level) ? number : undefined;
     let own = Math.round(1 + this.#weights.below(level, i) + octaves.harmonics);
     own = Math.min(CLASSES, Math.max(1, own));
     // A splat whose codes overflow a byte needs larger steps.
@@ -242,7 +245,8 @@ export class PageEncoder {
       const [x, y, z] = origin.map((low, axis) => (step > 0 ? Math.round((own[3 * k + axis] - low) / step) : 0));
       return { i: first + k, coarse: interleaved(x >> 8, y >> 8, z >> 8), fine: interleaved(x, y, z) };
     });
-    if (!this.#keepsOrder) splats.sort((a, b) => a.coarse - b.coarse || a.fine - b.fine);
+    // Scenes of planes keep the order of the file; see mortonOrder.
+    if (!this.#tree.isOfPlanes) splats.sort((a, b) => a.coarse - b.coarse || a.fine - b.fine);
     return { origin, step, splats };
   }
 }

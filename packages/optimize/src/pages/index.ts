@@ -22,3 +22,15 @@ export type { Deflate } from './page-planes.js';
 export { HarmonicRounder } from './round-harmonics.js';
 export { visibilityWeights, type SplatVisibility } from './splat-visibility.js';
 export { instancedTree } from './tile-tree.js';
+export { packTop, SceneCells } from './cells.js';
+export {
+  countShells,
+  keysOf,
+  orderBy,
+  planScene,
+  positionsFrom,
+  sampleStep,
+  type ScenePlan,
+  type SplatKeys,
+} from './scene-plan.js';
+export { MAX_SHELLS, placeShells, type ShellCounts, type ShellPlaces } from './shell-order.js';

@@ -3,12 +3,14 @@ import {
   constants,
   emptyLevel,
   FACTOR_NUMBERS,
+  isOfPlanes,
   levelsAbove,
   shNumbers,
   type SplatLevel,
 } from '@gaussian-splat/renderer/tools';
 import type { Bounds, Vector3 } from '@gaussian-splat/core';
 import { treeOf, type DetailTree } from './build-pages.js';
+import { referenceWeight } from './splat-weights.js';
 
 const { CULL_GROUP } = constants;
 
@@ -33,6 +35,8 @@ export function instancedTree(tree: DetailTree, places: readonly Vector3[]): Det
       order: tree.order,
       origin: tree.origin,
     },
+    isOfPlanes: isOfPlanes(finest.positions),
+    reference: referenceWeight(finest),
     bounds: boundsAround(tree.bounds, places, radius),
   };
 }

@@ -17,19 +17,22 @@ export function buildLevels(cloud: GaussianCloud, kept: Uint32Array): SplatLevel
   return [leaves, ...levelsAbove(leaves)];
 }
 
-/** Builds all levels that are coarser than the given one, finest first. */
-export function levelsAbove(finest: LevelSource): SplatLevel[] {
-  return finish(buildLevelsAbove(finest));
+/**
+ * Builds the levels that are coarser than the given one, finest first.
+ * @param count Number of levels; default: until one chunk represents the scene.
+ */
+export function levelsAbove(finest: LevelSource, count?: number): SplatLevel[] {
+  return finish(buildLevelsAbove(finest, count));
 }
 
 /**
- * Builds all levels that are coarser than the given one, finest first. Each step takes about ten milliseconds, so that
+ * Builds the levels of {@link levelsAbove}. Each step takes about ten milliseconds, so that
  * the thread can run other tasks.
  */
-export function* buildLevelsAbove(finest: LevelSource): Generator<void, SplatLevel[]> {
+export function* buildLevelsAbove(finest: LevelSource, count?: number): Generator<void, SplatLevel[]> {
   const levels: SplatLevel[] = [];
   let level = finest;
-  while (chunksOf(level.count) > 1) {
+  while (count === undefined ? chunksOf(level.count) > 1 : levels.length < count) {
     const next: SplatLevel = yield* buildNextLevel(level);
     levels.push(next);
     level = next;

@@ -44,7 +44,10 @@ export const shNumbers = (degree: ShDegree): number => 3 * shCoefficientCount(de
 export const chunksOf = (splats: number): number => Math.ceil(splats / constants.CULL_GROUP);
 
 /** Allocates a level of `count` merged splats; all values are 0. */
-export function emptyLevel(count: number, { shDegree, dilation }: LevelSource): SplatLevel {
+export function emptyLevel(
+  count: number,
+  { shDegree, dilation }: Pick<LevelSource, 'shDegree' | 'dilation'>,
+): SplatLevel {
   const stride = shNumbers(shDegree);
   const sh = new Float32Array(stride * count);
   return {
