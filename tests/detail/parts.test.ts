@@ -62,9 +62,13 @@ test('cells, and parts in any order, have the bytes of a scene in one piece', ()
     assert.equal(detail(scene, '--out', whole, format).status, 0);
     const { status, text } = detail(scene, '--out', cells, format, ...SMALL);
     assert.equal(status, 0, text);
-    assert.match(text, /in 6 cells of 4096/);
+    assert.match(text, /in [56] cells of 4096/);
     assertSame(cells, whole);
   }
+  assert.match(
+    detail(scene, '--out', inFolder('asked'), ...SMALL, '--min-psnr', '45').text,
+    /a scene that fits into --memory/,
+  );
   const parts = inFolder('parts');
   for (const part of ['2/2', '1/2'])
     assert.equal(detail(scene, '--out', parts, '--quantized', ...SMALL, '--part', part).status, 0);

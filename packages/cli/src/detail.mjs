@@ -107,6 +107,7 @@ function parseOptions(args) {
     memory: parseMemory(values.memory),
     part: values.part === undefined ? undefined : parsePart(values.part),
     isJoining: values.join === true,
+    isMeasuring: values['min-psnr'] !== undefined || views !== undefined,
   };
 }
 
@@ -187,6 +188,7 @@ async function writeCopies(build, options) {
 
 async function main(options) {
   const { scene, out, degree, geometry, minPsnr, scored, given, columns, rows, memory, part, isJoining } = options;
+  const { isMeasuring } = options;
   const inputs = inputsOf(scene);
   // Pages without a plan are those of another program.
   if (existsSync(out) && !existsSync(join(out, UNFINISHED)))
@@ -200,7 +202,10 @@ async function main(options) {
     console.log(
       `${spool.count} splats in ${cells.count} cells of ${cells.range(0).end}, for ${gigabytes(memory)} of memory`,
     );
-  if (given && cells.count > 1) throw new UsageError('--views: expected a scene that fits into --memory');
+  if (isMeasuring && cells.count > 1)
+    throw new UsageError(
+      '--min-psnr, --views: expected a scene that fits into --memory, because it is measured as a whole. Without them its files have about 45 to 50 dB',
+    );
   const isTiled = columns * rows > 1;
   let manifest = isTiled ? await writeCopies(build, options) : undefined;
   if (!isTiled && !isJoining) {

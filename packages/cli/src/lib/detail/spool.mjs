@@ -227,7 +227,7 @@ function findOrder(path, spool, geometry) {
       bins[shell][keys.codes[k] >>> binShift(shell)]++;
     }
   });
-  return { plan, shells: [...shells], bins: bins.map((own) => sparse(own ?? [])) };
+  return { plan, shells: [...shells], bins: Array.from(bins, (own = []) => sparse(own)) };
 }
 
 /** Returns [bin, count] of the bins that are not empty. */
