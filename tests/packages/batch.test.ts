@@ -127,6 +127,7 @@ test('a catalogue of a folder: scenes are copied, each with a link, and broken o
   const { status, text } = command('page', 'scenes', 'site', '--no-serve');
   assert.equal(status, 1, text);
   const page = readFileSync(inFolder('site', 'index.html'), 'utf8');
+  assert.equal(rowsOf('site').find(({ file }) => file === 'scene-0.ply')?.splats, 20);
   assert.match(page, /data-tag="gaussian-splat" data-src="scene-0\/scene-0\.ply"/);
   assert.ok(existsSync(inFolder('site', 'scene-0', 'scene-0.ply')));
   assert.ok(existsSync(inFolder('site', 'cdn', 'gaussian-splat.min.js')));

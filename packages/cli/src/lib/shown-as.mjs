@@ -3,7 +3,7 @@ import { readFileSync, statSync } from 'node:fs';
 import { open } from 'node:fs/promises';
 import { basename, dirname, extname, join } from 'node:path';
 import { LoadBudget, parseSequence, readScene, readTriangles } from '@gaussian-splat/formats';
-import { CommandError } from './command.mjs';
+import { CommandError, report } from './command.mjs';
 import { filesBeside } from './files-beside.mjs';
 
 /** Larger scenes are checked by their beginning, in bytes. */
@@ -35,7 +35,8 @@ async function readAs(path, size) {
   const name = basename(path);
   const beside = (file) => join(dirname(path), file);
   try {
-    await readScene(bytes, { name, openFile: (file) => readFileSync(beside(file)) });
+    const { count } = await readScene(bytes, { name, openFile: (file) => readFileSync(beside(file)) });
+    report({ splats: count });
   } catch (error) {
     if (error.code === 'decode/truncated' && !isWhole) return 'gaussian-splat';
     if (error.code !== 'decode/not-splats') throw error;
