@@ -1,28 +1,57 @@
 /** Implicit tiles of 3D Tiles (OGC 22-025, section 8): regular trees whose tiles are listed by bits in subtree files. */
 import { grouped, startsWith, viewOf } from './bytes.js';
 import { damaged } from './faults.js';
-import type { Affine } from './gltf/nodes.js';
+import { multiply, type Affine } from './gltf/nodes.js';
 import { isObject, parseJson, show, type Json, type JsonSource } from './json.js';
 import { MAX_PATH } from './lod/meta.js';
 import type { Tile } from './tile.js';
+import { countTile, TO_CLOUD, type TreeLoad } from './tileset.js';
+import { partOfVolume, volumeOf } from './tile-volume.js';
 
-/** Opens a file by its URI from the tileset. */
+/** Opens a file by its URI from the outermost tileset. */
 export type OpenSubtree = (uri: string) => Promise<Uint8Array>;
 
-/** An implicit tile, which is the root of a tree. */
-export interface ImplicitRoot {
-  /** The property `implicitTiling` of the tile. */
-  readonly tiling: unknown;
+/** Access to subtrees. */
+export interface SubtreeFiles extends Pick<JsonSource, 'name' | 'budget'> {
+  readonly openSubtree: OpenSubtree;
+  /** Subtrees that have been read, by their URIs. */
+  readonly subtrees: Map<string, Promise<Subtree>>;
+}
+
+/** Properties of the root of implicit tiles. Plain data, as {@link ImplicitTile} is. */
+interface ImplicitRoot {
   /** Templates of the URIs of its contents. */
   readonly uris: readonly string[];
   readonly toTileset: Affine;
+  readonly turn: Affine | undefined;
   readonly isAdded: boolean;
-  /** Path of the tile in the JSON, for error messages. */
-  readonly path: string;
-  readonly source: JsonSource;
-  readonly openSubtree: OpenSubtree;
-  /** Counts a tile. Throws for too many. */
-  readonly countTile: (path: string) => void;
+  /** Geometric error; each level halves it. */
+  readonly error: number;
+  /** Value in the JSON, in the coordinates of the tile. */
+  readonly boundingVolume: unknown;
+  /** Folder of the tileset, relative to the outermost one. */
+  readonly folder: string;
+  /** Place of the root in error messages. */
+  readonly where: string;
+}
+
+interface TreeShape {
+  /** Number of divided axes: 2 or 3. A tile has 4 or 8 children. */
+  readonly axes: number;
+  readonly subtreeLevels: number;
+  readonly levels: number;
+  /** Template of the URIs of subtrees. */
+  readonly template: string;
+}
+
+/** An implicit tile whose subtree has not been read for its contents and children. */
+export interface ImplicitTile extends Place {
+  readonly root: ImplicitRoot;
+  readonly shape: TreeShape;
+  /** Highest tile of its subtree. */
+  readonly top: Place;
+  /** Index of the tile in its level of the subtree. */
+  readonly morton: number;
 }
 
 /** Maximum level of a tile, and bits of an index in a subtree, so that both are exact integers. */
@@ -47,7 +76,7 @@ interface Place {
 /** Returns whether the tile, content or child with an index exists. */
 type Availability = (index: number) => boolean;
 
-interface Subtree {
+export interface Subtree {
   /** Tiles by level, then by Morton index. */
   readonly tiles: Availability;
   /** For each content of a tile, the tiles that have it. */
@@ -57,15 +86,15 @@ interface Subtree {
 }
 
 /**
- * Returns the tree of an implicit tile.
- * @throws GaussianSplatError `decode/header`, `decode/corrupt`, `decode/truncated`, or as `openSubtree` does
+ * Returns the highest implicit tile of a tileset.
+ * @param json The property `implicitTiling` of the tile.
+ * @throws GaussianSplatError `decode/header`
  */
-export async function implicitTiles(root: ImplicitRoot): Promise<Tile> {
-  const where = `${root.source.name}, ${root.path}`;
+export function implicitTile(json: unknown, root: ImplicitRoot): ImplicitTile {
   const fail = (path: string, expected: string, found: unknown): never => {
-    throw damaged(`${where}.implicitTiling.${path}`, expected, show(found), 'decode/header');
+    throw damaged(`${root.where}.implicitTiling.${path}`, expected, show(found), 'decode/header');
   };
-  const tiling = isObject(root.tiling) ? root.tiling : {};
+  const tiling = isObject(json) ? json : {};
   const { subdivisionScheme, subtreeLevels, subtrees } = tiling;
   // Version 1.0 has the highest level in place of the number of levels.
   const levels = tiling.availableLevels ?? Number(tiling.maximumLevel) + 1;
@@ -82,64 +111,52 @@ export async function implicitTiles(root: ImplicitRoot): Promise<Tile> {
   if (root.uris.length > MAX_CONTENTS) return fail('content', `at most ${MAX_CONTENTS} files`, root.uris.length);
   if ([template, ...root.uris].some(({ length }) => length > MAX_PATH))
     return fail('subtrees.uri', `addresses of at most ${grouped(MAX_PATH)} characters`, 'longer ones');
-  const tree = new ImplicitTree(root, { branches: 2 ** axes, subtreeLevels, levels, template });
-  return (
-    (await tree.subtreeAt({ level: 0, x: 0, y: 0, z: 0 })) ?? { contents: [], children: [], isAdded: root.isAdded }
-  );
+  const top = { level: 0, x: 0, y: 0, z: 0 };
+  return { ...top, top, morton: 0, root, shape: { axes, subtreeLevels, levels, template } };
 }
 
-interface TreeShape {
-  /** Number of children of a tile: 4 or 8. */
-  readonly branches: number;
-  readonly subtreeLevels: number;
-  readonly levels: number;
-  /** Template of the URIs of subtrees. */
-  readonly template: string;
+/**
+ * Reads the subtree of an implicit tile. Returns the tile with its contents, and with children that are implicit tiles.
+ * @throws GaussianSplatError `decode/header`, `decode/corrupt`, `decode/truncated`, or as `openSubtree` does
+ */
+export async function readImplicit(tile: ImplicitTile, load: TreeLoad, files: SubtreeFiles): Promise<Tile> {
+  const { root, shape, top, morton, level } = tile;
+  const { axes, subtreeLevels, levels, template } = shape;
+  const { toTileset, turn } = root;
+  const branches = 2 ** axes;
+  countTile(load, root.where);
+  const uri = root.folder + filled(template, top);
+  const reading = files.subtrees.get(uri) ?? readSubtree(uri, root.uris.length, files);
+  files.subtrees.set(uri, reading);
+  const subtree = await reading;
+  const depth = level - top.level;
+  const isThere = (own: Availability): boolean => own(firstOf(depth, branches) + morton);
+  const children: Tile[] = [];
+  const contents = isThere(subtree.tiles)
+    ? root.uris
+        .filter((_, k) => isThere(subtree.contents[k]))
+        .map((one) => ({ uri: root.folder + filled(one, tile), toTileset, ...(turn && { turn }) }))
+    : [];
+  for (const content of contents) files.budget.take(CONTENT_BYTES + 2 * content.uri.length, files.name);
+  for (let k = 0; k < branches && isThere(subtree.tiles) && level + 1 < levels; k++) {
+    const [x, y, z] = [tile.x, tile.y, tile.z].map((value, axis) => 2 * value + ((k >> axis) & 1));
+    const below = { level: level + 1, x, y, z };
+    const own = branches * morton + k;
+    const isInner = depth + 1 < subtreeLevels;
+    if (!(isInner ? subtree.tiles(firstOf(depth + 1, branches) + own) : subtree.children(own))) continue;
+    const place = isInner ? { top, morton: own } : { top: below, morton: 0 };
+    children.push(propertiesOf({ ...below, ...place, root, shape }));
+  }
+  return { ...propertiesOf(tile), contents, children, implicit: undefined };
 }
 
-class ImplicitTree {
-  readonly #root: ImplicitRoot;
-  readonly #shape: TreeShape;
-
-  constructor(root: ImplicitRoot, shape: TreeShape) {
-    this.#root = root;
-    this.#shape = shape;
-  }
-
-  /** Returns the highest tile of a subtree with all tiles below it; undefined if it does not exist. */
-  async subtreeAt(place: Place): Promise<Tile | undefined> {
-    const { source, openSubtree, uris, countTile, path } = this.#root;
-    countTile(path);
-    const uri = filled(this.#shape.template, place);
-    const subtree = await readSubtree(await openSubtree(uri), uri, uris.length, source, openSubtree);
-    return subtree.tiles(0) ? this.#tileAt(subtree, place, 0, 0) : undefined;
-  }
-
-  /** @param depth Level of the tile in the subtree. @param morton Index of the tile in its level of the subtree. */
-  async #tileAt(subtree: Subtree, place: Place, depth: number, morton: number): Promise<Tile> {
-    const { uris, toTileset, isAdded, source, countTile, path } = this.#root;
-    const { branches, subtreeLevels, levels } = this.#shape;
-    countTile(path);
-    const isThere = (own: Availability): boolean => own(firstOf(depth, branches) + morton);
-    const contents = uris
-      .filter((_, k) => isThere(subtree.contents[k]))
-      .map((uri) => ({ uri: filled(uri, place), toTileset }));
-    for (const { uri } of contents) source.budget.take(CONTENT_BYTES + 2 * uri.length, source.name);
-    const children: Tile[] = [];
-    for (let k = 0; k < branches && place.level + 1 < levels; k++) {
-      const [x, y, z] = [place.x, place.y, place.z].map((value, axis) => 2 * value + ((k >> axis) & 1));
-      const below = { level: place.level + 1, x, y, z };
-      const own = branches * morton + k;
-      if (depth + 1 < subtreeLevels) {
-        if (subtree.tiles(firstOf(depth + 1, branches) + own))
-          children.push(await this.#tileAt(subtree, below, depth + 1, own));
-      } else if (subtree.children(own)) {
-        const tile = await this.subtreeAt(below);
-        if (tile) children.push(tile);
-      }
-    }
-    return { contents, children, isAdded };
-  }
+/** Returns an implicit tile as a tile without contents and children. */
+export function propertiesOf(implicit: ImplicitTile): Tile {
+  const { root, shape, level } = implicit;
+  const { isAdded, error, boundingVolume, toTileset } = root;
+  const part = partOfVolume(boundingVolume, implicit, shape.axes);
+  const volume = volumeOf(part, multiply(TO_CLOUD, toTileset), TO_CLOUD);
+  return { isAdded, error: error / 2 ** level, volume, contents: [], children: [], implicit };
 }
 
 /** Index of the first tile of a level in a subtree. */
@@ -150,12 +167,11 @@ const filled = (template: string, place: Place): string =>
 
 /** Reads a subtree, which is JSON, or binary with JSON and a buffer in it. */
 async function readSubtree(
-  bytes: Uint8Array,
   uri: string,
   contents: number,
-  { name, budget }: JsonSource,
-  open: OpenSubtree,
+  { name, budget, openSubtree: open }: SubtreeFiles,
 ): Promise<Subtree> {
+  const bytes = await open(uri);
   const where = `${name}, ${uri}`;
   const { text, binary } = chunksOf(bytes, where);
   const json = parseJson({ bytes: text, name: where, budget }, MAX_SUBTREE_BYTES);

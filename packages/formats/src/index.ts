@@ -1,7 +1,7 @@
 export { LoadBudget, type LoadLimits } from './budget.js';
 export { parseJson } from './json.js';
 export { detectFormat } from './detect.js';
-export { fetchScene, fileOpenerFor, type FetchSceneOptions } from './fetch-scene.js';
+export { fetchScene, fileOpenerFor, partAddress, type FetchSceneOptions } from './fetch-scene.js';
 export { sceneFormats } from './late-formats.js';
 export {
   clipRoomBytes,
@@ -16,6 +16,15 @@ export { outOfMemory } from './scene-errors.js';
 export { readLodScene, sogAddress, type LodBox, type LodScene, type SogAddress, type SogRun } from './lod/boxes.js';
 export { readCoarsestLevel } from './lod/read-coarsest.js';
 export { SogFiles, type FetchBytes } from './lod/sog-files.js';
+export { mergeClouds } from './merge-clouds.js';
+export {
+  openTree,
+  readNode,
+  type ReadNode,
+  type SceneNode,
+  type SceneTree,
+  type TreeFiles,
+} from './tree/scene-tree.js';
 export { readPrefix } from './read-prefix.js';
 export { MAX_DROPPED_RATIO, prepareReader, readScene, type ReadSceneOptions } from './read-scene.js';
 export { boundedImageHeader, type ImageHeader } from './triangles/image-size.js';

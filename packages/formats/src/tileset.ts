@@ -2,15 +2,19 @@
 import { grouped } from './bytes.js';
 import { damaged } from './faults.js';
 import { multiply, type Affine } from './gltf/nodes.js';
-import { implicitTiles, type OpenSubtree } from './implicit-tiles.js';
+import { implicitTile, propertiesOf, readImplicit, type SubtreeFiles } from './implicit-tiles.js';
 import { isObject, parseJson, show, type Json, type JsonSource } from './json.js';
 import { MAX_INDEX_BYTES } from './lod/meta.js';
+import { scaleOf, volumeOf } from './tile-volume.js';
 import type { Tile, TileContent } from './tile.js';
 
 const MAX_TILES = 100_000;
 const MAX_DEPTH = 500;
 
 const IDENTITY: Affine = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0];
+
+/** Transform from the coordinates of tiles (z up) to those of a cloud (x right, y down, z forward): its own inverse. */
+export const TO_CLOUD: Affine = [-1, 0, 0, 0, 0, 0, -1, 0, 0, -1, 0, 0];
 
 /** Figures of all tilesets of one load. */
 export interface TreeLoad {
@@ -20,57 +24,72 @@ export interface TreeLoad {
   height: number;
 }
 
+/** Counts a tile. Throws `decode/header` for too many. @param where Place of the tile in error messages. */
+export function countTile(load: TreeLoad, where: string): void {
+  if (++load.tiles > MAX_TILES) throw damaged(where, `at most ${grouped(MAX_TILES)} tiles`, 'more', 'decode/header');
+}
+
 /**
- * Returns the files of a tileset at a level of detail. Level 0 is the finest; level n omits the n lowest levels of tiles
- * in each branch.
+ * Parses a tileset. Returns its root; subtrees of implicit tiles are not read.
  * @param load Figures of all tilesets of a load, which this function updates.
- * @param openSubtree Opens the subtrees of implicit tiles by their URIs from the tileset.
- * @param toParent Transform from the coordinates of the tileset to those of its parent.
- * @throws GaussianSplatError `decode/header`, `decode/corrupt`, `decode/truncated`, or as `parseJson` and `openSubtree` do
+ * @param folder Folder of the tileset, relative to the outermost one, with a `/` at its end; empty for that one itself.
+ * @param toParent Transform from the coordinates of the tileset to those of the outermost one.
+ * @throws GaussianSplatError `decode/header`, `decode/unsupported`, or as `parseJson` does
  */
-export async function contentsAt(
-  source: JsonSource,
-  level: number,
-  load: TreeLoad,
-  openSubtree: OpenSubtree,
-  toParent: Affine = IDENTITY,
-): Promise<TileContent[]> {
+export function parseTileset(source: JsonSource, load: TreeLoad, folder = '', toParent: Affine = IDENTITY): Tile {
   const { root, asset } = parseJson(source, MAX_INDEX_BYTES);
+  const turn = turnOf(asset, source.name);
   const fail = (path: string, expected: string, found: unknown): never => {
     throw damaged(`${source.name}, ${path}`, expected, show(found), 'decode/header');
   };
-  const countTile = (path: string): void => {
-    if (++load.tiles > MAX_TILES) fail(path, `at most ${grouped(MAX_TILES)} tiles`, 'more');
-  };
-  /** Functions that complete the trees of implicit tiles. */
-  const implicit: (() => Promise<void>)[] = [];
   const open = (json: unknown, parent: Affine, isParentAdded: boolean, path: string, depth: number): Tile => {
     if (!isObject(json)) return fail(path, 'a tile', json);
-    countTile(path);
+    const where = `${source.name}, ${path}`;
+    countTile(load, where);
     if (depth > MAX_DEPTH) fail(path, `tiles at most ${MAX_DEPTH} deep`, 'deeper ones');
-    const toTileset = multiply(parent, transformOf(json, `${source.name}, ${path}`));
+    // Tiles without a transform share that of their parent, also in a message.
+    const toTileset = json.transform === undefined ? parent : multiply(parent, transformOf(json, where));
     const isAdded =
       json.refine === undefined ? isParentAdded : /^add$/i.test(typeof json.refine === 'string' ? json.refine : '');
+    const { boundingVolume, geometricError } = json;
+    const error = Number.isFinite(geometricError) ? (geometricError as number) * scaleOf(toTileset) : Infinity;
+    const volume = volumeOf(boundingVolume, multiply(TO_CLOUD, toTileset), TO_CLOUD);
+    const own = { isAdded, error, volume };
     const tiling = json.implicitTiling ?? extensionOf(json, '3DTILES_implicit_tiling');
     if (tiling !== undefined) {
-      const tile: Tile = { contents: [], children: [], isAdded };
-      const from = { tiling, uris: urisOf(json), toTileset, isAdded, path, source, openSubtree, countTile };
-      implicit.push(async () => void Object.assign(tile, await implicitTiles(from)));
-      return tile;
+      const root = { ...{ toTileset, turn, isAdded, error, folder, where, boundingVolume }, uris: urisOf(json) };
+      return propertiesOf(implicitTile(tiling, root));
     }
     const children: unknown[] = Array.isArray(json.children) ? json.children : [];
     return {
-      contents: urisOf(json).map((uri) => ({ uri, toTileset })),
+      ...own,
+      contents: urisOf(json).map((uri) => ({ uri: folder + uri, toTileset, ...(turn && { turn }) })),
       children: children.map((child, k) => open(child, toTileset, isAdded, `${path}.children[${k}]`, depth + 1)),
-      isAdded,
     };
   };
-  const tree = open(root, toParent, false, 'root', 0);
-  for (const complete of implicit) await complete();
-  const turn = turnOf(asset, source.name);
-  const { contents, height } = drawnOf(tree, level);
+  return open(root, toParent, false, 'root', 0);
+}
+
+/**
+ * Returns the files of a tileset at a level of detail. Level 0 is the finest; level n omits the n lowest levels of tiles
+ * in each branch. Reads all subtrees of implicit tiles.
+ * @throws GaussianSplatError as {@link parseTileset} and `readSubtree` do
+ */
+export async function contentsAt(
+  root: Tile,
+  level: number,
+  load: TreeLoad,
+  files: SubtreeFiles,
+): Promise<TileContent[]> {
+  const complete = async (tile: Tile): Promise<Tile> => {
+    const own = tile.implicit ? await readImplicit(tile.implicit, load, files) : tile;
+    const children: Tile[] = [];
+    for (const child of own.children) children.push(await complete(child));
+    return { ...own, children };
+  };
+  const { contents, height } = drawnOf(await complete(root), level);
   load.height = Math.max(load.height, height);
-  return turn ? contents.map((content) => ({ ...content, turn })) : contents;
+  return contents;
 }
 
 /** Rotations of glTF contents by their vertical axis, from the coordinates of contents whose vertical axis is y. */
@@ -133,7 +152,6 @@ function urisOf(tile: Json): string[] {
 
 /** Returns the transform of a tile, which is a column-major 4x4 matrix in the file; the identity if absent. */
 function transformOf({ transform }: Json, where: string): Affine {
-  if (transform === undefined) return IDENTITY;
   const m = transform as number[];
   if (!Array.isArray(transform) || m.length !== 16 || !m.every(Number.isFinite))
     throw damaged(`${where}.transform`, '16 numbers', show(transform), 'decode/header');

@@ -55,6 +55,8 @@ export { buildPackedLevels, packWithDetail, type PackedLevels } from './levels/p
 export { packLevelRuns } from './streaming/pack-runs.js';
 export { layoutLevels, type LevelBox, type LevelPage, type LevelScene } from './streaming/level-pages.js';
 export { levelSource, packLevelPage } from './streaming/level-source.js';
+export { packNodes, type NodeContent, type NodePage, type RunError } from './streaming/pack-nodes.js';
+export { treeSource, type FetchedNode, type OpenedTree } from './streaming/tree-source.js';
 export { readPacked } from './pack/packed-scene.js';
 export type { PackedGaussians, PackedHead, PackOptions } from './pack/pack.js';
 export { sceneBytes, type PackedPortion } from './gaussian-buffers.js';

@@ -211,10 +211,11 @@ export function fuzzScenes(): Readonly<Record<FuzzFormat, readonly FuzzScene[]>>
 }
 
 /** Request to a worker: see `WorkerRequest` of the element. */
-export type ReaderKind = 'load' | 'levels' | 'clip' | 'manifest' | 'floor' | 'voxels' | 'mesh' | 'model';
+export type ReaderKind = 'load' | 'levels' | 'tree' | 'clip' | 'manifest' | 'floor' | 'voxels' | 'mesh' | 'model';
 
 /** Readers that are not those of a whole scene. */
-export type OtherReader = 'sequence' | 'streamed' | 'clip' | '4dgs' | 'detail' | 'floor' | 'voxels' | 'mesh' | 'model';
+export type OtherReader =
+  'sequence' | 'streamed' | 'tree' | 'clip' | '4dgs' | 'detail' | 'floor' | 'voxels' | 'mesh' | 'model';
 
 /** A solid block below air, in voxels as splat-transform writes them. */
 function voxels(): FuzzScene {
@@ -247,6 +248,7 @@ export async function otherScenes(): Promise<
       ],
     },
     streamed: { kind: 'levels', scenes: fuzzScenes().lod },
+    tree: { kind: 'tree', scenes: [...fuzzScenes().tiles, ...fuzzScenes().lcc] },
     clip: { kind: 'clip', scenes: [one('a.gsv', gsv.bytes)] },
     '4dgs': { kind: 'clip', scenes: states.map((name) => one('a.4dgs', new Uint8Array(corpus[name]))) },
     detail: { kind: 'manifest', scenes: [{ name: 'detail.json', files: { 'detail.json': json(manifest), ...pages } }] },

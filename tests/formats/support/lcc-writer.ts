@@ -6,6 +6,8 @@ const SH_C0 = 0.28209479177387814;
 export interface LccOptions {
   /** Number of splats in each cell; default all in one. */
   readonly cellSize?: number;
+  /** Number of cells, each with the same part of every level; instead of `cellSize`. */
+  readonly cellCount?: number;
   /** Splats around the scene, for `environment.bin`. */
   readonly environment?: GaussianCloud;
   /** Changes of the description. */
@@ -76,21 +78,30 @@ function harmonicsRecord({ sh, shDegree }: GaussianCloud, i: number, limits: Lim
   return new Uint8Array(record.buffer);
 }
 
-const joined = (parts: readonly Uint8Array[]): Uint8Array => new Uint8Array(Buffer.concat(parts));
+/** Joins parts, also in pages. */
+function joined(parts: readonly Uint8Array[]): Uint8Array {
+  const all = new Uint8Array(parts.reduce((sum, { length }) => sum + length, 0));
+  let at = 0;
+  for (const part of parts) {
+    all.set(part, at);
+    at += part.length;
+  }
+  return all;
+}
 
 /**
  * Files of a scene by their paths.
  * @param levels Clouds of degree 3 or 0, the finest first, with z up.
  */
 export function writeLcc(levels: readonly GaussianCloud[], options: LccOptions = {}): Record<string, Uint8Array> {
-  const { cellSize = Infinity, environment, meta } = options;
+  const { cellSize = Infinity, cellCount, environment, meta } = options;
   const hasHarmonics = levels[0].shDegree > 0;
   const scale = scalesOf(levels);
   const shcoef = hasHarmonics ? harmonicsOf(levels) : { min: [0, 0, 0], max: [1, 1, 1] };
   const around = environment ? [environment] : levels;
   const envscale = scalesOf(around);
   const envshcoef = hasHarmonics ? harmonicsOf(around) : shcoef;
-  const cells = Math.max(1, ...levels.map(({ count }) => Math.ceil(count / cellSize)));
+  const cells = cellCount ?? Math.max(1, ...levels.map(({ count }) => Math.ceil(count / cellSize)));
   const [data, harmonics]: [Uint8Array[], Uint8Array[]] = [[], []];
   const index = new DataView(new ArrayBuffer(cells * (4 + 16 * levels.length)));
   let at = 0;
@@ -98,8 +109,9 @@ export function writeLcc(levels: readonly GaussianCloud[], options: LccOptions =
     index.setUint16(at, cell, true);
     at += 4;
     for (const cloud of levels) {
-      const first = cell === 0 ? 0 : cell * cellSize;
-      const end = Math.max(first, Math.min(cloud.count, cell === cells - 1 ? cloud.count : first + cellSize));
+      const size = cellCount === undefined ? cellSize : Math.ceil(cloud.count / cellCount);
+      const first = cell === 0 ? 0 : Math.min(cloud.count, cell * size);
+      const end = Math.max(first, Math.min(cloud.count, cell === cells - 1 ? cloud.count : first + size));
       index.setUint32(at, end - first, true);
       index.setBigUint64(at + 4, BigInt(32 * data.length), true);
       index.setUint32(at + 12, 32 * (end - first), true);

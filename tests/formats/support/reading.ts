@@ -91,6 +91,8 @@ async function ask(kind: ReaderKind, { name, files }: FuzzScene): Promise<unknow
       return [await runOnPage('load', request, signal, listeners)];
     case 'levels':
       return [await runOnPage('boxes', request, signal, listeners)];
+    case 'tree':
+      return tree(url, signal);
     case 'clip':
       return clip(url, signal);
     case 'manifest':
@@ -106,6 +108,21 @@ async function ask(kind: ReaderKind, { name, files }: FuzzScene): Promise<unknow
     case 'model':
       return [await runOnPage('model', { place: { url, credentials: 'same-origin' } }, signal, listeners)];
   }
+}
+
+/** A tree's first page, and a path down to a leaf. */
+async function tree(url: string, signal: AbortSignal): Promise<unknown[]> {
+  const asked = { url, credentials: 'same-origin', sh: 'auto' } as const;
+  const opened = await runOnPage('tree', asked, signal, listeners);
+  const answers: unknown[] = [opened];
+  let [[node], [above]] = [opened.children, opened.first.errors];
+  for (let depth = 0; node && depth < 20; depth++) {
+    const own = { tree: opened.tree, node, scene: opened.scene, above };
+    const page = await runOnPage('node', { url, credentials: 'same-origin', ...own }, signal, listeners);
+    answers.push(page);
+    [node, above] = [[...node.children, ...page.found][0], page.errors[0]];
+  }
+  return answers;
 }
 
 /** The memory that the page allocates on the GPU for a clip, in bytes, before its parts arrive. */

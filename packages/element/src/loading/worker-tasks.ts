@@ -49,6 +49,14 @@ export const WORKER_TASKS = {
     load: async () => (await loadModule(boxes, () => import('./lod-boxes.js'))).readBox,
     transfer: (words) => [words],
   }),
+  tree: task({
+    load: async () => (await loadModule(streams, () => import('./scene-tree.js'))).openTree,
+    transfer: ({ first }) => [first.words.buffer],
+  }),
+  node: task({
+    load: async () => (await loadModule(streams, () => import('./scene-tree.js'))).readNode,
+    transfer: ({ words }) => [words.buffer],
+  }),
   clip: task({
     load: async () => (await loadModule(clips, () => import('./clip-of.js'))).openClip,
     transfer: ({ index }) => buffersOf(index),

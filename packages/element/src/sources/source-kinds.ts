@@ -21,10 +21,10 @@ const SOURCE_KINDS: readonly SourceKind[] = [
     load: () => import('./clip/clip-player.js'),
   },
   {
-    // A `detail.json`, or a `lod-meta.json`, unless the request is for its finest level, complete.
+    // A `detail.json`; or a `lod-meta.json`, a tileset or LCC, unless the request is for its finest level, complete.
     name: 'stream',
     matches: ({ url, isWhole }) =>
-      (isWhole ? /(^|\/)detail\.json$/i : /(^|\/)(detail|lod-meta)\.json$/i).test(nameIn(url)),
+      (isWhole ? /(^|\/)detail\.json$/i : /(^|\/)(detail|lod-meta|tileset)\.json$|\.lcc$/i).test(nameIn(url)),
     load: () => import('./stream/open-streamed.js'),
   },
   // The manifest of a sequence may have any name.
@@ -61,7 +61,7 @@ export async function openSource(
  * Returns the text that identifies the kind of a file: the path of an address, or the name that a page has appended to
  * an object URL.
  */
-function nameIn(url: string): string {
+export function nameIn(url: string): string {
   if (!URL.canParse(url)) return url;
   const { pathname, protocol, hash } = new URL(url);
   return protocol === 'blob:' ? hash : pathname;

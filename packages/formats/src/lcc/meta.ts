@@ -32,6 +32,8 @@ export interface LccRun {
   readonly count: number;
 }
 
+/** Bytes of a splat in `data.bin`, and of its harmonics in `shcoef.bin`. `environment.bin` has both in turn. */
+export const [SPLAT_BYTES, HARMONICS_BYTES] = [32, 64];
 const MAX_META_BYTES = 1 << 20;
 const MAX_LEVELS = 64;
 /** Bytes of a cell's number, and of each of its levels, in `index.bin`. */
@@ -83,7 +85,7 @@ export function parseLccMeta(source: JsonSource): LccMeta {
 /**
  * Reads `index.bin`: for each cell its number, and for each level the number of splats (uint32), their byte offset
  * (uint64) and their size in bytes (uint32).
- * @returns The non-empty blocks of each level, in the order of the file.
+ * @returns The blocks of each cell by level, the finest first; blocks may be empty.
  * @throws GaussianSplatError `decode/truncated`, `decode/corrupt`
  */
 export function parseLccIndex(bytes: Uint8Array, levels: number, name: string): LccRun[][] {
@@ -91,14 +93,18 @@ export function parseLccIndex(bytes: Uint8Array, levels: number, name: string): 
   if (bytes.length % cellBytes !== 0)
     throw damaged(name, `cells of ${cellBytes} bytes`, `${grouped(bytes.length)} bytes`, 'decode/truncated');
   const view = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
-  const runs = Array.from({ length: levels }, (): LccRun[] => []);
+  const cells: LccRun[][] = [];
   for (let cell = 0; cell < bytes.length; cell += cellBytes) {
+    const runs: LccRun[] = [];
     for (let level = 0; level < levels; level++) {
       const at = cell + CELL_BYTES + LEVEL_BYTES * level;
       const [count, start] = [view.getUint32(at, true), Number(view.getBigUint64(at + 4, true))];
       if (!Number.isSafeInteger(start)) throw damaged(name, 'offsets within a file', String(start));
-      if (count > 0) runs[level].push({ start, count });
+      if (count > 0 && start % SPLAT_BYTES !== 0)
+        throw damaged(name, `offsets that are multiples of ${SPLAT_BYTES}`, grouped(start));
+      runs.push({ start, count });
     }
+    cells.push(runs);
   }
-  return runs;
+  return cells;
 }

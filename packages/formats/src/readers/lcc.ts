@@ -3,14 +3,20 @@ import { grouped, viewOf } from '../bytes.js';
 import { allocateCloud, SH_C0, type DraftCloud } from '../cloud.js';
 import { damaged, warn } from '../faults.js';
 import { checkedPart } from '../foreign-signatures.js';
-import { parseLccIndex, parseLccMeta, type LccMeta, type LccRanges, type LccRun } from '../lcc/meta.js';
+import {
+  HARMONICS_BYTES,
+  parseLccIndex,
+  parseLccMeta,
+  SPLAT_BYTES,
+  type LccMeta,
+  type LccRanges,
+  type LccRun,
+} from '../lcc/meta.js';
 import { mergeClouds } from '../merge-clouds.js';
 import type { SceneSource } from '../scene-format.js';
 import { optionalPart } from './optional-part.js';
 import { noParts } from './sog.js';
 
-/** Bytes of a splat in `data.bin`, and of its harmonics in `shcoef.bin`. `environment.bin` has both in turn. */
-const [SPLAT_BYTES, HARMONICS_BYTES] = [32, 64];
 const COEFFICIENTS = 15;
 
 /**
@@ -23,35 +29,56 @@ export async function readLcc(source: SceneSource): Promise<GaussianCloud> {
   const meta = parseLccMeta(source);
   const part = partOpener(source);
   const index = await part('index.bin');
-  const runs = parseLccIndex(index, meta.levels, `${name}, index.bin`);
-  const countAt = (own: number): number => runs[own].reduce((sum, { count }) => sum + count, 0);
+  const cells = parseLccIndex(index, meta.levels, `${name}, index.bin`);
+  const countAt = (own: number): number => cells.reduce((sum, runs) => sum + runs[own].count, 0);
   let own = Math.min(level === 'all' ? 0 : level, meta.levels - 1);
   while (own < meta.levels - 1 && countAt(own) > maxSplats) own++;
-  const count = countAt(own);
   const data = await part('data.bin');
-  if (SPLAT_BYTES * count > data.length)
+  if (SPLAT_BYTES * countAt(own) > data.length)
     throw damaged(
       `${name}, index.bin`,
       `at most ${grouped(Math.floor(data.length / SPLAT_BYTES))} splats`,
-      grouped(count),
+      grouped(countAt(own)),
     );
   const harmonics = meta.hasHarmonics ? await part('shcoef.bin') : undefined;
   signal?.throwIfAborted();
-  const cloud = allocateCloud(count, harmonics ? 3 : 0, source);
+  const runs = cells.map((levels) => levels[own]).filter((run) => run.count > 0);
+  const cloud = readRuns(runs, meta, data, harmonics, source);
+  const around = await readAround(meta, part, source, cloud);
+  const both = [cloud, ...(around ? [around] : [])].map((each) => ({ cloud: each, first: 0, count: each.count }));
+  const whole = around ? mergeClouds(both, source) : cloud;
+  whole.hints = { ...whole.hints, up: [0, 0, 1] };
+  return whole;
+}
+
+type Account = Pick<SceneSource, 'budget' | 'name'>;
+
+/**
+ * Reads blocks of splats.
+ * @param data Content of `data.bin`. @param harmonics Content of `shcoef.bin`, if the scene has it.
+ * @throws GaussianSplatError `decode/truncated`, `out-of-memory/budget`
+ */
+export function readRuns(
+  runs: readonly LccRun[],
+  { ranges }: LccMeta,
+  data: Uint8Array,
+  harmonics: Uint8Array | undefined,
+  source: Account,
+): DraftCloud {
+  const total = runs.reduce((sum, { count }) => sum + count, 0);
+  const cloud = allocateCloud(total, harmonics ? 3 : 0, source);
   let first = 0;
-  for (const run of runs[own]) {
-    requireRoom(data, run, SPLAT_BYTES, `${name}, data.bin`);
-    if (harmonics) requireRoom(harmonics, run, HARMONICS_BYTES, `${name}, shcoef.bin`);
+  for (const run of runs) {
+    requireRoom(data, run, SPLAT_BYTES, `${source.name}, data.bin`);
+    if (harmonics) requireRoom(harmonics, run, HARMONICS_BYTES, `${source.name}, shcoef.bin`);
     const records = { bytes: data, start: run.start, stride: SPLAT_BYTES };
     const coefficients = harmonics && {
       ...{ bytes: harmonics, start: (run.start / SPLAT_BYTES) * HARMONICS_BYTES, stride: HARMONICS_BYTES },
     };
-    unpack(records, coefficients, meta.ranges, cloud, first, run.count);
+    unpack(records, coefficients, ranges, cloud, first, run.count);
     first += run.count;
   }
-  const whole = await withEnvironment(cloud, meta, part, source);
-  whole.hints = { ...whole.hints, up: [0, 0, 1] };
-  return whole;
+  return cloud;
 }
 
 type OpenPart = (path: string) => Promise<Uint8Array>;
@@ -61,21 +88,25 @@ function partOpener({ openFile, name }: SceneSource): OpenPart {
   return async (path) => checkedPart(await open(path), `${name}, ${path}`);
 }
 
-/** Adds the splats of `environment.bin`. The description does not say whether there is such a file. */
-async function withEnvironment(
-  cloud: DraftCloud,
+/**
+ * Reads the splats of `environment.bin`; undefined without any. The description does not say whether there is such a
+ * file.
+ * @param scene Cloud that gets a warning if the file cannot be read.
+ */
+export async function readAround(
   { hasHarmonics, around }: LccMeta,
   part: OpenPart,
-  source: SceneSource,
-): Promise<DraftCloud> {
+  source: Account & Pick<SceneSource, 'signal'>,
+  scene: DraftCloud,
+): Promise<DraftCloud | undefined> {
   const path = 'environment.bin';
   const bytes = await optionalPart(part(path), source.signal);
   if (bytes instanceof Error) {
     if (bytes instanceof GaussianSplatError && /^network\/(?!status)/.test(bytes.code))
-      warn(cloud, `The surroundings (${path}) are left out: ${bytes.message}`);
-    return cloud;
+      warn(scene, `The surroundings (${path}) are left out: ${bytes.message}`);
+    return undefined;
   }
-  if (bytes.length === 0) return cloud;
+  if (bytes.length === 0) return undefined;
   const stride = SPLAT_BYTES + (hasHarmonics ? HARMONICS_BYTES : 0);
   if (bytes.length % stride !== 0)
     throw damaged(
@@ -85,18 +116,14 @@ async function withEnvironment(
       'decode/truncated',
     );
   const count = bytes.length / stride;
-  const own = allocateCloud(count, cloud.shDegree, source);
+  const cloud = allocateCloud(count, hasHarmonics ? 3 : 0, source);
   const coefficients = hasHarmonics ? { bytes, start: SPLAT_BYTES, stride } : undefined;
-  unpack({ bytes, start: 0, stride }, coefficients, around, own, 0, count);
-  return mergeClouds(
-    [cloud, own].map((each) => ({ cloud: each, first: 0, count: each.count })),
-    source,
-  );
+  unpack({ bytes, start: 0, stride }, coefficients, around, cloud, 0, count);
+  return cloud;
 }
 
 function requireRoom({ length }: Uint8Array, { start, count }: LccRun, bytes: number, name: string): void {
   const end = (start / SPLAT_BYTES + count) * bytes;
-  if (start % SPLAT_BYTES !== 0) throw damaged(name, `offsets that are multiples of ${SPLAT_BYTES}`, grouped(start));
   if (end > length) throw damaged(name, `${grouped(end)} bytes`, grouped(length), 'decode/truncated');
 }
 

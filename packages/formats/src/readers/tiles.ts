@@ -2,23 +2,20 @@ import { GaussianSplatError, type GaussianCloud, type Vector3 } from '@gaussian-
 import { checkedPart } from '../foreign-signatures.js';
 import { asciiOf, grouped } from '../bytes.js';
 import { damaged, warn } from '../faults.js';
-import { multiply, type Affine } from '../gltf/nodes.js';
+import { multiply } from '../gltf/nodes.js';
+import type { SubtreeFiles } from '../implicit-tiles.js';
 import { MAX_PATH } from '../lod/meta.js';
 import { mergeClouds } from '../merge-clouds.js';
 import type { SceneSource } from '../scene-format.js';
 import type { TileContent } from '../tile.js';
-import { contentsAt, type TreeLoad } from '../tileset.js';
+import { isTileset } from '../signatures.js';
+import { contentsAt, parseTileset, TO_CLOUD, type TreeLoad } from '../tileset.js';
 import { applyMotion } from '../transform/moved-cloud.js';
-import { isTileset, readGltf } from './gltf.js';
+import { readGltf } from './gltf.js';
 import { noParts } from './sog.js';
 
-/**
- * Transform from the coordinates of tiles (z up) to those of a cloud (x right, y down, z forward). It is its own inverse,
- * and includes the rotation between glTF (y up) and tiles.
- */
-const TO_CLOUD: Affine = [-1, 0, 0, 0, 0, 0, -1, 0, 0, -1, 0, 0];
 /** Maximum nesting of tilesets. */
-const MAX_NESTED = 16;
+export const MAX_NESTED = 16;
 /** Bytes charged for each reference to a file, besides its address. */
 const CONTENT_BYTES = 256;
 /** Minimum distance from the Earth's center, in meters, of a georeferenced tileset. */
@@ -48,23 +45,12 @@ async function readLevel(source: SceneSource, level: number): Promise<GaussianCl
   const hasCoarser = (): boolean => maxSplats < Infinity && level < load.height;
   for await (const { toTileset, turn, uri, bytes } of filesOf(source, level, load)) {
     source.signal?.throwIfAborted();
-    const { budget, signal } = source;
-    const name = `${source.name}, ${uri}`;
-    if (isOtherTile(bytes)) {
-      others++;
-      continue;
-    }
-    const folder = decoded(folderOf(uri));
-    const openFile = (path: string, query?: string): Promise<Uint8Array> => opened(source, folder + path, query);
-    const cloud = await readGltf({ bytes, name, budget, signal, openFile }).catch((error: unknown) => {
-      if (error instanceof GaussianSplatError && error.code === 'decode/not-splats') return undefined;
+    const cloud = await readContent(source, { uri, toTileset, turn }, bytes).catch((error: unknown) => {
       if (error instanceof GaussianSplatError && error.code === 'out-of-memory/budget' && hasCoarser()) return null;
       throw error;
     });
     if (cloud === null) return undefined;
-    // TO_CLOUD is its own inverse, so that the same transform leads from the cloud to the tile.
-    const fromContent = turn ? multiply(toTileset, turn) : toTileset;
-    if (cloud) clouds.push(applyMotion(cloud, multiply(TO_CLOUD, multiply(fromContent, TO_CLOUD))));
+    if (cloud) clouds.push(cloud);
     else others++;
     count += cloud?.count ?? 0;
     if (count > maxSplats && hasCoarser()) return undefined;
@@ -86,6 +72,36 @@ async function readLevel(source: SceneSource, level: number): Promise<GaussianCl
   return whole;
 }
 
+/**
+ * Reads a content of a tile, in the coordinates of a cloud. Resolves to undefined if it has no splats.
+ * @param bytes The file.
+ * @throws GaussianSplatError as `readGltf` does
+ */
+export async function readContent(
+  source: SceneSource,
+  { uri, toTileset, turn }: TileContent,
+  bytes: Uint8Array,
+): Promise<GaussianCloud | undefined> {
+  if (isOtherTile(bytes)) return undefined;
+  const { budget, signal } = source;
+  const folder = decoded(folderOf(uri));
+  const openFile = (path: string, query?: string): Promise<Uint8Array> => opened(source, folder + path, query);
+  const name = `${source.name}, ${uri}`;
+  const cloud = await readGltf({ bytes, name, budget, signal, openFile }).catch((error: unknown) => {
+    if (error instanceof GaussianSplatError && error.code === 'decode/not-splats') return undefined;
+    throw error;
+  });
+  // TO_CLOUD is its own inverse, so that the same transform leads from the cloud to the tile.
+  const fromContent = turn ? multiply(toTileset, turn) : toTileset;
+  return cloud && applyMotion(cloud, multiply(TO_CLOUD, multiply(fromContent, TO_CLOUD)));
+}
+
+/** Opens a file of a tileset. @param uri URI from the outermost tileset, with its query. */
+export async function openPart(source: Pick<SceneSource, 'openFile' | 'name'>, uri: string): Promise<Uint8Array> {
+  const [path, query = ''] = uri.split(/(?=\?)/, 2);
+  return checkedPart(await opened(source, decoded(path), query), `${source.name}, ${uri}`);
+}
+
 type TileFile = TileContent & { readonly bytes: Uint8Array };
 
 /** Iterates over the glTF files of a tileset and of nested tilesets, at a level of detail. */
@@ -105,21 +121,16 @@ async function* filesOf(source: SceneSource, level: number, load: TreeLoad): Asy
       uses.set(content.uri, (uses.get(content.uri) ?? 0) + 1);
     }
   };
-  const subtreeOf =
-    (folder: string) =>
-    async (uri: string): Promise<Uint8Array> => {
-      const [path, query = ''] = (folder + uri).split(/(?=\?)/, 2);
-      return checkedPart(await opened(source, decoded(path), query), `${name}, ${uri}`);
-    };
-  list(await contentsAt(source, level, load, subtreeOf('')), 0);
+  const openSubtree = (uri: string): Promise<Uint8Array> => openPart(source, uri);
+  const files: SubtreeFiles = { name, budget, openSubtree, subtrees: new Map() };
+  list(await contentsAt(parseTileset(source, load), level, load, files), 0);
   for (let content = left.pop(); content; content = left.pop()) {
     const { uri, toTileset, turn, depth } = content;
-    const [path, query = ''] = uri.split(/(?=\?)/, 2);
     const where = `${name}, ${uri}`;
     // A file with several references is fetched once, and charged for each further reference.
     const again = kept.get(uri);
     budget.take(again?.length ?? 0, where);
-    const bytes = again ?? (await checkedPart(await opened(source, decoded(path), query), where));
+    const bytes = again ?? (await openPart(source, uri));
     uses.set(uri, uses.get(uri)! - 1);
     if (uses.get(uri)) kept.set(uri, bytes);
     else kept.delete(uri);
@@ -129,22 +140,21 @@ async function* filesOf(source: SceneSource, level: number, load: TreeLoad): Asy
     }
     if (depth >= MAX_NESTED)
       throw damaged(where, `tilesets at most ${MAX_NESTED} deep`, 'deeper ones', 'decode/header');
-    const folder = folderOf(path);
-    const inner = await contentsAt({ bytes, name: where, budget }, level, load, subtreeOf(folder), toTileset);
-    list(
-      inner.map((one) => ({ ...one, uri: folder + one.uri })),
-      depth + 1,
-    );
+    const inner = parseTileset({ bytes, name: where, budget }, load, folderOf(uri), toTileset);
+    list(await contentsAt(inner, level, load, { ...files, name: where }), depth + 1);
   }
 }
 
-const opened = ({ openFile, name }: SceneSource, path: string, query?: string): Promise<Uint8Array> =>
-  (openFile ?? noParts(name, 'scene.zip'))(path, query);
+const opened = (
+  { openFile, name }: Pick<SceneSource, 'openFile' | 'name'>,
+  path: string,
+  query?: string,
+): Promise<Uint8Array> => (openFile ?? noParts(name, 'scene.zip'))(path, query);
 
 /** Whether a tile is of a kind of 3D Tiles 1.0, which cannot have splats. */
 const isOtherTile = (bytes: Uint8Array): boolean => /^(b3dm|i3dm|pnts|cmpt)$/.test(asciiOf(bytes, 0, 4));
 
-function folderOf(uri: string): string {
+export function folderOf(uri: string): string {
   const [path] = uri.split('?', 1);
   return path.slice(0, path.lastIndexOf('/') + 1);
 }
@@ -158,7 +168,7 @@ function decoded(path: string): string {
 }
 
 /** Returns the unit direction away from the Earth's center for a georeferenced origin; otherwise undefined. */
-function upAt(origin: Vector3): Vector3 | undefined {
+export function upAt(origin: Vector3): Vector3 | undefined {
   const radius = Math.hypot(...origin);
   return radius < ON_EARTH ? undefined : (origin.map((x) => x / radius) as unknown as Vector3);
 }

@@ -55,7 +55,10 @@ export class FeedbackViews {
     const merged = requests.slice();
     for (const sample of this.#looks.values()) {
       if (sample === last || sample.requests === undefined || sample.drawnAt <= this.#sampledAt[1]) continue;
-      for (let page = 0; page < merged.length; page++) merged[page] = Math.max(merged[page], sample.requests[page]);
+      const { requests: others } = sample;
+      // Pages may have been added to the scene since.
+      for (let page = 0; page < Math.min(merged.length, others.length); page++)
+        merged[page] = Math.max(merged[page], others[page]);
     }
     return merged;
   }

@@ -34,7 +34,7 @@ export function packLevelPage(
 }
 
 /** Returns the cloud relative to the origin of the scene, with spherical harmonics of the scene's degree. */
-function placedIn(cloud: GaussianCloud, { origin, shDegree }: StreamedScene): GaussianCloud {
+export function placedIn(cloud: GaussianCloud, { origin, shDegree }: StreamedScene): GaussianCloud {
   const shift = cloud.origin.map((x, axis) => x - origin[axis]);
   const positions = shift.every((x) => x === 0) ? cloud.positions : cloud.positions.map((x, i) => x + shift[i % 3]);
   return { ...cloud, origin, positions, sh: shOfDegree(cloud, shDegree), shDegree };

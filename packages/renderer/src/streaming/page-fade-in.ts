@@ -24,7 +24,7 @@ export class PageFadeIn {
     this.#list = list;
     this.#milliseconds = milliseconds;
     this.#setArrived = setArrived;
-    this.#passed = new Float32Array(list.count).fill(1);
+    this.#passed = new Float32Array(list.capacity ?? list.count).fill(1);
   }
 
   /** Number of pages that are still fading in. */

@@ -25,8 +25,10 @@ const STALE_MS = 120;
 const AHEAD_NUMBERS = 20;
 
 export interface PageFeedbackOptions {
-  /** Number of pages of the scene. */
+  /** Maximum number of pages of the scene. */
   readonly pages: number;
+  /** Returns the current number of pages. */
+  readonly count: () => number;
   /** Prediction time of a moving camera in milliseconds: the arrival time of a page. */
   readonly aheadMs: () => number;
   /** Returns the version of the scene, which changes when pages arrive or are evicted. */
@@ -67,6 +69,8 @@ export class PageFeedback implements PageRequests {
   #passedOver = 0;
   #timer: ReturnType<typeof setTimeout> | undefined;
   #isReading = false;
+  /** Number of bytes of the read-back. */
+  #bytes = 0;
   /** Matrix of the last camera. */
   #worldToCamera: Camera['worldToCamera'] = [];
 
@@ -150,14 +154,16 @@ export class PageFeedback implements PageRequests {
   }
 
   copy(encoder: GPUCommandEncoder): void {
-    encoder.copyBufferToBuffer(this.#requests, 0, this.#staging, 0, this.#requests.size);
+    this.#bytes = 4 * this.#options.count();
+    encoder.copyBufferToBuffer(this.#requests, 0, this.#staging, 0, this.#bytes);
     this.#isReading = true;
   }
 
   read(): void {
-    this.#staging.mapAsync(0x1).then(
+    const bytes = this.#bytes;
+    this.#staging.mapAsync(0x1, 0, bytes).then(
       () => {
-        const requests = this.#views.end(new Float32Array(this.#staging.getMappedRange().slice(0)));
+        const requests = this.#views.end(new Float32Array(this.#staging.getMappedRange(0, bytes).slice(0)));
         this.#staging.unmap();
         this.#isReading = false;
         this.#options.onFeedback(requests, requests[0]);

@@ -11,6 +11,10 @@ export { NONE };
 export interface PageList {
   /** Number of pages, P. */
   readonly count: number;
+  /** Maximum of {@link count}, and length of the arrays of pages; undefined if the list does not grow. */
+  readonly capacity?: number | undefined;
+  /** Maximum number of slots of all pages; undefined if it is the sum of {@link slots}. */
+  readonly maxSlots?: number | undefined;
   /** [P] number of slots of each page, one for each {@link SLOT_CHUNKS} chunks. */
   readonly slots: Uint32Array;
   /** [P] number of chunks of each page; a run of a level has fewer if some of its splats are unusable. */
@@ -80,13 +84,60 @@ export function childrenIn(list: PageList, page: number, slot: number): Uint32Ar
   return list.children.subarray(from, from + Math.min(SLOT_CHUNKS, list.chunks[page] - SLOT_CHUNKS * slot));
 }
 
-/** Returns [P] 1 for each page that needs more than `max` slots together with all its ancestors; otherwise 0. */
-export function largerThan(max: number, { count, slots, parent }: PageList): Uint8Array {
-  const withAbove = new Float64Array(count);
-  for (let page = 0; page < count; page++) {
-    withAbove[page] = slots[page] + (parent[page] === NONE ? 0 : withAbove[parent[page]]);
+/**
+ * A list of pages that grows while a scene is streamed. The chunks of a page and its children become known when the
+ * page is fetched; before, it is assumed to have four times as many chunks as it replaces.
+ */
+export class GrowingList implements PageList {
+  readonly capacity: number;
+  readonly maxSlots: number;
+  readonly slots: Uint32Array;
+  readonly chunks: Uint32Array;
+  readonly upper: Uint32Array;
+  readonly parent: Uint32Array;
+  readonly parentChunk: Uint32Array;
+  readonly parentChunks: Uint32Array;
+  readonly firstChunk: Uint32Array;
+  #children = new Uint32Array(SLOT_CHUNKS).fill(NONE);
+  /** Number of elements of {@link children} in use. */
+  #used = 0;
+  #count = 0;
+
+  constructor(capacity: number, maxSlots: number) {
+    const numbers = (): Uint32Array => new Uint32Array(capacity);
+    [this.capacity, this.maxSlots] = [capacity, maxSlots];
+    [this.slots, this.chunks, this.upper, this.firstChunk] = [numbers(), numbers(), numbers(), numbers()];
+    [this.parent, this.parentChunk, this.parentChunks] = [numbers().fill(NONE), numbers(), numbers()];
   }
-  return Uint8Array.from(withAbove, (needed) => (needed > max ? 1 : 0));
+
+  get count(): number {
+    return this.#count;
+  }
+
+  get children(): Uint32Array {
+    return this.#children;
+  }
+
+  /** Appends a page below consecutive chunks of a page whose chunks are known. @returns Its index. */
+  append(parent: number, firstChunk: number, chunks: number): number {
+    const page = this.#count++;
+    this.slots[page] = Math.ceil((4 * chunks) / SLOT_CHUNKS);
+    putBelow(this, page, parent, firstChunk, chunks);
+    return page;
+  }
+
+  /** Sets the number of chunks of a page. Appends the page if it is the first one. */
+  measure(page: number, chunks: number): void {
+    if (this.#count === 0) this.#count = 1;
+    this.slots[page] = Math.ceil(chunks / SLOT_CHUNKS);
+    this.chunks[page] = this.upper[page] = chunks;
+    this.firstChunk[page] = this.#used;
+    this.#used += SLOT_CHUNKS * this.slots[page];
+    if (this.#used <= this.#children.length) return;
+    const before = this.#children;
+    this.#children = new Uint32Array(2 * this.#used).fill(NONE);
+    this.#children.set(before);
+  }
 }
 
 /** A page of a tree, and its parent: the index of the parent page in the tree, and of the chunk in that page. */

@@ -46,7 +46,7 @@ export const poolBytes = (format: PageFormat, { slots, blocks }: PoolSize): numb
  * @throws GaussianSplatError `out-of-memory/budget` if the first page does not fit.
  */
 export function poolSize(format: PageFormat, list: PageList, budget: number): PoolSize {
-  const all = list.slots.reduce((sum, slots) => sum + slots, 0);
+  const all = list.maxSlots ?? list.slots.reduce((sum, slots) => sum + slots, 0);
   const bytes = Math.min(budget, all * slotBytes(format));
   const blocks = Math.floor(Math.min(STAGING.max, STAGING.share * bytes) / BLOCK_BYTES);
   const slots = Math.min(all, Math.floor((budget - blocks * BLOCK_BYTES) / slotBytes(format)));

@@ -50,7 +50,8 @@ export class PageStreamer<Words> {
   readonly #failures: BackOff<number>;
   #retry: ReturnType<typeof setTimeout> | undefined;
   #recheckTimer: ReturnType<typeof setTimeout> | undefined;
-  readonly #sentAt = new Map<number, number>();
+  /** Time of the request of each page in transit, and the number of slots that it was assumed to need. */
+  readonly #sent = new Map<number, { readonly at: number; readonly slots: number }>();
   readonly #now: () => number;
   #arrivalMs = 0;
   #slotsUnderWay = 0;
@@ -113,7 +114,6 @@ export class PageStreamer<Words> {
     if (max === undefined) return undefined;
     const words = this.#waiting.get(max)!;
     this.#waiting.delete(max);
-    this.#slotsUnderWay -= this.#residency.slotsFor(max);
     this.#noteArrival(max);
     return { page: max, words };
   }
@@ -165,9 +165,16 @@ export class PageStreamer<Words> {
     this.sendForMore();
   }
 
+  /** Ends the transit of a page. @returns The time of its request. */
+  #takeSent(page: number): number {
+    const { at, slots } = this.#sent.get(page)!;
+    this.#sent.delete(page);
+    this.#slotsUnderWay -= slots;
+    return at;
+  }
+
   #noteArrival(page: number): void {
-    const took = this.#now() - this.#sentAt.get(page)!;
-    this.#sentAt.delete(page);
+    const took = this.#now() - this.#takeSent(page);
     this.#arrivalMs = this.#arrivalMs === 0 ? took : MEMORY * this.#arrivalMs + (1 - MEMORY) * took;
   }
 
@@ -175,8 +182,7 @@ export class PageStreamer<Words> {
     this.#fetching.get(page)?.abort();
     this.#fetching.delete(page);
     this.#waiting.delete(page);
-    this.#sentAt.delete(page);
-    this.#slotsUnderWay -= this.#residency.slotsFor(page);
+    this.#takeSent(page);
     this.#residency.cancel(page);
     this.#abandoned++;
   }
@@ -184,7 +190,7 @@ export class PageStreamer<Words> {
   async #bring(page: number): Promise<void> {
     const controller = new AbortController();
     this.#fetching.set(page, controller);
-    this.#sentAt.set(page, this.#now());
+    this.#sent.set(page, { at: this.#now(), slots: this.#residency.slotsFor(page) });
     this.#slotsUnderWay += this.#residency.slotsFor(page);
     // A canceled page may have been requested again meanwhile, which is a separate fetch.
     const isOver = (): boolean => this.#fetching.get(page) !== controller;
@@ -196,9 +202,8 @@ export class PageStreamer<Words> {
       this.#failures.succeed(page);
     } catch (error) {
       if (isOver()) return;
-      this.#slotsUnderWay -= this.#residency.slotsFor(page);
+      this.#takeSent(page);
       this.#residency.cancel(page);
-      this.#sentAt.delete(page);
       this.#noteFailure(page, error);
     }
     this.#fetching.delete(page);

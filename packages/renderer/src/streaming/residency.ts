@@ -1,5 +1,5 @@
 import { RankedHeap } from '../ranked-heap.js';
-import { largerThan, NONE, type PageList } from './page-list.js';
+import { NONE, type PageList } from './page-list.js';
 import { PageSlots, type Settled } from './page-slots.js';
 
 /** Factor by which a requested page must be more needed than a requested page that is evicted for it. */
@@ -31,9 +31,12 @@ export class Residency {
   readonly #requestedAt: Uint32Array;
   /** [P] number of descendants of a page that are resident or in transit. */
   readonly #below: Uint32Array;
-  /** [P] 1 for pages that do not fit in the pool together with their ancestors. */
-  readonly #isTooLarge: Uint8Array;
-  readonly #coming = new Set<number>();
+  /** [P] number of slots of a page together with its ancestors; see {@link #extend}. */
+  readonly #slotsAbove: Float64Array;
+  /** Number of pages whose {@link #slotsAbove} is known. */
+  #extent = 0;
+  /** Pages in transit, and the number of slots that are reserved for each. */
+  readonly #coming = new Map<number, number>();
   readonly #missing: RankedHeap;
   /** Evictable pages, least needed first. */
   readonly #evictees: RankedHeap;
@@ -60,13 +63,15 @@ export class Residency {
   constructor(list: PageList, slots: number, isCached: (page: number) => boolean = () => false) {
     this.#list = list;
     this.#isCached = isCached;
-    this.slots = new PageSlots(list.count, slots);
-    this.#request = new Float32Array(list.count);
-    this.#requestedAt = new Uint32Array(list.count);
-    this.#below = new Uint32Array(list.count);
-    this.#isTooLarge = largerThan(slots, list);
-    this.#isListed = new Uint8Array(list.count);
-    this.#missing = new RankedHeap(list.count);
+    const pages = list.capacity ?? list.count;
+    this.slots = new PageSlots(pages, slots);
+    this.#request = new Float32Array(pages);
+    this.#requestedAt = new Uint32Array(pages);
+    this.#below = new Uint32Array(pages);
+    this.#slotsAbove = new Float64Array(pages);
+    this.#isListed = new Uint8Array(pages);
+    this.#missing = new RankedHeap(pages);
+    this.#extend();
     this.#evictees = new RankedHeap(slots);
   }
 
@@ -93,8 +98,8 @@ export class Residency {
 
   /** Whether a page that the last feedback pass requested found no slots. */
   get lacksSlots(): boolean {
-    const isRefused = (isTooLarge: number, page: number): boolean => isTooLarge === 1 && this.#request[page] > 0;
-    return this.#noRoom.slots < Infinity || this.#isTooLarge.some(isRefused);
+    if (this.#noRoom.slots < Infinity) return true;
+    return this.#request.some((pixels, page) => pixels > 0 && this.#isTooLarge(page));
   }
 
   /**
@@ -114,6 +119,7 @@ export class Residency {
    * @param requests [P] screen error in pixels of each missing page; 0 if it is not requested.
    */
   note(requests: Float32Array): void {
+    this.#extend();
     this.#sample++;
     this.#noRoom = { slots: Infinity, need: 0 };
     this.#request.set(requests.subarray(0, this.#list.count));
@@ -161,15 +167,14 @@ export class Residency {
       this.#noteNoRoom(this.#list.slots[page], this.#request[page]);
       return false;
     }
-    this.#coming.add(page);
+    this.#coming.set(page, this.#list.slots[page]);
     this.#slotsComing += this.#list.slots[page];
     return true;
   }
 
   /** Cancels a page in transit, and releases its reserved slots. Does nothing for other pages. */
   cancel(page: number): void {
-    if (!this.#coming.delete(page)) return;
-    this.#slotsComing -= this.#list.slots[page];
+    if (!this.#arrive(page)) return;
     const parent = this.#list.parent[page];
     if (parent !== NONE) this.#release(parent);
     while (this.#reserved.length > 0) {
@@ -190,8 +195,7 @@ export class Residency {
       return undefined;
     }
     const left = evictees.map((evictee) => ({ page: evictee, slots: this.slots.clear(evictee) }));
-    this.#coming.delete(page);
-    this.#slotsComing -= this.#list.slots[page];
+    this.#arrive(page);
     const slots = this.slots.fill(page, this.#list.slots[page]);
     for (const evictee of evictees) {
       this.#isListed[evictee] = 0;
@@ -199,6 +203,32 @@ export class Residency {
     }
     this.#offer(page);
     return { slots, left };
+  }
+
+  /** Computes {@link #slotsAbove} of pages that were appended to the list. Parents precede their children. */
+  #extend(): void {
+    while (this.#extent < this.#list.count) this.#measure(this.#extent++);
+  }
+
+  #measure(page: number): void {
+    const above = this.#list.parent[page];
+    this.#slotsAbove[page] = this.#list.slots[page] + (above === NONE ? 0 : this.#slotsAbove[above]);
+  }
+
+  /** Whether a page does not fit in the pool together with its ancestors. */
+  #isTooLarge(page: number): boolean {
+    const { capacity, chunks } = this.#list;
+    // The size of a page whose chunks are unknown is a guess, which is no reason not to fetch it.
+    if (capacity !== undefined && chunks[page] === 0) return false;
+    return this.#slotsAbove[page] > this.slots.pageIn.length;
+  }
+
+  /** Ends the transit of a page, and releases its reservation. @returns False if the page was not in transit. */
+  #arrive(page: number): boolean {
+    this.#slotsComing -= this.#coming.get(page) ?? 0;
+    // Its number of slots may have become known.
+    this.#measure(page);
+    return this.#coming.delete(page);
   }
 
   /** Number of slots that pages in transit need beyond the empty ones. */
@@ -214,7 +244,7 @@ export class Residency {
 
   #isMissing(page: number): boolean {
     const above = this.#list.parent[page];
-    const isNew = !this.isResident(page) && !this.#coming.has(page) && this.#isTooLarge[page] === 0;
+    const isNew = !this.isResident(page) && !this.#coming.has(page) && !this.#isTooLarge(page);
     return this.#request[page] > 0 && isNew && (above === NONE || this.isResident(above));
   }
 

@@ -35,7 +35,7 @@ function squaredDistance(positions: Float32Array, p: number, q: number): number 
  * nearest of the scattered splats, 2 √(1/π) for cells of side 1. A splat as wide as its cell adds as much again (in
  * squares).
  */
-const CELL_ERROR = 1.6;
+export const CELL_ERROR = 1.6;
 
 /**
  * Estimates the errors of the levels of a node in world units, because the file does not state them. They depend on the

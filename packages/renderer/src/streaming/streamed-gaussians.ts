@@ -93,8 +93,6 @@ function requireTime(arrivalMs: number): void {
  * finest pages.
  */
 export class StreamedGaussians extends SceneBuffers {
-  /** Number of splats in the finest level. */
-  readonly leafCount: number;
   /** Sort order of splats in training: see `CloudHints.order`. */
   readonly order: TrainedOrder | undefined;
   readonly bounds: Bounds;
@@ -128,12 +126,12 @@ export class StreamedGaussians extends SceneBuffers {
     memory.reserve('pages of a streamed scene', poolBytes(scene, size));
     ({ order: this.order, bounds: this.bounds } = scene);
     this.detailBudget = detailBudgetOn(device);
-    this.leafCount = scene.splats;
     this.#source = source;
     this.#options = options;
     this.#pool = new PagePool(device, memory, scene, size);
     this.pageRequests = new PageFeedback(device, memory, {
-      pages: list.count,
+      pages: list.capacity ?? list.count,
+      count: () => list.count,
       aheadMs: () => aheadMs(this.#traffic.arrivalMs),
       version: () => this.#version,
       onFeedback: (requests, lacking) => this.#take(requests, lacking),
@@ -193,6 +191,11 @@ export class StreamedGaussians extends SceneBuffers {
       options.signal?.throwIfAborted();
       throw error;
     }
+  }
+
+  /** Number of splats in the finest level, as far as it is known. */
+  get leafCount(): number {
+    return this.#source.scene.splats;
   }
 
   /** Incremented when a page arrives, fades in or is evicted. */

@@ -369,7 +369,8 @@ const ANSWERS = {
 
   /**
    * Files that a test has put there with PUT; DELETE takes one away. `log` returns the requested paths, in order. With a
-   * `gate`, all requests after the first `passing` wait until it is opened.
+   * `gate`, all requests after the first `passing` wait until it is opened. With `ranges`, ranges are answered, and listed as
+   * `NAME FIRST-LAST`.
    */
   async kept(context, path) {
     const [folder, ...rest] = path.split('/');
@@ -386,11 +387,17 @@ const ANSWERS = {
     } else if (name === 'log') {
       context.body = JSON.stringify(log);
     } else {
-      log.push(name);
-      const { gate, passing } = context.query;
+      const { gate, passing, ranges } = context.query;
+      const [, first, last] = (ranges !== undefined && /^bytes=(\d+)-(\d+)$/.exec(context.get('Range'))) || [];
+      log.push(first === undefined ? name : `${name} ${first}-${last}`);
       if (gate && log.length > Number(passing)) await gateOf(gate).opened;
       context.status = files.has(name) ? 200 : 404;
       context.body = files.get(name) ?? 'absent';
+      if (first === undefined || !files.has(name)) return;
+      const part = files.get(name).subarray(Number(first), Number(last) + 1);
+      context.status = 206;
+      context.set('Content-Range', `bytes ${first}-${Number(first) + part.length - 1}/${files.get(name).length}`);
+      context.body = part;
     }
   },
 

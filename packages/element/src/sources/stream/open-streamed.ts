@@ -1,8 +1,8 @@
-/** Opens streamed scenes: manifests of pages (docs/lod-format.md), and streamed SOG by boxes. */
+/** Opens streamed scenes: manifests of pages (docs/lod-format.md), streamed SOG by boxes, and trees node by node. */
 import { fileRequest } from '@gaussian-splat/core/fetch';
 import type { TrainedOrder } from '@gaussian-splat/core';
 import { MemoryLedger, pickInitialVariants, StreamedGaussians, type PoolOptions } from '@gaussian-splat/renderer';
-import { levelSource } from '@gaussian-splat/renderer/tools';
+import { levelSource, treeSource } from '@gaussian-splat/renderer/tools';
 import type { SceneLimits, SceneRequest } from '../../loading/protocol.js';
 import type { SceneBounds } from '../../viewer/camera/settings.js';
 import { LoadedGaussians, type OwnedGaussians } from '../../gpu/loaded-gaussians.js';
@@ -10,6 +10,7 @@ import { images, unlessWrong } from '../../gpu/initial-frames.js';
 import { limitScenes } from '../../gpu/memory-budget.js';
 import type { LodSettings } from '../../gpu/backend.js';
 import type { OpenOptions, OpenSource } from '../source-kind.js';
+import { nameIn } from '../source-kinds.js';
 import { streamCaps } from './stream-caps.js';
 
 interface StreamedOptions extends OpenOptions {
@@ -58,11 +59,12 @@ async function openStreamed(request: SceneRequest, device: GPUDevice, options: S
       console.warn(sentence);
     },
   };
-  const isSog = new URL(request.url).pathname.endsWith('lod-meta.json');
-  const gaussians = await (isSog ? openBoxes : openPages)(request, device, options, pool);
+  const name = nameIn(request.url);
+  const open = /detail\.json$/i.test(name) ? openPages : /lod-meta\.json$/i.test(name) ? openBoxes : openNodes;
+  const gaussians = await open(request, device, options, pool);
   const { bounds, order } = gaussians;
-  if (!signal.aborted)
-    return { ...{ gaussians, bounds, order, warnings }, detail: { detail: DETAIL, splatBudget: caps.splats } };
+  const splatBudget = Math.min(caps.splats, request.limits?.maxSplats ?? Infinity);
+  if (!signal.aborted) return { ...{ gaussians, bounds, order, warnings }, detail: { detail: DETAIL, splatBudget } };
   gaussians.destroy();
   throw signal.reason;
 }
@@ -87,7 +89,7 @@ class Allowance {
     return { ...this.#limits, maxBytes: Math.max(0, maxBytes - others) };
   }
 
-  async note(part: string, coming: Promise<ArrayBuffer>): Promise<ArrayBuffer> {
+  async note<T extends { readonly byteLength: number }>(part: string, coming: Promise<T>): Promise<T> {
     const bytes = await coming;
     this.#sum += bytes.byteLength - (this.#bytes.get(part) ?? 0);
     this.#bytes.set(part, bytes.byteLength);
@@ -128,6 +130,26 @@ const openBoxes: Open = async (request, device, { loader, signal, onProgress }, 
     const own = { credentials, limits: allowance.of(part), source: request.source };
     const box = { ...place, ...own, page, scene: levels.scene };
     return new Uint32Array(await allowance.note(part, loader.ask('box', box, aborted)));
+  });
+  return StreamedGaussians.openSource(device, source, pool);
+};
+
+const openNodes: Open = async (request, device, { loader, signal, onProgress }, pool) => {
+  const { tree, warnings, ...opened } = await loader.ask('tree', request, signal, { onProgress });
+  const report = (sentences: readonly string[]): void =>
+    sentences.forEach((sentence) => pool.onError?.(new Error(sentence)));
+  report(warnings);
+  const { url, credentials, source: from } = request;
+  const allowance = new Allowance(request.limits);
+  const source = treeSource(opened, async (node, above, aborted) => {
+    const part = above.join(' ');
+    const own = { credentials, limits: allowance.of(part), source: from };
+    // The worker needs the volumes of the children alone.
+    const bare = { ...node, children: node.children.map(({ volume }) => ({ volume, children: [] })) };
+    const page = await loader.ask('node', { url, ...own, tree, node: bare, scene: opened.scene, above }, aborted);
+    await allowance.note(part, Promise.resolve(page.words));
+    report(page.warnings);
+    return page;
   });
   return StreamedGaussians.openSource(device, source, pool);
 };

@@ -1,0 +1,243 @@
+/** Reads scenes whose files are trees of levels, node by node. The worker loads this module for the first such scene. */
+import { boundsOf, type GaussianCloud } from '@gaussian-splat/core';
+import { SharedReads } from '@gaussian-splat/core/fetch';
+import {
+  fetchRange,
+  fetchScene,
+  LoadBudget,
+  mergeClouds,
+  openTree as openFormat,
+  partAddress,
+  readNode as readFormat,
+  type FetchSceneOptions,
+  type LoadLimits,
+  type ReadNode,
+  type SceneNode,
+  type SceneTree,
+  type TreeFiles,
+} from '@gaussian-splat/formats';
+import type { StreamedScene } from '@gaussian-splat/renderer';
+import {
+  choosePrecision,
+  noiseIn,
+  packNodes,
+  pageLayout,
+  recentered,
+  usableIndices,
+  type FetchedNode,
+  type NodeContent,
+  type NodePage,
+  type OpenedTree,
+  type RunError,
+} from '@gaussian-splat/renderer/tools';
+import { fileLimits, fileName, limitsFrom, named, throttled } from './load-scene.js';
+import { ProgressSum } from './progress-sum.js';
+import type { SceneLimits, SceneRequest, TaskListeners } from './protocol.js';
+
+/** A tree whose coarsest nodes have been read. */
+export interface LoadedTree extends OpenedTree<SceneNode> {
+  /** Parameters for reading nodes. */
+  readonly tree: Pick<SceneTree, 'container' | 'facts'>;
+  readonly warnings: readonly string[];
+}
+
+/**
+ * A request for a node. It contains all data that the worker needs, because the worker may have been restarted since the
+ * previous request.
+ */
+export interface NodeRequest {
+  /** Absolute address of the scene's file. */
+  readonly url: string;
+  readonly credentials: RequestCredentials;
+  readonly tree: Pick<SceneTree, 'container' | 'facts'>;
+  /** The node. Its children have no children and no places of splats. */
+  readonly node: SceneNode;
+  readonly scene: StreamedScene;
+  /** The run that the page of the node replaces. */
+  readonly above: RunError;
+  readonly limits?: SceneLimits | undefined;
+}
+
+/** A page of a node, and warnings about content that is not drawn. */
+export interface LoadedNode extends FetchedNode<SceneNode> {
+  readonly warnings: readonly string[];
+}
+
+/** Maximum number of nodes in the first page, if nodes without splats are replaced by their children. */
+const MAX_FIRST = 16;
+/** Maximum number of splats of these nodes. */
+const MAX_FIRST_SPLATS = 500_000;
+/** Number of nodes that are read at the same time. */
+const AT_A_TIME = 8;
+
+type Read = readonly [node: SceneNode, read: ReadNode];
+
+/**
+ * Opens a scene whose file is a tree, and reads its coarsest nodes. Throws GaussianSplatError (`network/*`, `decode/*`,
+ * `out-of-memory/*`), or the signal's reason if that is aborted.
+ */
+export async function openTree(
+  request: SceneRequest,
+  signal: AbortSignal,
+  { onProgress }: Pick<TaskListeners, 'onProgress'>,
+): Promise<LoadedTree> {
+  const { url, credentials, sh } = request;
+  const name = fileName(url);
+  const limits = limitsFrom({ limits: { ...request.limits, maxSplats: undefined } });
+  const progress = new ProgressSum(throttled(onProgress), true);
+  const options = (): FetchSceneOptions => ({
+    ...{ mode: 'cors', credentials, signal, onProgress: progress.add() },
+    ...fileLimits(limits()),
+  });
+  try {
+    const bytes = await fetchScene(url, options());
+    const budget = new LoadBudget(bytes.length, limits());
+    const files = filesBeside({ url, name, budget, signal, options });
+    const tree = await openFormat(bytes, files);
+    const nodes = await readFirst(tree, files);
+    const clouds = nodes.flatMap(([, { cloud }]) => cloud ?? []);
+    const scene = sceneOf(clouds, tree, { sh, name, budget });
+    const first = packed(nodes, scene, files);
+    const children = nodes.flatMap(childrenOf);
+    const { container, facts, isComplete } = tree;
+    const warnings = clouds.flatMap((cloud) => cloud.warnings ?? []);
+    return { scene, first, children, isComplete, tree: { container, facts }, warnings };
+  } catch (error) {
+    signal.throwIfAborted();
+    throw named(error, name);
+  }
+}
+
+/** Reads a node, and packs its page. Throws as {@link openTree} does. */
+export async function readNode(
+  { url, credentials, tree, node, scene, above, limits }: NodeRequest,
+  signal: AbortSignal,
+): Promise<LoadedNode> {
+  const name = fileName(url);
+  try {
+    const all: LoadLimits = { ...limits, maxSplats: undefined };
+    const options = (): FetchSceneOptions => ({ mode: 'cors', credentials, signal, ...fileLimits(all) });
+    const files = filesBeside({ url, name, budget: new LoadBudget(0, all), signal, options });
+    const read = await readFormat(tree, node, files);
+    signal.throwIfAborted();
+    const page = packed([[node, read]], scene, files, above);
+    return { ...page, found: read.found, warnings: read.cloud?.warnings ?? [] };
+  } catch (error) {
+    signal.throwIfAborted();
+    throw named(error, name);
+  }
+}
+
+/** Reads the coarsest nodes. Nodes without splats are replaced by their children, as long as these are few. */
+async function readFirst({ container, facts, roots, isDescended }: SceneTree, files: TreeFiles): Promise<Read[]> {
+  const readAll = async (nodes: readonly SceneNode[]): Promise<Read[]> => {
+    const all: Read[] = [];
+    for (let k = 0; k < nodes.length; k += AT_A_TIME) {
+      const some = nodes.slice(k, k + AT_A_TIME);
+      const reads = await Promise.all(some.map((node) => readFormat({ container, facts }, node, files)));
+      some.forEach((node, n) => all.push([node, reads[n]]));
+    }
+    return all;
+  };
+  let reads = await readAll(roots);
+  while (isDescended) {
+    const below = reads.map((read) => (read[1].cloud ? [] : childrenOf(read)));
+    const count = below.reduce((sum, { length }) => sum + Math.max(1, length), 0);
+    if (count > MAX_FIRST || below.every(({ length }) => length === 0)) break;
+    const next: Read[] = [];
+    for (const [k, nodes] of below.entries()) next.push(...(nodes.length > 0 ? await readAll(nodes) : [reads[k]]));
+    if (next.reduce((sum, [, { cloud }]) => sum + (cloud?.count ?? 0), 0) > MAX_FIRST_SPLATS) break;
+    reads = next;
+  }
+  return reads;
+}
+
+const childrenOf = ([node, { found }]: Read): SceneNode[] => [...node.children, ...found];
+
+const contentOf = ([node, { cloud, found, isAdded, error }]: Read): NodeContent => ({
+  ...{ cloud, isAdded, error },
+  volumes: [...node.children, ...found].map(({ volume }) => volume),
+});
+
+/** Packs nodes as a page. Throws `out-of-memory/budget` for more children than the arrived bytes allow. */
+function packed(nodes: readonly Read[], scene: StreamedScene, { budget, name }: TreeFiles, above?: RunError): NodePage {
+  const children = nodes.reduce((sum, read) => sum + childrenOf(read).length, 0);
+  // Each child has a chunk, even if no splats of the node are in its volume.
+  budget.take(4 * pageLayout(scene, 1).total * children, name);
+  return packNodes(nodes.map(contentOf), scene, above);
+}
+
+/** Returns the properties of a scene, which follow from its coarsest splats. */
+function sceneOf(
+  clouds: readonly GaussianCloud[],
+  { roots: [root], up }: SceneTree,
+  { sh, ...account }: Pick<SceneRequest, 'sh'> & Pick<TreeFiles, 'budget' | 'name'>,
+): StreamedScene {
+  const merged = mergeClouds(
+    clouds.map((cloud) => ({ cloud, first: 0, count: cloud.count })),
+    account,
+  );
+  const whole = recentered(merged);
+  const usable = usableIndices(whole);
+  const { shDegree, antialiased, filterVariance, hints } = whole;
+  const [x, y, z] = root.volume ?? whole.origin;
+  const center = [x, y, z] as const;
+  const isEmpty = usable.length === 0;
+  const bounds = isEmpty ? { min: center, max: center, center, radius: root.volume?.[12] ?? 1 } : boundsOf(whole);
+  return {
+    ...{ shDegree, antialiased, filterVariance, order: hints?.order, geometry: 'quantized', splats: whole.count },
+    shPrecision: sh === 'auto' ? choosePrecision(noiseIn(whole, usable), usable.length) : sh,
+    origin: isEmpty ? center : whole.origin,
+    // The page takes the vertical axis from the bounds, as for files.
+    bounds: { ...bounds, ...hints, ...(up && { up }) },
+  };
+}
+
+interface Beside extends Pick<TreeFiles, 'name' | 'budget' | 'signal'> {
+  readonly url: string;
+  readonly options: () => FetchSceneOptions;
+}
+
+/** Files of servers that do not support range requests, by address. Only the latest file is kept. */
+const wholeFiles = new Map<string, Promise<Uint8Array>>();
+
+/** Maximum bytes of files that describe several nodes, of all scenes. */
+const INDEX_BYTES = 8e6;
+const indices = new SharedReads<Uint8Array>(({ byteLength }) => byteLength, INDEX_BYTES);
+
+/** Returns access to the files beside a scene. */
+function filesBeside({ url, name, budget, signal, options }: Beside): TreeFiles {
+  const fetchWhole = async (address: string): Promise<Uint8Array> => {
+    budget.request(name);
+    const bytes = await fetchScene(address, options());
+    budget.arrive(bytes.length);
+    return bytes;
+  };
+  return {
+    ...{ name, budget, signal },
+    openFile: (path, query) => fetchWhole(partAddress(url, path, query).href),
+    openIndex: async (path, query) => {
+      const { href } = partAddress(url, path, query);
+      budget.request(name);
+      const bytes = await indices.read(href, (ended) => fetchScene(href, { ...options(), signal: ended }), signal);
+      budget.arrive(bytes.length);
+      return bytes;
+    },
+    openRange: async (path, start, end) => {
+      const address = partAddress(url, path).href;
+      const kept = await wholeFiles.get(address);
+      if (kept) return kept.subarray(start, end);
+      budget.request(name);
+      const { bytes, isPartial } = await fetchRange(address, start, end, options());
+      if (!isPartial && start > 0) {
+        const whole = wholeFiles.get(address) ?? fetchWhole(address);
+        wholeFiles.clear();
+        wholeFiles.set(address, whole);
+        whole.catch(() => wholeFiles.delete(address));
+        return (await whole).subarray(start, end);
+      }
+      budget.arrive(bytes.length);
+      return bytes;
+    },
+  };
+}
