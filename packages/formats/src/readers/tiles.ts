@@ -8,10 +8,9 @@ import { MAX_PATH } from '../lod/meta.js';
 import { mergeClouds } from '../merge-clouds.js';
 import type { SceneSource } from '../scene-format.js';
 import type { TileContent } from '../tile.js';
-import { isTileset } from '../signatures.js';
 import { contentsAt, parseTileset, TO_CLOUD, type TreeLoad } from '../tileset.js';
 import { applyMotion } from '../transform/moved-cloud.js';
-import { readGltf } from './gltf.js';
+import { isTileset, readGltf } from './gltf.js';
 import { noParts } from './sog.js';
 
 /** Maximum nesting of tilesets. */

@@ -2,7 +2,7 @@
 import { allocateCloud } from '../cloud.js';
 import { HARMONICS_BYTES, parseLccIndex, parseLccMeta, SPLAT_BYTES, type LccMeta, type LccRun } from '../lcc/meta.js';
 import { readAround, readRuns } from '../readers/lcc.js';
-import type { ReadNode, SceneNode, SceneTree, TreeFiles, TreeReader } from './scene-tree.js';
+import type { ReadNode, SceneNode, SceneTree, TreeFiles, TreeReader } from './types.js';
 
 /** A level of a cell; its child is the next finer level. A node without a run has the splats around the scene. */
 interface LccNode extends SceneNode {

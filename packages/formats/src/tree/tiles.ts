@@ -6,11 +6,11 @@ import { damaged, warn } from '../faults.js';
 import { readImplicit, type SubtreeFiles } from '../implicit-tiles.js';
 import { MAX_PATH } from '../lod/meta.js';
 import { mergeClouds } from '../merge-clouds.js';
+import { isTileset } from '../readers/gltf.js';
 import { folderOf, MAX_NESTED, openPart, readContent, upAt } from '../readers/tiles.js';
-import { isTileset } from '../signatures.js';
 import type { Tile } from '../tile.js';
 import { parseTileset, type TreeLoad } from '../tileset.js';
-import type { ReadNode, SceneTree, TreeFiles, TreeReader } from './scene-tree.js';
+import type { ReadNode, SceneTree, TreeFiles, TreeReader } from './types.js';
 
 async function open(bytes: Uint8Array, files: TreeFiles): Promise<SceneTree> {
   const load: TreeLoad = { tiles: 0, height: 0 };
