@@ -43,7 +43,7 @@ async function pixelsOf(element: GaussianSplatElement): Promise<Uint8ClampedArra
   return context.getImageData(0, 0, bitmap.width, bitmap.height).data;
 }
 
-/** Peak signal-to-noise ratio in dB of two images that show something. */
+/** PSNR of two images that show something, in dB. */
 function psnr(a: Uint8ClampedArray, b: Uint8ClampedArray): number {
   assert(
     b.some((value, k) => value !== b[k % 4]),
