@@ -17,6 +17,7 @@ import {
   writePages,
 } from '@gaussian-splat/optimize/pages';
 import { parseSceneOptions, runCommand, sayWarnings, UsageError } from './lib/command.mjs';
+import { CREDIT_OPTIONS, CREDIT_USAGE, credited } from './lib/credits.mjs';
 import { deflate, deflateQuickly } from './lib/encoders.mjs';
 import { dealViews, parseViews } from './lib/given-views.mjs';
 import { obstacleToFolder, writeWhole } from './lib/output-file.mjs';
@@ -33,6 +34,7 @@ const USAGE = `usage: gaussian-splat detail SCENE --out FOLDER [options]
   --exact         the same with centers, shapes and opacities as float32 keeps them, in three to four times the bytes
   --tile AxB      A times B copies of the scene on a plane, to try large scenes; they share their files
   --spacing LEN   world units between copies; default: 2.5 times the radius of the scene
+${CREDIT_USAGE}
 `;
 
 function parseOptions(args) {
@@ -47,6 +49,7 @@ function parseOptions(args) {
     'score-views': text,
     quantized: { type: 'boolean' },
     exact: { type: 'boolean' },
+    ...CREDIT_OPTIONS,
   });
   if (parsed === undefined) return undefined;
   const { values } = parsed;
@@ -81,6 +84,7 @@ function parseOptions(args) {
   const views = values.views === undefined ? undefined : resolve(values.views);
   return {
     ...{ scene, out, degree, scored },
+    credits: { attribution: values.attribution, license: values.license },
     // The file is read first, so that its faults are reported before the work.
     given: views && { path: views, views: parseViews(views) },
     geometry: values.exact ? undefined : 'quantized',
@@ -149,9 +153,9 @@ function writeFolder(out, tree, coded, places) {
   }
 }
 
-async function main({ scene, out, degree, geometry, minPsnr, scored, given, columns, rows, spacing }) {
+async function main({ scene, out, degree, geometry, minPsnr, scored, given, columns, rows, spacing, credits }) {
   const openFile = (path) => readWhole(join(dirname(scene), path));
-  const read = await readScene(await readWhole(scene), { name: scene, openFile });
+  const read = credited(await readScene(await readWhole(scene), { name: scene, openFile }), credits);
   sayWarnings(scene, read, lossesIn('detail.json', read));
   // Pages store no up direction, so the scene is rotated to the default, (0, -1, 0).
   const cloud = upright(toDegree(Math.min(degree, read.shDegree), read));

@@ -9,6 +9,7 @@ import { createRequire } from 'node:module';
 import { basename, dirname, extname, join, relative, resolve } from 'node:path';
 import { fileURLToPath } from 'node:url';
 import { CommandError, parseCommandLine, runCommand, sayWarnings, UsageError } from './lib/command.mjs';
+import { CREDIT_OPTIONS, CREDIT_USAGE, credited } from './lib/credits.mjs';
 import { filesBeside } from './lib/files-beside.mjs';
 import { obstacleToFolder, writeWhole } from './lib/output-file.mjs';
 import { serve } from './lib/server.mjs';
@@ -22,6 +23,7 @@ const USAGE = `usage: gaussian-splat page SCENE... FOLDER [options]
   --usdz        also writes the splats as OpenUSD (.usdz) into the folder, for programs that read ParticleField3DGaussianSplat
   --port N      port of the server that shows the page (default 8000, or a free one if it is taken)
   --no-serve    ends when the page is written
+${CREDIT_USAGE.replace('SCENE', 'the scenes')}
 `;
 const elementFile = (path) => fileURLToPath(new URL(path, import.meta.resolve('@gaussian-splat/element/package.json')));
 const CDN = elementFile('cdn');
@@ -29,19 +31,19 @@ const CDN = elementFile('cdn');
 const ELEMENT = new URL('../dist/single.js', import.meta.url);
 const SCRIPT = '<script type="module" src="cdn/gaussian-splat.min.js"></script>';
 
-async function makePage({ scenes, folder, port, isServed, isSingle, hasUsdz }) {
+async function makePage({ scenes, folder, port, isServed, isSingle, hasUsdz, credits }) {
   const page = join(folder, 'index.html');
   const tags = [];
   for (const scene of scenes) tags.push(await tagShowing(scene));
   mkdirSync(folder, { recursive: true });
-  if (isSingle) await writeSingle(scenes[0], tags[0], page);
-  else await writeFolder(scenes, tags, folder, page);
-  for (const scene of hasUsdz ? scenes : []) await writeUsdz(scene, folder);
+  if (isSingle) await writeSingle(scenes[0], tags[0], page, credits);
+  else await writeFolder(scenes, tags, folder, page, credits);
+  for (const scene of hasUsdz ? scenes : []) await writeUsdz(scene, folder, credits);
   console.log(`\nThe page is ${isSingle ? page : `in ${folder}`}`);
   if (isServed) await show(folder, port);
 }
 
-async function writeFolder(scenes, tags, folder, page) {
+async function writeFolder(scenes, tags, folder, page, credits) {
   copyElement(join(folder, 'cdn'), scenes.some(isModel));
   if (scenes.some(isModel)) await copyRuntime(join(folder, 'cdn/onnxruntime'));
   const elements = [];
@@ -49,7 +51,7 @@ async function writeFolder(scenes, tags, folder, page) {
     const source = await copyScene(scene, folder);
     elements.push((attributes) => elementOf(tags[i], titleOf(scene), ` src="${addressOf(source)}"`, attributes));
   }
-  const markup = (attributes) => elements.map((element) => element(attributes)).join('\n  ');
+  const markup = (style) => elements.map((element) => element(attributesOf(credits) + style)).join('\n  ');
   const size = ' style="display: block; width: 100%; height: 80vh"';
   if (existsSync(page))
     console.log(`\n${page} exists and was not changed. Paste into it:\n\n${SCRIPT}\n${markup(size)}`);
@@ -57,7 +59,7 @@ async function writeFolder(scenes, tags, folder, page) {
 }
 
 /** Writes all splats of a scene as OpenUSD. */
-async function writeUsdz(scene, folder) {
+async function writeUsdz(scene, folder, credits) {
   if (isModel(scene)) throw new CommandError(`${scene} is a generator: --usdz takes a scene file.`);
   const [{ startReading }, { changeFormat, lossesIn }, { inline }] = await Promise.all([
     import('./lib/scene-in-parts.mjs'),
@@ -66,7 +68,7 @@ async function writeUsdz(scene, folder) {
   ]);
   const out = join(folder, `${plainTitleOf(scene)}.usdz`);
   if (resolve(scene) === out) return;
-  const cloud = await (await startReading(scene, inline)).cloud;
+  const cloud = credited(await (await startReading(scene, inline)).cloud, credits);
   sayWarnings(scene, cloud, lossesIn(out, cloud));
   writeWhole(out, (await changeFormat(cloud, { name: out })).bytes);
   console.log(`\n${out}: ${cloud.count} splats as OpenUSD`);
@@ -79,7 +81,7 @@ const MAX_SINGLE = 384e6;
  * Writes an index.html that contains the element and the scene as text. The page converts the scene to a file with its
  * name, because the name identifies some formats.
  */
-async function writeSingle(scene, tag, page) {
+async function writeSingle(scene, tag, page, credits) {
   if (existsSync(page)) throw new CommandError(`${page} exists. With --single name a folder without an index.html.`);
   const { found, missing } = await filesBeside(scene);
   if (isJson(scene) || found.length + missing.length > 0 || isModel(scene))
@@ -102,12 +104,18 @@ async function writeSingle(scene, tag, page) {
     await customElements.whenDefined('${tag}');
     document.querySelector('${tag}').src = new File([await data.blob()], ${name});
   </script>`;
-  writeWhole(page, htmlOf(`${elementOf(tag, title)}\n  ${script}`, title));
+  writeWhole(page, htmlOf(`${elementOf(tag, title, '', attributesOf(credits))}\n  ${script}`, title));
 }
 
 function parseOptions(args) {
   const flag = { type: 'boolean', default: false };
-  const options = { port: { type: 'string', default: '8000' }, 'no-serve': flag, single: flag, usdz: flag };
+  const options = {
+    port: { type: 'string', default: '8000' },
+    'no-serve': flag,
+    single: flag,
+    usdz: flag,
+    ...CREDIT_OPTIONS,
+  };
   const parsed = parseCommandLine(args, options);
   if (parsed === undefined) return undefined;
   const { values, positionals } = parsed;
@@ -137,6 +145,7 @@ function parseOptions(args) {
     isServed: !values['no-serve'] && !values.single,
     isSingle: values.single,
     hasUsdz: values.usdz,
+    credits: { attribution: values.attribution, license: values.license },
   };
 }
 
@@ -208,9 +217,15 @@ const isModel = (path) => extname(path).toLowerCase() === '.onnx';
 const plainTitleOf = (scene) => (isJson(scene) ? basename(dirname(scene)) : basename(scene, extname(scene)));
 
 /** Returns the title of a page: the name of the scene's file, or of the folder of a JSON file. */
-function titleOf(scene) {
-  return plainTitleOf(scene).replaceAll('&', '&amp;').replaceAll('"', '&quot;').replaceAll('<', '&lt;');
-}
+const titleOf = (scene) => escaped(plainTitleOf(scene));
+
+const escaped = (text) => text.replaceAll('&', '&amp;').replaceAll('"', '&quot;').replaceAll('<', '&lt;');
+
+/** Returns the attributes of credits. */
+const attributesOf = ({ attribution, license }) =>
+  Object.entries({ attribution, license })
+    .map(([name, text]) => (text === undefined ? '' : ` ${name}="${escaped(text)}"`))
+    .join('');
 
 const addressOf = (source) => source.split('/').map(encodeURIComponent).join('/');
 

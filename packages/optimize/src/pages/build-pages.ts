@@ -1,5 +1,5 @@
 import { upright } from '@gaussian-splat/formats';
-import { boundsOf, validateCloud, type GaussianCloud } from '@gaussian-splat/core';
+import { boundsOf, validateCloud, type Credits, type GaussianCloud } from '@gaussian-splat/core';
 import {
   boundLevel,
   CENTER_ROUNDING,
@@ -48,6 +48,7 @@ export interface DetailTree extends Pick<
   DetailManifest,
   'splats' | 'shPrecision' | 'geometry' | 'antialiased' | 'filterVariance' | 'order' | 'origin' | 'bounds'
 > {
+  readonly credits?: Credits | undefined;
   readonly levels: readonly SplatLevel[];
   /** Rows of the struct `Chunk` for each level. */
   readonly chunks: readonly Float32Array[];
@@ -81,6 +82,7 @@ export function buildDetailTree(given: GaussianCloud, { geometry }: DetailTreeOp
     antialiased,
     filterVariance,
     order: hints?.order,
+    credits: hints?.credits,
     origin,
     bounds: boundsOf(standing),
   };
@@ -195,7 +197,7 @@ export function manifestOf(
   coding?: PageCoding,
 ): DetailManifest {
   const stated = coding && statedOf(coding);
-  const { splats, shPrecision, geometry, antialiased, filterVariance, order, origin, bounds, levels } = tree;
+  const { splats, shPrecision, geometry, antialiased, filterVariance, order, credits, origin, bounds, levels } = tree;
   return {
     ...{
       format: 'gaussian-splat-detail',
@@ -204,7 +206,7 @@ export function manifestOf(
       shDegree: levels[0].shDegree,
     },
     ...{ shPrecision: coding ? 'int8' : shPrecision, ...(geometry && { geometry }), ...(stated && { coding: stated }) },
-    ...{ antialiased, filterVariance, ...(order && { order }), origin, bounds },
+    ...{ antialiased, filterVariance, ...(order && { order }), ...credits, origin, bounds },
     trees: [
       {
         pages: pages.map(({ chunks, upper, parent }, p) => ({

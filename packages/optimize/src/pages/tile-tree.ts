@@ -31,6 +31,7 @@ export function instancedTree(tree: DetailTree, places: readonly Vector3[]): Det
       antialiased: tree.antialiased,
       filterVariance: tree.filterVariance,
       order: tree.order,
+      credits: tree.credits,
       origin: tree.origin,
     },
     bounds: boundsAround(tree.bounds, places, radius),

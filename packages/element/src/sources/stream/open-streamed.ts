@@ -1,6 +1,6 @@
 /** Opens streamed scenes: manifests of pages (docs/lod-format.md), and streamed SOG by boxes. */
 import { fileRequest } from '@gaussian-splat/core/fetch';
-import type { TrainedOrder } from '@gaussian-splat/core';
+import type { Credits, TrainedOrder } from '@gaussian-splat/core';
 import { MemoryLedger, pickInitialVariants, StreamedGaussians, type PoolOptions } from '@gaussian-splat/renderer';
 import { levelSource } from '@gaussian-splat/renderer/tools';
 import type { SceneLimits, SceneRequest } from '../../loading/protocol.js';
@@ -24,6 +24,7 @@ interface OpenedStream {
   readonly order?: TrainedOrder | undefined;
   readonly detail?: LodSettings;
   readonly warnings?: readonly string[];
+  readonly credits?: Credits | undefined;
 }
 
 /** Fraction of the remaining memory budget that a streamed scene may use, because other scenes may follow. */
@@ -59,10 +60,10 @@ async function openStreamed(request: SceneRequest, device: GPUDevice, options: S
     },
   };
   const isSog = new URL(request.url).pathname.endsWith('lod-meta.json');
-  const gaussians = await (isSog ? openBoxes : openPages)(request, device, options, pool);
+  const { gaussians, credits } = await (isSog ? openBoxes : openPages)(request, device, options, pool);
   const { bounds, order } = gaussians;
   if (!signal.aborted)
-    return { ...{ gaussians, bounds, order, warnings }, detail: { detail: DETAIL, splatBudget: caps.splats } };
+    return { ...{ gaussians, bounds, order, warnings, credits }, detail: { detail: DETAIL, splatBudget: caps.splats } };
   gaussians.destroy();
   throw signal.reason;
 }
@@ -100,13 +101,14 @@ type Open = (
   device: GPUDevice,
   options: StreamedOptions,
   pool: PoolOptions,
-) => Promise<StreamedGaussians>;
+) => Promise<{ readonly gaussians: StreamedGaussians; readonly credits: Credits | undefined }>;
 
 const openPages: Open = async (request, device, { loader, signal, onProgress }, pool) => {
   const { limits = {} } = request;
   const allowance = new Allowance(limits);
   const manifest = await loader.ask('manifest', request, signal, { onProgress });
-  return StreamedGaussians.open(device, manifest, {
+  const { attribution, license } = manifest;
+  const gaussians = await StreamedGaussians.open(device, manifest, {
     ...pool,
     isDecoded: true,
     fetchPage: async (page, aborted, coded) => {
@@ -115,10 +117,11 @@ const openPages: Open = async (request, device, { loader, signal, onProgress }, 
       return allowance.note(part.url, loader.fetchFile(own, aborted));
     },
   });
+  return { gaussians, credits: attribution || license ? { attribution, license } : undefined };
 };
 
 const openBoxes: Open = async (request, device, { loader, signal, onProgress }, pool) => {
-  const { levels, files, runs, firstRuns } = await loader.ask('boxes', request, signal, { onProgress });
+  const { levels, files, runs, firstRuns, credits } = await loader.ask('boxes', request, signal, { onProgress });
   const { url, credentials } = request;
   const allowance = new Allowance(request.limits);
   const source = levelSource(levels, async (page, aborted) => {
@@ -129,7 +132,7 @@ const openBoxes: Open = async (request, device, { loader, signal, onProgress }, 
     const box = { ...place, ...own, page, scene: levels.scene };
     return new Uint32Array(await allowance.note(part, loader.ask('box', box, aborted)));
   });
-  return StreamedGaussians.openSource(device, source, pool);
+  return { gaussians: await StreamedGaussians.openSource(device, source, pool), credits };
 };
 
 /** Opens a streamed scene. */
