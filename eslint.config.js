@@ -66,6 +66,7 @@ export default tseslint.config(
       'test-output/',
       'coverage/',
       '**/assembly/',
+      'packages/notebook/{src,build}/',
     ],
   },
   ...tseslint.configs.recommended,

@@ -3,9 +3,9 @@
  * `-- --torch` installs PyTorch, too (gigabytes), for what trains, for modules and for comparisons with public code.
  * `-- --webgpu` runs the files on ONNX Runtime's WebGPU provider, in an environment beside it. Other arguments go to pytest.
  */
-import { existsSync, readFileSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { gpuEnvironment } from './lib/gpu-environment.mjs';
+import { environment } from './lib/python-environment.mjs';
 import { must, root } from './lib/run.mjs';
 
 const folder = join(root, 'packages/exporter');
@@ -14,7 +14,7 @@ const given = process.argv.slice(2);
 const [torch, webgpu] = [...flags].map((flag) => given.includes(flag));
 const rest = given.filter((argument) => !flags.has(argument));
 
-const python = environment(webgpu ? 'webgpu' : 'cpu', [
+const python = environment(`exporter/${webgpu ? 'webgpu' : 'cpu'}`, folder, [
   ...(webgpu ? ['onnxruntime-webgpu==1.27.0', 'pytest==9.2.0'] : []),
   ...['--editable', webgpu ? folder : `${folder}[dev${torch ? ',module,oracles' : ''}]`],
 ]);
@@ -25,18 +25,4 @@ if (webgpu) {
   must(python, ['-m', 'ruff', 'format', '--check', '.'], { cwd: folder });
   must(python, ['-m', 'mypy'], { cwd: folder });
   must(python, ['-m', 'pytest', '-rs', ...rest], { cwd: folder });
-}
-
-/** The Python of a virtual environment with these requirements; installs only changes since the last time. */
-function environment(name, requirements) {
-  const home = join(root, '.cache/exporter', name);
-  const bin = join(home, process.platform === 'win32' ? 'Scripts/python.exe' : 'bin/python');
-  const stamp = join(home, 'installed.txt');
-  const wanted = [...requirements, readFileSync(join(folder, 'pyproject.toml'), 'utf8')].join('\n');
-  if (!existsSync(bin)) must(process.env.PYTHON ?? 'python3', ['-m', 'venv', home]);
-  if (!existsSync(stamp) || readFileSync(stamp, 'utf8') !== wanted) {
-    must(bin, ['-m', 'pip', 'install', '--quiet', '--disable-pip-version-check', ...requirements]);
-    writeFileSync(stamp, wanted);
-  }
-  return bin;
 }

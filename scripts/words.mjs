@@ -102,7 +102,7 @@ function holdPythonLines() {
   // Ruff does not count comments for tools.
   const columnsOf = (text) => [...text.replace(/\s*# (type|noqa).*$/, '')].length;
   const long = code
-    .filter((path) => path.startsWith('packages/exporter/') && path.endsWith('.py'))
+    .filter((path) => /^packages\/(exporter|notebook)\//.test(path) && path.endsWith('.py'))
     .flatMap((path) =>
       placed(
         path,

@@ -19,6 +19,7 @@ const SECTIONS = [
         'labels',
         'animation',
         'changing-scenes',
+        'notebooks',
         'styling',
         'events',
       ].map(guide),
@@ -40,7 +41,12 @@ const SECTIONS = [
   ['Help', ['troubleshooting', 'browsers', 'limits', 'compare', 'coming-from'].map(guide)],
   [
     'Generators',
-    [guide('own-generator'), /^docs\/contract/, /^packages\/(generator|check|exporter)\//, /^demo\/generators\/README/],
+    [
+      guide('own-generator'),
+      /^docs\/contract/,
+      /^packages\/(generator|check|exporter|notebook)\//,
+      /^demo\/generators\/README/,
+    ],
   ],
   ['Accuracy and speed', [/^docs\/accuracy/, /^docs\/benchmark/, /^docs\/stability/, /^packages\/optimize\//]],
   [

@@ -44,6 +44,8 @@ interface Stage {
   readonly file: string;
   readonly up: 'Y' | 'Z';
   readonly meters: number | null;
+  /** Attribution and license. */
+  readonly credits: readonly (string | null)[];
   readonly fields: readonly Field[];
 }
 
@@ -112,7 +114,7 @@ function assertField(cloud: GaussianCloud, first: number, field: Field, where: s
 const determinantOf = (m: readonly number[]): number =>
   m[0] * (m[4] * m[8] - m[5] * m[7]) - m[1] * (m[3] * m[8] - m[5] * m[6]) + m[2] * (m[3] * m[7] - m[4] * m[6]);
 
-async function assertStage(folder: string, { file, up, meters, fields }: Stage): Promise<number> {
+async function assertStage(folder: string, { file, up, meters, credits, fields }: Stage): Promise<number> {
   const bytes = readFileSync(join(folder, file));
   const count = fields.reduce((sum, field) => sum + field.count, 0);
   if (count === 0) {
@@ -124,6 +126,8 @@ async function assertStage(folder: string, { file, up, meters, fields }: Stage):
   assert.equal(cloud.count, count, file);
   assert.deepEqual(cloud.hints?.up, up === 'Y' ? [0, 1, 0] : [0, 0, 1], file);
   assert.equal(cloud.hints?.metersPerUnit ?? null, meters, file);
+  const { attribution = null, license = null } = cloud.hints?.credits ?? {};
+  assert.deepEqual([attribution, license], credits, file);
   const largest = fields.reduce((max, field) => (field.count > max.count ? field : max));
   assert.equal(cloud.hints?.order, ORDERS[largest.order], file);
   let first = 0;
@@ -151,6 +155,7 @@ test('200 random stages are as usd-core reads them, within 1e-6', { skip }, asyn
 /** Scenes of the shared data. The test takes a few thousand splats of each. */
 const SCENES = ['skull.ply', 'angel.compressed.ply', 'massa.sog', 'st-peter.sog', 'plant.splat'];
 const MAX_SPLATS = 3_000;
+const CREDITS = { attribution: 'Museum; Łódź "A"', license: 'CC-BY-4.0' };
 
 test(
   'five scenes are written as usd-core accepts them, and return from its layers',
@@ -177,6 +182,7 @@ test(
         const cloud = clouds.get(stage.file)!;
         assert.deepEqual(stage.faults, [], stage.file);
         assert.equal(stage.fields[0].count, cloud.count, stage.file);
+        assert.deepEqual(stage.credits, Object.values(CREDITS), stage.file);
         await assertStage(folder, stage);
         // The values of float32 are those of the scene, which is turned by half a turn about x.
         if (stage.file.includes('1.usd')) {
@@ -207,7 +213,7 @@ function sampled(cloud: GaussianCloud, max: number): GaussianCloud {
   };
   const { positions, scales, rotations, opacities, sh } = cloud;
   return {
-    ...{ ...cloud, count, hints: undefined, positions: rows(positions), scales: rows(scales) },
+    ...{ ...cloud, count, hints: { credits: CREDITS }, positions: rows(positions), scales: rows(scales) },
     ...{ rotations: rows(rotations), opacities: rows(opacities), sh: rows(sh) },
   };
 }

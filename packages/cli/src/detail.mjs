@@ -15,6 +15,7 @@ import {
   writePages,
 } from '@gaussian-splat/optimize/pages';
 import { parseSceneOptions, report, runCommand, sayWarnings, UsageError } from './lib/command.mjs';
+import { CREDIT_OPTIONS, CREDIT_USAGE, creditsWith } from './lib/credits.mjs';
 import {
   buildPart,
   finishBuild,
@@ -45,6 +46,7 @@ const USAGE = `usage: gaussian-splat detail SCENE --out FOLDER [options]
   --memory SIZE   such as 2GB, the most that the command takes; default: half of the machine's. Larger scenes are built in cells, on the disk of FOLDER
   --part I/N      builds one of N parts of the cells, into the same FOLDER, on any machine that sees it; ended parts are not built again
   --join          builds the levels above the parts, and writes detail.json
+${CREDIT_USAGE}
 
 SCENE may be a list of files: {"scenes": [{"file": "a.ply", "transform": [16 numbers, column by column]}, ...]}
 `;
@@ -62,6 +64,7 @@ function parseOptions(args) {
     quantized: { type: 'boolean' },
     exact: { type: 'boolean' },
     ...{ memory: text, part: text, join: { type: 'boolean' } },
+    ...CREDIT_OPTIONS,
   });
   if (parsed === undefined) return undefined;
   const { values } = parsed;
@@ -97,6 +100,7 @@ function parseOptions(args) {
   const views = values.views === undefined ? undefined : resolve(values.views);
   return {
     ...{ scene, out, degree, scored },
+    credits: { attribution: values.attribution, license: values.license },
     // The file is read first, so that its faults are reported before the work.
     given: views && { path: views, views: parseViews(views) },
     geometry: values.exact ? undefined : 'quantized',
@@ -188,7 +192,7 @@ async function writeCopies(build, options) {
 
 async function main(options) {
   const { scene, out, degree, geometry, minPsnr, scored, given, columns, rows, memory, part, isJoining } = options;
-  const { isMeasuring } = options;
+  const { isMeasuring, credits } = options;
   const inputs = inputsOf(scene);
   // Pages without a plan are those of another program.
   if (existsSync(out) && !existsSync(join(out, UNFINISHED)))
@@ -214,7 +218,8 @@ async function main(options) {
   }
   if (part) return console.log(`part ${part.index} of ${part.of} in ${seconds(start)} s, ${memoryUsed()}: ${out}`);
   const choice = minPsnr === undefined ? undefined : chosenCoding(build, minPsnr);
-  manifest ??= joinParts(build, choice);
+  const { attribution, license, ...joined } = manifest ?? joinParts(build, choice);
+  manifest = { ...joined, ...creditsWith({ attribution, license }, credits) };
   finishBuild(build, manifest);
   const files = manifest.trees.flatMap((tree) => tree.pages.map(({ file }) => file));
   const bytes = files.reduce((sum, file) => sum + statSync(join(out, file)).size, 0);

@@ -20,6 +20,7 @@ import {
 import { inline } from '@gaussian-splat/optimize/parts';
 import { writeCatalogue } from './lib/catalogue.mjs';
 import { parseSceneOptions, report as reportFigures, runCommand, sayWarnings, UsageError } from './lib/command.mjs';
+import { CREDIT_OPTIONS, CREDIT_USAGE, credited } from './lib/credits.mjs';
 import { encodeWebp } from './lib/encoders.mjs';
 import { filesBeside } from './lib/files-beside.mjs';
 import { checkPython, Gate, neededDecibels } from './lib/gate/gate.mjs';
@@ -50,6 +51,7 @@ const USAGE = `usage: gaussian-splat optimize SCENE --min-psnr DB --out FILE [op
   --threads N     threads for reading a large PLY, and for writing a GLB and reading it again, 1 to 64 (default: one for each processor, at most 16)
   --merge         also merges similar splats: fewer remain at the same PSNR, in several times the time
   --refine        optimizes the remaining splats for frames of the whole scene, on the GPU, and removes more of them if that helps
+${CREDIT_USAGE}
   --report FILE   writes all measurements as JSON, with the seconds of each kind of work; reading counts from when the GPU device is ready
 `;
 
@@ -69,6 +71,7 @@ function parseOptions(args) {
     threads: { ...text, default: String(usualThreads()) },
     merge: { type: 'boolean', default: false },
     refine: { type: 'boolean', default: false },
+    ...CREDIT_OPTIONS,
   });
   if (parsed === undefined) return undefined;
   const { values } = parsed;
@@ -101,7 +104,23 @@ function parseOptions(args) {
   if (!(Number.isInteger(threads) && threads >= 1 && threads <= 64))
     throw new UsageError(`--threads: expected a whole number from 1 to 64, found "${values.threads}"`);
   const gating = gate && { cameras: gate, images, python: values.python ?? 'python3' };
-  return { scene, out, isFormatOnly, minPsnr, maxBytes, gating, views, report, scored, threads, merge, refine };
+  const { attribution, license } = values;
+  const credits = { attribution, license };
+  return {
+    scene,
+    out,
+    isFormatOnly,
+    minPsnr,
+    maxBytes,
+    gating,
+    views,
+    report,
+    scored,
+    threads,
+    merge,
+    refine,
+    credits,
+  };
 }
 
 /** Checks before the work that outputs can be written, and that they differ from inputs and each other. */
@@ -195,10 +214,10 @@ const triesOf = (tries = []) =>
     .join('');
 
 /** Writes a scene in another format, with all of its splats. */
-async function writeFormat({ scene, out, threads }) {
+async function writeFormat({ scene, out, threads, credits }) {
   const begun = performance.now();
   const pool = threads > 1 ? new ThreadPool(threads) : inline;
-  const cloud = await (await startReading(scene, pool)).cloud;
+  const cloud = credited(await (await startReading(scene, pool)).cloud, credits);
   sayWarnings(scene, cloud, lossesIn(out, cloud));
   const { bytes, encoding } = await changeFormat(cloud, { name: out, pool, encodeWebp });
   writeOut(out, bytes);
@@ -227,6 +246,7 @@ async function reduceScene({
   threads,
   merge,
   refine,
+  credits,
 }) {
   const begun = performance.now();
   const seconds = () => (performance.now() - begun) / 1000;
@@ -242,7 +262,7 @@ async function reduceScene({
   const device = await openDevice();
   GpuEvaluator.prepare(device);
   const opened = seconds();
-  const cloud = await reading;
+  const cloud = credited(await reading, credits);
   sayWarnings(scene, cloud, lossesIn(out, cloud));
   // Unsupported properties of the format are reported before the first image is drawn.
   encodingsFor(out, cloud);

@@ -18,6 +18,7 @@ import {
   SeveralInputs,
   UsageError,
 } from './lib/command.mjs';
+import { CREDIT_OPTIONS, CREDIT_USAGE, credited } from './lib/credits.mjs';
 import { filesBeside } from './lib/files-beside.mjs';
 import { obstacleToFolder, writeWhole } from './lib/output-file.mjs';
 import { serve } from './lib/server.mjs';
@@ -33,26 +34,27 @@ const USAGE = `usage: gaussian-splat page SCENE... FOLDER [options]
   --no-serve    ends when the page is written
   --catalogue   lists the scenes, and shows one at a time; the default for a folder or a pattern
   --scene-only  reads and copies the scenes, without the element and a page
+${CREDIT_USAGE.replace('SCENE', 'the scenes')}
 `;
 /** Module with the element and all of its late-loaded chunks. */
 const ELEMENT = new URL('../dist/single.js', import.meta.url);
 const SCRIPT = '<script type="module" src="cdn/gaussian-splat.min.js"></script>';
 
-async function makePage({ scenes, folder, port, isServed, isSingle, isSceneOnly, hasUsdz }) {
+async function makePage({ scenes, folder, port, isServed, isSingle, isSceneOnly, hasUsdz, credits }) {
   const page = join(folder, 'index.html');
   const tags = [];
   for (const scene of scenes) tags.push(await tagShowing(scene));
   mkdirSync(folder, { recursive: true });
   if (isSceneOnly)
     for (const [k, scene] of scenes.entries()) report({ source: await copyScene(scene, folder), tag: tags[k] });
-  else if (isSingle) await writeSingle(scenes[0], tags[0], page);
-  else await writeFolder(scenes, tags, folder, page);
-  for (const scene of hasUsdz ? scenes : []) await writeUsdz(scene, folder);
+  else if (isSingle) await writeSingle(scenes[0], tags[0], page, credits);
+  else await writeFolder(scenes, tags, folder, page, credits);
+  for (const scene of hasUsdz ? scenes : []) await writeUsdz(scene, folder, credits);
   if (!isSceneOnly) console.log(`\nThe page is ${isSingle ? page : `in ${folder}`}`);
   if (isServed) await show(folder, port);
 }
 
-async function writeFolder(scenes, tags, folder, page) {
+async function writeFolder(scenes, tags, folder, page, credits) {
   copyElement(join(folder, 'cdn'), scenes.some(isModel));
   if (scenes.some(isModel)) await copyRuntime(join(folder, 'cdn/onnxruntime'));
   const elements = [];
@@ -60,7 +62,7 @@ async function writeFolder(scenes, tags, folder, page) {
     const source = await copyScene(scene, folder);
     elements.push((attributes) => elementOf(tags[i], titleOf(scene), ` src="${addressOf(source)}"`, attributes));
   }
-  const markup = (attributes) => elements.map((element) => element(attributes)).join('\n  ');
+  const markup = (style) => elements.map((element) => element(attributesOf(credits) + style)).join('\n  ');
   const size = ' style="display: block; width: 100%; height: 80vh"';
   if (existsSync(page))
     console.log(`\n${page} exists and was not changed. Paste into it:\n\n${SCRIPT}\n${markup(size)}`);
@@ -68,7 +70,7 @@ async function writeFolder(scenes, tags, folder, page) {
 }
 
 /** Writes all splats of a scene as OpenUSD. */
-async function writeUsdz(scene, folder) {
+async function writeUsdz(scene, folder, credits) {
   if (isModel(scene)) throw new CommandError(`${scene} is a generator: --usdz takes a scene file.`);
   const [{ startReading }, { changeFormat, lossesIn }, { inline }] = await Promise.all([
     import('./lib/scene-in-parts.mjs'),
@@ -77,7 +79,7 @@ async function writeUsdz(scene, folder) {
   ]);
   const out = join(folder, `${plainTitleOf(scene)}.usdz`);
   if (resolve(scene) === out) return;
-  const cloud = await (await startReading(scene, inline)).cloud;
+  const cloud = credited(await (await startReading(scene, inline)).cloud, credits);
   sayWarnings(scene, cloud, lossesIn(out, cloud));
   writeWhole(out, (await changeFormat(cloud, { name: out })).bytes);
   console.log(`\n${out}: ${cloud.count} splats as OpenUSD`);
@@ -90,7 +92,7 @@ const MAX_SINGLE = 384e6;
  * Writes an index.html that contains the element and the scene as text. The page converts the scene to a file with its
  * name, because the name identifies some formats.
  */
-async function writeSingle(scene, tag, page) {
+async function writeSingle(scene, tag, page, credits) {
   if (existsSync(page)) throw new CommandError(`${page} exists. With --single name a folder without an index.html.`);
   const { found, missing } = await filesBeside(scene);
   if (isJson(scene) || found.length + missing.length > 0 || isModel(scene))
@@ -113,13 +115,13 @@ async function writeSingle(scene, tag, page) {
     await customElements.whenDefined('${tag}');
     document.querySelector('${tag}').src = new File([await data.blob()], ${name});
   </script>`;
-  writeWhole(page, htmlOf(`${elementOf(tag, title)}\n  ${script}`, title));
+  writeWhole(page, htmlOf(`${elementOf(tag, title, '', attributesOf(credits))}\n  ${script}`, title));
 }
 
 function parseOptions(args) {
   const flag = { type: 'boolean', default: false };
   const options = { port: { type: 'string', default: '8000' }, 'no-serve': flag, single: flag, usdz: flag };
-  Object.assign(options, { catalogue: flag, 'scene-only': flag });
+  Object.assign(options, { catalogue: flag, 'scene-only': flag, ...CREDIT_OPTIONS });
   const parsed = parseCommandLine(args, options);
   if (parsed === undefined) return undefined;
   const { values, positionals } = parsed;
@@ -152,6 +154,7 @@ function parseOptions(args) {
     isSceneOnly: values['scene-only'],
     isSingle: values.single,
     hasUsdz: values.usdz,
+    credits: { attribution: values.attribution, license: values.license },
   };
 }
 
@@ -217,6 +220,12 @@ const plainTitleOf = (scene) => (isJson(scene) ? basename(dirname(scene)) : base
 function titleOf(scene) {
   return escaped(plainTitleOf(scene));
 }
+
+/** Returns the attributes of credits. */
+const attributesOf = ({ attribution, license }) =>
+  Object.entries({ attribution, license })
+    .map(([name, text]) => (text === undefined ? '' : ` ${name}="${escaped(text)}"`))
+    .join('');
 
 /** Returns the HTML that shows a scene, or a mesh, which is a child of the element. */
 function elementOf(tag, title, src = '', attributes = '') {

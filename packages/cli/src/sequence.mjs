@@ -5,6 +5,7 @@ import { framePath, parseSequence, readScene } from '@gaussian-splat/formats';
 import { deviceDescriptor, pickInitialVariants } from '@gaussian-splat/renderer';
 import { CommandError, parseSceneOptions, report, runCommand, UsageError } from './lib/command.mjs';
 import { codeClip, drawOn } from '@gaussian-splat/optimize';
+import { CREDIT_OPTIONS, CREDIT_USAGE, creditsWith } from './lib/credits.mjs';
 import { openClipStore } from './lib/clip-store.mjs';
 import { encodeWebp } from './lib/encoders.mjs';
 import { requestNodeAdapter } from './lib/node-gpu.mjs';
@@ -20,12 +21,13 @@ const USAGE = `usage: gaussian-splat sequence MANIFEST --out CLIP.gsv [options]
   --max-mbps RATE   most megabits a second; the PSNR may then be below the default of --min-psnr
   --per-file N      frames of a group, 2 to 480 (default 100): with more, the result is smaller, and its fine image comes later.
                     Groups of large frames are shorter, so that their memory is bounded
+${CREDIT_USAGE.replace('SCENE', 'MANIFEST, or of the scene files')}
 
 An interrupted command continues after its last group if it is started again: finished groups are in CLIP.gsv.unfinished.
 `;
 
 function parseOptions(args) {
-  const own = { out: { type: 'string' }, 'max-mbps': { type: 'string' } };
+  const own = { out: { type: 'string' }, 'max-mbps': { type: 'string' }, ...CREDIT_OPTIONS };
   const parsed = parseSceneOptions(args, { ...own, 'min-psnr': { type: 'string' }, 'per-file': { type: 'string' } });
   if (parsed === undefined) return undefined;
   const { values } = parsed;
@@ -45,7 +47,9 @@ function parseOptions(args) {
   const maxMbps = rate === undefined ? undefined : Number(rate);
   // A rate without a PSNR is the only demand.
   const isDemanded = maxMbps === undefined || values['min-psnr'] !== undefined;
-  return { manifest: resolve(parsed.scene), out, minPsnr, isDemanded, maxMbps, framesPerGroup };
+  const { attribution, license } = values;
+  const credits = { attribution, license };
+  return { manifest: resolve(parsed.scene), out, minPsnr, isDemanded, maxMbps, framesPerGroup, credits };
 }
 
 async function openDevice() {
@@ -55,7 +59,7 @@ async function openDevice() {
   return device;
 }
 
-async function main({ manifest, out, minPsnr, isDemanded, maxMbps, framesPerGroup }) {
+async function main({ manifest, out, minPsnr, isDemanded, maxMbps, framesPerGroup, credits }) {
   const sequence = parseSequence(await readWhole(manifest), basename(manifest));
   const { frameCount, framesPerSecond } = sequence;
   const paths = Array.from({ length: frameCount }, (_, frame) => join(dirname(manifest), framePath(sequence, frame)));
@@ -71,6 +75,7 @@ async function main({ manifest, out, minPsnr, isDemanded, maxMbps, framesPerGrou
   const clip = await codeClip({
     ...{ frameCount, framesPerSecond, framesPerGroup, openFrame, minPsnr, maxMbps, draw: drawOn(await openDevice()) },
     ...{ encodeWebp, store },
+    credits: creditsWith(sequence.credits, credits),
     onStep: (step) => console.log(`  ${step}`),
     onProgress: (frames) => console.log(`${frames} of ${frameCount} frames`),
   });

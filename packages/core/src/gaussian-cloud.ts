@@ -1,3 +1,4 @@
+import type { Credits } from './credits.js';
 import { GaussianSplatError } from './errors.js';
 import type { Vector3 } from './vector.js';
 
@@ -54,11 +55,10 @@ export type TrainedOrder = 'pixel' | 'distance';
 export interface CloudHints {
   /** Unit vector that points up, in the coordinates of the cloud. */
   readonly up?: Vector3 | undefined;
-  /**
-   * Whether {@link up} was inferred from the program that wrote the file, because the file declares no coordinate
-   * system.
-   */
+  /** Whether {@link up} was inferred from the program that wrote the file, which declares no coordinate system. */
   readonly isUpAssumed?: boolean;
+  /** Credits that the file declares. */
+  readonly credits?: Credits | undefined;
   /** Name of the program that wrote the file, as stated in the file. */
   readonly generator?: string;
   /** Sort order of splats in training, if it is not that of their centers by depth. */
@@ -108,10 +108,7 @@ export interface GaussianCloud extends FilterRule {
   readonly levelRuns?: readonly LevelRun[];
   /** Number of splats of the source that were dropped because of an unusable value; see {@link keepUsable}. */
   readonly droppedCount: number;
-  /**
-   * Four counts of the splats that {@link keepUsable} dropped: for a scale below 0, for a zero rotation, for no extent,
-   * and for values that are not finite or too large.
-   */
+  /** Counts of dropped splats: scale below 0, zero rotation, no extent, other values. See {@link keepUsable}. */
   readonly faults?: readonly number[] | undefined;
   /** Messages about parts of the file that are not drawn or may be misinterpreted. */
   readonly warnings?: readonly string[] | undefined;
@@ -127,9 +124,7 @@ export const MAX_SCALE = 1e12;
  * limit of float32, the type of chunk bounds.
  */
 export const MAX_POSITION = 1e18;
-/**
- * Lower limit of the standard deviation along a splat's longest axis, in world units. Smaller splats have no extent.
- */
+/** Lower limit of the longest standard deviation of a splat, world units. Smaller splats have no extent. */
 const MIN_LONGEST_SCALE = 1e-12;
 
 /** Throws `argument/cloud` unless the arrays of a cloud have the lengths that `count` and `shDegree` require. */

@@ -10,6 +10,7 @@ export {
 } from './camera.js';
 export * from './projections.js';
 export * from './errors.js';
+export * from './credits.js';
 export * from './gaussian-cloud.js';
 export * from './half.js';
 export * from './linear.js';

@@ -2,9 +2,17 @@
  * Head and index of clips (.gsv): animated scenes in one file, read by byte ranges. docs/sequences.md describes the
  * format.
  */
-import { GaussianSplatError, type Bounds, type FilterRule, type ShDegree, type Vector3 } from '@gaussian-splat/core';
+import {
+  GaussianSplatError,
+  type Bounds,
+  type Credits,
+  type FilterRule,
+  type ShDegree,
+  type Vector3,
+} from '@gaussian-splat/core';
 import { LoadBudget, type LoadLimits } from './budget.js';
 import { grouped, startsWith, viewOf } from './bytes.js';
+import { creditsOf } from './credits.js';
 import { damaged } from './faults.js';
 import { isObject, parseJson, show, type Json } from './json.js';
 import { ANIMATED_ATTRIBUTES, ANIMATED_ATTRIBUTE_NAMES } from './motion.js';
@@ -53,6 +61,8 @@ export interface ClipIndex extends FilterRule {
   readonly shDegree: ShDegree;
   readonly origin: Vector3;
   readonly bounds: Bounds & { readonly up?: Vector3 | undefined };
+  /** Credits of all frames. The index has them as `attribution` and `license`. */
+  readonly credits?: Credits | undefined;
   /** Factor of the scales of the first part's splats while other parts of its group are missing, 1 to 8. */
   readonly grow: number;
   readonly groups: readonly ClipGroup[];
@@ -143,6 +153,7 @@ class IndexReader {
       antialiased: antialiased === true,
       filterVariance: filterVariance === undefined ? undefined : this.#number('filterVariance', filterVariance, 0, 100),
       grow: this.#number('grow', this.#json.grow ?? 1, 1, 8),
+      credits: creditsOf(this.#json),
     };
   }
 
@@ -235,7 +246,7 @@ function endOf(parts: readonly ClipPart[], start: number): number {
  * Returns the bytes of head and index. In the file, the parts that never change follow, then the groups: the scene and the motion of each part follow in order.
  * @throws GaussianSplatError `argument/value` for an index that {@link parseClip} would refuse for its size.
  */
-export function writeClipHead({ groups, still = [], ...facts }: ClipHead): Uint8Array<ArrayBuffer> {
+export function writeClipHead({ groups, still = [], credits, ...facts }: ClipHead): Uint8Array<ArrayBuffer> {
   requireAtMost(groups.length, MAX_GROUPS, 'groups');
   requireAtMost(
     groups.reduce((sum, { parts }) => sum + parts.length, 0),
@@ -247,7 +258,7 @@ export function writeClipHead({ groups, still = [], ...facts }: ClipHead): Uint8
     ...parts.map(({ splats, planes, sceneBytes, motionBytes }) => [splats, planes, sceneBytes, motionBytes]),
   ]);
   const stillRows = still.map(({ splats, sceneBytes }) => [splats, sceneBytes]);
-  const json = { ...facts, ...(still.length > 0 && { still: stillRows }), groups: rows };
+  const json = { ...facts, ...credits, ...(still.length > 0 && { still: stillRows }), groups: rows };
   const index = new TextEncoder().encode(JSON.stringify(json));
   requireAtMost(index.length, MAX_CLIP_INDEX_BYTES, 'bytes');
   const bytes = new Uint8Array(CLIP_HEAD_BYTES + index.length);

@@ -12,6 +12,7 @@ export {
   type PackedClipIndex,
 } from './clip-table.js';
 export { fetchRange, type FetchedRange } from './fetch-range.js';
+export { assetOfCredits, creditsOf, joinCredits } from './credits.js';
 export { outOfMemory } from './scene-errors.js';
 export { readLodScene, sogAddress, type LodBox, type LodScene, type SogAddress, type SogRun } from './lod/boxes.js';
 export { readCoarsestLevel } from './lod/read-coarsest.js';

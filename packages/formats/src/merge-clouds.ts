@@ -1,5 +1,6 @@
 import { shCoefficientCount, type GaussianCloud, type LevelRun, type ShDegree } from '@gaussian-splat/core';
 import { allocateCloud, type DraftCloud } from './cloud.js';
+import { addCredits, joinCredits } from './credits.js';
 import { warn } from './faults.js';
 import type { SceneSource } from './scene-format.js';
 
@@ -12,7 +13,8 @@ export interface CloudPart {
 
 /**
  * Copies parts of several clouds into a new cloud, in order. The new cloud has the highest degree of the parts; other
- * coefficients are padded with zeros. Its origin and hints are those of the part with the most splats.
+ * coefficients are padded with zeros. Its origin and hints are those of the part with the most splats, but its
+ * credits are those of all parts.
  * @throws GaussianSplatError `out-of-memory/budget`
  */
 export function mergeClouds(parts: readonly CloudPart[], source: Pick<SceneSource, 'budget' | 'name'>): DraftCloud {
@@ -27,6 +29,7 @@ export function mergeClouds(parts: readonly CloudPart[], source: Pick<SceneSourc
   merged.antialiased = parts.some(({ cloud }) => cloud.antialiased);
   merged.filterVariance = parts.find(({ cloud }) => cloud.antialiased)?.cloud.filterVariance;
   merged.hints = largest?.cloud.hints;
+  addCredits(merged, joinCredits(parts.map(({ cloud }) => cloud.hints?.credits)));
   for (const { cloud } of parts) for (const sentence of cloud.warnings ?? []) warn(merged, sentence);
   let at = 0;
   for (const part of parts) {

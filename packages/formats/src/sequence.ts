@@ -1,5 +1,7 @@
+import type { Credits } from '@gaussian-splat/core';
 import { LoadBudget } from './budget.js';
 import { grouped } from './bytes.js';
+import { creditsOf } from './credits.js';
 import { damaged } from './faults.js';
 import { parseJson, show } from './json.js';
 import { MAX_PATH } from './lod/meta.js';
@@ -13,6 +15,8 @@ export interface SceneSequence {
   readonly framesPerSecond: number;
   /** Seconds from the first frame to the end of the last. */
   readonly durationSeconds: number;
+  /** Credits that the manifest declares. */
+  readonly credits?: Credits | undefined;
 }
 
 /** Numbered paths: `before`, the number of the path, and `behind`. */
@@ -41,6 +45,8 @@ type Fail = (path: string, expected: string, found: unknown) => never;
  * { "gaussianSplatSequence": 1, "framesPerSecond": 24, "frames": "frame-{0001}.spz", "count": 240 }
  * ```
  *
+ * Both may have `attribution` and `license`.
+ *
  * @throws GaussianSplatError `decode/corrupt`, `decode/truncated`, `decode/header` or `decode/unsupported`.
  */
 export function parseSequence(bytes: Uint8Array, name: string): SceneSequence {
@@ -53,11 +59,13 @@ export function parseSequence(bytes: Uint8Array, name: string): SceneSequence {
   if (!(Number.isFinite(framesPerSecond) && (framesPerSecond as number) > 0 && (framesPerSecond as number) <= 1000)) {
     fail('framesPerSecond', 'a number above 0, 1000 at most', framesPerSecond);
   }
+  const credits = creditsOf(json);
   const sequence = (found: SceneSequence['frames'], frameCount: number): SceneSequence => ({
     frames: found,
     frameCount,
     framesPerSecond: framesPerSecond as number,
     durationSeconds: frameCount / (framesPerSecond as number),
+    ...(credits && { credits }),
   });
   if (typeof frames === 'string') return sequence(patternOf(frames, 'frames', fail), countOf(count, fail));
   const paths = pathsOf(frames, 'frames', fail);

@@ -144,6 +144,10 @@ def write_stage(path):
     if random.random() < 0.2:
         stage.CreateClassPrim("/Prototype")
         add_splats(stage, "/Prototype/S", time)
+    if random.random() < 0.5:
+        nested = {"copyright": "of another dictionary", "number": 1.5}
+        data = {"creator": "usdzconvert", "copyright": '2026 "Museum" Łódź', "years": Vt.IntArray([1, 2]), "nested": nested}
+        stage.GetRootLayer().customLayerData = data | random.choice([{}, {"zeros": 0.5, "license": "CC-BY-4.0"}])
     stage.GetRootLayer().Save()
     if layer != path and not UsdUtils.CreateNewUsdzPackage(str(layer), str(path)):
         raise RuntimeError(f"{path} was not written")
@@ -214,8 +218,10 @@ def read_stage(path):
                 "order": prim.GetAttribute("sortingModeHint").Get(),
             }
         )
+    data = stage.GetRootLayer().customLayerData
     return {
         "file": Path(path).name,
+        "credits": [data.get("copyright"), data.get("license")],
         "up": UsdGeom.GetStageUpAxis(stage),
         "meters": UsdGeom.GetStageMetersPerUnit(stage) if UsdGeom.StageHasAuthoredMetersPerUnit(stage) else None,
         "fields": sorted(fields, key=lambda field: field["path"]),

@@ -1,4 +1,4 @@
-import type { TrainedOrder } from '@gaussian-splat/core';
+import type { Credits, TrainedOrder } from '@gaussian-splat/core';
 import type { GaussianScene, StreamProgress } from '@gaussian-splat/renderer';
 import { QueueClock } from '@gaussian-splat/renderer/tools';
 import type { SceneBounds } from '../viewer/camera/settings.js';
@@ -56,6 +56,8 @@ export class LoadedGaussians implements Drawable {
   readonly order: TrainedOrder | undefined;
   /** Whether the file also contains triangle meshes. */
   readonly hasMeshes: boolean;
+  /** Credits that the file, the manifest or the contract declares. */
+  readonly credits: Credits | undefined;
   /** Messages about content of the file that is not drawn. */
   warnings: readonly string[];
   /** Called when another frame is required: a part has arrived, or a view has no feedback pass yet. */
@@ -80,12 +82,14 @@ export class LoadedGaussians implements Drawable {
       order,
       hasMeshes = false,
       warnings = [],
+      credits,
     }: {
       live?: Timeline | undefined;
       detail?: LodSettings;
       order?: TrainedOrder | undefined;
       hasMeshes?: boolean | undefined;
       warnings?: readonly string[] | undefined;
+      credits?: Credits | undefined;
     } = {},
   ) {
     this.place = lease;
@@ -97,6 +101,7 @@ export class LoadedGaussians implements Drawable {
     this.order = order;
     this.hasMeshes = hasMeshes;
     this.warnings = warnings;
+    this.credits = credits ?? live?.credits;
     if (live) QueueClock.of(lease.device).isShared = true;
   }
 

@@ -231,8 +231,8 @@ export class LargePly {
     const joined = new JoinedBlocks(layout, packer.count, { antialiased, filterVariance, origin, droppedCount }, send);
     void onPart?.({ head: joined.head });
     await packer.finish((block) => joined.add(block));
-    const { up, order } = hints ?? {};
-    const own = { bounds: { ...joined.bounds, up }, order, warnings };
+    const { up, order, credits } = hints ?? {};
+    const own = { bounds: { ...joined.bounds, up }, order, warnings, credits };
     if (!onPart) return { ...own, packed: joined.packed };
     void onPart({ portion: { chunks: joined.chunks } });
     return own;

@@ -63,6 +63,7 @@ export async function loadScene(
       warnings: cloud.warnings,
       order: cloud.hints?.order,
       hasMeshes: cloud.hints?.meshes,
+      credits: cloud.hints?.credits,
     });
     const pack = async (cloud: GaussianCloud): Promise<LoadedScene> => ({
       packed: await (await packer.get()).packCloud(cloud, { sh: request.sh }),

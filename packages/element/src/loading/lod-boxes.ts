@@ -1,4 +1,5 @@
 /** Reads streamed SOG scenes box by box. The worker loads this module for the first such scene. */
+import type { Credits } from '@gaussian-splat/core';
 import {
   fetchScene,
   LoadBudget,
@@ -27,6 +28,7 @@ export interface LoadedBoxes {
   readonly runs: Float64Array;
   /** [B] index in `runs` of the first level of each box. */
   readonly firstRuns: Uint32Array;
+  readonly credits: Credits | undefined;
 }
 
 /**
@@ -86,7 +88,8 @@ export async function openBoxes(
     const lod = readLodScene(await fetch(url, signal), name, url, limits());
     const coarsest = await readCoarsestLevel(lod, files, fetch, name, signal, limits());
     const boxes = lod.boxes.map(({ min, max, runs }) => ({ min, max, counts: runs.map(({ count }) => count) }));
-    return { levels: layoutLevels(coarsest, boxes, { sh }), ...placesOf(lod) };
+    const credits = lod.credits ?? coarsest.hints?.credits;
+    return { levels: layoutLevels(coarsest, boxes, { sh }), ...placesOf(lod), credits };
   } catch (error) {
     signal.throwIfAborted();
     throw named(error, name);

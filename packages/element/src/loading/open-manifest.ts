@@ -1,6 +1,6 @@
 /** Reads manifests of streamed scenes. The worker loads this module for the first streamed scene. */
 import { GaussianSplatError } from '@gaussian-splat/core';
-import { fetchScene, LoadBudget, parseJson } from '@gaussian-splat/formats';
+import { creditsOf, fetchScene, LoadBudget, parseJson } from '@gaussian-splat/formats';
 import { checkManifest, type DetailManifest } from '@gaussian-splat/renderer';
 import { fileName, named, throttled } from './load-helpers.js';
 import type { FileRequest, TaskListeners } from './protocol.js';
@@ -39,7 +39,7 @@ export async function openManifest(
     const json = parseJson({ bytes, name: url, budget }, MAX_BYTES);
     const manifest = checkManifest(json, url, Math.floor(budget.allowed / PAGE_BYTES));
     if (manifest.splats > maxSplats) throw tooMany(url, manifest.splats, maxSplats);
-    return manifest;
+    return { ...manifest, ...creditsOf(manifest) };
   } catch (error) {
     signal.throwIfAborted();
     throw named(error, fileName(url));

@@ -7,4 +7,5 @@ export const packLevels = (cloud: GaussianCloud, sh: SceneRequest['sh']): Loaded
   packed: packLevelRuns(cloud, { sh }),
   bounds: { ...boundsOf(cloud), ...cloud.hints },
   warnings: cloud.warnings,
+  credits: cloud.hints?.credits,
 });

@@ -1,5 +1,5 @@
 /** Requests to the scene worker, its answers, and the functions that it calls meanwhile. Those of one task alone are beside its code. */
-import type { TrainedOrder } from '@gaussian-splat/core';
+import type { Credits, TrainedOrder } from '@gaussian-splat/core';
 import type { RendererChoice } from '../viewer/attributes.js';
 import type { SceneBounds } from '../viewer/camera/settings.js';
 import type { LoadLimits, SceneSequence } from '@gaussian-splat/formats';
@@ -72,6 +72,7 @@ export interface LoadedFacts {
   readonly order?: TrainedOrder | undefined;
   /** Whether the file also contains triangle meshes. */
   readonly hasMeshes?: boolean | undefined;
+  readonly credits?: Credits | undefined;
 }
 
 /** A scene, fetched and packed, ready for upload. */

@@ -1,9 +1,10 @@
 /** Reads scenes whose files are trees of levels, node by node. The worker loads this module for the first such scene. */
-import { boundsOf, type GaussianCloud } from '@gaussian-splat/core';
+import { boundsOf, type Credits, type GaussianCloud } from '@gaussian-splat/core';
 import { SharedReads } from '@gaussian-splat/core/fetch';
 import {
   fetchRange,
   fetchScene,
+  joinCredits,
   LoadBudget,
   mergeClouds,
   openTree as openFormat,
@@ -39,6 +40,8 @@ export interface LoadedTree extends OpenedTree<SceneNode> {
   /** Parameters for reading nodes. */
   readonly tree: Pick<SceneTree, 'container' | 'facts'>;
   readonly warnings: readonly string[];
+  /** Credits of the coarsest nodes. */
+  readonly credits: Credits | undefined;
 }
 
 /**
@@ -101,7 +104,8 @@ export async function openTree(
     const children = nodes.flatMap(childrenOf);
     const { container, facts, isComplete } = tree;
     const warnings = clouds.flatMap((cloud) => cloud.warnings ?? []);
-    return { scene, first, children, isComplete, tree: { container, facts }, warnings };
+    const credits = joinCredits(clouds.map(({ hints }) => hints?.credits));
+    return { scene, first, children, isComplete, tree: { container, facts }, warnings, credits };
   } catch (error) {
     signal.throwIfAborted();
     throw named(error, name);

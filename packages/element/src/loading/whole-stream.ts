@@ -4,7 +4,14 @@
  */
 import { GaussianSplatError, type GaussianCloud } from '@gaussian-splat/core';
 import { fileRequest } from '@gaussian-splat/core/fetch';
-import { fetchScene, fileOpenerFor, readScene, type FetchSceneOptions, type LoadLimits } from '@gaussian-splat/formats';
+import {
+  creditsOf,
+  fetchScene,
+  fileOpenerFor,
+  readScene,
+  type FetchSceneOptions,
+  type LoadLimits,
+} from '@gaussian-splat/formats';
 import type { DetailManifest } from '@gaussian-splat/renderer';
 import {
   cloudOfChunks,
@@ -98,7 +105,10 @@ async function loadPages(
     due = GROWTH * (k + 1);
   }
   onReading?.(true);
-  return { ...(await pack(cloudOf(manifest, list, pages, words))), order: manifest.order };
+  return {
+    ...(await pack(cloudOf(manifest, list, pages, words))),
+    ...{ order: manifest.order, credits: creditsOf(manifest) },
+  };
 }
 
 /**

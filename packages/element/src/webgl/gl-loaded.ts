@@ -36,11 +36,11 @@ export class GlLoaded extends LoadedGaussians {
   private constructor(
     lease: GlLease,
     content: GlContent,
-    { bounds, warnings = [], hasMeshes = false }: LoadedScene,
+    { bounds, warnings = [], hasMeshes = false, credits }: LoadedScene,
     spawn: () => Worker,
     live: Timeline | undefined,
   ) {
-    super(lease, content.gaussians, bounds, 1, { warnings: hasMeshes ? [...warnings, NO_MESHES] : warnings });
+    super(lease, content.gaussians, bounds, 1, { warnings: hasMeshes ? [...warnings, NO_MESHES] : warnings, credits });
     this.lease = lease;
     this.#content = content;
     this.spawn = spawn;

@@ -1,3 +1,4 @@
+import type { Credits } from '@gaussian-splat/core';
 import { LoadBudget, type LoadLimits } from '../budget.js';
 import { grouped } from '../bytes.js';
 import { damaged } from '../faults.js';
@@ -37,6 +38,8 @@ export interface LodScene {
   readonly files: readonly string[];
   /** File whose splats are shown at every level, or undefined. */
   readonly environment: SogAddress | undefined;
+  /** Credits that the index declares. */
+  readonly credits?: Credits | undefined;
 }
 
 /** Maximum number of splats over all levels of an index. */
@@ -54,7 +57,7 @@ const KEPT_BYTES = 32 / 256;
  */
 export function readLodScene(bytes: Uint8Array, name: string, url: string, limits?: LoadLimits): LodScene {
   const budget = new LoadBudget(bytes.length, limits);
-  const { files, leaves, environment } = parseLodMeta({ bytes, name, budget });
+  const { files, leaves, environment, credits } = parseLodMeta({ bytes, name, budget });
   budget.take(files.length * (FILE_BYTES + url.length), name);
   const addresses = files.map((path) => sogAddress(path, name, url));
   const boxes = leaves.map(({ min, max, levels }) => ({
@@ -69,6 +72,7 @@ export function readLodScene(bytes: Uint8Array, name: string, url: string, limit
   return {
     boxes: boxes.filter(({ runs }) => runs.length > 0),
     files,
+    ...(credits && { credits }),
     environment: environment === undefined ? undefined : sogAddress(environment, name, url),
   };
 }

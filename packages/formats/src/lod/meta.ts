@@ -1,3 +1,5 @@
+import type { Credits } from '@gaussian-splat/core';
+import { creditsOfAsset } from '../credits.js';
 import { damaged } from '../faults.js';
 import { grouped } from '../bytes.js';
 import { isObject, parseJson, show, type JsonSource } from '../json.js';
@@ -26,6 +28,7 @@ export interface LodMeta {
   readonly files: readonly string[];
   /** Path of the SOG file whose splats are shown at every level, or undefined. */
   readonly environment: string | undefined;
+  readonly credits: Credits | undefined;
   readonly leaves: readonly LodLeaf[];
 }
 
@@ -65,6 +68,7 @@ export function parseLodMeta(source: JsonSource): LodMeta {
     levels: lodLevels as number,
     files: filenames,
     environment: (environment as string | null) || undefined,
+    credits: creditsOfAsset(json.asset),
     leaves,
   };
 }

@@ -86,7 +86,8 @@ export function parsePlyHeader(source: SceneSource): PlyHeader {
   let encoding: PlyHeader['encoding'] | undefined;
   lines.forEach((line, index) => {
     const fail = headerFailure(source, line, index + 1);
-    const [keyword, ...words] = line.trim().split(/[ \t]+/);
+    // A trimmed line would lose the last byte of some characters of UTF-8.
+    const [keyword = '', ...words] = line.split(/[ \t]+/).filter((word) => word !== '');
     if (keyword === 'format') {
       encoding = ENCODINGS.get(words[0]);
       if (!encoding || words[1] !== '1.0') fail('format ascii, binary_little_endian or binary_big_endian 1.0');

@@ -3,8 +3,9 @@
  * that change the meaning of others.
  */
 import { GaussianSplatError, loadModule, normalize, type Vector3 } from '@gaussian-splat/core';
-import { grouped } from '../bytes.js';
+import { asciiOf, grouped } from '../bytes.js';
 import type { DraftCloud } from '../cloud.js';
+import { addCredits, creditsOf } from '../credits.js';
 import { DEGREE_4, FLAT, warn } from '../faults.js';
 import { OFFSETS, PLAIN, TRAILING } from './gaussian-layout.js';
 import { safeOrbit } from '../safe-orbit.js';
@@ -32,7 +33,35 @@ function valueOf(comments: readonly string[], key: RegExp): string | undefined {
     .toLowerCase();
 }
 
-/** Sets the metadata of a cloud from comments: filter, sort order, direction up, and the program that wrote the file. */
+/** Matches comments with a credit, which is group 1 or 2, or with a license, which is group 3. */
+const CREDIT =
+  /^\s*(?:(?:attribution|authors?|copyright|credits?)\s*[:=]\s*(.*)|(copyright\b.*)|licen[cs]e\s*[:=]\s*(.*))$/is;
+
+/** Reads the credits in comments such as `author: Jane Doe` and `license: CC-BY-4.0`. Several of a kind are joined. */
+function readCredits(cloud: DraftCloud, comments: readonly string[]): void {
+  const matches = comments.map((text) => CREDIT.exec(text)).filter((match) => match !== null);
+  if (matches.length === 0) return;
+  const join = (groups: readonly number[]): string =>
+    matches
+      .flatMap((match) => groups.flatMap((group) => match[group] ?? []))
+      .map(utf8Of)
+      .join('; ');
+  addCredits(cloud, creditsOf({ attribution: join([1, 2]), license: join([3]) }));
+}
+
+/** Bytes by the characters that `asciiOf` returns for them. */
+const BYTES = new Map(Array.from(asciiOf(Uint8Array.from({ length: 256 }, (_, k) => k)), (char, k) => [char, k]));
+
+/** Decodes a text of UTF-8 that was decoded as one character for each byte. Returns other texts as they are. */
+function utf8Of(text: string): string {
+  try {
+    return new TextDecoder('utf-8', { fatal: true }).decode(Uint8Array.from(text, (char) => BYTES.get(char)!));
+  } catch {
+    return text;
+  }
+}
+
+/** Sets the metadata of a cloud from comments: filter, sort order, direction up, credits, and the program that wrote the file. */
 export function readComments(cloud: DraftCloud, comments: readonly string[]): void {
   const mode = valueOf(comments, /^splatrendermode\s*:\s*(.*)$/i);
   if (mode !== undefined) cloud.antialiased = mode === 'mip';
@@ -47,6 +76,7 @@ export function readComments(cloud: DraftCloud, comments: readonly string[]): vo
   if (order) cloud.hints = { ...cloud.hints, order };
   const up = upOf(comments);
   if (up) cloud.hints = { ...cloud.hints, up };
+  readCredits(cloud, comments);
   if (generator !== undefined) cloud.hints = { ...cloud.hints, generator };
 }
 

@@ -6,6 +6,7 @@ import { activate, activationOf, isPlain, type Activation } from '../gltf/activa
 import { hasLinearColors, isSplats, isUncompressed, readPrimitive, shapesIn, splatsIn } from '../gltf/primitive.js';
 import { grouped } from '../bytes.js';
 import type { DraftCloud } from '../cloud.js';
+import { addCredits, creditsOfAsset } from '../credits.js';
 import { warn } from '../faults.js';
 import { isObject } from '../json.js';
 import { mergeClouds } from '../merge-clouds.js';
@@ -72,6 +73,7 @@ async function readSplats(source: SceneSource): Promise<GaussianCloud> {
           source,
         );
   if (others > 0) whole.hints = { ...whole.hints, meshes: true };
+  addCredits(whole, creditsOfAsset(document.json.asset));
   warnDropped(whole, document.json, others > 0);
   return whole;
 }

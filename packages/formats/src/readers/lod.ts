@@ -1,5 +1,6 @@
 import type { GaussianCloud } from '@gaussian-splat/core';
 import { grouped } from '../bytes.js';
+import { addCredits } from '../credits.js';
 import { checkedPart } from '../foreign-signatures.js';
 import { damaged } from '../faults.js';
 import { parseLodMeta, runsAtAllLevels, runsAtLevel, type LodMeta, type NodeRun } from '../lod/meta.js';
@@ -28,6 +29,7 @@ export async function readLod(source: SceneSource): Promise<GaussianCloud> {
   }
   const parts = [...(await readRuns(runs, meta, open, source)), ...around];
   const merged = mergeClouds(parts, source);
+  addCredits(merged, meta.credits);
   return level === 'all' ? { ...merged, levelRuns: levelRunsOf(parts) } : merged;
 }
 

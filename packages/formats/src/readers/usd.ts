@@ -1,13 +1,14 @@
 import { GaussianSplatError, type CloudHints, type GaussianCloud } from '@gaussian-splat/core';
 import { grouped, startsWith } from '../bytes.js';
 import type { DraftCloud } from '../cloud.js';
+import { addCredits, creditsOf } from '../credits.js';
 import { warn } from '../faults.js';
 import { mergeClouds } from '../merge-clouds.js';
 import type { SceneSource } from '../scene-format.js';
 import { applyMotion } from '../transform/moved-cloud.js';
 import { readCrate } from '../usd/crate.js';
 import { isField, readField } from '../usd/fields.js';
-import { pathOf, shownPath, valueAt, type UsdLayer, type UsdPrim } from '../usd/layer.js';
+import { DATA_PREFIX, pathOf, shownPath, valueAt, type UsdLayer, type UsdPrim } from '../usd/layer.js';
 import { readTextLayer } from '../usd/text-layer.js';
 import { placesAt } from '../usd/transforms.js';
 
@@ -52,6 +53,9 @@ export async function readUsd(source: SceneSource): Promise<GaussianCloud> {
           source,
         );
   whole.hints = { ...whole.hints, ...stageHints(layer) };
+  // Apple's usdzconvert writes `copyright`.
+  const [attribution, license] = ['copyright', 'license'].map((key) => layer.metadata.get(DATA_PREFIX + key));
+  addCredits(whole, creditsOf({ attribution, license }));
   if (left.length > 0)
     warn(whole, `Content of other layers is left out: ${left.join(', ')}. "usdcat --flatten" puts it into one file.`);
   if (whole.hints.isUpAssumed) warn(whole, ASSUMED_Y);

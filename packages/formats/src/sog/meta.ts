@@ -1,5 +1,6 @@
-import { GaussianSplatError, type ShDegree, type TrainedOrder } from '@gaussian-splat/core';
+import { GaussianSplatError, type Credits, type ShDegree, type TrainedOrder } from '@gaussian-splat/core';
 import { grouped } from '../bytes.js';
+import { creditsOfAsset } from '../credits.js';
 import { damaged } from '../faults.js';
 import { trainedOrder } from '../trained-order.js';
 import { isObject, parseJson, show, type Json, type JsonSource } from '../json.js';
@@ -19,6 +20,7 @@ export interface SogMeta {
   readonly filterVariance: number | undefined;
   /** Sort order of `sortingMethod: pixel`, which the exporter of this project writes; otherwise undefined. */
   readonly order: TrainedOrder | undefined;
+  readonly credits: Credits | undefined;
   /** Whether splats are 2D Gaussians (2DGS): `model: 2dgs` of splat-transform. */
   readonly isFlat: boolean;
   readonly means: {
@@ -97,6 +99,7 @@ export function parseSogMeta(source: JsonSource): SogMeta {
     antialiased: json.antialias === true || json.model === 'antialiased',
     filterVariance: json.model === 'antialiased' ? 0.1 : undefined,
     order: trainedOrder(json.sortingMethod),
+    credits: creditsOfAsset(json.asset),
     isFlat: json.model === '2dgs',
     means: { mins: numbers('means', 'mins', 3), maxs: numbers('means', 'maxs', 3), files: files('means', 2) },
     scales: { values: isFirst ? between('scales', 3) : repeated(codebook('scales'), 3), files: files('scales', 1) },

@@ -1,6 +1,7 @@
 import { loadModule, type GaussianCloud, type ShDegree } from '@gaussian-splat/core';
 import { grouped, startsWith } from '../bytes.js';
 import { allocateCloud, DEGREE_OF_REST_COUNT, type DraftCloud } from '../cloud.js';
+import { addCredits } from '../credits.js';
 import { damaged, FLAT, warn } from '../faults.js';
 import { previewWanted, type OpenFile, type SceneSource } from '../scene-format.js';
 import { PREVIEW_STEP, sparse } from '../preview.js';
@@ -109,6 +110,7 @@ function unpackGeometry(
   if (meta.isFlat) warn(cloud, FLAT);
   cloud.filterVariance = meta.filterVariance;
   if (meta.order) cloud.hints = { order: meta.order };
+  addCredits(cloud, meta.credits);
   unpackMeans(planes.low, planes.high, meta.means, selection, cloud.positions);
   unpackScales(planes.scales, meta.scales, selection, cloud.scales);
   unpackQuats(planes.quats, selection, cloud.rotations);

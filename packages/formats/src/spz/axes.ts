@@ -1,5 +1,6 @@
-import { GaussianSplatError, type TrainedOrder } from '@gaussian-splat/core';
+import { GaussianSplatError, type Credits, type TrainedOrder } from '@gaussian-splat/core';
 import { viewOf } from '../bytes.js';
+import { creditsOf } from '../credits.js';
 import { safeOrbit, type OrbitLimits } from '../safe-orbit.js';
 import type { SpzHeader } from './header.js';
 
@@ -19,6 +20,8 @@ const PADDING = 0;
 /** Our own record of the trained order of splats: a number of {@link ORDERS}, from 1 on. */
 const ORDER = 0x47530001;
 const ORDERS: readonly TrainedOrder[] = ['pixel', 'distance'];
+/** Our own record of credits: attribution and license in UTF-8, separated by a zero byte. */
+const CREDITS = 0x47530002;
 const MAX_SKIPPED = 8;
 /** Number of fractional bits in the files of all converters. */
 const USUAL_FRACTIONAL_BITS = 12;
@@ -34,6 +37,7 @@ export interface SpzFrame {
   readonly isAssumed?: boolean | undefined;
   readonly order?: TrainedOrder | undefined;
   readonly orbit?: OrbitLimits | undefined;
+  readonly credits?: Credits | undefined;
 }
 
 /**
@@ -66,18 +70,21 @@ export function readExtensions(
   let frame: SpzFrame | undefined;
   let order: TrainedOrder | undefined;
   let orbit: OrbitLimits | undefined;
+  let credits: Credits | undefined;
   for (const { type, payload } of recordsIn(records)) {
     const length = payload.byteLength;
     const limits = type === SAFE_ORBIT && length >= 12 && !header.followsSpecification ? limitsIn(payload) : undefined;
     if (limits) orbit = limits;
     else if (type === COORDINATE_SYSTEM && length >= 4) frame ??= frameOfSystem(payload.getUint32(0, true), name);
     else if (type === ORDER && length >= 4) order = ORDERS[payload.getUint32(0, true) - 1];
+    else if (type === CREDITS) credits = creditsIn(payload);
     else if (type !== PADDING && skipped.size < MAX_SKIPPED) skipped.add(type);
   }
   return {
     ...(frame ?? { axes: assumedAxes(header), isAssumed: !header.followsSpecification }),
     order,
     orbit,
+    credits,
     skipped: [...skipped],
   };
 }
@@ -91,6 +98,11 @@ function* recordsIn(records: Uint8Array): Generator<{ type: number; payload: Dat
     yield { type: view.getUint32(at, true), payload: viewOf(records.subarray(at + 8, end > records.length ? 0 : end)) };
     at = end;
   }
+}
+
+function creditsIn(payload: DataView): Credits | undefined {
+  const [attribution, license] = new TextDecoder().decode(payload).split('\0');
+  return creditsOf({ attribution, license });
 }
 
 const limitsIn = (payload: DataView): OrbitLimits | undefined =>

@@ -1,6 +1,7 @@
 import { halfToNumber, shCoefficientCount, type GaussianCloud } from '@gaussian-splat/core';
 import { viewOf } from '../bytes.js';
 import { allocateCloud, expInPlace, keptDegree } from '../cloud.js';
+import { addCredits } from '../credits.js';
 import { DEGREE_4, warn } from '../faults.js';
 import { harmonicSigns, quaternionSigns, type AxisSigns } from './axes.js';
 import { bytesPerSplat, type SpzHeader } from './header.js';
@@ -13,13 +14,14 @@ const COLOR_SCALE = 0.15;
 /** Returns the cloud of packed attributes, as `unpackGaussians` in SPZ's `src/cc/load-spz.cc` defines them. */
 export function unpackSplats(
   header: SpzHeader,
-  { attributes, axes, isAssumed, order, orbit, skipped = [] }: PackedScene,
+  { attributes, axes, isAssumed, order, orbit, credits, skipped = [] }: PackedScene,
   source: Pick<SceneSource, 'budget' | 'name'>,
 ): GaussianCloud {
   const cloud = allocateCloud(header.count, keptDegree(header.degree), source);
   cloud.antialiased = header.antialiased;
   if (isAssumed || order || orbit)
     cloud.hints = { ...(isAssumed && { isUpAssumed: true }), ...(order && { order }), ...(orbit && { orbit }) };
+  addCredits(cloud, credits);
   if (header.degree === 4) warn(cloud, DEGREE_4);
   for (const type of skipped) warn(cloud, `The SPZ extension 0x${type.toString(16)} is left out.`);
   if (header.version === 1) unpackHalfPositions(attributes.positions, axes, cloud.positions);

@@ -1,5 +1,7 @@
 import { GaussianSplatError } from '@gaussian-splat/core';
+import type { Credits } from '@gaussian-splat/core';
 import type { LoadBudget } from '../budget.js';
+import { creditsOfAsset } from '../credits.js';
 import { isPly } from '../signatures.js';
 import { readPlyMesh } from './ply-mesh.js';
 import { leftOutExtensions, openContainer, type Json } from '../gltf/container.js';
@@ -40,6 +42,8 @@ export interface TriangleFile {
   readonly triangles: number;
   /** Messages about parts of the file that are not shown. */
   readonly warnings: readonly string[];
+  /** Credits that the glTF declares. */
+  readonly credits?: Credits | undefined;
 }
 
 /** Matches the extensions that a file may require. */
@@ -68,6 +72,7 @@ export async function readTriangles(source: TriangleSource): Promise<TriangleFil
     images: files,
     byteLength: views.byteLength + survey.copies + images.byteLength,
     triangles: survey.triangles,
+    credits: creditsOfAsset(file.json.asset),
     warnings: [...darkLights(survey.darkLights), ...leftOutExtensions(file.json, KNOWN)],
   };
 }

@@ -30,6 +30,7 @@ const NUMBERS: ReadonlyMap<number, readonly [Scalar, number]> = new Map([
   [48, [DOUBLE, 1]],
   [56, [DOUBLE, 1]],
 ]);
+const [STRING, DICTIONARY] = [10, 31];
 const [BOOL, TOKEN, MATRIX_4D, TOKEN_LIST, SPECIFIER, TIME_SAMPLES, DOUBLE_VECTOR] = [1, 11, 15, 32, 42, 46, 48];
 const isQuaternion = (type: number): boolean => type >= 16 && type <= 18;
 /** Arrays of fewer elements are not compressed, even if they are marked as such. */
@@ -49,11 +50,14 @@ export class CrateValues {
   readonly #tokens: readonly string[];
   /** Version, as 100 · minor + patch. */
   readonly #version: number;
+  /** Place of the section of strings: their number, and the index of the token of each. */
+  readonly #strings: number | undefined;
 
-  constructor(file: CrateBytes, tokens: readonly string[], version: number) {
+  constructor(file: CrateBytes, tokens: readonly string[], version: number, strings: number | undefined) {
     this.#file = file;
     this.#tokens = tokens;
     this.#version = version;
+    this.#strings = strings;
   }
 
   /** Returns a value; undefined for types that no splats need. Throws `decode/corrupt`, `decode/truncated`, `out-of-memory/budget`. */
@@ -71,6 +75,26 @@ export class CrateValues {
     if (isArray) return at === 0 ? new Float32Array(0) : this.#array(type, scalar, width, at, isPacked);
     const numbers = this.#plain(scalar, width, 1, at);
     return width === 1 ? numbers[0] : wFirst(numbers, type);
+  }
+
+  /** Returns the texts of a dictionary by name. Its entries have a name, and the distance and the field of a value. */
+  dictionary(rep: ValueRep): Map<string, string> {
+    const { type, at } = fieldsOf(rep);
+    const texts = new Map<string, string>();
+    if (type !== DICTIONARY || this.#strings === undefined) return texts;
+    const count = this.#file.u64(at);
+    for (let k = 0, entry = at + 8; k < count; k++) {
+      const valueAt = entry + 4 + this.#file.u64(entry + 4);
+      const value = this.#repAt(valueAt);
+      this.#file.take(ATTRIBUTE_BYTES);
+      if (fieldsOf(value).type === STRING) texts.set(this.#string(this.#file.u32(entry)), this.#string(value.low));
+      entry = valueAt + 8;
+    }
+    return texts;
+  }
+
+  #string(index: number): string {
+    return this.#token(this.#file.u32(this.#strings! + 8 + 4 * index));
   }
 
   /** Returns the samples of an attribute: the times and values that a field of time samples names. */

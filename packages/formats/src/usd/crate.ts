@@ -6,7 +6,9 @@ import { CrateValues, type ValueRep } from './crate-values.js';
 import {
   ARCS,
   ATTRIBUTE_BYTES,
+  DATA_PREFIX,
   KEPT_METADATA,
+  LAYER_DATA,
   MAX_DEPTH,
   PRIM_BYTES,
   type UsdLayer,
@@ -54,7 +56,8 @@ export function readCrate(source: JsonSource): UsdLayer {
   const tokens = readTokens(file, section('TOKENS'));
   const fields = readFields(file, section('FIELDS'), section('FIELDSETS'), tokens);
   const paths = readPaths(file, section('PATHS'), tokens);
-  return layerOf(file, readSpecs(file, section('SPECS')), paths, fields, new CrateValues(file, tokens, version));
+  const values = new CrateValues(file, tokens, version, sections.get('STRINGS'));
+  return layerOf(file, readSpecs(file, section('SPECS')), paths, fields, values);
 }
 
 function sectionsOf(file: CrateBytes): Map<string, number> {
@@ -201,6 +204,7 @@ function readMetadata(fields: Fields, values: CrateValues, to: Map<string, UsdVa
   for (const [name, rep] of fields) {
     const value = KEPT_METADATA.has(name) ? values.read(rep) : undefined;
     if (value !== undefined) to.set(name, value);
+    if (name === LAYER_DATA) for (const [key, text] of values.dictionary(rep)) to.set(DATA_PREFIX + key, text);
     if (ARCS.has(name) && values.hasItems(rep)) arc ??= ARCS.get(name);
   }
   return arc;

@@ -53,6 +53,10 @@ export const ARCS: ReadonlyMap<string, string> = new Map([
   ['layerRelocates', 'relocates'],
 ]);
 
+/** Dictionary of a layer whose texts readers keep among its metadata, under their names after this prefix. */
+export const LAYER_DATA = 'customLayerData';
+export const DATA_PREFIX = `${LAYER_DATA}:`;
+
 /** Metadata that readers of layers keep. */
 export const KEPT_METADATA: ReadonlySet<string> = new Set([
   ...['upAxis', 'metersPerUnit', 'startTimeCode'],

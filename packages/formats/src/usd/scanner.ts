@@ -145,6 +145,21 @@ export class Scanner {
     return unquoted(word) ?? (number === undefined ? word : ROUND[precision](number));
   }
 
+  /** Returns the texts of a dictionary in a range, `{ string NAME = "..." ... }`, by name. Ends at the first fault. */
+  dictionary({ start, end }: TextRange): Map<string, string> {
+    const texts = new Map<string, string>();
+    const inner = new Scanner(this.#text.slice(start + 1, end - 1), this.#name, this.#budget);
+    for (let type = inner.next(); type !== ''; type = inner.next()) {
+      if (inner.peek() === '[') inner.skipValue();
+      const name = inner.next();
+      if (inner.next() !== '=') break;
+      const value = inner.parse(inner.skipValue(), 'double');
+      if (type === 'string' && typeof value === 'string')
+        texts.set(unquoted(name) ?? name, value.replace(/\\(.)/gs, '$1'));
+    }
+    return texts;
+  }
+
   #texts(): string[] {
     const texts: string[] = [];
     for (let token = this.next(); token !== ''; token = this.next()) {

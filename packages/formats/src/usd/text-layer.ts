@@ -4,7 +4,9 @@ import { damaged } from '../faults.js';
 import {
   ARCS,
   ATTRIBUTE_BYTES,
+  DATA_PREFIX,
   KEPT_METADATA,
+  LAYER_DATA,
   MAX_DEPTH,
   PRIM_BYTES,
   type LateValue,
@@ -85,6 +87,8 @@ function readMetadata(scanner: Scanner, to: WithMetadata): void {
     if (KEPT_METADATA.has(key)) {
       const value = scanner.parse(range, 'double');
       if (value !== undefined && !isDeleted) to.metadata.set(key, value);
+    } else if (key === LAYER_DATA) {
+      for (const [name, text] of scanner.dictionary(range)) to.metadata.set(DATA_PREFIX + name, text);
     } else if (arc && !isDeleted && !scanner.isEmpty(range)) to.arc ??= arc;
     // The path of a reference within its asset, and its offset in time.
     while (/^[<(]/.test(scanner.peek())) scanner.skipValue();

@@ -1,6 +1,6 @@
-import { boundsOf, type GaussianCloud, type ShDegree } from '@gaussian-splat/core';
+import { boundsOf, type Credits, type GaussianCloud, type ShDegree } from '@gaussian-splat/core';
 import { concatenated } from '@gaussian-splat/core/fetch';
-import { readScene, toDegree, upright, writeClipHead } from '@gaussian-splat/formats';
+import { joinCredits, readScene, toDegree, upright, writeClipHead } from '@gaussian-splat/formats';
 import { decibels, mean, meanSquareOf } from '../measure.js';
 import type { Encoding } from '../write/index.js';
 import type { EncodeWebp } from '../write/sog.js';
@@ -20,6 +20,8 @@ export interface CodeClipOptions {
   /** Reads a frame by its index. Frames may have different splats. */
   readonly openFrame: (frame: number) => Promise<GaussianCloud>;
   readonly framesPerSecond: number;
+  /** Credits of the clip, in place of those of its frames. */
+  readonly credits?: Credits | undefined;
   readonly framesPerGroup: number;
   /** Target PSNR of frames against their sources in dB, over covered pixels. */
   readonly minPsnr: number;
@@ -138,7 +140,7 @@ class ClipCoder {
     const passing = tracks.lives.first.filter((first, i) => first > 0 || tracks.lives.end[i] < frames).length;
     this.#splats += tracks.count;
     this.#passing += passing;
-    this.#note(sources[0], whole);
+    this.#note(sources, whole);
     this.#onStep(
       `frames ${begin} to ${begin + frames - 1}: ${tracks.count} splats, ${passing} of them in some frames only`,
     );
@@ -157,11 +159,12 @@ class ClipCoder {
   }
 
   finish(): CodedClip {
-    const { framesPerSecond } = this.#options;
+    const { framesPerSecond, credits } = this.#options;
     const groups = this.#groups;
     const still = this.#stillParts.map(({ written }) => written);
     const head = writeClipHead({
       ...{ ...this.#facts!, framesPerSecond, shDegree: this.#shDegree, grow: this.#grow },
+      credits: { ...this.#facts!.credits, ...credits },
       ...{ groups, still },
     });
     const errors = groups.flatMap((group) => group.errors);
@@ -252,12 +255,15 @@ class ClipCoder {
   }
 
   /** Sets the properties of the clip. Its bounds, which determine views, are those of the group with the most splats. */
-  #note(frame: GaussianCloud, whole: GaussianCloud): void {
+  #note(frames: readonly GaussianCloud[], whole: GaussianCloud): void {
+    const credits = joinCredits([this.#facts?.credits, ...frames.map(({ hints }) => hints?.credits)]);
+    if (this.#facts) this.#facts = { ...this.#facts, credits };
     if (whole.count <= this.#largest) return;
     this.#largest = whole.count;
-    const { antialiased, filterVariance } = frame;
-    const { origin } = this.#facts ?? frame;
-    this.#facts = { origin, antialiased, filterVariance, bounds: boundsOf(together(whole, this.#still?.cloud)) };
+    const { antialiased, filterVariance } = frames[0];
+    const { origin } = this.#facts ?? frames[0];
+    const bounds = boundsOf(together(whole, this.#still?.cloud));
+    this.#facts = { origin, antialiased, filterVariance, bounds, credits };
   }
 
   /** Returns an encoding of scenes whose steps are measured with a frame of the first group. */

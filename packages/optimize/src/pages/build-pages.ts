@@ -208,7 +208,7 @@ export function manifestOf(
   coding?: PageCoding,
 ): DetailManifest {
   const stated = coding && statedOf(coding);
-  const { splats, shPrecision, geometry, antialiased, filterVariance, order, origin, bounds, levels } = tree;
+  const { splats, shPrecision, geometry, antialiased, filterVariance, order, credits, origin, bounds, levels } = tree;
   return {
     ...{
       format: 'gaussian-splat-detail',
@@ -217,7 +217,7 @@ export function manifestOf(
       shDegree: levels[0].shDegree,
     },
     ...{ shPrecision: coding ? 'int8' : shPrecision, ...(geometry && { geometry }), ...(stated && { coding: stated }) },
-    ...{ antialiased, filterVariance, ...(order && { order }), origin, bounds },
+    ...{ antialiased, filterVariance, ...(order && { order }), ...credits, origin, bounds },
     trees: [
       {
         pages: pages.map(({ chunks, upper, parent }, p) => ({

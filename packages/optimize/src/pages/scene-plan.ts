@@ -1,4 +1,4 @@
-import { boundsOf, type Bounds, type GaussianCloud, type Vector3 } from '@gaussian-splat/core';
+import { boundsOf, type Bounds, type Credits, type GaussianCloud, type Vector3 } from '@gaussian-splat/core';
 import {
   choosePrecision,
   codesAlong,
@@ -28,6 +28,8 @@ export interface ScenePlan extends Pick<
   DetailManifest,
   'shPrecision' | 'geometry' | 'antialiased' | 'filterVariance' | 'order' | 'origin' | 'bounds'
 > {
+  /** Credits that the manifest states. */
+  readonly credits?: Credits | undefined;
   /** Curve that orders the splats; undefined if they keep the order of their file. */
   readonly curve: Curve | undefined;
   /** Center and extent that define shells; undefined if chunks are not limited by shells. */
@@ -56,7 +58,7 @@ export function planScene(
   const isFlat = isOfPlanes(positions);
   const order = packedOrder(near);
   return {
-    ...{ geometry, antialiased, filterVariance, origin, order: hints?.order, isOfPlanes: isFlat },
+    ...{ geometry, antialiased, filterVariance, origin, order: hints?.order, credits: hints?.credits, isOfPlanes: isFlat },
     bounds: { ...boundsOf(sample), min, max },
     shPrecision: choosePrecision(noiseIn(near, order), order.length),
     curve: curveThrough(positions, all),

@@ -33,6 +33,7 @@ export function instancedTree(tree: DetailTree, places: readonly Vector3[]): Det
       antialiased: tree.antialiased,
       filterVariance: tree.filterVariance,
       order: tree.order,
+      credits: tree.credits,
       origin: tree.origin,
     },
     isOfPlanes: isOfPlanes(finest.positions),

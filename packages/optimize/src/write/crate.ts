@@ -9,6 +9,7 @@ export type CrateValue =
   | { readonly token: string }
   | { readonly tokens: readonly string[]; readonly isArray?: boolean }
   | { readonly double: number }
+  | { readonly strings: Readonly<Record<string, string>> }
   | { readonly int: number }
   | { readonly doubles: readonly [number, number, number] }
   | { readonly specifier: 0 }
@@ -27,6 +28,7 @@ const TYPES = {
 } as const;
 export type CrateType = keyof typeof TYPES;
 
+const [STRING, DICTIONARY] = [10, 31];
 const [TOKEN, INT, DOUBLE, VECTOR_3D, TOKEN_VECTOR, SPECIFIER, VARIABILITY] = [11, 3, 9, 23, 41, 42, 44];
 const [IS_ARRAY, IS_INLINE] = [0x80000000, 0x40000000];
 /** Kinds of specs. */
@@ -74,7 +76,7 @@ export function writeCrate(layer: CrateFields, { name, fields, attributes }: Cra
   const jumps = [-1, names.length > 0 ? -1 : -2, ...names.map((_, k) => (k < names.length - 1 ? 0 : -2))];
   const sections: readonly (readonly [string, readonly Uint8Array[]])[] = [
     ['TOKENS', tokenSection(parts.tokens)],
-    ['STRINGS', [u64(0)]],
+    ['STRINGS', [u64(parts.strings.length), bytesOf(parts.strings)]],
     [
       'FIELDS',
       [
@@ -93,6 +95,8 @@ export function writeCrate(layer: CrateFields, { name, fields, attributes }: Cra
 /** Values before the sections of a layer, with their places in the file, and its tokens. */
 class Parts {
   readonly tokens: string[] = [];
+  /** Index of the token of each string. */
+  readonly strings: number[] = [];
   readonly values: { readonly at: number; readonly bytes: Uint8Array }[] = [];
   end = HEADER_BYTES;
   readonly #known = new Map<string, number>();
@@ -115,6 +119,15 @@ class Parts {
     if ('specifier' in value) return inline(SPECIFIER, value.specifier);
     if ('isUniform' in value) return inline(VARIABILITY, 1);
     if ('doubles' in value) return this.#add(VECTOR_3D << 16, [bytesIn(Float64Array.from(value.doubles))]);
+    if ('strings' in value) {
+      const entries = Object.entries(value.strings);
+      // The distance of 8 bytes to each value is that of its own size.
+      const rows = entries.flatMap(([key, text]) => {
+        const { low, high } = inline(STRING, this.#stringOf(text));
+        return [this.#stringOf(key), 8, 0, low, high];
+      });
+      return this.#add(DICTIONARY << 16, [u64(entries.length), bytesOf(rows)]);
+    }
     if ('double' in value) return this.#doubleOf(value.double, inline);
     if ('tokens' in value) {
       const indices = bytesOf(value.tokens.map((token) => this.tokenOf(token)));
@@ -123,6 +136,10 @@ class Parts {
     }
     const { array, type, width } = value;
     return this.#add(IS_ARRAY + (TYPES[type] << 16), [u64(array.length / width), bytesIn(array)]);
+  }
+
+  #stringOf(text: string): number {
+    return this.strings.push(this.tokenOf(text)) - 1;
   }
 
   /** A double is stored as a float if that is exact. */

@@ -1,5 +1,5 @@
 import type { GaussianCloud } from '@gaussian-splat/core';
-import { upright } from '@gaussian-splat/formats';
+import { assetOfCredits, upright } from '@gaussian-splat/formats';
 import type { WrittenCloud } from './index.js';
 import { arraysOf, columnsOf, type Columns } from '../parts/cloud-memory.js';
 import { inline, partsOf, poolFor, type TaskPool } from '../parts/task-pool.js';
@@ -101,7 +101,7 @@ function describe(
     extensions: { [EXTENSION]: splats },
   }));
   const json = {
-    asset: { version: '2.0', generator: 'gaussian-splat optimize' },
+    asset: { version: '2.0', generator: 'gaussian-splat optimize', ...assetOfCredits(hints?.credits) },
     extensionsUsed: [EXTENSION],
     scene: 0,
     scenes: [{ nodes: [0] }],

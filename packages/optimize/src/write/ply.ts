@@ -1,9 +1,10 @@
 import { shCoefficientCount, type GaussianCloud } from '@gaussian-splat/core';
+import { creditsOf } from '@gaussian-splat/formats';
 import { fileBytes } from './file-bytes.js';
 import { safeOrbitOf } from './safe-orbit.js';
 
 /**
- * Writes the PLY of 3D Gaussian Splatting, binary, float32, without normals, with comments for filter, up and order, and
+ * Writes the PLY of 3D Gaussian Splatting, binary, float32, without normals, with comments for filter, up, order and credits, and
  * the elements of Niantic's library for the limits of a camera;
  * positions are float64 if the cloud lies too far from (0, 0, 0) for float32.
  * @throws GaussianSplatError `out-of-memory/allocation`
@@ -37,6 +38,7 @@ export function writePly(cloud: GaussianCloud): Uint8Array<ArrayBuffer> {
     ...(antialiased || filterVariance !== 0.3 ? [`comment filter_variance ${filterVariance}`] : []),
     ...(hints?.up ? [`comment Vertical axis: ${hints.up.join(' ')}`] : []),
     ...(hints?.order ? [`comment sorting_method ${hints.order}`] : []),
+    ...Object.entries(creditsOf(hints?.credits ?? {}) ?? {}).map(([key, text]) => `comment ${key}: ${text}`),
     `element vertex ${count}`,
     ...names.map((name, k) => `property ${isFar && k < 3 ? 'double' : 'float'} ${name}`),
     ...(orbit ? ORBIT_ELEMENTS : []),

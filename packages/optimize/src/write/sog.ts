@@ -1,5 +1,5 @@
 import { GaussianSplatError, shCoefficientCount, type GaussianCloud } from '@gaussian-splat/core';
-import { upright } from '@gaussian-splat/formats';
+import { assetOfCredits, upright } from '@gaussian-splat/formats';
 import { packedOrder } from '@gaussian-splat/renderer/tools';
 import type { SplatVisibility } from '../pages/splat-visibility.js';
 import type { Steps } from '../steps.js';
@@ -105,6 +105,7 @@ export async function sogFiles(
     antialias: cloud.antialiased,
     ...(cloud.antialiased && cloud.filterVariance === 0.1 && { model: 'antialiased' }),
     ...(cloud.hints?.order && { sortingMethod: cloud.hints.order }),
+    ...(cloud.hints?.credits && { asset: assetOfCredits(cloud.hints.credits) }),
     means: { ...means, files: ['means_l.webp', 'means_u.webp'] },
     scales: { codebook: ofAllCodes(scales.values), files: ['scales.webp'] },
     quats: { files: ['quats.webp'] },

@@ -1,4 +1,4 @@
-import { GaussianSplatError, shCoefficientCount, type GaussianCloud } from '@gaussian-splat/core';
+import { GaussianSplatError, shCoefficientCount, type Credits, type GaussianCloud } from '@gaussian-splat/core';
 import { upright } from '@gaussian-splat/formats';
 import { fileBytes, MAX_UINT32, requireAtMost } from './file-bytes.js';
 import { safeOrbitOf } from './safe-orbit.js';
@@ -27,6 +27,8 @@ const SAFE_ORBIT = [0xadbe0002, 12];
  */
 const ORDER = [0x47530001, 4];
 const ORDER_VALUES = { pixel: 1, distance: 2 };
+/** Record of this project for credits: attribution and license in UTF-8, separated by a zero byte. */
+const CREDITS = 0x47530002;
 const FLAG_ANTIALIASED = 1;
 const FLAG_EXTENSIONS = 2;
 
@@ -44,6 +46,7 @@ export async function writeSpz(given: GaussianCloud, options: SpzOptions): Promi
   const records = [
     ...FRAME,
     ...(order ? [...ORDER, ORDER_VALUES[order]] : []),
+    ...creditsRecord(cloud.hints?.credits),
     ...(orbit ? [...SAFE_ORBIT, ...new Uint32Array(Float32Array.from(orbit).buffer)] : []),
   ];
   const coefficients = shCoefficientCount(shDegree) - 1;
@@ -62,6 +65,15 @@ export async function writeSpz(given: GaussianCloud, options: SpzOptions): Promi
   at = packHarmonics(cloud, options.shBits, body, at);
   records.forEach((value, k) => view.setUint32(at + 4 * k, value, true));
   return gzip(body);
+}
+
+/** Returns the words of the record of credits; none without credits. Spaces pad the text to whole words. */
+function creditsRecord(credits: Credits | undefined): number[] {
+  if (!credits) return [];
+  const text = new TextEncoder().encode(`${credits.attribution ?? ''}\0${credits.license ?? ''}`);
+  const padded = new Uint8Array(text.length + (-text.length & 3)).fill(0x20);
+  padded.set(text);
+  return [CREDITS, padded.length, ...new Uint32Array(padded.buffer)];
 }
 
 /** Largest magnitude of coefficients that SPZ holds: of the constant one, and of all others. */

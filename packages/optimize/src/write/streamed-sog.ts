@@ -1,6 +1,6 @@
 import { quaternionOfMatrix, shCoefficientCount, symmetricEigen, type GaussianCloud } from '@gaussian-splat/core';
 import { concatenated } from '@gaussian-splat/core/fetch';
-import { upright } from '@gaussian-splat/formats';
+import { assetOfCredits, upright } from '@gaussian-splat/formats';
 import { packedOrder } from '@gaussian-splat/renderer/tools';
 import { buildLevels, recentered, type SplatLevel } from '@gaussian-splat/renderer/stages';
 import { nothingToWrite, sogFiles, type SogOptions } from './sog.js';
@@ -83,7 +83,8 @@ export async function writeStreamedSog(
     }
   }
   const children = boxes.map(({ kept }, box) => ({ bound: boundOf(cloud, kept), lods: lods[box] }));
-  const index = { lodLevels, environment: null, filenames, tree: { bound: boundOf(cloud, order), children } };
+  const asset = cloud.hints?.credits && { asset: assetOfCredits(cloud.hints.credits) };
+  const index = { ...asset, lodLevels, environment: null, filenames, tree: { bound: boundOf(cloud, order), children } };
   return files.set(LOD_INDEX, new TextEncoder().encode(JSON.stringify(index)));
 }
 

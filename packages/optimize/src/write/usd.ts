@@ -2,6 +2,7 @@ import {
   numberToHalf,
   shCoefficientCount,
   type CloudHints,
+  type Credits,
   type GaussianCloud,
   type Vector3,
 } from '@gaussian-splat/core';
@@ -59,6 +60,7 @@ export function writeUsdc(given: GaussianCloud, { hasHalves }: UsdOptions): Uint
       defaultPrim: { token: NAME },
       metersPerUnit: { double: hints?.metersPerUnit ?? 1 },
       upAxis: { token: axis ?? 'Y' },
+      ...(hints?.credits && { customLayerData: { strings: dataOf(hints.credits) } }),
     },
     {
       name: NAME,
@@ -92,6 +94,12 @@ export function writeUsdc(given: GaussianCloud, { hasHalves }: UsdOptions): Uint
     },
   );
 }
+
+/** Entries of the dictionary `customLayerData`, as Apple's usdzconvert names them. */
+const dataOf = ({ attribution, license }: Credits): Record<string, string> => ({
+  ...(attribution && { copyright: attribution }),
+  ...(license && { license }),
+});
 
 /** Writes a USDZ: an archive with the layer of {@link writeUsdc}. Throws `argument/value` for 4 GiB or more. */
 export function writeUsdz(cloud: GaussianCloud, options: UsdOptions): Uint8Array<ArrayBuffer> {

@@ -1,6 +1,7 @@
 import {
   GaussianSplatError,
   type Bounds,
+  type Credits,
   type ErrorCode,
   type FilterRule,
   type ShDegree,
@@ -62,7 +63,7 @@ export interface TreeInstance {
 }
 
 /** Manifest (`detail.json`) of a streamed scene. docs/lod-format.md describes the files. */
-export interface DetailManifest extends FilterRule {
+export interface DetailManifest extends FilterRule, Credits {
   readonly format: 'gaussian-splat-detail';
   /** 2 with {@link geometry}, 4 with {@link coding}, otherwise 1. Version 3 was never released. */
   readonly version: 1 | 2 | 4;
@@ -147,6 +148,8 @@ export function checkManifest(value: unknown, where: string, maxPages = MAX_PAGE
   const { order } = manifest;
   if (order !== undefined && order !== 'pixel' && order !== 'distance')
     fail('order', 'pixel, distance, or nothing', order);
+  for (const name of ['attribution', 'license'] as const)
+    if (!['undefined', 'string'].includes(typeof manifest[name])) fail(name, 'a text, or nothing', manifest[name]);
   if (!isVector(origin)) fail('origin', '3 numbers', origin);
   const hasBounds = isVector(bounds?.min) && isVector(bounds.max) && isVector(bounds.center);
   if (!hasBounds || !Number.isFinite(bounds?.radius)) fail('bounds', 'min, max, center and radius', bounds);

@@ -17,7 +17,7 @@ import {
   writeFileSync,
 } from 'node:fs';
 import { dirname, join } from 'node:path';
-import { MAX_DROPPED_RATIO, readScene, toDegree } from '@gaussian-splat/formats';
+import { joinCredits, MAX_DROPPED_RATIO, readScene, toDegree } from '@gaussian-splat/formats';
 import {
   countShells,
   keysOf,
@@ -118,7 +118,7 @@ async function writeRows(path, inputs, { highest, temporary, maxBytes }) {
   const degree = Math.min(highest, await degreeOf(inputs, options));
   const segments = [];
   const box = { min: [Infinity, Infinity, Infinity], max: [-Infinity, -Infinity, -Infinity] };
-  const warnings = new Set();
+  const [warnings, credits] = [new Set(), new Set()];
   let [count, droppedCount, facts] = [0, 0, undefined];
   const file = openSync(path, 'w');
   try {
@@ -128,6 +128,7 @@ async function writeRows(path, inputs, { highest, temporary, maxBytes }) {
         const cloud = toDegree(degree, block);
         const { antialiased, filterVariance, hints, turn } = cloud;
         facts ??= { rule: { antialiased, filterVariance, hints }, turn };
+        credits.add(JSON.stringify(hints?.credits ?? null));
         if (antialiased !== facts.rule.antialiased || filterVariance !== facts.rule.filterVariance)
           throw new CommandError(`${input.path}: expected the low-pass filter of ${inputs[0].path}, found another one`);
         for (const warning of cloud.warnings ?? []) warnings.add(warning);
@@ -149,6 +150,8 @@ async function writeRows(path, inputs, { highest, temporary, maxBytes }) {
     closeSync(file);
   }
   if (count === 0) throw new CommandError(`${inputs[0].path}: expected splats, found none`);
+  const all = [...credits].map((text) => JSON.parse(text) ?? undefined);
+  facts.rule.hints = { ...facts.rule.hints, credits: joinCredits(all) };
   return { count, degree, segments, box, ...facts, droppedCount, warnings: [...warnings] };
 }
 

@@ -1,6 +1,6 @@
 /** Plays clips of moving splats. The module is loaded only for clips. */
 import { clipGroupAt, clipRooms, frameAt, unpackClipIndex, type ClipIndex } from '@gaussian-splat/formats';
-import { GaussianSplatError } from '@gaussian-splat/core';
+import { GaussianSplatError, type Credits } from '@gaussian-splat/core';
 import { AnimatedGaussians, pickInitialVariants } from '@gaussian-splat/renderer';
 import { LoadedGaussians } from '../../gpu/loaded-gaussians.js';
 import { images, unlessWrong } from '../../gpu/initial-frames.js';
@@ -35,6 +35,7 @@ export interface ClipOptions {
 export class ClipPlayer implements Timeline {
   readonly gaussians: AnimatedGaussians;
   readonly bounds: SceneBounds;
+  readonly credits: Credits | undefined;
   readonly duration: number;
   readonly #index: ClipIndex;
   readonly #options: ClipOptions;
@@ -48,6 +49,7 @@ export class ClipPlayer implements Timeline {
     this.#index = index;
     this.gaussians = gaussians;
     this.bounds = index.bounds;
+    this.credits = index.credits;
     this.duration = index.durationSeconds;
     this.#cache = cache;
     this.#slots = new GroupSlots(gaussians, index);

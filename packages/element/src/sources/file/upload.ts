@@ -37,6 +37,6 @@ export async function upload(
 export const shown = (
   lease: DeviceLease,
   gaussians: GaussianBuffers,
-  { bounds, warnings, order, hasMeshes }: LoadedFacts,
+  { bounds, ...facts }: LoadedFacts,
   { submissions }: Pick<SceneUploadOptions, 'submissions'>,
-): LoadedGaussians => new LoadedGaussians(lease, gaussians, bounds, submissions, { warnings, order, hasMeshes });
+): LoadedGaussians => new LoadedGaussians(lease, gaussians, bounds, submissions, facts);

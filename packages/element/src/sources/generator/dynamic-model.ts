@@ -1,4 +1,4 @@
-import type { Camera } from '@gaussian-splat/core';
+import type { Camera, Credits } from '@gaussian-splat/core';
 import type { DynamicGaussians } from '@gaussian-splat/renderer';
 import type { SceneBounds } from '../../viewer/camera/settings.js';
 import type { GeneratorInput } from './inputs.js';
@@ -38,6 +38,8 @@ export interface Timeline {
   readBounds?(): Promise<SceneBounds>;
   /** Bounds of the Gaussians, as the contract or the file declares them, otherwise as measured in the last runs. */
   readonly bounds?: SceneBounds;
+  /** Credits that the contract or the manifest declares. */
+  readonly credits?: Credits | undefined;
   /** Duration in seconds; Infinity if the contract declares none, NaN if time has no effect. */
   readonly duration: number;
   /** Inputs that the page may set; absent if there are none. */

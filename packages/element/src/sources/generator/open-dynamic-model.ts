@@ -159,8 +159,10 @@ async function openDynamicModel(
       },
     });
     watch.frameMade();
+    const { attribution, license } = model.contract;
     return {
       ...live,
+      ...((attribution || license) && { credits: { attribution, license } }),
       get bounds() {
         return bounds;
       },

@@ -66,8 +66,8 @@ export const open: OpenSource = async (request, options, acquiring) => {
   const { onShown } = dynamicRequest().listeners;
   const live: Timeline | undefined = Number.isNaN(model.duration) ? undefined : timelineOf(model, onShown);
   const bounds = { ...model.bounds, up: [0, 1, 0] as const };
-  const { warnings } = mesh;
-  const loaded = new LoadedGaussians(lease, noSplats(), bounds, submissions, { live, warnings });
+  const { warnings, credits } = mesh;
+  const loaded = new LoadedGaussians(lease, noSplats(), bounds, submissions, { live, warnings, credits });
   loaded.model = model;
   return loaded;
 };

@@ -1,5 +1,5 @@
 /** Plays sequences of scene files. The module is loaded only for sequences. */
-import { type Bounds } from '@gaussian-splat/core';
+import { type Bounds, type Credits } from '@gaussian-splat/core';
 import { BackOff, fileRequest } from '@gaussian-splat/core/fetch';
 import { frameAt, framePath, type SceneSequence } from '@gaussian-splat/formats';
 import { SequenceGaussians, type PackedGaussians } from '@gaussian-splat/renderer';
@@ -48,6 +48,8 @@ interface FetchedFrame {
 export class SequencePlayer implements Timeline {
   readonly duration: number;
   readonly bounds: Bounds;
+  /** Credits of the manifest, or else of the first frame. */
+  readonly credits: Credits | undefined;
   /** Scene that shows the sequence. Its creator sets this property once. */
   scene: LoadedGaussians | undefined;
   readonly #sequence: SceneSequence;
@@ -73,6 +75,7 @@ export class SequencePlayer implements Timeline {
     this.#gaussians = gaussians;
     this.duration = sequence.durationSeconds;
     this.bounds = first.bounds;
+    this.credits = sequence.credits ?? first.credits;
     this.#room = new FrameRoom(sequence.frameCount, sequence.framesPerSecond);
     this.#playing = new PlayDirection(sequence.frameCount, sequence.framesPerSecond);
     this.#room.note(bytesOf(first.packed));

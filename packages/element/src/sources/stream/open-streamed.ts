@@ -1,6 +1,6 @@
 /** Opens streamed scenes: manifests of pages (docs/lod-format.md), streamed SOG by boxes, and trees node by node. */
 import { fileRequest } from '@gaussian-splat/core/fetch';
-import type { TrainedOrder } from '@gaussian-splat/core';
+import type { Credits, TrainedOrder } from '@gaussian-splat/core';
 import { MemoryLedger, pickInitialVariants, StreamedGaussians, type PoolOptions } from '@gaussian-splat/renderer';
 import { levelSource, treeSource } from '@gaussian-splat/renderer/tools';
 import type { SceneLimits, SceneRequest } from '../../loading/protocol.js';
@@ -25,6 +25,7 @@ interface OpenedStream {
   readonly order?: TrainedOrder | undefined;
   readonly detail?: LodSettings;
   readonly warnings?: readonly string[];
+  readonly credits?: Credits | undefined;
 }
 
 /** Fraction of the remaining memory budget that a streamed scene may use, because other scenes may follow. */
@@ -61,10 +62,10 @@ async function openStreamed(request: SceneRequest, device: GPUDevice, options: S
   };
   const name = nameIn(request.url);
   const open = /detail\.json$/i.test(name) ? openPages : /lod-meta\.json$/i.test(name) ? openBoxes : openNodes;
-  const gaussians = await open(request, device, options, pool);
+  const { gaussians, credits } = await open(request, device, options, pool);
   const { bounds, order } = gaussians;
   const splatBudget = Math.min(caps.splats, request.limits?.maxSplats ?? Infinity);
-  if (!signal.aborted) return { ...{ gaussians, bounds, order, warnings }, detail: { detail: DETAIL, splatBudget } };
+  if (!signal.aborted) return { ...{ gaussians, bounds, order, warnings, credits }, detail: { detail: DETAIL, splatBudget } };
   gaussians.destroy();
   throw signal.reason;
 }
@@ -102,13 +103,14 @@ type Open = (
   device: GPUDevice,
   options: StreamedOptions,
   pool: PoolOptions,
-) => Promise<StreamedGaussians>;
+) => Promise<{ readonly gaussians: StreamedGaussians; readonly credits: Credits | undefined }>;
 
 const openPages: Open = async (request, device, { loader, signal, onProgress }, pool) => {
   const { limits = {} } = request;
   const allowance = new Allowance(limits);
   const manifest = await loader.ask('manifest', request, signal, { onProgress });
-  return StreamedGaussians.open(device, manifest, {
+  const { attribution, license } = manifest;
+  const gaussians = await StreamedGaussians.open(device, manifest, {
     ...pool,
     isDecoded: true,
     fetchPage: async (page, aborted, coded) => {
@@ -117,10 +119,11 @@ const openPages: Open = async (request, device, { loader, signal, onProgress }, 
       return allowance.note(part.url, loader.fetchFile(own, aborted));
     },
   });
+  return { gaussians, credits: attribution || license ? { attribution, license } : undefined };
 };
 
 const openBoxes: Open = async (request, device, { loader, signal, onProgress }, pool) => {
-  const { levels, files, runs, firstRuns } = await loader.ask('boxes', request, signal, { onProgress });
+  const { levels, files, runs, firstRuns, credits } = await loader.ask('boxes', request, signal, { onProgress });
   const { url, credentials } = request;
   const allowance = new Allowance(request.limits);
   const source = levelSource(levels, async (page, aborted) => {
@@ -131,7 +134,7 @@ const openBoxes: Open = async (request, device, { loader, signal, onProgress }, 
     const box = { ...place, ...own, page, scene: levels.scene };
     return new Uint32Array(await allowance.note(part, loader.ask('box', box, aborted)));
   });
-  return StreamedGaussians.openSource(device, source, pool);
+  return { gaussians: await StreamedGaussians.openSource(device, source, pool), credits };
 };
 
 const openNodes: Open = async (request, device, { loader, signal, onProgress }, pool) => {
@@ -151,7 +154,7 @@ const openNodes: Open = async (request, device, { loader, signal, onProgress }, 
     report(page.warnings);
     return page;
   });
-  return StreamedGaussians.openSource(device, source, pool);
+  return { gaussians: await StreamedGaussians.openSource(device, source, pool), credits: opened.credits };
 };
 
 /** Opens a streamed scene. */
