@@ -1,4 +1,5 @@
 export { capture, type CaptureRequest } from './capture.js';
+export { renderDepth, type DepthImage, type DepthRequest } from './render-depth.js';
 export {
   autotune,
   pickInitialVariants,
