@@ -26,6 +26,7 @@ const SECTIONS = [
         'scenes-and-meshes',
         'effects',
         'large-scenes',
+        'depth',
         'performance',
         'accessibility',
         'hosting',

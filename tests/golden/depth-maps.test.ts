@@ -4,10 +4,15 @@ import { readFileSync } from 'node:fs';
 import { after, test } from 'node:test';
 import {
   cameraFromCalibration,
+  cross,
+  multiply,
+  normalize,
+  scale,
   type CalibratedView,
   type Camera,
   type GaussianCloud,
   type Matrix4,
+  type Vector3,
 } from '@gaussian-splat/core';
 import { readScene } from '@gaussian-splat/formats';
 import {
@@ -15,15 +20,18 @@ import {
   GaussianBuffers,
   packGaussians,
   renderDepth,
+  renderFisheye,
   Viewpoint,
   World,
   type ViewpointOptions,
 } from '@gaussian-splat/renderer';
 import { densestDepth } from '../oracle/densest.js';
-import { renderOracleWorld, type PlacedCloud } from '../oracle/oracle.js';
+import { renderOracle, renderOracleWorld, type PlacedCloud } from '../oracle/oracle.js';
 import { projectEllipse, toCamera, worldPosition } from '../oracle/projection.js';
 import { RULES } from '../oracle/rules.js';
+import { cloudOf, repeat } from '../support/clouds.js';
 import { endNodeDevice, serialDevice } from '../support/node-device.js';
+import { seededRandom } from '../support/random.js';
 import { cameraAt, resized, room, thinned } from '../support/scenes.js';
 import { pebbles } from '../support/scenes/pebbles.js';
 
@@ -161,6 +169,87 @@ test('quads and an order for each pixel are refused by name', async () => {
   const where = 'FrameTarget.auxiliary';
   await refused({ settings: { rasterizer: 'quads' } }, { code: 'unsupported/limits', where });
   await refused({ settings: { rasterizer: 'tiles', order: 'pixel' } }, { code: 'argument/value', where });
+});
+
+/**
+ * What the oracle finds along one ray: the middle of a pinhole camera that looks along it, with the angle of a pixel of the lens. Splats are ordered by distance.
+ */
+function alongRay(cloud: GaussianCloud, camera: Camera, ray: Vector3): Oracle {
+  const helper: Vector3 = Math.abs(ray[1]) < 0.9 ? [0, 1, 0] : [1, 0, 0];
+  const right = normalize(cross(helper, ray));
+  const turn = [...right, 0, ...cross(ray, right), 0, ...ray, 0, 0, 0, 0, 1];
+  const worldToCamera = multiply(turn, camera.worldToCamera);
+  const pixel: Camera = { ...camera, width: 1, height: 1, cx: 0.5, cy: 0.5, worldToCamera };
+  const depthKeys = Array.from({ length: cloud.count }, (_, i) =>
+    Math.hypot(...toCamera(pixel, worldPosition(cloud, i))),
+  );
+  // Splats beyond 1.3 of the half field of view of a face, which is 1, are moved there.
+  const rules = { ...RULES.gsplat, jacobianMargin: 1.3 * 2 * camera.fx };
+  return renderOracle(cloud, pixel, { rules, mode: 'classic', depthKeys, measuresDepths: true });
+}
+
+test('a fisheye lens of 190 degrees: each pixel is that of a pinhole camera along its ray', async () => {
+  const device = await serialDevice();
+  // Splats of many pixels around the camera: the filter of a face is that of its own, smaller pixels.
+  const random = seededRandom(76);
+  const around = repeat(5_000, () => ({
+    position: scale(random.direction(), random.uniform(3, 6)),
+    scale: [0, 0, 0].map(() => random.uniform(0.1, 0.25)) as unknown as Vector3,
+    rotation: random.rotation(),
+    opacity: random.uniform(0.3, 1),
+    color: [0, 0, 0].map(() => random.uniform(0, 1)) as unknown as Vector3,
+  }));
+  const cloud = cloudOf(around, 0);
+  const world = new World();
+  const gaussians = await GaussianBuffers.upload(device, packGaussians(cloud));
+  world.add({ scene: gaussians });
+  const viewpoint = new Viewpoint(device, world, { settings: { rasterizer: 'tiles' } });
+  const [width, height, focal] = [220, 220, 60];
+  const { worldToCamera, near, far } = cameraAt([0, 0, 0], [1, 0.2, 0.5]);
+  const lens = { width, height, fx: focal, fy: focal, cx: 110, cy: 110, worldToCamera, near, far };
+  // r(θ) as cv2.fisheye.projectPoints has it for these coefficients.
+  const fisheye = [0.05, -0.01, 0.003, -0.0004];
+  const image = await renderFisheye(device, viewpoint, { camera: { ...lens, fisheye } });
+  const radiusAt = (a: number): number => a + fisheye.reduce((sum, k, i) => sum + k * a ** (2 * i + 3), 0);
+  const [colors, depths]: [number[], number[]] = [[], []];
+  let ids = 0;
+  for (let angle = 0.02; angle < 1.65; angle += 0.2) {
+    for (const turn of [0.3, 2.9, 4.2, 5.5]) {
+      const radius = focal * radiusAt(angle);
+      const [column, row] = [110 + radius * Math.cos(turn), 110 + radius * Math.sin(turn)].map(Math.floor);
+      // The ray of the pixel's center, by bisection.
+      const [x, y] = [(column + 0.5 - 110) / focal, (row + 0.5 - 110) / focal];
+      let [low, high] = [0, Math.PI];
+      for (let k = 0; k < 60; k++) {
+        const middle = (low + high) / 2;
+        if (radiusAt(middle) < Math.hypot(x, y)) low = middle;
+        else high = middle;
+      }
+      const sine = Math.sin(low) / Math.hypot(x, y);
+      const found = alongRay(cloud, lens, [sine * x, sine * y, Math.cos(low)]);
+      const pixel = row * width + column;
+      for (let k = 0; k < 3; k++) colors.push(Math.abs(image.color[4 * pixel + k] - found.color[k]));
+      depths.push(Math.abs(image.depth[pixel] / found.depths!.median[0] - 1));
+      if (image.ids[pixel] === found.depths!.ids[0]) ids++;
+    }
+  }
+  for (const list of [colors, depths]) list.sort((a, b) => a - b);
+  const at = (list: number[], share: number): number => list[Math.floor(share * (list.length - 1))];
+  console.log(
+    `fisheye: ${depths.length} rays, ids ${ids}; color half within ${at(colors, 0.5).toFixed(4)}, 90 % ${at(colors, 0.9).toFixed(4)}; ` +
+      `depth half within ${(100 * at(depths, 0.5)).toFixed(2)} %, 80 % ${(100 * at(depths, 0.8)).toFixed(2)} %`,
+  );
+  assert.equal(ids, depths.length, 'ids');
+  // Splats are affine images of Gaussians: those of a face differ from those of a camera that looks along the ray.
+  assert.ok(at(colors, 0.5) < 0.02 && at(colors, 0.9) < 0.06, 'colors');
+  assert.ok(at(depths, 0.5) < 0.005, 'depths');
+  const outside = image.coverage[0] + image.depth[0] + image.ids[0];
+  assert.equal(outside, 0, 'a corner beyond the range of the lens');
+  await assert.rejects(() => renderFisheye(device, viewpoint, { camera: { ...lens, fisheye: [0, 0] } }), {
+    code: 'argument/camera',
+    where: 'camera.fisheye',
+  });
+  for (const owned of [viewpoint, gaussians]) owned.destroy();
 });
 
 after(endNodeDevice);

@@ -29,7 +29,7 @@ const MAPS = {
 const USAGE = `usage: gaussian-splat render SCENE... --camera CAMERA.json --out IMAGE.png [options]
 
   --camera FILE        one view: {width, height, K (3x3, pixels), worldToCamera (4x4, OpenCV axes)}, optionally near and far,
-                       and orthographic; or {views: [...]} together with --view NAME
+                       orthographic (true) or fisheye ([k1, k2, k3, k4] of OpenCV); or {views: [...]} together with --view NAME
   --out FILE           8-bit PNG, alpha not premultiplied
   --float FILE         width*height*4 little-endian float32, premultiplied RGBA, row by row from the top
   --depth FILE         median depth, units of the scene along the optical axis: .npy, .exr (channel Z), or .png of 16 bits.
@@ -77,10 +77,12 @@ function parseOptions(args) {
   const maps = Object.keys(outputs).filter((name) => name in MAPS);
   for (const name of maps) checkMapFile(name, outputs[name]);
   const drawing = readDrawOptions(values);
-  if (maps.length > 0 && drawing.raster === 'quads')
-    throw new UsageError(`--raster: expected tiles or auto, found quads, which cannot measure --${maps[0]}`);
-  if (maps.length > 0) drawing.raster = 'tiles';
-  return { ...values, scenes, outputs, maps, unit, drawing };
+  const camera = readCamera(values.camera, values.view);
+  const isMeasured = maps.length > 0 || camera.fisheye !== undefined;
+  if (isMeasured && drawing.raster === 'quads')
+    throw new UsageError('--raster: expected tiles or auto, found quads, which cannot measure depth or draw a fisheye');
+  if (isMeasured) drawing.raster = 'tiles';
+  return { scenes, outputs, maps, unit, drawing, isMeasured, camera, cameraFile: values.camera, time: values.time };
 }
 
 function readCamera(path, name) {
@@ -91,7 +93,7 @@ function readCamera(path, name) {
     throw new UsageError(`--camera: cannot read ${path} as JSON: ${error.message}`);
   }
   const views = content?.views;
-  if (views === undefined) return cameraFromCalibration(content, basename(path));
+  if (views === undefined) return cameraOf(content, basename(path));
   if (!Array.isArray(views))
     throw new UsageError(`--camera: expected a list of views in ${path}, found ${typeof views}`);
   const view = views.find((v, i) => v?.name === name || String(i) === name);
@@ -99,12 +101,18 @@ function readCamera(path, name) {
     const names = views.map((v, i) => v?.name ?? i).join(', ');
     throw new UsageError(`--view: expected one of ${names} (${path} holds several views), found ${name ?? 'nothing'}`);
   }
-  return cameraFromCalibration(view, `${basename(path)}: view ${name}`);
+  return cameraOf(view, `${basename(path)}: view ${name}`);
 }
 
+/** Returns the camera of a view; with `fisheye` a `FisheyeCamera` of the renderer. */
+const cameraOf = (view, where) => ({
+  ...cameraFromCalibration(view, where),
+  ...(view.fisheye && { fisheye: view.fisheye }),
+});
+
 /** Checks before rendering that outputs can be written, and that all of them differ from the inputs and each other. */
-function checkFiles({ scenes, camera, outputs }) {
-  const inputs = Object.fromEntries([...scenes, camera].map((path) => [path, path]));
+function checkFiles({ scenes, cameraFile, outputs }) {
+  const inputs = Object.fromEntries([...scenes, cameraFile].map((path) => [path, path]));
   const names = Object.keys(outputs);
   for (const [i, option] of names.entries()) {
     checkOutput(option, outputs[option], inputs);
@@ -124,12 +132,11 @@ async function readScenes({ scenes, time }) {
 
 async function render(options) {
   checkFiles(options);
-  const { outputs, maps, scenes, unit } = options;
-  const camera = readCamera(options.camera, options.view);
+  const { outputs, maps, scenes, unit, camera } = options;
   const clouds = await readScenes(options);
   const renderer = await openSceneRenderer(clouds[0], options.drawing);
   for (const cloud of clouds.slice(1)) await renderer.add(cloud);
-  const measured = maps.length > 0 ? await renderer.measure(camera) : undefined;
+  const measured = options.isMeasured ? await renderer.measure(camera) : undefined;
   const pixels = measured?.color ?? (await renderer.draw(camera));
   const { viewpoint, accumulation, mode, adapterName } = renderer;
   const statistics = await viewpoint.stats();

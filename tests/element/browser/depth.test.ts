@@ -1,6 +1,7 @@
 /** `renderDepth()`: depth, coverage and the element of each pixel, against positions that picks find. */
 import '@gaussian-splat/element';
 import type { GaussianSplatElement, MeasuredView } from '@gaussian-splat/element';
+import type { SplatSceneElement } from '@gaussian-splat/element/scenes.js';
 import { assert, assertEqual, COMPASS, FIXTURES, showLoaded } from './support/harness.js';
 
 const GREEN = `${FIXTURES}green.splat`;
@@ -52,7 +53,7 @@ describe('renderDepth()', () => {
     assert(picked > 5, `${picked} picks`);
     for (const id of [1, 2]) assert(view.ids.includes(id), `pixels of owner ${id}`);
     child.hidden = true;
-    await element.updateComplete;
+    await (child as SplatSceneElement).updateComplete;
     const without = await element.renderDepth({ width: 60 });
     assertEqual(
       [without.width, without.height, without.owners.length],

@@ -9,6 +9,7 @@ import {
   GaussianBuffers,
   packGaussians,
   renderDepth,
+  renderFisheye,
   Viewpoint,
   World,
 } from '@gaussian-splat/renderer';
@@ -127,7 +128,10 @@ export async function openSceneRenderer(cloud, options) {
     mode: filterOf(cloud).antialiased ? 'antialiased' : 'classic',
     adapterName: adapter.info.description || adapter.info.vendor,
     draw: (camera) => checked(capture(device, viewpoint, { camera, background: options.background })),
-    measure: (camera) => checked(renderDepth(device, viewpoint, { camera, background: options.background })),
+    measure: (camera) => {
+      const measure = camera.fisheye ? renderFisheye : renderDepth;
+      return checked(measure(device, viewpoint, { camera, background: options.background }));
+    },
   };
 }
 

@@ -39,6 +39,7 @@ export async function measureDepth(host: Viewer, options: DepthOptions): Promise
   const camera = host.camera.view(size.width, size.height);
   if (host.drawBeneath({ camera } as Parameters<Viewer['drawBeneath']>[0]).depth)
     throw new DOMException('renderDepth(): expected splats alone, found a mesh: hide it', 'NotSupportedError');
+  host.prepareFrame();
   const { members } = sources;
   const world = worldOf(members);
   const settings = { ...view.settings, rasterizer: 'tiles', order: 'center' } as const;
