@@ -39,7 +39,7 @@ const SCENES = new URL('../../demo/scenes/', import.meta.url);
 
 /** Largest difference of depths, world units: 1 cm if a unit is a meter. */
 const LIMIT = 0.01;
-/** Coverage from which on depths count. */
+/** Minimum coverage of compared depths. */
 const COVERED = 0.9;
 
 /** The images of both of a world. */
@@ -172,7 +172,7 @@ test('quads and an order for each pixel are refused by name', async () => {
 });
 
 /**
- * What the oracle finds along one ray: the middle of a pinhole camera that looks along it, with the angle of a pixel of the lens. Splats are ordered by distance.
+ * Returns the oracle's pixel along one ray: the middle of a pinhole camera that looks along it, with the angle of a pixel of the lens. Splats are ordered by distance.
  */
 function alongRay(cloud: GaussianCloud, camera: Camera, ray: Vector3): Oracle {
   const helper: Vector3 = Math.abs(ray[1]) < 0.9 ? [0, 1, 0] : [1, 0, 0];

@@ -6,7 +6,7 @@ import { isLab, someOf } from '../support/extent.js';
 import { endNodeDevice, serialDevice } from '../support/node-device.js';
 import { studio, STUDIO, type StudioName } from '../support/studio.js';
 
-/** Coverage from which on depths count. */
+/** Minimum coverage of compared depths. */
 const COVERED = 0.9;
 /** Differences that a robot can work with, as a fraction of the true depth. */
 const NEAR = 0.05;

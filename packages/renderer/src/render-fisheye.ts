@@ -21,7 +21,7 @@ export interface FisheyeRequest extends DepthRequest {
 const OVERSAMPLING = 2;
 /** Pixels beyond the edge of a face, for interpolation. */
 const MARGIN = 2;
-/** Steps in which the range of angles is searched. */
+/** Step of the table of angles, radians. */
 const STEP = 0.002;
 
 /** Axes of the faces of a cube around the camera: right, down and forward, in the axes of the camera. */

@@ -42,7 +42,7 @@ export function alphaOfWorld({ device, members, settings, filter, drawBeneath }:
   };
 }
 
-/** Returns a world of the splats of all members alone, from which other views can be drawn. */
+/** Returns a world of the splats of all members alone, for other views. */
 export function worldOf(members: readonly WorldEntry[]): World {
   const world = new World();
   for (const { placement } of members) {
