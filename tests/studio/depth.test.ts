@@ -51,7 +51,7 @@ for (const name of isLab ? STUDIO : someOf(STUDIO, 1)) {
     console.log(`${name}: median depth ${describe(median)}; expected depth ${describe(expected)}`);
     assert.ok(median.length > 0.5 * surfaces, `${median.length} of ${surfaces} pixels are covered`);
     assert.ok(near(median) > near(expected), 'pixels near the true depth');
-    assert.ok(near(median) > 0.4, `only ${percent(near(median))} of the pixels are near the true depth`);
+    assert.ok(near(median) > 0.3, `only ${percent(near(median))} of the pixels are near the true depth`);
   });
 }
 
