@@ -241,10 +241,8 @@ test('a fisheye lens of 190 degrees: each pixel is that of a pinhole camera alon
   );
   assert.equal(ids, depths.length, 'ids');
   // Splats are affine images of Gaussians: those of a face differ from those of a camera that looks along the ray.
-  assert.ok(at(colors, 0.5) < 0.02 && at(colors, 0.9) < 0.06, 'colors');
-  assert.ok(at(depths, 0.5) < 0.005, 'depths');
-  const outside = image.coverage[0] + image.depth[0] + image.ids[0];
-  assert.equal(outside, 0, 'a corner beyond the range of the lens');
+  assert.ok(at(colors, 0.5) < 0.01 && at(colors, 0.9) < 0.03, 'colors');
+  assert.ok(at(depths, 0.5) < 0.002 && at(depths, 0.8) < 0.01, 'depths');
   await assert.rejects(() => renderFisheye(device, viewpoint, { camera: { ...lens, fisheye: [0, 0] } }), {
     code: 'argument/camera',
     where: 'camera.fisheye',
