@@ -23,6 +23,7 @@ const RARE = {
   'depth-shaders': ['blend_layers', 'rasterize_quads_depth', 'rasterize_tiles_depth', 'rasterize_tiles_depth_few'],
   'linear-shaders': ['compose_linear'],
   'rectangle-shaders': ['compose_rectangle'],
+  'maps-shaders': ['rasterize_tiles_maps', 'splat_owners'],
   'order-shaders': ['pixel_depths', 'pixel_depths_quantized', 'rasterize_tiles_order'],
 };
 /** Stages that are made a second time, `cull_quantized` of `cull` and so on, with another part in place of one. */
@@ -36,11 +37,12 @@ const SEGMENTS = {
   'shared/column_rows': 'shared/single_rows',
   'shared/whole_lists': 'shared/segments',
 };
+const PLAIN_SEGMENTS = { ...SEGMENTS, 'shared/whole_lists': 'shared/plain_segments' };
 const FEW = {
   bin_index: { 'shared/undivided': 'shared/tile_counts' },
   bin_order: { 'shared/undivided': 'shared/divide_lists' },
-  rasterize_tiles: { ...SEGMENTS, 'shared/whole_lists': 'shared/plain_segments' },
-  rasterize_tiles_auxiliary: SEGMENTS,
+  rasterize_tiles: PLAIN_SEGMENTS,
+  rasterize_tiles_auxiliary: PLAIN_SEGMENTS,
   rasterize_tiles_depth: SEGMENTS,
 };
 /**

@@ -1,5 +1,4 @@
-// Computes how the depth of each survivor of a block changes from pixel to pixel, and replaces its depth key. Runs
-// between `project` and the sort.
+// Computes how the depth of each survivor of a block changes from pixel to pixel. Runs between `project` and the sort.
 #import shared/projection
 #import shared/stored_gaussian
 #import shared/cull_stats
@@ -20,6 +19,9 @@
 // comes too late for a pixel's window is blended too late; one that comes too early waits in the window.
 const AHEAD = 0.5;
 
+// True to replace the depth keys of the survivors, for an order by the depths at pixels.
+override sets_keys: bool = true;
+
 // Same as `depth_key` of `project`, for depths that may lie in front of the nearest center.
 fn ahead_key(depth: f32) -> u32 {
   let depth_bits = bitcast<u32>(max(depth, 0.0));
@@ -39,5 +41,5 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
   let slot = page.first_slot + rank;
   let found = pixel_depth_of(view, unpack_gaussian(gaussian_at(survivors[slot] - view.first_group * CULL_GROUP)), view.filter_variance);
   pixel_depths[slot] = found.depth;
-  keys[slot] = ahead_key(found.center - AHEAD * found.spread);
+  if (sets_keys) { keys[slot] = ahead_key(found.center - AHEAD * found.spread); }
 }

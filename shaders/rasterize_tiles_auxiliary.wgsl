@@ -1,25 +1,19 @@
-// Rasterizes tiles, and writes the contribution of each splat and the depth of each pixel.
+// Rasterizes tiles, and writes the contribution of each splat.
 #import shared/paint_columns
 #import shared/whole_lists
 #import shared/column_rows
-#import shared/median_depth
 
 // Indices of the splats by slot.
 @group(0) @binding(7) var<storage, read> survivors: array<u32>;
 // Index is that of the splat: bits of its largest weight, alpha times transmittance, in any pixel of any frame.
 @group(0) @binding(8) var<storage, read_write> contributions: array<atomic<u32>>;
-// Camera depth, in world units, of the splat that reduces the transmittance of a pixel to half or less; 0 if none does.
-@group(0) @binding(9) var depths: texture_storage_2d<r32float, write>;
 
 // Slots of the splats of the batch.
 var<workgroup> slots: array<u32, BATCH>;
 // Largest weight of each splat of the batch, and of the placeholder for missing ones.
 var<workgroup> weights: array<atomic<u32>, BATCH + 1u>;
 
-fn load_more(k: u32, slot: u32, s: ProjectedSplat, tile_corner: vec2f) {
-  slots[k] = slot;
-  batch_depths[k] = splat_depth(s);
-}
+fn load_more(k: u32, slot: u32, s: ProjectedSplat, tile_corner: vec2f) { slots[k] = slot; }
 
 fn start_hiding(position: vec2u) {}
 fn hide(pixels: ptr<function, Pixels>, k: u32) {}
@@ -31,7 +25,6 @@ fn aux_clear(lane: u32) {
 
 fn aux_blend(k: u32, weight: Column, before: Column, after: Column, is_blended: Flags) {
   atomicMax(&weights[k], bitcast<u32>(largest(weight)));
-  note_depth(k, before, after, is_blended);
 }
 
 fn aux_store(k: u32) {
@@ -39,6 +32,4 @@ fn aux_store(k: u32) {
   if (number < arrayLength(&contributions)) { atomicMax(&contributions[number], atomicLoad(&weights[k])); }
 }
 
-fn aux_pixel(pixel: vec2u, row: u32) {
-  textureStore(depths, pixel, vec4f(row_of(half_depth, row)));
-}
+fn aux_pixel(pixel: vec2u, row: u32) {}

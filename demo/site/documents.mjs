@@ -28,6 +28,7 @@ const SECTIONS = [
         'effects',
         'large-scenes',
         'many-machines',
+        'depth',
         'performance',
         'accessibility',
         'hosting',

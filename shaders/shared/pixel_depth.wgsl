@@ -17,3 +17,7 @@ struct PixelDepth {
 const MARGIN_OCTAVES = 1u;
 // Bits of a float32 that count the steps within an octave.
 const OCTAVE_BITS = 23u;
+
+// Limits of a depth at a pixel, as multiples of the depth of the center, for rays nearly parallel to a large flat splat.
+const NEAREST_SHARE = 0.5;
+const FARTHEST_SHARE = 2.0;

@@ -82,12 +82,10 @@ const WAYS: Readonly<
 > = {
   plain: () => ({ target: {} }),
   'auxiliary outputs': (device) => {
-    const [contributions, depth] = [device.createBuffer({ size: 4 * 8_448, usage: 0x8c }), outputOn(device)];
-    const more = async (): Promise<Float32Array> => {
-      const weights = await readBack(device, [{ buffer: contributions }]);
-      return Float32Array.of(...new Float32Array(weights[0]), ...(await depthsIn(device, depth)));
-    };
-    return { target: { auxiliary: new AuxiliaryOutputs({ contributions, depth }) }, more };
+    const contributions = device.createBuffer({ size: 4 * 8_448, usage: 0x8c });
+    const more = async (): Promise<Float32Array> =>
+      new Float32Array((await readBack(device, [{ buffer: contributions }]))[0]);
+    return { target: { auxiliary: new AuxiliaryOutputs({ contributions }) }, more };
   },
   'depth of a host and median depth': (device) => {
     const out = outputOn(device);

@@ -1,5 +1,6 @@
 /** Front-to-back alpha compositing of ellipses into an image. */
 import type { Vector3 } from '@gaussian-splat/core';
+import { DepthAndIds, type OracleDepths } from './depth-and-ids.js';
 import type { PixelRect } from './footprint.js';
 import type { Ellipse } from './projection.js';
 import type { Rules } from './rules.js';
@@ -8,6 +9,8 @@ import type { Rules } from './rules.js';
 export interface ScreenSplat {
   /** Its place in the cloud. */
   readonly index: number;
+  /** Index of the cloud among those of the world. */
+  readonly owner: number;
   /** Splats are blended by ascending key, equal keys by index. */
   readonly key: number;
   /** Depth in camera axes. */
@@ -36,10 +39,18 @@ export interface OracleImage {
   readonly medianDepth: Float64Array;
   /** [N] largest weight alpha·T that each splat of the cloud has in any pixel; 0 if it is not seen. */
   readonly maxWeight: Float64Array;
+  /** Depth and identity, if the options ask for them. */
+  depths?: OracleDepths;
 }
 
-export function emptyImage(width: number, height: number, splatCount: number): OracleImage {
+/** An image that splats are blended into. */
+export interface Canvas extends OracleImage {
+  readonly sums?: DepthAndIds | undefined;
+}
+
+export function emptyImage(width: number, height: number, splatCount: number, measuresDepths = false): Canvas {
   return {
+    sums: measuresDepths ? new DepthAndIds(width, height) : undefined,
     width,
     height,
     color: new Float64Array(3 * width * height),
@@ -69,7 +80,7 @@ class LayersAmong {
   readonly #layers: readonly OracleLayer[];
   readonly #passed: Set<OracleLayer>[];
 
-  constructor(image: OracleImage, layers: readonly OracleLayer[]) {
+  constructor(image: Canvas, layers: readonly OracleLayer[]) {
     this.#image = image;
     this.#layers = layers;
     this.#passed = layers.length === 0 ? [] : Array.from(image.transmittance, () => new Set<OracleLayer>());
@@ -97,7 +108,7 @@ class LayersAmong {
  * @param limit [height, width] depth of other contents of the image: splats behind it are hidden
  */
 export function blend(
-  image: OracleImage,
+  image: Canvas,
   splats: readonly ScreenSplat[],
   rules: Rules,
   limit?: ArrayLike<number>,
@@ -120,7 +131,7 @@ interface Fragment {
  * Blends splats in a separate order for each pixel: by the depth at which each is densest along its ray, equal depths in the given order. A splat is hidden if that depth is behind the limit.
  */
 export function blendByPixel(
-  image: OracleImage,
+  image: Canvas,
   splats: readonly ScreenSplat[],
   rules: Rules,
   limit?: ArrayLike<number>,
@@ -156,7 +167,7 @@ export function blendByPixel(
 }
 
 function blendSplat(
-  image: OracleImage,
+  image: Canvas,
   finished: Uint8Array,
   splat: ScreenSplat,
   rules: Rules,
@@ -199,15 +210,16 @@ function alphaAt(
 }
 
 function blendFragment(
-  image: OracleImage,
+  image: Canvas,
   finished: Uint8Array,
   pixel: number,
-  { index, color: [red, green, blue] }: ScreenSplat,
+  splat: ScreenSplat,
   alpha: number,
   depth: number,
   rules: Rules,
 ): void {
-  const { color, transmittance, contributors, maxWeight, medianDepth } = image;
+  const { color, transmittance, contributors, maxWeight, medianDepth, sums } = image;
+  const { index, color: own } = splat;
   if (finished[pixel]) return;
   const before = transmittance[pixel];
   const after = before * (1 - alpha);
@@ -216,17 +228,16 @@ function blendFragment(
     return;
   }
   const weight = before * alpha;
-  color[3 * pixel] += weight * red;
-  color[3 * pixel + 1] += weight * green;
-  color[3 * pixel + 2] += weight * blue;
+  for (let k = 0; k < 3; k++) color[3 * pixel + k] += weight * own[k];
   transmittance[pixel] = after;
   if (before > 0.5 && after <= 0.5) medianDepth[pixel] = depth;
+  sums?.add(pixel, splat, before, after);
   contributors[pixel]++;
   if (weight > maxWeight[index]) maxWeight[index] = weight;
 }
 
 /** Adds what shines through: C += T·background. */
-export function addBackground(image: OracleImage, background: Vector3): void {
+export function addBackground(image: Canvas, background: Vector3): void {
   for (let i = 0; i < image.color.length; i++) {
     image.color[i] += image.transmittance[Math.floor(i / 3)] * background[i % 3];
   }

@@ -1,15 +1,16 @@
 /** The point of a ray at which a splat is densest: the depths of an order for each pixel (Radl et al. 2024), of the splat as it is painted, filter included. */
 import type { Camera, GaussianCloud, Vector3 } from '@gaussian-splat/core';
-import { linearPart, rotationTimesScale } from './projection.js';
+import { linearPart, rotationTimesScale, type Ellipse } from './projection.js';
 import type { Rules } from './rules.js';
 
-/** For splat `i` with its center at `center` in camera axes: the depth of its maximum along the ray of a pixel, 0 if that is behind the camera. */
+/** For splat `i` with its center at `center` in camera axes: the depth of its maximum along the ray of a pixel, 0 if that is behind the camera. @param ellipse the drawn one, by whose size a splat far outside of the image differs. */
 export function densestDepth(
   cloud: GaussianCloud,
   i: number,
   camera: Camera,
   center: Vector3,
   rules: Rules,
+  ellipse?: Ellipse,
 ): (column: number, row: number) => number {
   const { fx, fy, cx, cy, orthographic } = camera;
   const [x, y, z] = center;
@@ -32,8 +33,14 @@ export function densestDepth(
     return (column, row) => Math.max(0, z - (a * ((column + 0.5 - cx) / fx - x) + b * ((row + 0.5 - cy) / fy - y)) / c);
   }
   const toCenter = inverse.map((row) => dot(row, center));
+  const whole = dot(center, toCenter);
   return (column, row) => {
     const ray = [(column + 0.5 - cx) / fx, (row + 0.5 - cy) / fy, 1];
+    if (ellipse) {
+      // The same for a splat in view: rayᵀ A ray is that of the center's ray, along it, and the ellipse's distance across.
+      const share = (dot(ray, toCenter) * z) / whole;
+      return Math.max(0, (z * share) / (share * share + distance2(ellipse, column, row) / whole));
+    }
     // (t·ray - center)ᵀ A (t·ray - center) is least at t = rayᵀ A center / rayᵀ A ray.
     return Math.max(
       0,
@@ -44,6 +51,12 @@ export function densestDepth(
         ),
     );
   };
+}
+
+/** Squared distance of a pixel's center from that of an ellipse, in standard deviations. */
+function distance2({ conic: { xx, xy, yy }, x, y }: Ellipse, column: number, row: number): number {
+  const [dx, dy] = [column + 0.5 - x, row + 0.5 - y];
+  return xx * dx * dx + 2 * xy * dx * dy + yy * dy * dy;
 }
 
 function inverse3([a, b, c]: number[][]): number[][] {

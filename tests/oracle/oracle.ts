@@ -51,6 +51,8 @@ export interface OracleOptions {
   readonly depthKeys?: ArrayLike<number>;
   /** `pixel`: each pixel blends by the depth at which each splat is densest along its ray, regardless of keys. Default `center`. */
   readonly order?: 'center' | 'pixel';
+  /** Whether the image gets `depths`. */
+  readonly measuresDepths?: boolean;
 }
 
 /**
@@ -63,9 +65,10 @@ export function renderOracle(cloud: GaussianCloud, camera: Camera, options: Orac
   validateCamera(camera);
   const rules = typeof options.rules === 'string' ? RULES[options.rules] : options.rules;
 
-  const image = emptyImage(camera.width, camera.height, cloud.count);
+  const image = emptyImage(camera.width, camera.height, cloud.count, options.measuresDepths);
   const splats = screenSplats(cloud, camera, rules, options);
   blenderOf(options)(image, nearestFirst(splats), rules, options.depth, options.layers);
+  image.depths = image.sums?.result();
   if (options.background) addBackground(image, options.background);
   return image;
 }
@@ -86,25 +89,26 @@ export interface PlacedCloud {
 export function renderOracleWorld(
   placed: readonly PlacedCloud[],
   camera: Camera,
-  options: Pick<OracleOptions, 'rules' | 'depth' | 'layers' | 'background' | 'order'>,
+  options: Pick<OracleOptions, 'rules' | 'depth' | 'layers' | 'background' | 'order' | 'measuresDepths'>,
 ): OracleImage {
   const rules = typeof options.rules === 'string' ? RULES[options.rules] : options.rules;
   let first = 0;
-  const splats = placed.flatMap(({ cloud: whole, mode, sceneToWorld, opacity = 1, crop, cuts = [] }) => {
+  const splats = placed.flatMap(({ cloud: whole, mode, sceneToWorld, opacity = 1, crop, cuts = [] }, owner) => {
     const { cloud, recolor } = cutCloud(whole, cuts, sceneToWorld);
     const worldToCamera = sceneToWorld ? multiply(camera.worldToCamera, sceneToWorld) : camera.worldToCamera;
     const isInside = (i: number): boolean =>
       crop === undefined || worldPosition(cloud, i).every((v, axis) => v >= crop.min[axis] && v <= crop.max[axis]);
     const faded = { ...cloud, opacities: cloud.opacities.map((own, i) => (isInside(i) ? thinned(own, opacity) : 0)) };
-    const all = screenSplats(faded, { ...camera, worldToCamera }, rules, { rules, mode, order: options.order });
+    const all = screenSplats(faded, { ...camera, worldToCamera }, rules, { ...options, mode });
     const start = first;
     first += cloud.count;
     return all
       .filter(({ index }) => faded.opacities[index] > 0)
-      .map((s) => ({ ...s, color: recolor(s.index, s.color), index: start + s.index }));
+      .map((s) => ({ ...s, color: recolor(s.index, s.color), index: start + s.index, owner }));
   });
-  const image = emptyImage(camera.width, camera.height, first);
+  const image = emptyImage(camera.width, camera.height, first, options.measuresDepths);
   blenderOf(options)(image, nearestFirst(splats), rules, options.depth, options.layers);
+  image.depths = image.sums?.result();
   if (options.background) addBackground(image, options.background);
   return image;
 }
@@ -138,13 +142,16 @@ function screenSplats(cloud: GaussianCloud, camera: Camera, rules: Rules, option
     requireFinite(index, [...Object.values(ellipse.conic), ellipse.x, ellipse.y, opacity, ...color, key]);
     splats.push({
       index,
+      owner: 0,
       key,
       depth: z,
       ellipse,
       footprint: footprintOf(ellipse, opacity, camera, rules),
       opacity,
       color,
-      ...(options.order === 'pixel' && { depthAt: densestDepth(cloud, index, camera, center, rules) }),
+      ...((options.order === 'pixel' || options.measuresDepths) && {
+        depthAt: densestDepth(cloud, index, camera, center, rules, options.measuresDepths ? ellipse : undefined),
+      }),
     });
   }
   return splats;

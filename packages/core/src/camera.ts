@@ -50,6 +50,8 @@ export interface CalibratedView {
   readonly near?: number;
   /** Far plane in world units; default {@link DEFAULT_FAR}. */
   readonly far?: number;
+  /** Whether all rays are parallel: see {@link Camera.orthographic}. */
+  readonly orthographic?: boolean;
 }
 
 /**
@@ -57,7 +59,7 @@ export interface CalibratedView {
  * view in the error.
  */
 export function cameraFromCalibration(view: CalibratedView, where = 'camera'): Camera {
-  const { width, height, K, worldToCamera } = view ?? {};
+  const { width, height, K, worldToCamera, orthographic } = view ?? {};
   const isMatrix = (m: unknown, size: number): boolean =>
     Array.isArray(m) && m.length === size && m.every((row) => Array.isArray(row) && row.length === size);
   if (!isMatrix(K, 3)) failCamera(`${where}.K`, 'a 3x3 array of numbers in pixels', describeCamera(K));
@@ -73,6 +75,7 @@ export function cameraFromCalibration(view: CalibratedView, where = 'camera'): C
     worldToCamera: worldToCamera.flat(),
     near: view.near ?? DEFAULT_NEAR,
     far: view.far ?? DEFAULT_FAR,
+    ...(orthographic !== undefined && { orthographic }),
   };
   validateCamera(camera, where);
   if (K[0][1] !== 0) failCamera(`${where}.K[0][1]`, '0 (no skew)', describeCamera(K[0][1]));

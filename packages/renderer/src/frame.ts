@@ -24,8 +24,8 @@ export interface Frame {
   readonly hasDetail: boolean;
   /** Whether to limit the splats to `RenderSettings.splatBudget`. */
   readonly isBudgeted: boolean;
-  /** Stages that sort splats for each pixel; undefined for other orders. */
-  readonly order: PixelOrder | undefined;
+  /** Stages that need the depths of splats at pixels, for an order or a map; undefined without. */
+  readonly order: Pick<PixelOrder, 'recordDepths'> | undefined;
   /** Whether the rasterizer needs the depths of the splats. Sort keys must then be depths. */
   readonly keepsDepths: boolean;
   readonly timer?: FrameTimer | undefined;

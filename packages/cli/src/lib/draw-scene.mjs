@@ -3,7 +3,16 @@ import { dirname, join, resolve } from 'node:path';
 import { PNG } from 'pngjs';
 import { boundsOf, SPLAT_FILTERS } from '@gaussian-splat/core';
 import { readScene } from '@gaussian-splat/formats';
-import { capture, deviceDescriptor, GaussianBuffers, packGaussians, Viewpoint, World } from '@gaussian-splat/renderer';
+import {
+  capture,
+  deviceDescriptor,
+  GaussianBuffers,
+  packGaussians,
+  renderDepth,
+  renderFisheye,
+  Viewpoint,
+  World,
+} from '@gaussian-splat/renderer';
 import { clipMoment, isClip, openClip } from './clip-frame.mjs';
 import { CommandError, UsageError } from './command.mjs';
 import { readWhole } from './input-file.mjs';
@@ -77,11 +86,12 @@ export async function openMovingScene(name) {
 /**
  * Opens a renderer of a scene.
  * @param options Result of {@link readDrawOptions}.
- * @returns The renderer. `show(cloud)` replaces the splats. `draw(camera)` resolves to float32 premultiplied RGBA,
- * [height, width, 4], top row first. It rejects if WebGPU's validation has reported an error.
+ * @returns The renderer. `show(cloud)` replaces the splats; `add(cloud)` adds a scene beside them. `draw(camera)`
+ * resolves to float32 premultiplied RGBA, [height, width, 4], top row first. `measure(camera)` resolves to the
+ * `DepthImage` of a renderer with `tiles`. Both reject if WebGPU's validation has reported an error.
  */
 export async function openSceneRenderer(cloud, options) {
-  const { antialiased, filterVariance } = options.filter === undefined ? cloud : SPLAT_FILTERS[options.filter];
+  const filterOf = (of) => (options.filter === undefined ? of : SPLAT_FILTERS[options.filter]);
   const adapter = await requestNodeAdapter();
   const device = await adapter.requestDevice(deviceDescriptor(adapter));
   const validationErrors = [];
@@ -90,6 +100,16 @@ export async function openSceneRenderer(cloud, options) {
   const world = new World();
   const viewpoint = new Viewpoint(device, world, { settings: { rasterizer: options.raster, accumulation } });
   let shown;
+  const add = async (next) => {
+    const { antialiased, filterVariance } = filterOf(next);
+    const gaussians = await GaussianBuffers.upload(device, packGaussians({ ...next, antialiased, filterVariance }));
+    return { gaussians, placement: world.add({ scene: gaussians }) };
+  };
+  const checked = async (drawn) => {
+    const image = await drawn;
+    if (validationErrors.length > 0) throw new CommandError(`WebGPU: ${validationErrors.join('\n')}`);
+    return image;
+  };
   const show = async (next) => {
     if (next === shown?.cloud) return;
     if (shown) world.remove(shown.placement);
@@ -97,20 +117,20 @@ export async function openSceneRenderer(cloud, options) {
     shown = undefined;
     // Frames of a clip may have no splats.
     if (next.count === 0) return;
-    const gaussians = await GaussianBuffers.upload(device, packGaussians({ ...next, antialiased, filterVariance }));
-    shown = { cloud: next, gaussians, placement: world.add({ scene: gaussians }) };
+    shown = { cloud: next, ...(await add(next)) };
   };
   await show(cloud);
   return {
     show,
+    add,
     viewpoint,
     accumulation,
-    mode: antialiased ? 'antialiased' : 'classic',
+    mode: filterOf(cloud).antialiased ? 'antialiased' : 'classic',
     adapterName: adapter.info.description || adapter.info.vendor,
-    async draw(camera) {
-      const pixels = await capture(device, viewpoint, { camera, background: options.background });
-      if (validationErrors.length > 0) throw new CommandError(`WebGPU: ${validationErrors.join('\n')}`);
-      return pixels;
+    draw: (camera) => checked(capture(device, viewpoint, { camera, background: options.background })),
+    measure: (camera) => {
+      const measure = camera.fisheye ? renderFisheye : renderDepth;
+      return checked(measure(device, viewpoint, { camera, background: options.background }));
     },
   };
 }

@@ -31,11 +31,7 @@ export function alphaOfWorld({ device, members, settings, filter, drawBeneath }:
   readonly take: TakeAlpha;
   free(): void;
 } {
-  const world = new World();
-  for (const { placement } of members) {
-    const { scene, sceneToWorld, opacity, crop, visible, modifier } = placement;
-    world.add({ scene: asItIs(scene), sceneToWorld, opacity, crop, visible, modifier });
-  }
+  const world = worldOf(members);
   const viewpoint = new Viewpoint(device, world, { settings: { ...settings, shDegree: 0 } });
   return {
     take: async (camera) => {
@@ -44,6 +40,16 @@ export function alphaOfWorld({ device, members, settings, filter, drawBeneath }:
     },
     free: () => viewpoint.destroy(),
   };
+}
+
+/** Returns a world of the splats of all members alone, for other views. */
+export function worldOf(members: readonly WorldEntry[]): World {
+  const world = new World();
+  for (const { placement } of members) {
+    const { scene, sceneToWorld, opacity, crop, visible, modifier } = placement;
+    world.add({ scene: asItIs(scene), sceneToWorld, opacity, crop, visible, modifier });
+  }
+  return world;
 }
 
 /** Returns a copy of a scene without streaming, so that the view from above requests no pages. */

@@ -29,6 +29,7 @@ export type { CreditsChangeDetail } from '../features/credits/row.js';
 export type { InteractionPrompt, InteractionPromptStyle } from '../features/input/row.js';
 export type { HotspotPlace } from '../features/labels/hotspot-controller.js';
 export type { ImageOptions } from '../features/recording/capture-image.js';
+export type { DepthOptions, MeasuredView } from '../features/recording/depth-image.js';
 export type { FrameOptions, RecordOptions } from '../features/recording/recording.js';
 export type { MeasureDetail } from '../features/ruler/row.js';
 export type { ViewChangeDetail } from '../features/views/row.js';

@@ -4,10 +4,12 @@ import { boxOf, type SceneBox } from './scene-queries.js';
 import type { CameraView } from './camera/camera-view.js';
 import type { HotspotController, InputController, Recording, Tour } from './feature-classes.js';
 import type {
+  DepthOptions,
   FlightOptions,
   FrameOptions,
   HotspotPlace,
   ImageOptions,
+  MeasuredView,
   PathOptions,
   RecordOptions,
 } from './feature-table.js';
@@ -137,6 +139,16 @@ export abstract class ViewingMethods extends MediaProperties {
    */
   async toBlob(options: ImageOptions = {}): Promise<Blob> {
     return (await this.#images()).takeImage(this.core, options);
+  }
+
+  /**
+   * Measures the current view in one pass: depth in meters along the optical axis, coverage, and the element or child
+   * at each pixel. It contains no meshes and no shadow, and ignores `order`.
+   * @returns Rejects with an `InvalidStateError` if no scene is shown, with a `NotSupportedError` if the scene has
+   * meshes, with a `RangeError` for a size that the GPU cannot draw, and with `unsupported/webgl` without WebGPU.
+   */
+  async renderDepth(options: DepthOptions = {}): Promise<MeasuredView> {
+    return (await this.#images()).renderDepth(this.core, options);
   }
 
   /**

@@ -1,7 +1,7 @@
 /** Rasterizes tiles with auxiliary outputs. */
 import { rasterizeTilesAuxiliary, rasterizeTilesAuxiliaryFew } from '../generated/auxiliary-shaders.js';
 import { constants } from '../generated/shaders.js';
-import { BUFFER_USAGE, perDevice, TEXTURE_USAGE } from '../gpu/kernel.js';
+import { BUFFER_USAGE, perDevice } from '../gpu/kernel.js';
 import type {
   AuxiliaryFrame,
   AuxiliaryOutputs as AuxiliaryOutputsOf,
@@ -63,22 +63,14 @@ class AuxiliaryPainter implements AuxiliaryTilePainter {
 
   /** Returns new bindings for each frame. They are not cached, because few frames have auxiliary outputs. */
   bind(kernel: RasterizeKernel, painted: PaintedTiles): GPUBindGroup {
-    const unused = unusedOutputs(this.#device);
-    const { contributions = unused.contributions, depth = unused.depth } = this.#outputs;
+    const { contributions = noContributions(this.#device) } = this.#outputs;
     this.#frame = { ...(painted as PaintedTiles & AuxiliaryFrame), survivors: this.#survivors };
-    return new BoundImages().bind(kernel, painted, {
-      ...{ survivors: this.#survivors, contributions },
-      depths: depth.createView(),
-    });
+    return new BoundImages().bind(kernel, painted, { survivors: this.#survivors, contributions });
   }
 }
 
-/** Placeholders for auxiliary outputs that the caller did not request. */
-const unusedOutputs = (device: GPUDevice): Required<AuxiliaryTargets> =>
-  perDevice(device, 'unused outputs', () => ({
-    contributions: device.createBuffer({ label: 'gs.no_contributions', size: 4, usage: BUFFER_USAGE.storage }),
-    depth: device.createTexture({
-      ...{ label: 'gs.no_depth', size: [1, 1], format: 'r32float' as const },
-      usage: TEXTURE_USAGE.storageBinding,
-    }),
-  }));
+/** Placeholder for contributions that the caller did not request. */
+const noContributions = (device: GPUDevice): GPUBuffer =>
+  perDevice(device, 'no contributions', () =>
+    device.createBuffer({ label: 'gs.no_contributions', size: 4, usage: BUFFER_USAGE.storage }),
+  );

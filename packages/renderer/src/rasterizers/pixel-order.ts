@@ -1,18 +1,12 @@
 /** Order of splats for each pixel, for the rasterizer `tiles`. Loaded with the first frame that requests it. */
 import type { Camera } from '@gaussian-splat/core';
 import type { FrameBindings } from '../bindings.js';
-import { pixelDepths, pixelDepthsQuantized, rasterizeTilesOrder } from '../generated/order-shaders.js';
+import { rasterizeTilesOrder } from '../generated/order-shaders.js';
 import { constants, layouts } from '../generated/shaders.js';
-import {
-  BUFFER_USAGE,
-  kernelOf,
-  perDevice,
-  TEXTURE_USAGE,
-  type ComputeKernel,
-  type ShaderDescription,
-} from '../gpu/kernel.js';
+import { BUFFER_USAGE, perDevice, TEXTURE_USAGE } from '../gpu/kernel.js';
 import type { RenderSettings } from '../render-settings.js';
 import type { Scratch } from '../scratch.js';
+import { PixelDepths } from './pixel-depths.js';
 import type { PaintingDepth } from './rasterizer.js';
 import { rasterizeKernel } from './tile-kernels.js';
 import { BoundImages, type TilePainter } from './tile-painter.js';
@@ -22,12 +16,12 @@ type DepthResources = PaintingDepth['resources'];
 /** Device resources of `order: 'pixel'`: see shaders/pixel_depths.wgsl and shaders/rasterize_tiles_order.wgsl. */
 export class PixelOrder {
   readonly #device: GPUDevice;
-  /** Kernels and bind groups for the blocks of a frame. */
-  readonly #pages = new WeakMap<FrameBindings, readonly Recorded[]>();
+  readonly #depths: PixelDepths;
   readonly #bound = new BoundImages();
 
   constructor(device: GPUDevice) {
     this.#device = device;
+    this.#depths = new PixelDepths(device, true);
   }
 
   /**
@@ -35,9 +29,7 @@ export class PixelOrder {
    * after `project`.
    */
   recordDepths(pass: GPUComputePassEncoder, bindings: FrameBindings): void {
-    let pages = this.#pages.get(bindings);
-    if (pages === undefined) this.#pages.set(bindings, (pages = this.#bindPages(bindings)));
-    for (const { kernel, group, groups } of pages) kernel.dispatch(pass, group, groups);
+    this.#depths.record(pass, bindings);
   }
 
   /**
@@ -60,37 +52,11 @@ export class PixelOrder {
       kernel: (variant) => rasterizeKernel(this.#device, rasterizeTilesOrder, variant, overrides),
       bind: (kernel, painted) =>
         this.#bound.bind(kernel, painted, {
-          ...{ pixel_depths: depthsIn(scratch!), cull_stats: scratch!.cullStats },
+          ...{ pixel_depths: this.#depths.in(scratch!), cull_stats: scratch!.cullStats },
           ...(depth?.resources ?? noDepth(this.#device)),
         }),
     };
   }
-
-  #bindPages({ table, scratch }: FrameBindings): Recorded[] {
-    const { order, plan, cullStats, keys } = scratch;
-    return table.blocks.map((page, i) => {
-      const plain = page.reading ? pixelDepthsQuantized : pixelDepths;
-      const kernel = kernelOf<DepthsShader>(this.#device, table.readingOf(i)?.pixelDepths ?? plain);
-      const group = kernel.bind({
-        ...table.modifiersOf(i),
-        ...{ view: table.view(i), gaussians: page.geometry, survivors: order[0], plan, cull_stats: cullStats },
-        ...{ pixel_depths: depthsIn(scratch), keys: keys[0] },
-      });
-      return { kernel, group, groups: Math.ceil(Math.min(scratch.capacity, page.count) / constants.PROJECT_GROUP) };
-    });
-  }
-}
-
-/** Returns the buffer array<PixelDepth>, by slot. */
-const depthsIn = (scratch: Scratch): GPUBuffer => scratch.kept('pixel_depths', layouts.PixelDepth.size);
-
-/** Shader of `pixel_depths`, for any kind of geometry. */
-type DepthsShader = ShaderDescription & Pick<typeof pixelDepths, 'bindings'>;
-
-interface Recorded {
-  readonly kernel: ComputeKernel<DepthsShader>;
-  readonly group: GPUBindGroup;
-  readonly groups: number;
 }
 
 /** Returns placeholders for the bindings of depth in frames without it. The shader does not read them. */

@@ -43,7 +43,7 @@ export interface Surface {
   readonly height: number;
 }
 
-/** Auxiliary outputs of a frame, besides its image. */
+/** Auxiliary outputs of a frame, besides its image. `renderDepth` writes depth and identity. */
 export interface AuxiliaryTargets {
   /**
    * One u32 for each splat, in the order of `packedOrder`, with blocks padded to whole chunks of 256. It contains the
@@ -51,15 +51,9 @@ export interface AuxiliaryTargets {
    * frames are kept: clear the buffer for the weights of a single frame. Usage: STORAGE.
    */
   readonly contributions?: GPUBuffer;
-  /**
-   * Texture that receives the camera depth of each pixel, in world units to 11 bits. This is the depth of the splat
-   * that reduces the transmittance to half or less; 0 if no splat does. Same size as the target, format `r32float`,
-   * usage STORAGE_BINDING.
-   */
-  readonly depth?: GPUTexture;
 }
 
-/** Writes auxiliary outputs. The class of this name in `@gaussian-splat/renderer/tools` implements it. */
+/** Writes auxiliary outputs: `AuxiliaryOutputs` of `@gaussian-splat/renderer/tools`, or {@link DepthMaps}. */
 export interface AuxiliaryOutputs {
   /** Returns the variant of tile rasterization for a frame. @param survivors Indices of the visible splats by slot. */
   painter(device: GPUDevice, survivors: GPUBuffer): AuxiliaryTilePainter;

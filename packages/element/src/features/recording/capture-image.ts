@@ -1,7 +1,9 @@
 /** Takes images for scripts: of any size, with a background color and the CSS filters of the element. */
+import { loadModule } from '@gaussian-splat/core';
 import type { PixelSize } from '../../viewer/size-controller.js';
 import type { Viewer } from '../../viewer/viewer.js';
 import type { Backend } from '../../gpu/backend.js';
+import type { DepthOptions, MeasuredView } from './depth-image.js';
 
 /** Options of `toBlob()`. */
 export interface ImageOptions {
@@ -20,6 +22,12 @@ export interface ImageOptions {
 }
 
 export { record, recordFrames } from './recording.js';
+
+/** Measures depth and identity, with code that is loaded at the first call. */
+export async function renderDepth(host: Viewer, options: DepthOptions): Promise<MeasuredView> {
+  const { measureDepth } = await loadModule('the code that measures depth', () => import('./depth-image.js'));
+  return measureDepth(host, options);
+}
 
 /** Color with premultiplied alpha, each component 0..1. */
 export type Rgba = readonly [red: number, green: number, blue: number, alpha: number];
@@ -81,14 +89,19 @@ export const nothingToDraw = (): DOMException =>
  * @returns null if neither side is given
  * @throws RangeError for a size that the GPU cannot draw
  */
-function sizeOf({ width, height }: ImageOptions, canvas: HTMLCanvasElement | null, max: number): PixelSize | null {
+export function sizeOf(
+  { width, height }: ImageOptions,
+  canvas: HTMLCanvasElement | null,
+  max: number,
+  method = 'toBlob',
+): PixelSize | null {
   if (canvas === null || (width === undefined && height === undefined)) return null;
   const aspect = canvas.width / canvas.height;
   const size = { width: Math.round(width ?? height! * aspect), height: Math.round(height ?? width! / aspect) };
   const isDrawable = (side: number): boolean => side >= 1 && side <= max;
   if (!isDrawable(size.width) || !isDrawable(size.height))
     throw new RangeError(
-      `toBlob(): expected an image of 1 to ${max} pixels to a side, which is what this GPU can draw, found ${size.width} x ${size.height}`,
+      `${method}(): expected an image of 1 to ${max} pixels to a side, which is what this GPU can draw, found ${size.width} x ${size.height}`,
     );
   return size;
 }
