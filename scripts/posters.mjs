@@ -68,7 +68,7 @@ async function saveVersions(small) {
   }
   const splats = await tab.locator('gaussian-splat').evaluate((element) => element.stats.splats);
   const bytes = { ply: PLY_BYTES * splats, small: statSync(small).size };
-  writeFileSync(join(folder, 'versions.json'), `${JSON.stringify(bytes)}\n`);
+  writeFileSync(join(folder, 'versions.json'), `${JSON.stringify(bytes, null, 2)}\n`);
   await tab.close();
 }
 

@@ -35,11 +35,18 @@ const SCENES = [
     credit: `${STUDIO} Robot arm: “Black Honey”, sunglasses: Eric Chadwick, both CC BY 4.0.`,
   },
   {
-    ...{ id: 'house', kind: 'room', title: 'A house and its garden', src: 'scenes/studio/garden.spz' },
+    ...{ id: 'house', kind: 'room', title: 'A tour of a house', src: 'scenes/studio/garden.spz' },
     alt: 'A brick house with a green door behind a lawn',
     view: ['-23.9deg 90deg 6m', '-2.74m 1.6m 2.52m', '52deg'],
-    attributes: walked('garden'),
-    words: 'Walk on lawn and path. The map of the floor was made by a command.',
+    attributes: { ...walked('garden'), 'floor-plan': '' },
+    doors: [
+      ['garden', 'apartment', '0m 1.6m 0.3m', '0deg', 'Into the house'],
+      ['apartment', 'garden', '0.3m 1.6m 1.2m', '90deg', 'To the garden'],
+      ['apartment', 'hall', '7.2m 1.6m -2.4m', '0deg', 'To the hall'],
+      ['hall', 'apartment', '-8.7m 1.6m 0m', '90deg', 'To the study'],
+    ],
+    words:
+      'Three captures with doors between them. Walk to a door or choose its label; the plan comes from the maps of the floors. In VR the doors work, too.',
     credit: STUDIO,
   },
   {
@@ -47,7 +54,7 @@ const SCENES = [
     alt: 'A statue on a plinth between columns',
     view: ['-179.6deg 90deg 5m', '1.02m 1.6m 2.59m', '59deg'],
     attributes: walked('hall'),
-    words: 'Only 34 images: nothing is cleaned, so that you see what a hasty capture looks like.',
+    words: 'Walk among columns and statues. Trained from 150 images of a moving phone; nothing is cleaned.',
     credit: `${STUDIO} The cat is by Ankledot, CC BY 4.0.`,
   },
   {
@@ -137,7 +144,8 @@ export default function gallery() {
       size: sizeOf(scene.src),
       splats: counts[scene.id]?.toLocaleString('en'),
       tag: tagOf([...attributes, ['poster', poster]], (file) => `../../${file}`, ' '),
-      code: `<gaussian-splat ${tagOf(attributes, shortOf, '\n  ')}></gaussian-splat>`,
+      children: doorsOf(scene, (file) => `../../${file}`),
+      code: `<gaussian-splat ${tagOf(attributes, shortOf, '\n  ')}>${doorsOf(scene, shortOf)}</gaussian-splat>`,
       playground: new URLSearchParams(
         attributes.map(([name, value]) => [name, pathIn(name, value, (file) => `../${file}`)]),
       ),
@@ -150,6 +158,17 @@ const shortOf = (file) => (basename(file).startsWith('model.') ? `${file.split('
 const pathIn = (name, value, addressOf) => (ADDRESSES.includes(name) ? addressOf(value) : value);
 const tagOf = (attributes, addressOf, space) =>
   attributes.map(([name, value]) => (value === '' ? name : `${name}="${pathIn(name, value, addressOf)}"`)).join(space);
+
+/** Children that lead to other scenes: the slots of labels, with the rooms on both sides. */
+const doorsOf = ({ doors = [] }, addressOf) =>
+  doors
+    .map(([room, to, position, heading, label], i) => {
+      const [from, behind, map] = [`${room}.spz`, `${to}.spz`, `${to}.floor`].map((name) =>
+        addressOf(`scenes/studio/${name}`),
+      );
+      return `\n  <button slot="hotspot-${i}" data-position="${position}" data-heading="${heading}"\n    data-room="${from}" data-door="${behind}" data-floor-map="${map}">${label}</button>`;
+    })
+    .join('') + (doors.length > 0 ? '\n' : '');
 
 /** Megabytes of a scene: of its file, or of its folder if it is streamed. */
 function sizeOf(src) {

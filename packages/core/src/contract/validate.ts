@@ -111,7 +111,7 @@ function validateConditions(value: Record<string, unknown>, schema: Schema, wher
   });
 }
 
-/** Validates `oneOf`: alternatives that a property distinguishes, or of which exactly one property must be present. */
+/** Validates `oneOf`: alternatives that a property distinguishes, or that need exactly one property. */
 function validateOneOf(value: unknown, { oneOf = [], description }: Schema, where: string): ContractFault[] {
   const key = discriminatorOf(oneOf[0]);
   if (key === undefined) {

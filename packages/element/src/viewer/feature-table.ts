@@ -1,6 +1,7 @@
 /** All features of the element. The order is that of their calls: see {@link Feature}. */
 import { autoRotate, motion } from '../features/auto-rotate/row.js';
 import { children } from '../features/children/row.js';
+import { doors } from '../features/doors/row.js';
 import { effects } from '../features/effects/row.js';
 import { flight } from '../features/flight/row.js';
 import { announcer, input } from '../features/input/row.js';
@@ -17,6 +18,7 @@ import { ar, vr } from '../features/xr/row.js';
 import type { FeatureTable } from './features.js';
 // The declarations of the package keep these imports, whose rows add attributes and members to the types of the element.
 import '../features/auto-rotate/row.js';
+import '../features/doors/row.js';
 import '../features/effects/row.js';
 import '../features/flight/row.js';
 import '../features/shadow/row.js';
@@ -25,6 +27,7 @@ import '../features/sound/row.js';
 
 export type { InteractionPrompt, InteractionPromptStyle } from '../features/input/row.js';
 export type { HotspotPlace } from '../features/labels/hotspot-controller.js';
+export type { RoomChangeDetail } from '../features/doors/row.js';
 export type { ImageOptions } from '../features/recording/capture-image.js';
 export type { FrameOptions, RecordOptions } from '../features/recording/recording.js';
 export type { MeasureDetail } from '../features/ruler/row.js';
@@ -34,8 +37,8 @@ export type { WalkReadyDetail } from '../features/walk/row.js';
 export type { ImmersiveStatusDetail } from '../features/xr/row.js';
 
 const FEATURES: FeatureTable = {
-  ...{ children, views, autoRotate, walk, flight, vr, ar, ruler, shadow, sky, sound, effects, labels, input, motion },
-  ...{ announcer, print, recording },
+  ...{ children, views, autoRotate, walk, flight, vr, ar, ruler, shadow, sky, sound, effects, labels, doors },
+  ...{ input, motion, announcer, print, recording },
 };
 
 export default FEATURES;
