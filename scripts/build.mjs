@@ -11,14 +11,14 @@ import { must, mustSoon, root, TSC } from './lib/run.mjs';
 
 /** Scripts of pages, each beside its page. */
 const SCRIPTS = [
-  'home.js',
   'check/check.js',
   'check/run.js',
   'compare/compare.js',
   'docs/search.js',
   'examples/examples.js',
   'examples/features/features.js',
-  'gallery/gallery.js',
+  'gallery/scene.js',
+  'gallery/wall.js',
   'map/map.js',
   'playground/playground.js',
   'three/three.js',
@@ -165,17 +165,10 @@ async function buildDemo() {
   // The map starts its workers from this file.
   for (const name of ['maplibre-gl-worker.mjs', 'maplibre-gl.css'])
     cpSync(join(root, 'node_modules/maplibre-gl/dist', name), join(to, 'map', name));
-  await build({
-    entryPoints: SCRIPTS.map((name) => join(from, name)),
-    outdir: to,
-    outbase: from,
-    bundle: true,
-    // Code that a page loads later is a separate script.
-    external: ['./run.js'],
-    format: 'esm',
-    minify: true,
-    logLevel: 'warning',
-  });
+  const options = { outdir: to, outbase: from, bundle: true, format: 'esm', minify: true, logLevel: 'warning' };
+  // Code that a page loads later is a separate script.
+  await build({ ...options, entryPoints: SCRIPTS.map((name) => join(from, name)), external: ['./run.js'] });
+  await build({ ...options, entryPoints: [join(from, 'home.js')], splitting: true, chunkNames: 'home/[name]-[hash]' });
 }
 
 /** Vite builds the apps from the bundle's production output. */

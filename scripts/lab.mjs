@@ -45,6 +45,7 @@ const COMMANDS = {
   grid: { what: 'many elements on one page', in: 'chromium', command: ['scripts/grid/run-grid.mjs'] },
   lives: { what: 'elements that are added and removed', command: ['scripts/lives.mjs'] },
   load: { what: 'times from navigation to the first frame', in: 'chromium', command: ['scripts/bench/run-load.mjs'] },
+  posters: { what: 'posters of the site, as its scenes are first drawn', command: ['scripts/posters.mjs'] },
   screenshots: { what: 'every page of the site, for people to look at', command: ['scripts/screenshots.mjs'] },
   soak: { what: 'hours of random actions with flat memory', in: 'chromium', command: ['scripts/soak/run-soak.mjs'] },
   stability: { what: 'known failures of renderers', command: ['scripts/stability.mjs'] },

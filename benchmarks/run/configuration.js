@@ -42,7 +42,7 @@ export const SIZES_MILLIONS = [0.25, 1, 3, 6.06, 12, 24];
 const NUMBERS = ['splats', 'visible', 'width', 'height', 'distance', 'resolutionScale'];
 const SHORT = { n: 'splats', w: 'width', h: 'height' };
 
-/** JSON, or the shorter `key=value,key:value`, of which numbers and booleans are read as such. */
+/** JSON, or the shorter `key=value,key:value`; its numbers and booleans are read as such. */
 export function parseObject(text) {
   if (text.trim().startsWith('{')) return JSON.parse(text);
   const value = (word) => {

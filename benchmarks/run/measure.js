@@ -17,7 +17,7 @@ const READ_EVERY = 50;
 const IN_A_ROW = 40;
 /** Frames that may be in flight when a GPU is made to work. */
 const BUSY_IN_FLIGHT = 16;
-/** Number of empty submissions, the fastest of which is the latency of the wait. */
+/** Number of empty submissions; the fastest is the latency of the wait. */
 const EMPTY = 8;
 /** Milliseconds of work before a visit measures: GPUs that were idle run at a fraction of their clock. */
 const BUSY_MS = 400;

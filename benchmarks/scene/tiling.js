@@ -97,7 +97,7 @@ function shifted(packed, offset) {
   return moved;
 }
 
-/** Moves packed splats, each of which starts with its position in float32, and the bounds of their chunks. */
+/** Moves packed splats, whose first values are their positions in float32, and the bounds of their chunks. */
 function shiftPacked({ geometry, chunks }, stride, offset) {
   const floats = new Float32Array(geometry.buffer, geometry.byteOffset, geometry.length);
   shift(floats, 0, stride, geometry.length / stride, offset);

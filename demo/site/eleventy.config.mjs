@@ -21,7 +21,7 @@ const COPIED = {
   'benchmarks/peers/*.html': 'bench/peers',
   'docs/*.{png,webp}': 'docs',
   'docs/stability': 'stability/data',
-  'docs/frontier': 'frontier/data',
+  'docs/frontier': 'speed/data',
   'packages/element/cdn': 'cdn',
 };
 /** HTML that is no page of the site. */

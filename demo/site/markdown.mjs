@@ -8,8 +8,8 @@ import { pageFolders, relativeAddress } from './links.mjs';
 /** Folders and files of the repository that have an address on the site, besides the documents. */
 const ADDRESSES = [
   [/^docs\/(?:README\.md|(?:decisions|guide)\/?)$/, '/docs/'],
-  [/^docs\/frontier\/?$/, '/frontier/'],
-  [/^docs\/frontier\/(.+)$/, '/frontier/data/$1'],
+  [/^docs\/frontier\/?$/, '/speed/'],
+  [/^docs\/frontier\/(.+)$/, '/speed/data/$1'],
   [/^docs\/stability\/(.+)$/, '/stability/data/$1'],
   [/^docs\/([^/]+\.(?:png|webp))$/, '/docs/$1'],
   [/^demo\/(scenes\/.+|generators\/.+\.(?:onnx|json|webp|png))$/, '/$1'],

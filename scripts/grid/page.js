@@ -3,7 +3,8 @@ import { ledger } from '/soak/ledger.js';
 
 const query = new URLSearchParams(location.search);
 const count = Number(query.get('count') ?? 12);
-const FILES = ['skull.spz', 'st-peter.sog', 'room.spz'];
+const FILES = ['skull.spz', 'st-peter.sog', 'studio/apartment.spz'];
+const POSTERS = ['skull', 'statue', 'apartment'];
 
 /** Long tasks by their length in ms, and bytes of the GPU, one entry per sample. */
 const longTasks = [];
@@ -18,7 +19,7 @@ for (let i = 0; i < count; i++) {
   const file = FILES[i % FILES.length];
   article.innerHTML = `<h2>Scene ${i + 1}</h2>
     <gaussian-splat src="/scenes/${file}?${i}" alt="Scene ${i + 1}" camera-controls camera-orbit="${30 * i}deg 75deg auto"
-      poster="/scenes/${file.replace(/\..*/, '')}-poster.webp"></gaussian-splat>
+      poster="/scenes/posters/${POSTERS[i % FILES.length]}.webp"></gaussian-splat>
     <p>A page has words between its scenes, some of which are long enough for two lines.</p>`;
   document.body.append(article);
 }

@@ -37,21 +37,25 @@ describe('the first page', { skip: isBuilt ? false : 'no site: npm run build' },
     assert.ok(shifts < 0.01, `cumulative layout shift ${shifts}`);
   });
 
-  it('has its words beside the scene on a phone that lies on its side and on a tablet', async () => {
+  it('shows its words and chips in the first screen, and never over the middle of the scene', async () => {
     const { tab } = only;
     for (const [width, height] of [
-      [844, 390],
+      [390, 844],
       [1024, 768],
+      [1280, 800],
+      [2560, 1440],
     ]) {
       await tab.setViewportSize({ width, height });
-      const [end, start] = await tab.evaluate(() => {
-        // The lines of text, not the boxes that hold them.
-        const range = document.createRange();
-        range.selectNodeContents(document.querySelector('.hero .words')!);
-        const ends = [...range.getClientRects()].map(({ right }) => right);
-        return [Math.max(...ends), document.querySelector('#hero')!.getBoundingClientRect().left];
+      const found = await tab.evaluate(() => {
+        const { left, top, width, height } = document.querySelector('#hero')!.getBoundingClientRect();
+        const chips = document.querySelector('.chips')!.getBoundingClientRect();
+        const middle = document.elementFromPoint(left + width / 2, Math.min(innerHeight - 1, top + height / 2));
+        return { middle: middle?.id, below: chips.bottom - innerHeight, aspect: width / height };
       });
-      assert.ok(end <= start + 0.5, `words end at ${end}, the scene begins at ${start} of ${width}`);
+      assert.equal(found.middle, 'hero', `${width} x ${height}`);
+      assert.ok(found.below <= 0, `${width} x ${height}: chips end ${found.below} pixels below the window`);
+      // The poster is as wide: a wider scene would show what it lacks.
+      assert.ok(found.aspect <= (width <= 640 ? 1.001 : 2.201), `${width} x ${height}: ${found.aspect}`);
     }
     await tab.setViewportSize({ width: 390, height: 800 });
   });
@@ -93,6 +97,29 @@ describe('the first page', { skip: isBuilt ? false : 'no site: npm run build' },
     assert.deepEqual(faults, []);
   });
 
+  it('has chips that act on its scene, and take it back', async () => {
+    const { tab, faults } = only;
+    for (const [chip, attribute] of [
+      ['measure', 'measure'],
+      ['walk', 'navigation'],
+    ]) {
+      await tab.click(`[data-chip=${chip}]`);
+      await tab.waitForFunction((name) => document.querySelector('#hero')!.hasAttribute(name), attribute, TIMEOUT);
+      assert.match((await tab.locator('#snippet').textContent())!, new RegExp(`\\b${attribute}\\b`));
+    }
+    assert.equal(await tab.locator('#hero').getAttribute('measure'), null);
+    await tab.click('[data-chip=play]');
+    await tab.waitForFunction(
+      () => document.querySelector<Splat>('#hero > splat-scene')?.loaded === true,
+      undefined,
+      TIMEOUT,
+    );
+    await tab.click('[data-chip=play]');
+    assert.equal(await tab.locator('#hero > splat-scene').count(), 0);
+    assert.equal(await tab.locator('.chips [aria-pressed=true]').count(), 0);
+    assert.deepEqual(faults, []);
+  });
+
   it('is a page as every other', () => checkPage(only));
 
   it('copies the name of the file that a visitor has opened', async () => {
@@ -113,7 +140,7 @@ describe('the first page', { skip: isBuilt ? false : 'no site: npm run build' },
       );
       const html = (await tab.locator('#snippet').textContent())!;
       assert.match(html, /src="compass\.ply" alt="compass\.ply"/);
-      assert.doesNotMatch(html, /skull/);
+      assert.doesNotMatch(html, /apartment/);
     }
   });
 });

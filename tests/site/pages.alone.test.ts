@@ -6,7 +6,7 @@ import { isBuilt, openSite, pagesOf, withCompass, withScenesToCome, type OpenSit
 
 const isFull = process.env.SITE === 'full';
 /** Pages that `npm test` opens, one of each layout; the laboratory opens all. */
-const DAILY = ['/check/', '/docs/', '/examples/', '/frontier/', '/reference/'];
+const DAILY = ['/check/', '/docs/', '/examples/', '/speed/', '/reference/'];
 
 /** Pages that measure as soon as they are open are given next to nothing to measure. */
 const QUERIES: Readonly<Record<string, string>> = {

@@ -44,13 +44,15 @@ export interface OpenSite {
 /** A model may have its contract beside it; that it has not is an answer, too. */
 const MAY_BE_MISSING = /\.contract\.json$/;
 
-/** A scene of a few splats in place of the skull, for tests that are about something else. */
+/** A scene of a few splats in place of the first page's and of the skull, for tests that are about something else. */
 export const withCompass = (tab: Page): Promise<unknown> =>
-  tab.route('**/skull.spz', (route) => route.fulfill({ body: compass, contentType: 'application/octet-stream' }));
+  tab.route(/\/(skull|apartment)\.spz$/, (route) =>
+    route.fulfill({ body: compass, contentType: 'application/octet-stream' }),
+  );
 
 /** Scenes and models that never arrive, until the function that this returns is called: the page is as it is while they load. */
 export async function withScenesToCome(tab: Page): Promise<() => Promise<void>> {
-  const scenes = /\.(spz|onnx)$|knot\.gsv$/;
+  const scenes = /\.(spz|sog|onnx|gsv)$|lod-meta\.json$/;
   await tab.route(scenes, () => undefined);
   return () => tab.unroute(scenes);
 }

@@ -2,6 +2,7 @@
 import { readdirSync, readFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { timeOf } from '../../../scripts/frontier/front.mjs';
+import { raceOf } from '../race.mjs';
 import { root } from '../../../scripts/lib/run.mjs';
 
 const folder = join(root, 'docs/frontier');
@@ -20,40 +21,14 @@ function describe(name, { environment, scene, results, standard }) {
     date: environment.date.slice(0, 10),
     scene: { ...scene, splats: scene.splats.toLocaleString('en') },
     rows: results.filter(({ error }) => !error).map((result) => rowOf(result, standard)),
-    first: firstOf(results, standard),
+    first: raceOf({ results, standard }, SHOWN),
+    race: raceOf({ results, standard }, ['default', 'PlayCanvas', 'Spark']),
     hasLpips: results.some(({ quality }) => quality?.lpips !== undefined),
   };
 }
 
-/**
- * Configurations for most visitors: the qualities of the element, and the others in their defaults. All by one clock.
- */
-const QUALITIES = ['reference', 'default', 'balanced', 'fast'];
-const OTHERS = ['PlayCanvas', 'Spark'];
-/** Visibility of a difference in dB to the eye. */
-const TO_THE_EYE = [
-  [59, 'no difference on a display'],
-  [42, 'hardly visible'],
-  [36, 'visible beside the original'],
-  [0, 'visible'],
-];
-
-function firstOf(results, standard) {
-  const rows = [...QUALITIES, ...OTHERS].flatMap((wanted) => {
-    const result = results.find(({ configuration, error }) => configuration.name === wanted && !error);
-    return result
-      ? [{ name: wanted, isOther: OTHERS.includes(wanted), ms: timeOf(result, standard), psnr: result.quality.psnr }]
-      : [];
-  });
-  const max = Math.max(...rows.map(({ ms }) => ms));
-  return rows.map(({ ms, psnr, ...row }) => ({
-    ...row,
-    milliseconds: ms < 10 ? ms.toPrecision(2) : Math.round(ms).toLocaleString('en'),
-    share: (ms / max).toFixed(3),
-    decibels: psnr.toFixed(0),
-    eye: TO_THE_EYE.find(([min]) => psnr >= min)[1],
-  }));
-}
+/** Configurations for most visitors: the qualities of the element, and the others in their defaults. All by one clock. */
+const SHOWN = ['reference', 'default', 'balanced', 'fast', 'PlayCanvas', 'Spark'];
 
 /** As it is usually called: makers and models say the same thing twice. */
 function adapterName({ vendor, architecture, description }) {

@@ -3,31 +3,43 @@ export default {
   name: 'gaussian-splat',
   /** The site's address for crawlers and previews of links; unknown unless SITE_URL is set. */
   address: process.env.SITE_URL ?? '',
-  /** The pages that every page leads to. */
+  /** The pages that every page leads to; the name of each is its heading, too. */
   navigation: [
     { title: 'Gallery', url: '/gallery/' },
-    { title: 'Examples', url: '/examples/features/' },
+    { title: 'Examples', url: '/examples/' },
     { title: 'Playground', url: '/playground/' },
     { title: 'Guide', url: '/docs/' },
     { title: 'Reference', url: '/reference/' },
-    { title: 'Performance', url: '/frontier/' },
+    { title: 'Speed and accuracy', url: '/speed/' },
   ],
-  /** The pages that measure, which lead to one another. */
-  measured: [
-    { title: 'Speed and accuracy', url: '/frontier/' },
-    { title: 'Compare two qualities', url: '/compare/' },
-    { title: 'Hard cases', url: '/stability/' },
-    { title: 'Measure this machine', url: '/bench/' },
+  /** Pages of one subject, which lead to one another. */
+  groups: [
+    {
+      name: 'Examples',
+      pages: [
+        { title: 'Examples', url: '/examples/' },
+        { title: 'Ten features', url: '/examples/features/' },
+        { title: 'Cuts, shadows, skies and videos', url: '/examples/effects/' },
+        { title: 'Check a generator', url: '/check/' },
+      ],
+    },
+    {
+      name: 'Speed and accuracy',
+      pages: [
+        { title: 'Speed and accuracy', url: '/speed/' },
+        { title: 'Compare two qualities', url: '/compare/' },
+        { title: 'Hard cases', url: '/stability/' },
+        { title: 'Measure this machine', url: '/bench/' },
+      ],
+    },
   ],
   /** Links of every page's footer. */
   footer: [
     { title: 'Get started', url: '/docs/guide/start/' },
-    { title: 'Generators', url: '/examples/' },
-    { title: 'In three.js', url: '/three/' },
-    { title: 'In three.js with WebGL', url: '/three-webgl/' },
-    { title: 'On a map', url: '/map/' },
+    { title: 'Splats in three.js', url: '/three/' },
+    { title: 'Splats in three.js with WebGL', url: '/three-webgl/' },
+    { title: 'Splats on a map', url: '/map/' },
     { title: 'Without WebGPU', url: '/without-webgpu/' },
-    { title: 'Check a generator', url: '/check/' },
     { title: 'React', url: '/react/' },
     { title: 'Vue', url: '/vue/' },
     { title: 'Contributing', url: '/docs/contributing/' },

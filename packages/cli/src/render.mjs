@@ -54,7 +54,7 @@ function parseOptions(args) {
   const files = Object.fromEntries(['out', 'float', ...Object.keys(MAPS)].map((name) => [name, text]));
   const parsed = parseSceneOptions(args, {
     ...files,
-    beside: { type: 'string', multiple: true, default: [] },
+    beside: { type: 'string', multiple: true },
     camera: text,
     view: text,
     time: text,
@@ -63,7 +63,7 @@ function parseOptions(args) {
   });
   if (parsed === undefined) return undefined;
   const { values } = parsed;
-  const scenes = [parsed.scene, ...values.beside];
+  const scenes = [parsed.scene, ...(values.beside ?? [])];
   if (values.camera === undefined) throw new UsageError('--camera is missing');
   const outputs = Object.fromEntries(
     Object.keys(files).flatMap((name) => (values[name] ? [[name, values[name]]] : [])),

@@ -25,7 +25,7 @@ export interface Schema {
   readonly required?: readonly string[];
   readonly dependentRequired?: Readonly<Record<string, readonly string[]>>;
   /**
-   * Alternatives, of which exactly one must match. Either a property with `const` distinguishes them, or each has only
+   * Alternatives: exactly one must match. Either a property with `const` distinguishes them, or each has only
    * `required`.
    */
   readonly oneOf?: readonly Schema[];

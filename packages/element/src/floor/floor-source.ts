@@ -27,6 +27,11 @@ export function mapUrlOf({ attributes, element }: Viewer): string | null {
   return url === 'auto' ? null : new URL(url, element.baseURI).href;
 }
 
+/** Sets the map of the next scene; null to find its floor in the splats. */
+export function setMapUrl({ element }: Viewer, url: string | null): void {
+  Object.assign(element, { walkMap: url });
+}
+
 /** Free height above the eyes, meters, that a body needs. */
 const ABOVE_EYES = 0.1;
 

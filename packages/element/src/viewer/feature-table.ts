@@ -2,6 +2,7 @@
 import { autoRotate, motion } from '../features/auto-rotate/row.js';
 import { children } from '../features/children/row.js';
 import { credits } from '../features/credits/row.js';
+import { doors } from '../features/doors/row.js';
 import { effects } from '../features/effects/row.js';
 import { flight } from '../features/flight/row.js';
 import { announcer, input } from '../features/input/row.js';
@@ -19,6 +20,7 @@ import type { FeatureTable } from './features.js';
 // The declarations of the package keep these imports, whose rows add attributes and members to the types of the element.
 import '../features/auto-rotate/row.js';
 import '../features/credits/row.js';
+import '../features/doors/row.js';
 import '../features/effects/row.js';
 import '../features/flight/row.js';
 import '../features/shadow/row.js';
@@ -28,6 +30,7 @@ import '../features/sound/row.js';
 export type { CreditsChangeDetail } from '../features/credits/row.js';
 export type { InteractionPrompt, InteractionPromptStyle } from '../features/input/row.js';
 export type { HotspotPlace } from '../features/labels/hotspot-controller.js';
+export type { RoomChangeDetail } from '../features/doors/row.js';
 export type { ImageOptions } from '../features/recording/capture-image.js';
 export type { DepthOptions, MeasuredView } from '../features/recording/depth-image.js';
 export type { FrameOptions, RecordOptions } from '../features/recording/recording.js';
@@ -38,8 +41,8 @@ export type { WalkReadyDetail } from '../features/walk/row.js';
 export type { ImmersiveStatusDetail } from '../features/xr/row.js';
 
 const FEATURES: FeatureTable = {
-  ...{ children, views, autoRotate, walk, flight, vr, ar, ruler, shadow, sky, sound, effects, labels, input, motion },
-  ...{ announcer, print, recording, credits },
+  ...{ children, views, autoRotate, walk, flight, vr, ar, ruler, shadow, sky, sound, effects, labels, doors },
+  ...{ input, motion, announcer, print, recording, credits },
 };
 
 export default FEATURES;

@@ -1,4 +1,4 @@
-import { Lazy, type Camera } from '@gaussian-splat/core';
+import { Lazy, type Camera, type Vector3 } from '@gaussian-splat/core';
 import type { FrameTarget } from '@gaussian-splat/renderer';
 import type { TemplateResult } from 'lit';
 import type { AttributeTable } from './attribute.js';
@@ -46,6 +46,10 @@ export interface Feature {
   pick?(clientX: number, clientY: number): true | undefined;
   /** Stops or resumes automatic motion, for the space bar. @returns true if there is any. */
   toggleMotion?(): true | undefined;
+  /** Whether a session in a headset continues with the scene that is being loaded. */
+  keepsSession?(): true | undefined;
+  /** Called in each frame of a headset. @param head Position of the head, viewer space in meters. */
+  headMoved?(head: Vector3): void;
   /** Whether automatic motion is allowed. The visitor may have stopped it. */
   mayMove?(): boolean;
   /** Returns the player of all automatic playback: `player` together with that of the feature. */

@@ -154,10 +154,7 @@ export class SceneController implements ReactiveController {
     return this.#shownRequest !== this.#request;
   }
 
-  /**
-   * Resolves when the requested scene is shown, has failed or was abandoned, at once if nothing is pending. Never
-   * rejects.
-   */
+  /** Resolves when the requested scene is shown, has failed or was abandoned, at once if nothing is pending. Never rejects. */
   get settled(): Promise<void> {
     if (this.#state !== 'waiting' && this.#state !== 'loading') return Promise.resolve();
     return new Promise((resolve) => this.#waiters.push(resolve));

@@ -125,6 +125,11 @@ export class VrRig {
     return this.#matrix();
   }
 
+  /** Position of the head in the last frame, viewer space in meters; undefined before the first frame. */
+  get head(): Vector3 | undefined {
+    return this.#pose && this.#headAt(this.#pose);
+  }
+
   /** Destination of a teleport in the session's space, meters; undefined without one. */
   get targetInSpace(): Vector3 | undefined {
     if (!this.target) return undefined;

@@ -109,7 +109,9 @@ function guideOf(core: Viewer, { session, space, spaceType, signal, drawing }: X
     background: BACKGROUND,
     place: (frame, pose, seconds) => {
       leaving.advance(seconds);
-      return rig.place(frame, pose, space, seconds);
+      const place = rig.place(frame, pose, space, seconds);
+      core.features.call('headMoved', rig.head!);
+      return place;
     },
     drawAbove: (eye) => {
       const place = leaving.isGesture ? undefined : rig.targetInSpace;

@@ -47,9 +47,11 @@ export interface XrStarted {
 interface Running {
   readonly session: XrSession;
   readonly over: AbortController;
-  readonly shown: LoadedGaussians | null;
+  shown: LoadedGaussians | null;
   drawing?: XrDrawing;
   frames?: XrLoop;
+  /** Signal of the drawing: it is replaced when a door leads to another scene. */
+  drawn?: AbortController;
 }
 
 /** Offers one kind of session: shows a button if the browser supports it, runs the session, and reports its status. */
@@ -118,16 +120,43 @@ export class XrOffer implements ReactiveController {
       if (!this.#slot.isConnected) this.#place.append(this.#slot);
       this.#offer();
     }
-    if (this.#running && this.#isOutdated(this.#running)) this.end();
+    if (this.#running && this.#isOutdated(this.#running)) {
+      if (this.core.features.first('keepsSession')) this.#await(this.#running);
+      else this.end();
+    }
+  }
+
+  /** Stops drawing in a session until the next scene of the page is shown, which the session then draws. */
+  #await(running: Running): void {
+    const { core } = this;
+    if (!running.frames) return;
+    this.#free(running);
+    running.shown = null;
+    const wait = (time: number): void => {
+      if (running !== this.#running || running.frames) return;
+      const { scene } = core.sources.ownEntry;
+      if (scene.error || scene.state === 'empty') return this.end();
+      if (scene.state === 'ready') {
+        running.shown = scene.scene;
+        this.#open(running).catch((error: Error) => this.#lost(running, error.message));
+        return;
+      }
+      // Browsers of headsets stop the frames of the page during a session, and a scene is ready with its first one.
+      core.view.drawFrame(time);
+      running.session.requestAnimationFrame(wait);
+    };
+    running.session.requestAnimationFrame(wait);
   }
 
   /**
    * Whether the session must end: another source is requested, or the page's splats that the session draws were replaced
    * or destroyed.
    */
-  #isOutdated({ drawing, shown }: Running): boolean {
+  #isOutdated({ drawing, frames, shown }: Running): boolean {
     const { sources } = this.core;
     const { scene } = sources.ownEntry;
+    // It waits for the scene behind a door.
+    if (shown === null && !frames) return false;
     return scene.isOutgoing || (drawing?.isOfPage === true && (scene.scene !== shown || sources.shown.length === 0));
   }
 
@@ -224,7 +253,8 @@ export class XrOffer implements ReactiveController {
   async #open(running: Running): Promise<void> {
     const { core, kind } = this;
     const { session, over, shown } = running;
-    const { signal } = over;
+    running.drawn = new AbortController();
+    const signal = AbortSignal.any([over.signal, running.drawn.signal]);
     const drawing = (running.drawing = await kind.open(session, { shown, request: core.stillRequest }));
     if (signal.aborted) return this.#free(running);
     drawing.onLost = (what) => this.#lost(running, what);
@@ -255,7 +285,9 @@ export class XrOffer implements ReactiveController {
   }
 
   #free(running: Running): void {
+    running.drawn?.abort(new DOMException('the session draws another scene', 'AbortError'));
     running.frames?.stop();
+    running.frames = undefined;
     running.drawing?.destroy();
     running.drawing = undefined;
   }

@@ -1,0 +1,223 @@
+/** Doors between scenes: by click, by keyboard and on foot, back and forth, with rooms fetched once, flat memory and a plan. */
+import { holdings } from './support/ledger.js';
+import '@gaussian-splat/element';
+import type { GaussianSplatElement } from '@gaussian-splat/element';
+import { encodeFloorMap } from '@gaussian-splat/formats/floor';
+import { sendKeys } from '@web/test-runner-commands';
+import { itInLab } from '../../support/extent-in-pages.js';
+import { headset } from './support/headset.js';
+import { assert, assertEqual, atRest, delay, nextEvent, show, until } from './support/harness.js';
+
+/** Rooms of 4 by 4 m in a row: each door leads to the next one or back. One arrives at z = 0.9. */
+const NAMES = ['a', 'b', 'c'] as const;
+/** On the server: another one for each tour, so that no cache has its files. */
+let folder = '';
+const addressOf = (name: string): string => new URL(`${folder}/${name}`, location.href).href;
+
+const put = (name: string, body: BodyInit): Promise<Response> => fetch(`${folder}/${name}`, { method: 'PUT', body });
+let tours = 0;
+
+/** Puts the rooms on the server: a wall behind each door in a color of its room, and the map of its floor. */
+function putRooms(): Promise<unknown> {
+  folder = `/net/kept/doors-${Math.round(performance.timeOrigin)}-${++tours}`;
+  const width = 40;
+  const layers = [new Float32Array(width * width)];
+  const map = encodeFloorMap({ cell: 0.1, corner: [-2, -2], width, depth: width, layers, step: 0.3, start: [0, 0, 0], area: 16 }); // prettier-ignore
+  return Promise.all(
+    NAMES.flatMap((name, room) => {
+      const view = new DataView(new ArrayBuffer(32 * 400));
+      for (let i = 0; i < 400; i++) {
+        const at = [((i % 20) - 9.5) * 0.25, -(Math.floor(i / 20) + 0.5) * 0.15, 2.5];
+        [...at, 0.1, 0.1, 0.01].forEach((value, k) => view.setFloat32(32 * i + 4 * k, value, true));
+        const color = [0, 0, 0].map((_, k) => (k === room ? 220 : 30));
+        [...color, 255, 255, 128, 128, 128].forEach((value, k) => view.setUint8(32 * i + 24 + k, value));
+      }
+      return [put(`${name}.splat`, view.buffer), put(`${name}.floor`, new Uint8Array(map))];
+    }),
+  );
+}
+
+function doorOf(from: string, to: string, z: number, heading: string): HTMLElement {
+  const door = document.createElement('button');
+  door.textContent = `To ${to}`;
+  door.slot = `hotspot-${from}-${to}`;
+  const data = { door: `${folder}/${to}.splat`, room: `${folder}/${from}.splat`, floorMap: `${folder}/${to}.floor` };
+  Object.assign(door.dataset, { ...data, position: `0 1.6m ${z}m`, heading });
+  return door;
+}
+
+async function showTour(attributes: Readonly<Record<string, string>> = {}): Promise<GaussianSplatElement> {
+  await putRooms();
+  const element = show(
+    {
+      ...{ src: `${folder}/a.splat`, 'walk-map': `${folder}/a.floor`, unit: '1m', 'camera-controls': '' },
+      ...{ 'camera-orbit': '0deg 90deg 1m', 'camera-target': '0m 1.6m 0m', 'interaction-prompt': 'none' },
+      ...{ 'interpolation-decay': '0', ...attributes },
+    },
+    'width: 200px; height: 160px',
+  );
+  for (const [i, name] of NAMES.entries()) {
+    if (i + 1 < NAMES.length) element.append(doorOf(name, NAMES[i + 1], -1.9, '0deg'));
+    if (i > 0) element.append(doorOf(name, NAMES[i - 1], 1.9, '180deg'));
+  }
+  await element.ready;
+  return element;
+}
+
+const shownDoors = (element: GaussianSplatElement): string[] =>
+  [...element.querySelectorAll<HTMLElement>('[data-door]')]
+    .filter(({ hidden }) => !hidden)
+    .map(({ textContent }) => textContent);
+
+const doorTo = (element: GaussianSplatElement, name: string): HTMLElement =>
+  [...element.querySelectorAll<HTMLElement>('[data-door]')].find(
+    (door) => !door.hidden && door.textContent === `To ${name}`,
+  )!;
+
+/** Names of the files that the server was asked for. */
+const log = async (): Promise<string[]> => (await (await fetch(`${folder}/log`)).json()) as string[];
+
+async function pass(element: GaussianSplatElement, name: string): Promise<void> {
+  const changed = nextEvent<CustomEvent<{ url: string }>>(element, 'room-change', 60_000);
+  doorTo(element, name).click();
+  assertEqual((await changed).detail.url, addressOf(`${name}.splat`), 'room');
+}
+
+async function enterVr(element: GaussianSplatElement): Promise<void> {
+  const { device } = headset();
+  device.position.set(0, 1.6, 0);
+  device.quaternion.set(0, 0, 0, 1);
+  const button = (): HTMLElement | null => element.shadowRoot!.querySelector('[part=vr-button]');
+  await until(() => button() !== null, 'the button');
+  button()!.click();
+  await until(() => element.getAttribute('vr-status') === 'session-started', 'the session');
+  await until(() => isIn(0), 'the first room in the headset');
+}
+
+async function leaveVr(element: GaussianSplatElement): Promise<void> {
+  element.exitXR!();
+  await until(() => element.getAttribute('vr-status') === 'not-presenting', 'the end');
+  headset().layer = undefined;
+}
+
+/** Whether the headset shows a room: each has a color of its own. */
+function isIn(room: number): boolean {
+  if (!headset().layer) return false;
+  const pixels = headset().pixels('left');
+  const brightest = (channel: number): number =>
+    pixels.reduce((max, value, i) => (i % 4 === channel ? Math.max(max, value) : max), 0);
+  return [0, 1, 2].every((channel) => brightest(channel) > 150 === (channel === room));
+}
+
+describe('doors', () => {
+  it('a click shows the scene behind the door, seen from its door, and the doors of that room', async () => {
+    const element = await showTour();
+    await until(() => shownDoors(element).length === 1, 'the doors of the first room');
+    assertEqual(shownDoors(element), ['To b'], 'doors');
+    await pass(element, 'b');
+    assertEqual(shownDoors(element), ['To c', 'To a'], 'doors');
+    const { x, y, z } = element.getCameraTarget();
+    const found = [x, y, z, element.getCameraOrbit().theta % (2 * Math.PI)].map((value) => value.toFixed(3));
+    assertEqual(found, ['0.000', '1.600', '-0.100', '0.000'], 'the view from the door');
+    // Back, one comes in at the other end and looks the other way.
+    await pass(element, 'a');
+    assertEqual(element.getCameraTarget().z.toFixed(3), '0.100', 'the view from the door back');
+  });
+
+  it('the keyboard goes through doors, and the room is announced', async () => {
+    const element = await showTour();
+    await until(() => shownDoors(element).length === 1, 'the doors of the first room');
+    doorTo(element, 'b').focus();
+    const changed = nextEvent(element, 'room-change', 60_000);
+    await sendKeys({ press: 'Enter' });
+    await changed;
+    await until(() => /To b/.test(element.shadowRoot!.querySelector('[role=status]')!.textContent), 'the room is read');
+  });
+
+  it('a visitor walks through doors, from room to room', async () => {
+    const element = await showTour({ navigation: 'walk' });
+    if (!element.getAttribute('walk-ready')) await until(() => element.getCameraTarget().y > 1.5, 'the floor');
+    const view = element.shadowRoot!.querySelector<HTMLElement>('#view')!;
+    const press = (type: string): boolean =>
+      view.dispatchEvent(new KeyboardEvent(type, { code: 'KeyW', key: 'w', bubbles: true, cancelable: true }));
+    for (const name of ['b', 'c']) {
+      const changed = nextEvent<CustomEvent<{ url: string }>>(element, 'room-change', 60_000);
+      // A key counts only when the floor is known, so that it is pressed until it does.
+      const pressing = setInterval(() => press('keydown'), 200);
+      assertEqual((await changed).detail.url, addressOf(`${name}.splat`), 'room');
+      clearInterval(pressing);
+      press('keyup');
+    }
+  });
+
+  it('the plan shows all rooms, and a click on one goes there', async () => {
+    const element = await showTour({ 'floor-plan': '' });
+    const plan = (): HTMLCanvasElement | null => element.shadowRoot!.querySelector('[part=floor-plan]');
+    await until(() => (plan()?.height ?? 0) > 2.5 * (plan()?.width ?? 1), 'three rooms in a row');
+    const changed = nextEvent<CustomEvent<{ url: string }>>(element, 'room-change', 60_000);
+    const { left, top, width, height } = plan()!.getBoundingClientRect();
+    // The first room is nearest to the viewer: the last is on top.
+    const at = { clientX: left + width / 2, clientY: top + height / 8, bubbles: true };
+    plan()!.dispatchEvent(new MouseEvent('click', at));
+    assertEqual((await changed).detail.url, addressOf('c.splat'), 'room');
+    const colors = plan()!.getContext('2d')!.getImageData(0, 0, plan()!.width, plan()!.height).data;
+    const count = (r: number, g: number): number =>
+      colors.reduce((sum, _, i) => sum + Number(i % 4 === 0 && colors[i] === r && colors[i + 1] === g), 0);
+    assert(count(0xe9, 0xe4) > 1000 && count(0x8f, 0x8a) > 2000, 'one room is present, two are not');
+    assert(count(0xff, 0x5a) > 20, 'the visitor');
+  });
+
+  it('a session in a headset continues behind the door, by click and on foot', async () => {
+    const { device } = headset();
+    const element = await showTour({ navigation: 'walk', vr: '' });
+    await enterVr(element);
+    await pass(element, 'b');
+    await until(() => isIn(1), 'the second room in the headset');
+    assertEqual(element.getAttribute('vr-status'), 'session-started', 'status');
+    // One arrives at z = 0.9 m: two steps of the body lead to the next door.
+    const changed = nextEvent<CustomEvent<{ url: string }>>(element, 'room-change', 60_000);
+    for (const z of [-0.8, -1.6, -2.3]) {
+      device.position.set(0, 1.6, z);
+      await delay(400);
+    }
+    assertEqual((await changed).detail.url, addressOf('c.splat'), 'room');
+    await until(() => isIn(2), 'the third room in the headset');
+    assertEqual(element.getAttribute('vr-status'), 'session-started', 'status');
+    await leaveVr(element);
+  });
+
+  for (const place of ['page', 'headset'] as const)
+    itInLab(`60 crossings in a ${place}: rooms are fetched once ahead, and memory stays flat`, async () => {
+      if (place === 'headset') headset();
+      const element = await showTour(place === 'headset' ? { vr: '' } : {});
+      await until(() => shownDoors(element).length === 1, 'the doors of the first room');
+      if (place === 'headset') await enterVr(element);
+      let longTasks = 0;
+      const observer = new PerformanceObserver((list) => (longTasks += list.getEntries().length));
+      observer.observe({ type: 'longtask' });
+      const bytes: number[] = [];
+      for (let i = 0; i < 60; i++) {
+        const name = ['b', 'c', 'b', 'a'][i % 4];
+        if (place === 'headset') {
+          await pass(element, name);
+          await until(() => isIn({ a: 0, b: 1, c: 2 }[name]!), 'the room in the headset');
+        } else {
+          const changed = nextEvent(element, 'room-change', 60_000);
+          doorTo(element, name).focus();
+          await sendKeys({ press: 'Enter' });
+          await changed;
+          await atRest(element);
+        }
+        if (i % 4 === 3) bytes.push(holdings().bytes);
+      }
+      observer.disconnect();
+      const asked = (await log()).filter((name) => name.endsWith('.splat'));
+      console.log(
+        `60 crossings in a ${place}: ${asked.length} requests, ${bytes.join()} bytes on the GPU, ${longTasks} tasks above 50 ms`,
+      );
+      assertEqual(element.getAttribute('vr-status'), place === 'headset' ? 'session-started' : null, 'status');
+      assert(asked.length <= 5, `requests: ${asked.join()}`);
+      assert(Math.max(...bytes.slice(1)) <= bytes[1], `memory grows: ${bytes.join()}`);
+      if (place === 'headset') await leaveVr(element);
+    });
+});
