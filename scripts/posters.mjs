@@ -1,6 +1,6 @@
 /**
  * `npm run lab -- posters [--only REGEX] [--small FILE.sog]`: the posters of the gallery and of the first page, as the built site draws the first frames of its scenes, and the
- * number of splats of each. `tests/site/posters.alone.test.ts` compares them again.
+ * number of splats of each. `tests/site/posters.alone.lab.test.ts` compares them again.
  */
 import { copyFileSync, mkdirSync, readFileSync, statSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';

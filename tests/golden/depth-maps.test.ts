@@ -19,12 +19,11 @@ import {
   capture,
   GaussianBuffers,
   packGaussians,
-  renderDepth,
-  renderFisheye,
   Viewpoint,
   World,
   type ViewpointOptions,
 } from '@gaussian-splat/renderer';
+import { renderDepth, renderFisheye } from '@gaussian-splat/renderer/depth';
 import { densestDepth } from '../oracle/densest.js';
 import { renderOracle, renderOracleWorld, type PlacedCloud } from '../oracle/oracle.js';
 import { projectEllipse, toCamera, worldPosition } from '../oracle/projection.js';

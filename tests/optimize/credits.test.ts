@@ -162,7 +162,7 @@ test('--attribution and --license replace what a file says', async () => {
   command('detail', 'f.ply', '--quantized', '--out', 'f', '--attribution', 'Jane Doe', '--license', '');
   assert.deepEqual(manifestIn('f/detail.json'), { attribution: 'Jane Doe', license: undefined });
   command('page', 'f.ply', 'f-page', '--no-serve', '--attribution', 'A "B" <C>');
-  assert.match(readFileSync(join(folder, 'f-page/index.html'), 'utf8'), / attribution="A &quot;B&quot; &lt;C>"/);
+  assert.match(readFileSync(join(folder, 'f-page/index.html'), 'utf8'), / attribution="A &quot;B&quot; &lt;C&gt;"/);
 });
 
 test('a scene with fewer splats keeps its credits', async () => {

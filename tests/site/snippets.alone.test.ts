@@ -236,7 +236,7 @@ const fixture = (path: string): Buffer => readFileSync(join(root, 'tests', path)
 /** A small scene of the right kind is served at every address in a snippet. */
 async function serveScenes(tab: Page, origin: string): Promise<void> {
   const headers = { 'access-control-allow-origin': '*' };
-  await tab.route(/\/(skull|scene|garden|room|mine%20%26%20yours)\.(ply|spz|glb)$/, (route) =>
+  await tab.route(/\/(skull|scene|garden|room|apartment|hall|study|mine%20%26%20yours)\.(ply|spz|glb)$/, (route) =>
     route.fulfill({ headers, body: fixture('element/browser/fixtures/compass.ply') }),
   );
   await tab.route(/\/copied\/|^https:\/\/[a-z]+\.example\//, async (route) => {
@@ -246,6 +246,9 @@ async function serveScenes(tab: Page, origin: string): Promise<void> {
   });
   await tab.route(/\/skull\.(webp|jpg)$/, (route) =>
     route.fulfill({ path: join(root, 'demo/scenes/skull-poster.webp') }),
+  );
+  await tab.route(/\/(hall|study)\.floor$/, (route) =>
+    route.fulfill({ path: join(root, 'demo/scenes/studio/apartment.floor') }),
   );
   const clip = await clipOf(fountain({ splats: 300, frames: 8, framesPerSecond: 10 }), {
     frames: 8,

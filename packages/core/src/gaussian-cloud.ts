@@ -118,12 +118,12 @@ export interface GaussianCloud extends FilterRule {
  * Upper limit of the standard deviation along a splat's longest axis, in world units, because squared screen sizes must
  * fit float32.
  */
-export const MAX_SCALE = 1e12;
+const MAX_SCALE = 1e12;
 /**
  * Upper limit of the coordinates of a drawable splat, in world units. Products of two coordinates are far below the
  * limit of float32, the type of chunk bounds.
  */
-export const MAX_POSITION = 1e18;
+const MAX_POSITION = 1e18;
 /** Lower limit of the longest standard deviation of a splat, world units. Smaller splats have no extent. */
 const MIN_LONGEST_SCALE = 1e-12;
 

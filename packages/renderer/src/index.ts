@@ -1,6 +1,4 @@
 export { capture, type CaptureRequest } from './capture.js';
-export { renderDepth, type DepthImage, type DepthRequest } from './render-depth.js';
-export { renderFisheye, type FisheyeCamera, type FisheyeRequest } from './render-fisheye.js';
 export {
   autotune,
   pickInitialVariants,

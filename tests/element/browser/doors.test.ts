@@ -167,7 +167,7 @@ describe('doors', () => {
     assert(count(0xff, 0x5a) > 20, 'the visitor');
   });
 
-  it('a session in a headset continues behind the door, by click and on foot', async () => {
+  itInLab('a session in a headset continues behind the door, by click and on foot', async () => {
     const { device } = headset();
     const element = await showTour({ navigation: 'walk', vr: '' });
     await enterVr(element);

@@ -1,6 +1,7 @@
 /** Scenes whose files are trees of levels, 3D Tiles and LCC, by view: requests, memory, and frames. */
 import { GaussianSplatElement } from '@gaussian-splat/element';
 import { writeLcc } from '../../formats/support/lcc-writer.js';
+import { itInLab } from '../../support/extent-in-pages.js';
 import { pick } from '../../support/lod-folder.js';
 import { pebbles } from '../../support/scenes/pebbles.js';
 import { splatTileset, type TilesetFiles, type TilesetOptions } from '../../support/tileset.js';
@@ -113,40 +114,43 @@ describe('a tileset', () => {
   beforeEach(() => void (GaussianSplatElement.memoryBudget = AMPLE));
   after(() => void (GaussianSplatElement.memoryBudget = null));
 
-  it('of 100,000 splats loads its root, then the tiles that each view needs, and shows what the whole scene shows', async () => {
-    GaussianSplatElement.memoryBudget = LARGE_BYTES;
-    const served = await tiles({}, undefined, LARGE);
-    const element = await opened(served, { ...FAR, detail: '3px' });
-    assertEqual((await calm(element, served)).join(' '), 'tileset.json 0/0-0.glb', 'from afar');
-    move(element, { ...NEAR, 'camera-target': '-3m 0m -3m' });
-    const near = await calm(element, served);
-    const there = { ...NEAR, 'camera-target': '3m 0m 3m' };
-    move(element, there);
-    const both = await calm(element, served);
-    const finest = (paths: readonly string[]): string[] => paths.filter((path) => path.startsWith('3/'));
-    assertEqual(new Set(both).size, both.length, 'each file once');
-    assert(
-      finest(near).length > 0 && finest(both).length > finest(near).length,
-      `${near.join(' ')}; ${both.join(' ')}`,
-    );
-    const [all, some] = [bytesOf([...served.files.keys()], served), bytesOf(near, served)];
-    console.log(
-      `near: ${near.length} of ${served.files.size} files, ${some} of ${all} bytes; both views: ${both.length}`,
-    );
-    assert(near.length < served.files.size, 'not all files');
-    const reference = await whole(await tiles({}, undefined, LARGE), there);
-    const truth = await pixelsOf(reference);
-    const decibels = [psnr(await pixelsOf(element), truth)];
-    element.setAttribute('detail', '0.02px');
-    await calm(element, served);
-    decibels.push(psnr(await pixelsOf(element), truth));
-    const { streamed, total } = element.stats!;
-    const text = decibels.map((value) => value.toFixed(1)).join(' and ');
-    console.log(`${text} dB at 3 px and 0.02 px; ${streamed[0].bytes} bytes, ${total} splats known`);
-    assert(decibels[0] > 20 && decibels[1] > 60, `${text} dB`);
-    await close(element);
-    await close(reference);
-  });
+  itInLab(
+    'of 100,000 splats loads its root, then the tiles that each view needs, and shows what the whole scene shows',
+    async () => {
+      GaussianSplatElement.memoryBudget = LARGE_BYTES;
+      const served = await tiles({}, undefined, LARGE);
+      const element = await opened(served, { ...FAR, detail: '3px' });
+      assertEqual((await calm(element, served)).join(' '), 'tileset.json 0/0-0.glb', 'from afar');
+      move(element, { ...NEAR, 'camera-target': '-3m 0m -3m' });
+      const near = await calm(element, served);
+      const there = { ...NEAR, 'camera-target': '3m 0m 3m' };
+      move(element, there);
+      const both = await calm(element, served);
+      const finest = (paths: readonly string[]): string[] => paths.filter((path) => path.startsWith('3/'));
+      assertEqual(new Set(both).size, both.length, 'each file once');
+      assert(
+        finest(near).length > 0 && finest(both).length > finest(near).length,
+        `${near.join(' ')}; ${both.join(' ')}`,
+      );
+      const [all, some] = [bytesOf([...served.files.keys()], served), bytesOf(near, served)];
+      console.log(
+        `near: ${near.length} of ${served.files.size} files, ${some} of ${all} bytes; both views: ${both.length}`,
+      );
+      assert(near.length < served.files.size, 'not all files');
+      const reference = await whole(await tiles({}, undefined, LARGE), there);
+      const truth = await pixelsOf(reference);
+      const decibels = [psnr(await pixelsOf(element), truth)];
+      element.setAttribute('detail', '0.02px');
+      await calm(element, served);
+      decibels.push(psnr(await pixelsOf(element), truth));
+      const { streamed, total } = element.stats!;
+      const text = decibels.map((value) => value.toFixed(1)).join(' and ');
+      console.log(`${text} dB at 3 px and 0.02 px; ${streamed[0].bytes} bytes, ${total} splats known`);
+      assert(decibels[0] > 20 && decibels[1] > 60, `${text} dB`);
+      await close(element);
+      await close(reference);
+    },
+  );
 
   it('whose tiles are in subtrees, or in tilesets of their own, loads those parts when the view needs them', async () => {
     for (const [options, part] of [

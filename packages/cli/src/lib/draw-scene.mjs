@@ -3,16 +3,8 @@ import { dirname, join, resolve } from 'node:path';
 import { PNG } from 'pngjs';
 import { boundsOf, SPLAT_FILTERS } from '@gaussian-splat/core';
 import { readScene } from '@gaussian-splat/formats';
-import {
-  capture,
-  deviceDescriptor,
-  GaussianBuffers,
-  packGaussians,
-  renderDepth,
-  renderFisheye,
-  Viewpoint,
-  World,
-} from '@gaussian-splat/renderer';
+import { capture, deviceDescriptor, GaussianBuffers, packGaussians, Viewpoint, World } from '@gaussian-splat/renderer';
+import { renderDepth, renderFisheye } from '@gaussian-splat/renderer/depth';
 import { clipMoment, isClip, openClip } from './clip-frame.mjs';
 import { CommandError, UsageError } from './command.mjs';
 import { readWhole } from './input-file.mjs';

@@ -198,7 +198,9 @@ export class WebGpuBackend implements Backend {
     return refusal();
   }
 
-  probe(points: readonly ProbePoint[]): Promise<readonly ProbeAnswer[]> {
+  async probe(points: readonly ProbePoint[]): Promise<readonly ProbeAnswer[]> {
+    // The buffers of the last frame are freed when other splats replace its scene.
+    if (this.#contents.sources.world.layout !== this.#layout) return [];
     return this.viewpoint.probe(points);
   }
 

@@ -322,6 +322,7 @@ export class Viewer implements SourceOwner {
 
   /** Reads surface positions of the last frame. Rejects if the frame is gone. */
   async probe(points: readonly ProbePoint[]): Promise<readonly ProbeAnswer[]> {
+    this.sources.place();
     const answers = (await this.view.backend?.probe(points)) ?? [];
     return this.sources.meshes.value?.probe(points, answers) ?? answers;
   }

@@ -58,7 +58,15 @@ export function planScene(
   const isFlat = isOfPlanes(positions);
   const order = packedOrder(near);
   return {
-    ...{ geometry, antialiased, filterVariance, origin, order: hints?.order, credits: hints?.credits, isOfPlanes: isFlat },
+    ...{
+      geometry,
+      antialiased,
+      filterVariance,
+      origin,
+      order: hints?.order,
+      credits: hints?.credits,
+      isOfPlanes: isFlat,
+    },
     bounds: { ...boundsOf(sample), min, max },
     shPrecision: choosePrecision(noiseIn(near, order), order.length),
     curve: curveThrough(positions, all),

@@ -2,7 +2,7 @@
  * Written by `npm run shaders:webgl` from shaders/webgl and shaders/shared, and committed: see scripts/lib/webgl-shaders.mjs. Do not edit.
  */
 /** Digest of the WGSL that this file was generated from. */
-export const SOURCE_DIGEST = '790afeecac4a50ff0fe36477f7f3c1ba';
+export const SOURCE_DIGEST = '8af3d6edec8d670b0d97c3b30e4f2b93';
 /** Texels in a row of the textures that hold arrays. */
 export const DATA_WIDTH = 4096;
 export const QuadsView = {

@@ -1,6 +1,7 @@
 /** Measures depth and identity of each pixel, in images of any size. Loaded with the first call of `renderDepth()`. */
 import type { Camera } from '@gaussian-splat/core';
-import { renderDepth, Viewpoint, type DepthImage } from '@gaussian-splat/renderer';
+import { Viewpoint } from '@gaussian-splat/renderer';
+import { renderDepth, type DepthImage } from '@gaussian-splat/renderer/depth';
 import type { WebGpuBackend } from '../../gpu/webgpu-backend.js';
 import { worldOf } from '../../shared/take-alpha.js';
 import type { SourceEntry } from '../../viewer/source-entry.js';

@@ -65,7 +65,8 @@ async function openStreamed(request: SceneRequest, device: GPUDevice, options: S
   const { gaussians, credits } = await open(request, device, options, pool);
   const { bounds, order } = gaussians;
   const splatBudget = Math.min(caps.splats, request.limits?.maxSplats ?? Infinity);
-  if (!signal.aborted) return { ...{ gaussians, bounds, order, warnings, credits }, detail: { detail: DETAIL, splatBudget } };
+  if (!signal.aborted)
+    return { ...{ gaussians, bounds, order, warnings, credits }, detail: { detail: DETAIL, splatBudget } };
   gaussians.destroy();
   throw signal.reason;
 }

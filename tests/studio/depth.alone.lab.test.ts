@@ -1,8 +1,8 @@
 /** Median and expected depth of captured scenes, against the true depth of their held-out views. docs/guide/depth.md has the figures. */
 import assert from 'node:assert/strict';
 import { after, test } from 'node:test';
-import { GaussianBuffers, packGaussians, renderDepth, Viewpoint, World } from '@gaussian-splat/renderer';
-import { isLab, someOf } from '../support/extent.js';
+import { GaussianBuffers, packGaussians, Viewpoint, World } from '@gaussian-splat/renderer';
+import { renderDepth } from '@gaussian-splat/renderer/depth';
 import { endNodeDevice, serialDevice } from '../support/node-device.js';
 import { studio, STUDIO, type StudioName } from '../support/studio.js';
 
@@ -45,7 +45,7 @@ const percent = (share: number): string => `${(100 * share).toFixed(1)} %`;
 const describe = (list: readonly number[]): string =>
   `half within ${percent(list[Math.floor(list.length / 2)])}, ${percent(near(list))} within ${percent(NEAR)}`;
 
-for (const name of isLab ? STUDIO : someOf(STUDIO, 1)) {
+for (const name of STUDIO) {
   test(`${name}: the median depth is nearer to the true depth than the expected depth`, async () => {
     const { median, expected, surfaces } = await differences(name, 2);
     console.log(`${name}: median depth ${describe(median)}; expected depth ${describe(expected)}`);
