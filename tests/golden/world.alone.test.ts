@@ -219,46 +219,51 @@ const VARIANTS: readonly Variant[] = [
 const placedPair: Case['placed'] = [{}, { sceneToWorld: all(move(0.8, 0.1, 0.4), turn(2.1)) }];
 
 for (const rasterizer of RASTERIZERS) {
-  test(`${rasterizer}: a bar through two scenes occludes what is behind it, for any depth format`, async () => {
-    const device = await serialDevice();
-    const { world, free } = await worldOf(device, placedPair);
-    const viewpoint = new Viewpoint(device, world, { settings: settings('default', { rasterizer }) });
-    // The meaning of a depth does not depend on the rasterizer.
-    const stores = someOf(VARIANTS, rasterizer === 'quads' ? 4 : 2);
-    for (const { format, isFlat = false, ...host } of stores) {
-      const camera = isFlat ? orthographic : view();
-      const bar = barDepth(camera);
-      const isDevice = format !== 'r32float' || host.values === 'device';
-      const values = Float32Array.from(bar, (depth) =>
-        isDevice
-          ? stored(depth, { reversed: host.reversed ?? false, isFlat, far: host.far })
-          : depth === Infinity
-            ? 0
-            : depth,
-      );
-      const texture = depthTexture(device, format, values, camera.width);
-      const depth = new SceneDepth(device, { host: { ...host, texture } });
-      const oracle = renderOracleWorld(asClouds(placedPair), camera, { rules: 'gsplat', depth: bar });
-      // The second frame has an order of all splats, the first one after a turn is sorted.
-      for (const each of [camera, { ...camera, worldToCamera: multiply(turn(1e-3), camera.worldToCamera) }, camera]) {
-        const pixels = await capture(device, viewpoint, { camera: each, depth });
-        if (each !== camera) continue;
-        const { psnr } = closeness(pixels, oracle);
-        console.log(`${rasterizer}, ${JSON.stringify({ format, isFlat, ...host })}: ${psnr.toFixed(1)} dB`);
-        assert.ok(psnr >= 59, `${format}: ${psnr} dB`);
-        const whole = renderOracleWorld(asClouds(placedPair), camera, { rules: 'gsplat' });
-        assert.ok(closeness(pixels, whole).psnr < 35, 'the bar hides much');
+  const skip = rasterizer === 'quads' && onlyInLab;
+  test(
+    `${rasterizer}: a bar through two scenes occludes what is behind it, for any depth format`,
+    { skip },
+    async () => {
+      const device = await serialDevice();
+      const { world, free } = await worldOf(device, placedPair);
+      const viewpoint = new Viewpoint(device, world, { settings: settings('default', { rasterizer }) });
+      // The meaning of a depth does not depend on the rasterizer.
+      const stores = someOf(VARIANTS, rasterizer === 'quads' ? 4 : 2);
+      for (const { format, isFlat = false, ...host } of stores) {
+        const camera = isFlat ? orthographic : view();
+        const bar = barDepth(camera);
+        const isDevice = format !== 'r32float' || host.values === 'device';
+        const values = Float32Array.from(bar, (depth) =>
+          isDevice
+            ? stored(depth, { reversed: host.reversed ?? false, isFlat, far: host.far })
+            : depth === Infinity
+              ? 0
+              : depth,
+        );
+        const texture = depthTexture(device, format, values, camera.width);
+        const depth = new SceneDepth(device, { host: { ...host, texture } });
+        const oracle = renderOracleWorld(asClouds(placedPair), camera, { rules: 'gsplat', depth: bar });
+        // The second frame has an order of all splats, the first one after a turn is sorted.
+        for (const each of [camera, { ...camera, worldToCamera: multiply(turn(1e-3), camera.worldToCamera) }, camera]) {
+          const pixels = await capture(device, viewpoint, { camera: each, depth });
+          if (each !== camera) continue;
+          const { psnr } = closeness(pixels, oracle);
+          console.log(`${rasterizer}, ${JSON.stringify({ format, isFlat, ...host })}: ${psnr.toFixed(1)} dB`);
+          assert.ok(psnr >= 59, `${format}: ${psnr} dB`);
+          const whole = renderOracleWorld(asClouds(placedPair), camera, { rules: 'gsplat' });
+          assert.ok(closeness(pixels, whole).psnr < 35, 'the bar hides much');
+        }
+        depth.destroy();
+        texture.destroy();
       }
-      depth.destroy();
-      texture.destroy();
-    }
-    const plain = await capture(device, viewpoint, { camera: view() });
-    const fresh = new Viewpoint(device, world, { settings: settings('default', { rasterizer }) });
-    assert.deepEqual(plain, await capture(device, fresh, { camera: view() }), 'frames without depth are as before');
-    fresh.destroy();
-    viewpoint.destroy();
-    free();
-  });
+      const plain = await capture(device, viewpoint, { camera: view() });
+      const fresh = new Viewpoint(device, world, { settings: settings('default', { rasterizer }) });
+      assert.deepEqual(plain, await capture(device, fresh, { camera: view() }), 'frames without depth are as before');
+      fresh.destroy();
+      viewpoint.destroy();
+      free();
+    },
+  );
 }
 
 test('the median depth is that of the oracle', async () => {

@@ -11,6 +11,7 @@ import { pathToFileURL } from 'node:url';
 import { chromium, type Browser } from 'playwright-core';
 import { PNG } from 'pngjs';
 import { snippets } from './snippets.js';
+import { onlyInLab } from '../support/extent.js';
 import { isBuilt, root } from './support.js';
 
 const load = (path: string): Promise<Record<string, never>> => import(new URL(`../../${path}`, import.meta.url).href);
@@ -67,26 +68,30 @@ describe('recipes', { skip: isBuilt ? false : 'no site: npm run build', timeout:
     return target;
   }
 
-  it('the whole HTML file of the first page shows its scene from the disk, and from another server', async () => {
-    const start = spawn(process.execPath, ['scripts/start.mjs'], { cwd: root, env: { ...process.env, PORT: '0' } });
-    try {
-      let output = '';
-      start.stdout.on('data', (data) => (output += String(data)));
-      while (!/http:\S+/.test(output)) await once(start.stdout, 'data');
-      const tab = await browser.newPage();
-      await tab.goto(/http:\S+/.exec(output)![0]);
-      await tab.click('#copy-page');
-      await tab.waitForFunction(() => document.querySelector('#snippet')!.textContent!.includes('<!doctype'));
-      const html = await tab.locator('#snippet').textContent();
-      await tab.close();
-      mkdirSync(join(folder, 'copied'));
-      writeFileSync(join(folder, 'copied/index.html'), html!);
-      await assertShown(pathToFileURL(join(folder, 'copied/index.html')).href);
-      await assertShown(await serveFolder(join(folder, 'copied')));
-    } finally {
-      start.kill();
-    }
-  });
+  it(
+    'the whole HTML file of the first page shows its scene from the disk, and from another server',
+    { skip: onlyInLab },
+    async () => {
+      const start = spawn(process.execPath, ['scripts/start.mjs'], { cwd: root, env: { ...process.env, PORT: '0' } });
+      try {
+        let output = '';
+        start.stdout.on('data', (data) => (output += String(data)));
+        while (!/http:\S+/.test(output)) await once(start.stdout, 'data');
+        const tab = await browser.newPage();
+        await tab.goto(/http:\S+/.exec(output)![0]);
+        await tab.click('#copy-page');
+        await tab.waitForFunction(() => document.querySelector('#snippet')!.textContent!.includes('<!doctype'));
+        const html = await tab.locator('#snippet').textContent();
+        await tab.close();
+        mkdirSync(join(folder, 'copied'));
+        writeFileSync(join(folder, 'copied/index.html'), html!);
+        await assertShown(pathToFileURL(join(folder, 'copied/index.html')).href);
+        await assertShown(await serveFolder(join(folder, 'copied')));
+      } finally {
+        start.kill();
+      }
+    },
+  );
 
   it('the first block of the README, and the page of Get started, show a scene beside the unpacked release', async () => {
     const { unzipSync } = await import('fflate');
@@ -120,7 +125,7 @@ describe('recipes', { skip: isBuilt ? false : 'no site: npm run build', timeout:
     await tab.close();
   });
 
-  it('the one file of `page --single` shows a scene, or a mesh, from the disk', async () => {
+  it('the one file of `page --single` shows a scene, or a mesh, from the disk', { skip: onlyInLab }, async () => {
     for (const [i, name] of ['compass.ply', 'textured.glb'].entries()) {
       const place = makePage(fixture(name), '--single', `single-${i}`);
       await assertShown(pathToFileURL(join(place, 'index.html')).href);
