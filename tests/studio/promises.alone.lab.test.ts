@@ -33,7 +33,7 @@ for (const name of STUDIO) {
 }
 
 /** Loss in dB against the figure of the trainer that the rounding of the scene to SPZ and of its images to WebP may cost. */
-const ROUNDING = 1.5;
+const ROUNDING = 1;
 
 for (const name of STUDIO) test(`${name}: the image against held-out images`, () => assertPictured(name, 3));
 

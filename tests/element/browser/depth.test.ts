@@ -32,7 +32,7 @@ async function pickedPixels(element: GaussianSplatElement, view: MeasuredView, i
     }
   }
   // A pick has the surface around it, which may be another one at an edge.
-  assert(far <= picked / 4, `${far} of ${picked} picks are 5 cm from the depth of their pixel, or more`);
+  assert(far <= picked / 20, `${far} of ${picked} picks are 5 cm from the depth of their pixel, or more`);
   // A pick has the element of the splat at the median depth, which may be another one at the edge of two.
   assert(others <= picked / 20, `${others} of ${picked} pixels have another element`);
   return picked;

@@ -245,9 +245,8 @@ describe("splats in a host's frame", () => {
       return splats.draw(camera, { depth: null });
     };
     assert(!paint(), 'an order before the worker has answered');
-    const end = performance.now() + 20_000;
-    while (!paint()) {
-      assert(performance.now() < end, 'an order of the worker');
+    for (let tries = 0; !paint(); tries++) {
+      assert(tries < 1_000, 'an order of the worker');
       await new Promise((resolve) => setTimeout(resolve, 20));
     }
     const found = read(gl, 0, 0, camera);

@@ -39,7 +39,7 @@ export class CameraController {
   #bounds = UNKNOWN_BOUNDS;
   #aspect = 1;
   #source: CameraChangeSource = 'none';
-  /** Whether a visitor has zoomed, flown or walked since the attributes last set the distance. A new aspect ratio then does not change the distance. */
+  /** Whether a visitor has changed the distance since the attributes set it; a new aspect ratio then keeps it. */
   #userDistance = false;
   /** Whether a visitor or a flight has moved the camera since a scene was framed or the camera was reset. */
   #isTouched = false;

@@ -154,13 +154,13 @@ export class SceneController implements ReactiveController {
     return this.#shownRequest !== this.#request;
   }
 
-  /** Resolves when the requested scene is shown, has failed or was abandoned, at once if nothing is pending. Never rejects. */
+  /** Resolves when the requested scene is shown, has failed or was abandoned; at once if none is. Never rejects. */
   get settled(): Promise<void> {
     if (this.#state !== 'waiting' && this.#state !== 'loading') return Promise.resolve();
     return new Promise((resolve) => this.#waiters.push(resolve));
   }
 
-  /** Returns whether a request, null for no scene, is for another scene than the last one, or other arrays than those that failed. */
+  /** Returns whether a request, null for none, is for another scene than the last, or other arrays than failed ones. */
   isOther(request: SceneRequest | null): boolean {
     if (this.#error && request?.splats !== this.#request?.splats) return true;
     return request === null ? this.#request !== null : !isSame(request, this.#request);

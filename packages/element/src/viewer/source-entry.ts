@@ -97,7 +97,7 @@ export class SourceEntry implements SceneHost, SourceHost, PlaybackHost, Dynamic
   readonly ownClock: PlaybackController;
   readonly live: DynamicWiring;
   readonly #source: SourceController;
-  /** Levels of detail. Needed only by scenes with the attribute `detail`, and by scenes too slow to be drawn in full during motion. */
+  /** Levels of detail: of scenes with the attribute `detail`, and of those too slow to be drawn in full in motion. */
   readonly #detail = new Lazy(
     'the code of levels of detail',
     async () => {

@@ -25,7 +25,7 @@ export interface ViewHost extends FrameSource {
     /** Called when drawing has failed permanently. */
     fail(error: unknown): void;
   };
-  /** Called once in each frame before the camera steps, so that automatic motions advance. `now` is requestAnimationFrame's clock, ms. */
+  /** Called in each frame before the camera steps, for automatic motions. `now`: requestAnimationFrame's clock, ms. */
   advance(now: number): void;
   readonly camera: CameraController;
   readonly size: SizeController;

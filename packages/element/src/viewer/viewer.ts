@@ -269,7 +269,7 @@ export class Viewer implements SourceOwner {
     return !this.reveal.isCovered && this.isVisible;
   }
 
-  /** Whether automatic motion is allowed: the scene is in view, and neither visitor nor system settings forbid motion. */
+  /** Whether automatic motion is allowed: the scene is in view, and neither visitor nor system forbids it. */
   get mayMove(): boolean {
     return this.isOnShow && !prefersReducedMotion() && !this.features.call('mayMove').includes(false);
   }
