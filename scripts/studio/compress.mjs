@@ -9,7 +9,7 @@ const truth = JSON.parse(readFileSync(join(made, 'truth.json'), 'utf8'));
 const read = await readScene(readFileSync(join(made, 'scene.ply')), { name: 'scene.ply' });
 // The garden is the largest: harmonics of degree 2 keep all scenes and references below 40 MB.
 const cloud = { ...toDegree(truth.name === 'garden' ? 2 : 3, read), antialiased: truth.training.antialiased };
-// Harmonics of 4 bits, or of 5 where 4 cost more than 1 dB of the trainer's image.
+// Harmonics of 4 bits, or of 5 where 4 cost more than 1 dB PSNR of the trainer's image.
 const encoding = encodingsFor('scene.spz', cloud)[['apartment', 'hall', 'product'].includes(truth.name) ? 1 : 0];
 const scene = await encoding.write({ cloud, degrees: new Uint8Array(cloud.count).fill(cloud.shDegree) });
 const out = join(data, truth.name);

@@ -36,8 +36,11 @@ test('options of gaussian-splat are those of the usage of the command', () => {
   const [, table] = /const COMMANDS = \{([^}]+)\}/.exec(read('packages/cli/bin/gaussian-splat.mjs'))!;
   const names = [...table.matchAll(/^ {2}(\w+):/gm)].map(([, name]) => name);
   assert.ok(names.length >= 8, names.join());
-  const usageOf = (name: string): string =>
-    read(name === 'check' ? 'packages/check/src/main.ts' : `packages/cli/src/${name}.mjs`);
+  const usageOf = (name: string): string => {
+    const text = read(name === 'check' ? 'packages/check/src/main.ts' : `packages/cli/src/${name}.mjs`);
+    const shared = [...text.matchAll(/import \{[^}]*_USAGE\b[^}]*\} from '\.\/(.+)';/g)];
+    return [text, ...shared.map(([, path]) => read(`packages/cli/src/${path}`))].join('\n');
+  };
   const called = matches(/gaussian-splat(?: --|\/cli)? ([a-z]+) ([^\n`|]*)/g).filter(({ groups: [name] }) =>
     names.includes(name),
   );

@@ -17,6 +17,8 @@ const EVENTS = {
   onArStatus: 'ar-status',
   onMeasure: 'measure',
   onModelVisibility: 'model-visibility',
+  onCreditsChange: 'credits-change',
+  onRoomChange: 'room-change',
   onGeneratorError: 'generator-error',
   onGeneratorMemory: 'generator-memory',
   onGeneratorFallback: 'generator-fallback',

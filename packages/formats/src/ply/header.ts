@@ -141,7 +141,7 @@ function splitHeader(source: SceneSource, length = USUAL_HEADER_BYTES): { lines:
   // If lines end with CR, a byte 10 after `end_header` belongs to the data. Otherwise LF ends every line, with an
   // optional CR before it.
   const usesLoneCr = /^[^\r\n]*\r(?!\n)/.test(text);
-  const end = (usesLoneCr ? /\rend_header[ \t]*(\r|$)/ : /\nend_header[ \t]*\r?(\n|$)/).exec(text);
+  const end = (usesLoneCr ? /\rend_header[ \t]*(\r|$)/ : /\r?\nend_header[ \t]*\r?(\n|$)/).exec(text);
   const isWithin = end !== null && end.index + end[0].length < length;
   if (!isWithin && length < Math.min(bytes.length, MAX_HEADER_BYTES)) return splitHeader(source, MAX_HEADER_BYTES);
   if (end) {
