@@ -1,9 +1,6 @@
 /** `npm run lab -- lives [CYCLES]`: 500 (or N) elements that are added and removed, 24 at once, 20 lost devices, in real Chromium. */
-import { build, ensureDependencies } from './lib/prepare.mjs';
 import { must } from './lib/run.mjs';
 
-ensureDependencies();
-build();
 must(
   process.execPath,
   [

@@ -1,0 +1,7 @@
+export interface LabCommand {
+  readonly what: string;
+  readonly in?: 'chromium' | 'dawn';
+  readonly command: readonly string[];
+  readonly smallest?: readonly string[];
+}
+export const COMMANDS: Readonly<Record<string, LabCommand>>;
