@@ -8,7 +8,7 @@ import { after, test } from 'node:test';
 import type { ShDegree } from '@gaussian-splat/core';
 import { writePly } from '../formats/support/ply-writer.js';
 import { inriaColumns, rawSplats } from '../formats/support/splats.js';
-import { isLab, onlyInLab } from '../support/extent.js';
+import { isLab, onlyInLab, someOf } from '../support/extent.js';
 
 const folder = mkdtempSync(join(tmpdir(), 'gs-batch-'));
 after(() => rmSync(folder, { recursive: true }));
@@ -106,7 +106,7 @@ test('patterns and lists of files; what cannot begin ends with status 2 and writ
     ['scene-0.glb', 'scene-2.glb', 'scene-4.glb', 'scene-6.glb', 'scene-5.glb'],
     two.text,
   );
-  for (const [sentence, ...args] of [
+  const wrong: readonly [RegExp, ...string[]][] = [
     [/--as: expected \.sog, .* found "gif"/, 'optimize', 'scenes', '--format-only', '--as', 'gif', '--out', 'no'],
     [/--out is missing/, 'floor', 'scenes'],
     [/--as: expected with several files/, 'floor', 'scenes/scene-0.ply', '--as', 'floor', '--out', 'a.floor'],
@@ -114,7 +114,8 @@ test('patterns and lists of files; what cannot begin ends with status 2 and writ
     [/expected a SCENE/, 'detail', '--out', 'no'],
     [/one of --min-psnr/, 'optimize', 'scenes', '--out', 'no'],
     [/There is no file none\.ply/, 'floor', 'none.ply', 'scenes', '--out', 'no'],
-  ] as const) {
+  ];
+  for (const [sentence, ...args] of someOf(wrong, 3)) {
     const { status, text } = command(...args);
     assert.equal(status, 2, text);
     assert.match(text, sentence);
