@@ -48,37 +48,26 @@ function typeOf(ts, { expression, typeArguments, arguments: [words] }, navigatio
   return TYPES[kind] ?? typeArguments?.at(-1).getText() ?? 'string | null';
 }
 
-/** A plugin of the manifest's analyzer: adds each entry of a table to its element, as an attribute and as its property. */
+/**
+ * A plugin of the manifest's analyzer: adds each entry of a table to its element, as an attribute and as its property. The analyzer visits files in any order, so that all is
+ * read at the end, by path.
+ */
 export function tableOfAttributes() {
-  const found = new Map();
-  const navigations = [];
-  /** Attributes and documented additions of all features. */
-  const ofFeatures = { attributes: [], slots: [], cssParts: [], cssProperties: [], events: [] };
+  const nodes = [];
   return {
     name: 'table-of-attributes',
-    analyzePhase({ ts, node, moduleDoc }) {
-      const isOfRow = isRow(moduleDoc.path);
-      if (isOfRow && ts.isVariableStatement(node)) readTags(ts, node, ofFeatures);
-      if (isOfRow && ts.isPropertyAssignment(node) && node.name.getText() === 'navigation')
-        navigations.push(node.initializer.getText());
-      if (!ts.isVariableDeclaration(node) || !node.initializer || !ts.isObjectLiteralExpression(node.initializer))
-        return;
-      if (!/^([A-Z_]*ATTRIBUTES|PLACED)$/.test(node.name.getText())) return;
-      const entries = node.initializer.properties.flatMap((entry) => {
-        // Common rows of several tables are listed once, in a table of their own.
-        if (ts.isSpreadAssignment(entry)) return found.get(entry.expression.getText());
-        const [{ comment, tags = [] }] = ts.getJSDocCommentsAndTags(entry).filter(ts.isJSDoc);
-        const tagged = (wanted) => tags.find(({ tagName }) => tagName.text === wanted)?.comment;
-        const [description, fallback, example] = [comment, tagged('default'), tagged('example')].map(
-          ts.getTextOfJSDocComment,
-        );
-        const type = { text: typeOf(ts, entry.initializer, navigations) };
-        return { name: entry.name.getText(), type, description, ...(fallback && { default: fallback }), example };
-      });
-      found.set(node.name.getText(), entries);
-      if (isOfRow || moduleDoc.path.endsWith('element-attributes.ts')) ofFeatures.attributes.push(...entries);
+    analyzePhase({ ts, node, moduleDoc: { path } }) {
+      const isTable =
+        ts.isVariableDeclaration(node) &&
+        node.initializer &&
+        ts.isObjectLiteralExpression(node.initializer) &&
+        /^([A-Z_]*ATTRIBUTES|PLACED)$/.test(node.name.getText());
+      const isMode = isRow(path) && ts.isPropertyAssignment(node) && node.name.getText() === 'navigation';
+      const isTagged = isRow(path) && ts.isVariableStatement(node);
+      if (isTable || isMode || isTagged) nodes.push({ ts, node, path, isTable, isMode, isTagged });
     },
     packageLinkPhase({ customElementsManifest: { modules } }) {
+      const { found, ofFeatures } = readAll(nodes.sort((a, b) => (a.path < b.path ? -1 : a.path > b.path ? 1 : 0)));
       for (const element of modules.flatMap(({ declarations = [] }) => declarations)) {
         const own = found.get(TABLES[element.tagName]?.table);
         if (own === undefined) continue;
@@ -103,6 +92,36 @@ export function tableOfAttributes() {
       }
     },
   };
+}
+
+/** Returns the entries of all tables by name, and the attributes and documented additions of all features. */
+function readAll(nodes) {
+  const navigations = nodes.filter(({ isMode }) => isMode).map(({ node }) => node.initializer.getText());
+  const tables = nodes.filter(({ isTable }) => isTable);
+  const found = new Map(tables.map(({ node }) => [node.name.getText(), undefined]));
+  const entriesOf = (name) => {
+    const { ts, node } = tables.find(({ node }) => node.name.getText() === name);
+    return node.initializer.properties.flatMap((entry) => {
+      // Common rows of several tables are listed once, in a table of their own.
+      if (ts.isSpreadAssignment(entry))
+        return found.has(entry.expression.getText()) ? entriesOf(entry.expression.getText()) : [];
+      const [{ comment, tags = [] }] = ts.getJSDocCommentsAndTags(entry).filter(ts.isJSDoc);
+      const tagged = (wanted) => tags.find(({ tagName }) => tagName.text === wanted)?.comment;
+      const [description, fallback, example] = [comment, tagged('default'), tagged('example')].map(
+        ts.getTextOfJSDocComment,
+      );
+      const type = { text: typeOf(ts, entry.initializer, navigations) };
+      return { name: entry.name.getText(), type, description, ...(fallback && { default: fallback }), example };
+    });
+  };
+  for (const name of found.keys()) found.set(name, entriesOf(name));
+  const ofFeatures = { attributes: [], slots: [], cssParts: [], cssProperties: [], events: [] };
+  for (const { ts, node, path, isTable, isTagged } of nodes) {
+    if (isTagged) readTags(ts, node, ofFeatures);
+    if (isTable && (isRow(path) || path.endsWith('element-attributes.ts')))
+      ofFeatures.attributes.push(...found.get(node.name.getText()));
+  }
+  return { found, ofFeatures };
 }
 
 /** Reads the tags of a feature's comment, as the analyzer reads those of a class. */
