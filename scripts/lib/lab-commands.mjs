@@ -117,6 +117,11 @@ export const COMMANDS = {
     command: ['scripts/posters.mjs'],
     smallest: ['--only', 'no such page'],
   },
+  scale: {
+    what: 'builds of streamed scenes in parts, and what a billion splats take',
+    command: ['scripts/scale/run-scale.mjs'],
+    smallest: ['--splats', '20000', '--cells', '302MB'],
+  },
   screenshots: {
     what: 'every page of the site, for people to look at',
     command: ['scripts/screenshots.mjs'],
