@@ -1,23 +1,64 @@
 /** Gaussian splats as a custom layer of MapLibre GL JS: they stand at a place of the earth, and buildings of the map hide them. */
 import { cameraFromClip, multiply } from '@gaussian-splat/core';
-import { fetchScene, readScene } from '@gaussian-splat/formats';
+import { fetchScene, fileOpenerFor, readScene } from '@gaussian-splat/formats';
 import { packGaussians } from '@gaussian-splat/renderer';
 import { GlHost } from '@gaussian-splat/renderer/webgl';
 import { MercatorCoordinate } from 'maplibre-gl';
+
+/**
+ * Transform from a scene to the map, column by column.
+ * @param axes of the scene that point to the east, to the north and up
+ */
+function placementAt(lngLat, altitude, metersPerUnit, [east, north, up]) {
+  const place = MercatorCoordinate.fromLngLat(lngLat, altitude);
+  const size = metersPerUnit * place.meterInMercatorCoordinateUnits();
+  // The map's y points south.
+  const column = (axis) => [size * east[axis], -size * north[axis], size * up[axis], 0];
+  return [...column(0), ...column(1), ...column(2), place.x, place.y, place.z, 1];
+}
+
+/** The same for a scene around a point in earth-centered coordinates of WGS 84. @param origin in a cloud's axes: -x, -z, -y */
+function placementOnEarth(origin) {
+  const [x, y, z] = [-origin[0], -origin[2], -origin[1]];
+  const [radius, eccentricity] = [6_378_137, 6.694_379_990_141_3e-3];
+  const flat = Math.hypot(x, y);
+  const lon = Math.atan2(y, x);
+  let lat = Math.atan2(z, flat * (1 - eccentricity));
+  let normal = radius;
+  for (let k = 0; k < 5; k++) {
+    normal = radius / Math.sqrt(1 - eccentricity * Math.sin(lat) ** 2);
+    lat = Math.atan2(z + eccentricity * normal * Math.sin(lat), flat);
+  }
+  const altitude = flat / Math.cos(lat) - normal;
+  const ofCloud = ([a, b, c]) => [-a, -c, -b];
+  const axes = [
+    [-Math.sin(lon), Math.cos(lon), 0],
+    [-Math.sin(lat) * Math.cos(lon), -Math.sin(lat) * Math.sin(lon), Math.cos(lat)],
+    [Math.cos(lat) * Math.cos(lon), Math.cos(lat) * Math.sin(lon), Math.sin(lat)],
+  ].map(ofCloud);
+  return placementAt([(180 * lon) / Math.PI, (180 * lat) / Math.PI], altitude, 1, axes);
+}
 
 export class SplatLayer {
   type = 'custom';
   renderingMode = '3d';
 
-  /** @param metersPerUnit length of a unit of the scene's file */
-  constructor({ id, src, lngLat, altitude = 0, metersPerUnit = 1 }) {
+  /**
+   * @param lngLat place of the scene; by default that of its file, if that has earth-centered coordinates (3D Tiles)
+   * @param metersPerUnit length of a unit of the scene's file
+   * @param maxSplats of a file with levels, the finest level that has fewer is shown
+   */
+  constructor({ id, src, lngLat, altitude = 0, metersPerUnit = 1, maxSplats }) {
     this.id = id;
     this.src = src;
-    const place = MercatorCoordinate.fromLngLat(lngLat, altitude);
-    const { x, y, z } = place;
-    const size = metersPerUnit * place.meterInMercatorCoordinateUnits();
-    // Columns. Captures have x to the right, y down and z forward: east, down and north on the map, whose y points south.
-    this.placement = [size, 0, 0, 0, 0, 0, -size, 0, 0, -size, 0, 0, x, y, z, 1];
+    this.maxSplats = maxSplats;
+    // Captures have x to the right, y down and z forward: east, down and north.
+    if (lngLat)
+      this.placement = placementAt(lngLat, altitude, metersPerUnit, [
+        [1, 0, 0],
+        [0, 0, 1],
+        [0, -1, 0],
+      ]);
   }
 
   onAdd(map, gl) {
@@ -28,7 +69,14 @@ export class SplatLayer {
 
   async load() {
     const { host } = this;
-    const splats = await host.load(packGaussians(await readScene(await fetchScene(this.src))));
+    const url = new URL(this.src, document.baseURI);
+    const options = { openFile: fileOpenerFor(url, () => ({})), maxSplats: this.maxSplats };
+    const cloud = await readScene(await fetchScene(url), options);
+    this.placement ??= placementOnEarth(cloud.origin);
+    // Float64 of the Earth is in the placement; what is left are meters around it.
+    const packed = packGaussians({ ...cloud, origin: [0, 0, 0] });
+    this.count = packed.count;
+    const splats = await host.load(packed);
     // The map may have removed the layer meanwhile.
     if (host !== this.host) return splats.destroy();
     this.splats = splats;

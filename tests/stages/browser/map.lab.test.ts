@@ -1,12 +1,15 @@
 /** Splats as a layer of MapLibre: at their place, without errors of WebGL, while the map turns. */
 import { Map as MapLibre, setWorkerUrl, type CustomLayerInterface } from 'maplibre-gl';
+import type { GaussianCloud } from '@gaussian-splat/core';
 import { assert, assertEqual } from '../../element/browser/support/harness.js';
+import { splatTileset } from '../../support/tileset.js';
 
 setWorkerUrl('/node_modules/maplibre-gl/dist/maplibre-gl-worker.mjs');
 const PLACE: [number, number] = [13.4, 52.52];
 
 interface Layer {
   readonly loaded: Promise<void>;
+  readonly count: number;
 }
 type LayerClass = new (options: object) => Layer & CustomLayerInterface;
 
@@ -113,4 +116,62 @@ describe('maps', () => {
     assert(blocked.count < 0.7 * free.count && blocked.count > 0.3 * free.count, JSON.stringify(found));
     assert(blocked.x > free.x + 5, `the left half is hidden: ${JSON.stringify(found)}`);
   });
+
+  it('show a tileset at its place on the Earth, at the level that fits', async () => {
+    const { SplatLayer } = (await import('/demo/map/splat-layer.js' as string)) as { SplatLayer: LayerClass };
+    const address = `/net/kept/map-${Date.now()}/`;
+    for (const [path, bytes] of splatTileset(redCube(), { levels: 2, transform: onEarth() }))
+      await fetch(address + path, { method: 'PUT', body: bytes.slice() });
+    const counts: number[] = [];
+    for (const maxSplats of [undefined, 500]) {
+      const map = await openMap(false);
+      const errors: unknown[] = [];
+      map.on('error', ({ error }) => errors.push(error));
+      const layer = new SplatLayer({ id: 'cube', src: `${address}tileset.json`, maxSplats });
+      map.addLayer(layer);
+      await layer.loaded;
+      const gl = map.getCanvas().getContext('webgl2')!;
+      for (const bearing of [0, 120, 240]) {
+        map.jumpTo({ bearing });
+        await map.once('render');
+        assertEqual([gl.getError(), String(errors)], [gl.NO_ERROR, ''], `errors at ${bearing} degrees`);
+        const [seen, place] = [splatsIn(map), map.project(PLACE)];
+        const text = `${bearing} degrees: ${JSON.stringify(seen)}, the place is ${place.x} ${place.y}`;
+        assert(seen.count > 300 && Math.hypot(seen.x - place.x, seen.y - place.y) < 10, text);
+      }
+      counts.push(layer.count);
+      map.remove();
+    }
+    assertEqual(counts[0], SIDE ** 3);
+    assert(counts[1] < 500 && counts[1] > 100, counts.join(' '));
+  });
 });
+
+/** Splats of a cube along a side. */
+const SIDE = 9;
+
+/** A red cube of 24 m around its origin, in the frame of glTF. */
+function redCube(): GaussianCloud {
+  const count = SIDE ** 3;
+  const positions = Float32Array.from({ length: 3 * count }, (_, n) => {
+    const i = Math.floor(n / 3);
+    return 3 * ([i % SIDE, Math.floor(i / SIDE) % SIDE, Math.floor(i / SIDE ** 2)][n % 3] - 4);
+  });
+  const each = (...values: number[]): Float32Array =>
+    Float32Array.from({ length: values.length * count }, (_, n) => values[n % values.length]);
+  return {
+    ...{ count, positions, scales: each(1.8, 1.8, 1.8), rotations: each(1, 0, 0, 0), opacities: each(0.999) },
+    ...{ sh: each(1, -1.5, -1.6), shDegree: 0, antialiased: false, droppedCount: 0, origin: [0, 0, 0] },
+  };
+}
+
+/** Transform from east, north, up at {@link PLACE}, on the ellipsoid of WGS 84, to earth-centered coordinates. */
+function onEarth(): number[] {
+  const [lon, lat] = PLACE.map((degree) => (degree * Math.PI) / 180);
+  const [a, b] = [6_378_137, 6_356_752.314_245];
+  const up = [Math.cos(lat) * Math.cos(lon), Math.cos(lat) * Math.sin(lon), Math.sin(lat)];
+  const north = [-Math.sin(lat) * Math.cos(lon), -Math.sin(lat) * Math.sin(lon), Math.cos(lat)];
+  const length = Math.hypot(a * Math.cos(lat), b * Math.sin(lat));
+  const place = [a, a, b].map((axis, k) => (axis ** 2 * up[k]) / length);
+  return [-Math.sin(lon), Math.cos(lon), 0, 0, ...north, 0, ...up, 0, ...place, 1];
+}
