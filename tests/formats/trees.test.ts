@@ -1,16 +1,17 @@
-/** Scenes whose files are trees of levels, node by node: the nodes of 3D Tiles and of LCC, their volumes, and what is read for each. */
+/** Scenes whose files are trees of levels, node by node: the nodes of 3D Tiles, LCC and RAD, their volumes, and what is read for each. */
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import type { GaussianCloud } from '@gaussian-splat/core';
 import {
   LoadBudget,
-  openTree,
+  openTree as openAny,
   readNode,
   readScene,
   type SceneNode,
   type SceneTree,
   type TreeFiles,
 } from '@gaussian-splat/formats';
+import { writeRadTree } from '../support/rad-tree.js';
 import { splatTileset } from '../support/tileset.js';
 import { writeLcc } from './support/lcc-writer.js';
 import { smallCloud } from './support/small-cloud.js';
@@ -37,7 +38,19 @@ function beside(files: Files): TreeFiles & { readonly opened: string[] } {
     kept.set(path, opening);
     return opening;
   };
-  return { name: 'scene', budget: new LoadBudget(1e9), openFile, openIndex, openRange, opened };
+  const openShared = async (path = [...files.keys()][0], start: number, end: number): Promise<Uint8Array> => {
+    const key = `${path} ${start}-${end}`;
+    const opening = kept.get(key) ?? openFile(path).then((bytes) => bytes.subarray(start, end));
+    kept.set(key, opening);
+    return opening;
+  };
+  return { name: 'scene', budget: new LoadBudget(1e9), openFile, openIndex, openShared, openRange, opened };
+}
+
+async function openTree(bytes: Uint8Array, files: TreeFiles): Promise<SceneTree> {
+  const tree = await openAny(bytes, files);
+  assert.ok(tree, 'a tree');
+  return tree;
 }
 
 const worldOf = ({ positions, origin }: GaussianCloud, i: number): number[] =>
@@ -63,7 +76,7 @@ interface Walked {
 async function walk(tree: SceneTree, files: TreeFiles, tolerance = 1e-4): Promise<Walked> {
   const all: Walked & { nodes: number; depth: number } = { leaves: [], nodes: 0, depth: 0 };
   const visit = async (node: SceneNode, depth: number): Promise<void> => {
-    const { cloud, found, isAdded, error } = await readNode(tree, node, files);
+    const { cloud, found, parts, isAdded, error } = await readNode(tree, node, files);
     all.nodes++;
     all.depth = Math.max(all.depth, depth);
     for (let i = 0; i < (cloud?.count ?? 0) && node.volume; i++)
@@ -71,6 +84,10 @@ async function walk(tree: SceneTree, files: TreeFiles, tolerance = 1e-4): Promis
     const children = [...node.children, ...found];
     assert.ok(error >= 0);
     if (cloud && (isAdded || children.length === 0)) all.leaves.push(cloud);
+    else if (cloud && parts) {
+      const replaced = parts.reduce((sum, count) => sum + count, 0);
+      all.leaves.push({ ...cloud, count: cloud.count - replaced, positions: cloud.positions.subarray(3 * replaced) });
+    }
     for (const child of children) await visit(child, depth + 1);
   };
   for (const root of tree.roots) await visit(root, 0);
@@ -191,4 +208,60 @@ test('a cell of LCC is a chain of levels, and only ranges of its files are read'
     807,
   );
   assert.equal(nodes, 4 + 1 + 1 + 1);
+});
+
+const stones = smallCloud(16_384, 1);
+const HEAD_BYTES = 512;
+
+test('RAD is read by chunks: the leaves are the scene, and a page replaces its part of the page above', async () => {
+  const bytes = writeRadTree(stones, { chunkSize: 1024 });
+  const files = beside(new Map([['scene.rad', bytes]]));
+  const tree = await openTree(bytes.subarray(0, HEAD_BYTES), files);
+  assert.deepEqual([tree.container, tree.roots.length], ['rad', 1]);
+  const { leaves, nodes, depth } = await walk(tree, files);
+  assert.ok(nodes > 8 && depth > 1, `${nodes} nodes, ${depth} deep`);
+  const whole = await readScene(bytes, { name: 'scene.rad' });
+  const all = leaves.reduce((sum, { count }) => sum + count, 0);
+  assert.equal(all, whole.count);
+  assertSameSplats(leaves, whole, 0);
+  // The description, whose beginning was given, and each chunk.
+  assert.equal(files.opened.length, 1 + Math.ceil((whole.count * 4) / 3 / 1024));
+});
+
+test('the first page of a RAD needs its first chunks alone', async () => {
+  const bytes = writeRadTree(stones, { chunkSize: 4096 });
+  const files = beside(new Map([['scene.rad', bytes]]));
+  const tree = await openTree(bytes, files);
+  const { cloud: first, parts, found } = await readNode(tree, tree.roots[0], files);
+  assert.equal(files.opened.length, 1);
+  assert.ok(first!.count > 1000 && parts!.length === found.length && found.length > 1, `${parts!.join(' ')}`);
+  await readNode(tree, found[0], files);
+  assert.equal(files.opened.length, 2);
+});
+
+test('a RAD without levels is no tree; one whose tree has a loop is refused', async () => {
+  const flat = writeRadTree(stones, { chunkSize: 4096, isFlat: true });
+  assert.equal(await openAny(flat, beside(new Map([['scene.rad', flat]]))), undefined);
+  const bytes = writeRadTree(stones, { chunkSize: 4096 });
+  // The first child of the root, 1, is the first number of its property.
+  const view = new DataView(bytes.buffer);
+  const after = (at: number): number => at + 8 + 8 * Math.ceil(view.getUint32(at + 4, true) / 8);
+  const chunk = after(0);
+  const text = new TextDecoder().decode(bytes.subarray(chunk, after(chunk)));
+  const { offset } = JSON.parse(/\{[^{}]*"child_start"[^{}]*\}/.exec(text)![0]) as { offset: number };
+  const at = after(chunk) + 8 + offset;
+  assert.equal(view.getUint32(at, true), 1);
+  view.setUint32(at, 0, true);
+  const files = beside(new Map([['scene.rad', bytes]]));
+  const looped = await openTree(bytes, files);
+  await assert.rejects(readNode(looped, looped.roots[0], files), /child_start.*expected an index from 1 to/);
+  await assert.rejects(readScene(bytes, { name: 'scene.rad', maxSplats: 1000 }), /child_start/);
+});
+
+test('a limit of splats chooses a cut through the tree of a RAD', async () => {
+  const bytes = writeRadTree(stones, { chunkSize: 4096 });
+  for (const maxSplats of [1, 1000, 5000, 16_384]) {
+    const { count } = await readScene(bytes, { name: 'scene.rad', maxSplats });
+    assert.ok(count <= maxSplats && count > 0.6 * maxSplats, `${count} of ${maxSplats}`);
+  }
 });

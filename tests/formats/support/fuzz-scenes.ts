@@ -6,6 +6,7 @@ import { encodeFloorMap } from '@gaussian-splat/formats/floor';
 import { clipOf } from '../../support/clips.js';
 import { detailFolder } from '../../support/detail-folder.js';
 import { fixturePath } from '../../support/generators.js';
+import { writeRadTree } from '../../support/rad-tree.js';
 import { pebbles } from '../../support/scenes/pebbles.js';
 import { buildGltf, writeGlb } from './gltf-writer.js';
 import { writeKsplat } from './ksplat-writer.js';
@@ -237,6 +238,7 @@ export async function otherScenes(): Promise<
   const states = Object.keys(corpus).filter((name) => name.endsWith('.4dgs') && corpus[name].length < 20_000);
   const gsv = await clipOf(() => smallCloud(30, 1), { frames: 6, framesPerGroup: 3 });
   const { manifest, files } = detailFolder(pebbles(2_000));
+  const levels = writeRadTree(smallCloud(60, 1), { chunkSize: 16 });
   const pages = Object.fromEntries([...files].map(([path, bytes]) => [path, new Uint8Array(bytes)]));
   const meshes = ['mesh: nodes of a mesh', 'mesh: lights', 'mesh: channels of an animation', 'mesh: joints'];
   return {
@@ -248,7 +250,7 @@ export async function otherScenes(): Promise<
       ],
     },
     streamed: { kind: 'levels', scenes: fuzzScenes().lod },
-    tree: { kind: 'tree', scenes: [...fuzzScenes().tiles, ...fuzzScenes().lcc] },
+    tree: { kind: 'tree', scenes: [...fuzzScenes().tiles, ...fuzzScenes().lcc, one('scene.rad', levels)] },
     clip: { kind: 'clip', scenes: [one('a.gsv', gsv.bytes)] },
     '4dgs': { kind: 'clip', scenes: states.map((name) => one('a.4dgs', new Uint8Array(corpus[name]))) },
     detail: { kind: 'manifest', scenes: [{ name: 'detail.json', files: { 'detail.json': json(manifest), ...pages } }] },

@@ -115,6 +115,7 @@ async function tree(url: string, signal: AbortSignal): Promise<unknown[]> {
   const asked = { url, credentials: 'same-origin', sh: 'auto' } as const;
   const opened = await runOnPage('tree', asked, signal, listeners);
   const answers: unknown[] = [opened];
+  if (!opened) return answers;
   let [[node], [above]] = [opened.children, opened.first.errors];
   for (let depth = 0; node && depth < 20; depth++) {
     const own = { tree: opened.tree, node, scene: opened.scene, above };

@@ -70,20 +70,22 @@ export interface LoadedNode extends FetchedNode<SceneNode> {
 const MAX_FIRST = 16;
 /** Maximum number of splats of these nodes. */
 const MAX_FIRST_SPLATS = 500_000;
+/** Bytes at the beginning of a RAD file, which describe 700 chunks or 46 million splats. */
+const HEAD_BYTES = 65_536;
 /** Number of nodes that are read at the same time. */
 const AT_A_TIME = 8;
 
 type Read = readonly [node: SceneNode, read: ReadNode];
 
 /**
- * Opens a scene whose file is a tree, and reads its coarsest nodes. Throws GaussianSplatError (`network/*`, `decode/*`,
+ * Opens a scene whose file is a tree, and reads its coarsest nodes. Resolves to undefined for a file without levels. Throws GaussianSplatError (`network/*`, `decode/*`,
  * `out-of-memory/*`), or the signal's reason if that is aborted.
  */
 export async function openTree(
   request: SceneRequest,
   signal: AbortSignal,
   { onProgress }: Pick<TaskListeners, 'onProgress'>,
-): Promise<LoadedTree> {
+): Promise<LoadedTree | undefined> {
   const { url, credentials, sh } = request;
   const name = fileName(url);
   const limits = limitsFrom({ limits: { ...request.limits, maxSplats: undefined } });
@@ -93,19 +95,23 @@ export async function openTree(
     ...fileLimits(limits()),
   });
   try {
-    const bytes = await fetchScene(url, options());
+    // Only the description at the beginning of a RAD file is needed.
+    const bytes = /\.rad$/i.test(name)
+      ? (await fetchRange(url, 0, HEAD_BYTES, options())).bytes
+      : await fetchScene(url, options());
     const budget = new LoadBudget(bytes.length, limits());
     const files = filesBeside({ url, name, budget, signal, options });
     const tree = await openFormat(bytes, files);
+    if (!tree) return undefined;
     const nodes = await readFirst(tree, files);
     const clouds = nodes.flatMap(([, { cloud }]) => cloud ?? []);
     const scene = sceneOf(clouds, tree, { sh, name, budget });
     const first = packed(nodes, scene, files);
     const children = nodes.flatMap(childrenOf);
-    const { container, facts, isComplete } = tree;
+    const { container, facts, isComplete, splats } = tree;
     const warnings = clouds.flatMap((cloud) => cloud.warnings ?? []);
     const credits = joinCredits(clouds.map(({ hints }) => hints?.credits));
-    return { scene, first, children, isComplete, tree: { container, facts }, warnings, credits };
+    return { scene, first, children, isComplete, splats, tree: { container, facts }, warnings, credits };
   } catch (error) {
     signal.throwIfAborted();
     throw named(error, name);
@@ -158,8 +164,8 @@ async function readFirst({ container, facts, roots, isDescended }: SceneTree, fi
 
 const childrenOf = ([node, { found }]: Read): SceneNode[] => [...node.children, ...found];
 
-const contentOf = ([node, { cloud, found, isAdded, error }]: Read): NodeContent => ({
-  ...{ cloud, isAdded, error },
+const contentOf = ([node, { cloud, found, parts, isAdded, error }]: Read): NodeContent => ({
+  ...{ cloud, parts, isAdded, error },
   volumes: [...node.children, ...found].map(({ volume }) => volume),
 });
 
@@ -205,43 +211,42 @@ interface Beside extends Pick<TreeFiles, 'name' | 'budget' | 'signal'> {
 /** Files of servers that do not support range requests, by address. Only the latest file is kept. */
 const wholeFiles = new Map<string, Promise<Uint8Array>>();
 
-/** Maximum bytes of files that describe several nodes, of all scenes. */
+/** Maximum bytes that are kept because they describe several nodes, of all scenes. */
 const INDEX_BYTES = 8e6;
 const indices = new SharedReads<Uint8Array>(({ byteLength }) => byteLength, INDEX_BYTES);
 
 /** Returns access to the files beside a scene. */
 function filesBeside({ url, name, budget, signal, options }: Beside): TreeFiles {
-  const fetchWhole = async (address: string): Promise<Uint8Array> => {
+  const counted = async (read: () => Promise<Uint8Array>): Promise<Uint8Array> => {
     budget.request(name);
-    const bytes = await fetchScene(address, options());
+    const bytes = await read();
     budget.arrive(bytes.length);
     return bytes;
   };
+  const fetchPart = async (address: string, start: number, end: number, ended = signal): Promise<Uint8Array> => {
+    const kept = await wholeFiles.get(address);
+    if (kept) return kept.subarray(start, end);
+    const { bytes, isPartial } = await fetchRange(address, start, end, { ...options(), signal: ended });
+    if (isPartial || start === 0) return bytes;
+    const whole = wholeFiles.get(address) ?? fetchScene(address, { ...options(), signal: ended });
+    wholeFiles.clear();
+    wholeFiles.set(address, whole);
+    whole.catch(() => wholeFiles.delete(address));
+    return (await whole).subarray(start, end);
+  };
   return {
     ...{ name, budget, signal },
-    openFile: (path, query) => fetchWhole(partAddress(url, path, query).href),
-    openIndex: async (path, query) => {
+    openFile: (path, query) => counted(() => fetchScene(partAddress(url, path, query).href, options())),
+    openIndex: (path, query) => {
       const { href } = partAddress(url, path, query);
-      budget.request(name);
-      const bytes = await indices.read(href, (ended) => fetchScene(href, { ...options(), signal: ended }), signal);
-      budget.arrive(bytes.length);
-      return bytes;
+      const read = (ended: AbortSignal): Promise<Uint8Array> => fetchScene(href, { ...options(), signal: ended });
+      return counted(() => indices.read(href, read, signal));
     },
-    openRange: async (path, start, end) => {
-      const address = partAddress(url, path).href;
-      const kept = await wholeFiles.get(address);
-      if (kept) return kept.subarray(start, end);
-      budget.request(name);
-      const { bytes, isPartial } = await fetchRange(address, start, end, options());
-      if (!isPartial && start > 0) {
-        const whole = wholeFiles.get(address) ?? fetchWhole(address);
-        wholeFiles.clear();
-        wholeFiles.set(address, whole);
-        whole.catch(() => wholeFiles.delete(address));
-        return (await whole).subarray(start, end);
-      }
-      budget.arrive(bytes.length);
-      return bytes;
+    openShared: (path, start, end) => {
+      const address = path === undefined ? url : partAddress(url, path).href;
+      const read = (ended: AbortSignal): Promise<Uint8Array> => fetchPart(address, start, end, ended);
+      return counted(() => indices.read(`${address} ${start}-${end}`, read, signal));
     },
+    openRange: (path, start, end) => counted(() => fetchPart(partAddress(url, path).href, start, end)),
   };
 }

@@ -180,7 +180,7 @@ export class WorkerPool {
     if (at >= 0) this.#queue.splice(at, 1);
     if (!slot) return;
     slot.drop(job);
-    this.#rest(slot, /^(file|box|clip)/.test(job.request.type) ? STREAMING_IDLE_MS : IDLE_MS);
+    this.#rest(slot, /^(file|box|node|clip)/.test(job.request.type) ? STREAMING_IDLE_MS : IDLE_MS);
     this.#placeQueued();
   }
 

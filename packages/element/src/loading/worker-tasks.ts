@@ -51,7 +51,7 @@ export const WORKER_TASKS = {
   }),
   tree: task({
     load: async () => (await loadModule(streams, () => import('./scene-tree.js'))).openTree,
-    transfer: ({ first }) => [first.words.buffer],
+    transfer: (opened) => (opened ? [opened.first.words.buffer] : []),
   }),
   node: task({
     load: async () => (await loadModule(streams, () => import('./scene-tree.js'))).readNode,

@@ -32,6 +32,53 @@ export interface RadChunk {
   readonly properties: readonly RadProperty[];
 }
 
+/** Place of a chunk: bytes `first` to `end`, excluding `end`, of the scene's file, or a file beside it. */
+export interface RadPlace {
+  readonly file?: string;
+  readonly first: number;
+  readonly end: number;
+}
+
+/** Description at the beginning of a RAD file. */
+export interface RadHead {
+  readonly places: readonly RadPlace[];
+  /** Number of splats of all chunks. */
+  readonly count: number;
+  /** Number of splats of each chunk except the last. */
+  readonly chunkSize: number;
+  /** Whether splats are the nodes of a tree, so that the file has levels of detail. */
+  readonly isTree: boolean;
+  /** Number of entries in the file's palette of spherical harmonics; undefined if the file declares none. */
+  readonly paletteCount: number | undefined;
+}
+
+/** Returns the number of bytes of the description at the beginning of a file, with its signature. */
+export const radHeadBytes = (bytes: Uint8Array): number =>
+  START_BYTES + (bytes.length < START_BYTES ? 0 : viewOf(bytes).getUint32(4, true));
+
+/**
+ * Parses the description at the beginning of a RAD file.
+ * @throws GaussianSplatError `decode/header`, `decode/truncated`, `decode/unsupported`
+ */
+export function parseRadHead({ bytes, name, budget }: Pick<SceneSource, 'bytes' | 'name' | 'budget'>): RadHead {
+  const { json, end } = descriptionAt({ budget }, bytes, 'RAD0', name);
+  const { type, version, chunks, shCodeCount, lodTree, count: splats = 0, chunkSize = splats } = json;
+  const paletteCount = shCodeCount === undefined ? undefined : count(shCodeCount, `${name}, shCodeCount`);
+  if (version !== 1 || type !== 'gsplat')
+    throw damaged(`${name}, version`, 'version 1 of type gsplat', show([version, type]), 'decode/unsupported');
+  if (!Array.isArray(chunks)) throw damaged(`${name}, chunks`, 'a list', show(chunks), 'decode/header');
+  const places = chunks.map((chunk: unknown, k): RadPlace => {
+    const where = `${name}, chunks[${k}]`;
+    if (!isObject(chunk)) throw damaged(where, 'an object', show(chunk), 'decode/header');
+    const { filename: file, offset, bytes: length } = chunk;
+    if (typeof file === 'string') return { file, first: 0, end: 0 };
+    const first = end + count(offset, `${where}.offset`);
+    return { first, end: first + count(length, `${where}.bytes`) };
+  });
+  const own = { count: count(splats, `${name}, count`), chunkSize: count(chunkSize, `${name}, chunkSize`) };
+  return { places, ...own, isTree: lodTree === true, paletteCount };
+}
+
 /**
  * Iterates over the chunks of a RAD file in order, including those in separate files. A file may be a single chunk.
  * @throws GaussianSplatError `decode/header`, `decode/truncated`, `decode/corrupt`, `decode/unsupported`,
@@ -43,31 +90,32 @@ export async function* chunksOf(source: SceneSource): AsyncGenerator<RadChunk> {
     yield chunkIn(source, bytes, name);
     return;
   }
-  const { json, end } = descriptionAt(source, bytes, 'RAD0', name);
-  const { type, version, chunks, shCodeCount } = json;
-  const entries = shCodeCount === undefined ? undefined : count(shCodeCount, `${name}, shCodeCount`);
-  if (version !== 1 || type !== 'gsplat')
-    throw damaged(`${name}, version`, 'version 1 of type gsplat', show([version, type]), 'decode/unsupported');
-  if (!Array.isArray(chunks)) throw damaged(`${name}, chunks`, 'a list', show(chunks), 'decode/header');
-  for (const [k, chunk] of chunks.entries()) {
-    const where = `${name}, chunks[${k}]`;
-    if (!isObject(chunk)) throw damaged(where, 'an object', show(chunk), 'decode/header');
-    const { filename, offset, bytes: length } = chunk;
-    if (typeof filename === 'string') {
-      const path = `${name}, ${filename}`;
-      yield chunkIn(source, await (source.openFile ?? noParts(name, 'scene.rad'))(filename), path, entries);
+  const { places, paletteCount } = parseRadHead(source);
+  for (const [k, { file, first, end }] of places.entries()) {
+    if (file !== undefined) {
+      const content = await (source.openFile ?? noParts(name, 'scene.rad'))(file);
+      yield chunkIn(source, content, `${name}, ${file}`, paletteCount);
       continue;
     }
-    const first = end + count(offset, `${where}.offset`);
-    const last = first + count(length, `${where}.bytes`);
-    if (last > bytes.length) throw damaged(where, `${grouped(last)} bytes`, grouped(bytes.length), 'decode/truncated');
+    const where = `${name}, chunks[${k}]`;
+    if (end > bytes.length) throw damaged(where, `${grouped(end)} bytes`, grouped(bytes.length), 'decode/truncated');
     // Each chunk is charged, because a list may refer to the same chunk repeatedly.
-    budget.take(length as number, where);
-    yield chunkIn(source, bytes.subarray(first, last), where, entries);
+    budget.take(end - first, where);
+    yield chunkIn(source, bytes.subarray(first, end), where, paletteCount);
   }
 }
 
-function chunkIn({ budget }: SceneSource, bytes: Uint8Array, where: string, paletteCount?: number): RadChunk {
+/**
+ * Parses a chunk. Its properties are not decoded.
+ * @param where Name of the chunk in error messages.
+ * @throws GaussianSplatError `decode/header`, `decode/truncated`, `decode/corrupt`, `decode/unsupported`
+ */
+export function chunkIn(
+  { budget }: Pick<SceneSource, 'budget'>,
+  bytes: Uint8Array,
+  where: string,
+  paletteCount?: number,
+): RadChunk {
   const { json, end } = descriptionAt({ budget }, bytes, 'RADC', where);
   const { version, maxSh = 0, lodTree = false, properties } = json;
   if (version !== 1) throw damaged(`${where}, version`, 'version 1', show(version), 'decode/unsupported');
@@ -111,7 +159,7 @@ function descriptionAt(
 ): { json: Json; end: number } {
   if (!startsWith(bytes, signature))
     throw damaged(name, signature, JSON.stringify(asciiOf(bytes, 0, 4)), 'decode/header');
-  const end = START_BYTES + (bytes.length < START_BYTES ? 0 : viewOf(bytes).getUint32(4, true));
+  const end = radHeadBytes(bytes);
   if (bytes.length < Math.max(START_BYTES, end))
     throw damaged(name, `${grouped(end)} bytes`, grouped(bytes.length), 'decode/truncated');
   const json = parseJson({ bytes: bytes.subarray(START_BYTES, end), name, budget }, MAX_JSON_BYTES);

@@ -51,6 +51,26 @@ export function valuesOf(
 }
 
 /**
+ * Decodes whole numbers of 16 or 32 bits, [count]. Float32 would round those above 2^24.
+ * @throws GaussianSplatError as {@link valuesOf} does
+ */
+export function indicesOf(
+  property: RadProperty,
+  count: number,
+  { budget, name }: Pick<SceneSource, 'budget' | 'name'>,
+): Uint32Array {
+  const where = `${name}, ${property.name}`;
+  const isShort = property.encoding === 'u16';
+  if (!isShort && property.encoding !== 'u32')
+    throw damaged(where, 'the encoding u16 or u32', property.encoding, 'decode/unsupported');
+  const view = viewOf(contentOf(property, count * (isShort ? 2 : 4), where, budget));
+  budget.take(4 * count, where);
+  return Uint32Array.from({ length: count }, (_, i) =>
+    isShort ? view.getUint16(2 * i, true) : view.getUint32(4 * i, true),
+  );
+}
+
+/**
  * Returns the inflated bytes of a property. They are a copy if decoding modifies them.
  * @param expected Number of bytes, if known. Throws `decode/truncated` for fewer.
  */

@@ -1,24 +1,28 @@
 import { loadModule } from '@gaussian-splat/core';
-import { isJsonWith } from '../signatures.js';
+import { isJsonWith, isRad } from '../signatures.js';
 import type { ReadNode, SceneNode, SceneTree, TreeContainer, TreeFiles, TreeReader } from './types.js';
 
 const READERS: Readonly<Record<TreeContainer, () => Promise<{ readonly reader: TreeReader }>>> = {
   tiles: () => import('./tiles.js'),
   lcc: () => import('./lcc.js'),
+  rad: () => import('./rad.js'),
 };
 
 const isLcc = isJsonWith(/"totalLevel"\s*:/);
+const isLcc2 = isJsonWith(/"(totalLevels|lod_3dgs_info)"\s*:/);
 
 const readerOf = async (container: TreeContainer): Promise<TreeReader> =>
   (await loadModule('the code that reads levels', READERS[container])).reader;
 
 /**
- * Opens a scene whose file is a tree of levels: a tileset of 3D Tiles, or LCC. Its nodes can then be read separately.
- * @param bytes The file of the scene, which describes the tree or its beginning.
+ * Opens a scene whose file is a tree of levels: a tileset of 3D Tiles, LCC, or RAD. Its nodes can then be read separately.
+ * @param bytes The file of the scene, which describes the tree or its beginning. The beginning of a RAD file is enough.
+ * @returns Undefined for files without levels, and for LCC2, whose nodes have no places.
  * @throws GaussianSplatError `decode/*`, `out-of-memory/budget`, or the errors of `files`.
  */
-export async function openTree(bytes: Uint8Array, files: TreeFiles): Promise<SceneTree> {
-  return (await readerOf(isLcc(bytes) ? 'lcc' : 'tiles')).open(bytes, files);
+export async function openTree(bytes: Uint8Array, files: TreeFiles): Promise<SceneTree | undefined> {
+  if (isLcc2(bytes)) return undefined;
+  return (await readerOf(isRad(bytes) ? 'rad' : isLcc(bytes) ? 'lcc' : 'tiles')).open(bytes, files);
 }
 
 /**

@@ -25,6 +25,11 @@ export interface ReadNode {
   readonly cloud?: GaussianCloud | undefined;
   /** Child nodes that were unknown, because another file lists them. */
   readonly found: readonly SceneNode[];
+  /**
+   * Number of splats that each child replaces, in the order of {@link cloud}; the remaining splats have no child. Absent
+   * if the splats are divided by the volumes of the children.
+   */
+  readonly parts?: readonly number[];
   /** Whether the node is drawn in addition to its children, instead of being replaced by them. */
   readonly isAdded: boolean;
   /** Maximum error in world units of the node without its children, as the file declares it; Infinity if it does not. */
@@ -32,7 +37,7 @@ export interface ReadNode {
 }
 
 /** Names of the containers whose nodes can be read separately. */
-export type TreeContainer = 'tiles' | 'lcc';
+export type TreeContainer = 'tiles' | 'lcc' | 'rad';
 
 /** A tree of levels whose root or roots are known. */
 export interface SceneTree {
@@ -45,6 +50,8 @@ export interface SceneTree {
   readonly isDescended: boolean;
   /** Whether {@link roots} contain all nodes, judged by the addresses of contents. */
   readonly isComplete: boolean;
+  /** Number of splats of all nodes, if the file states it. */
+  readonly splats?: number;
   /** Vertical axis, if the container has one. */
   readonly up?: Vector3;
 }
@@ -59,12 +66,15 @@ export interface TreeFiles {
   readonly openFile: OpenFile;
   /** Opens a file that describes several nodes, and keeps it for some time. */
   readonly openIndex: OpenFile;
+  /** Opens bytes that describe several nodes, and keeps them. No path denotes the file of the scene. */
+  readonly openShared: (path: string | undefined, start: number, end: number) => Promise<Uint8Array>;
   /** Opens bytes `start` to `end`, excluding `end`, of a file. Resolves to fewer if the file ends before. */
   readonly openRange: (path: string, start: number, end: number) => Promise<Uint8Array>;
 }
 
 /** Code of a container of trees. */
 export interface TreeReader {
-  open(bytes: Uint8Array, files: TreeFiles): Promise<SceneTree>;
+  /** Resolves to undefined for a file without levels. */
+  open(bytes: Uint8Array, files: TreeFiles): Promise<SceneTree | undefined>;
   read(node: SceneNode, facts: unknown, files: TreeFiles): Promise<ReadNode>;
 }

@@ -16,6 +16,11 @@ export interface NodeContent {
    * units, [13]. Undefined if it is unknown.
    */
   readonly volumes: readonly (readonly number[] | undefined)[];
+  /**
+   * Number of splats that each child replaces, in the order of {@link cloud}; the remaining splats have no child. If
+   * absent, the splats are divided by {@link volumes}.
+   */
+  readonly parts?: readonly number[] | undefined;
   /** Whether the node is drawn in addition to its children, instead of being replaced by them. */
   readonly isAdded: boolean;
   /** Maximum error in world units of the node without its children; Infinity if the file does not declare it. */
@@ -59,13 +64,17 @@ export function packNodes(nodes: readonly NodeContent[], scene: StreamedScene, a
   const drawn: PackedRun[] = [];
   const counts: number[] = [];
   let splats = 0;
-  for (const { cloud, volumes, isAdded, error } of nodes) {
+  for (const { cloud, volumes, parts: given, isAdded, error } of nodes) {
     const placed = cloud && placedIn(cloud, scene);
     const usable = placed ? usableIndices(placed) : new Uint32Array(0);
     splats += usable.length;
     const places = volumes.map((volume) => volume && relative(volume, scene.origin));
     const isLeaf = isAdded || volumes.length === 0;
-    const parts = isLeaf ? volumes.map(() => new Uint32Array(0)) : divided(placed, usable, places);
+    const [rest, ...parts] = given
+      ? cut(usable, given)
+      : isLeaf
+        ? [usable, ...volumes.map(() => new Uint32Array(0))]
+        : [new Uint32Array(0), ...divided(placed, usable, places)];
     parts.forEach((own, child) => {
       counts.push(own.length);
       const run = packPart(placed, own, scene, boxOf(places[child], above));
@@ -75,8 +84,8 @@ export function packNodes(nodes: readonly NodeContent[], scene: StreamedScene, a
         own.length === 0 ? 2 * sphere[3] : CELL_ERROR * (spacing || (2 * sphere[3]) / Math.sqrt(own.length));
       replaced.push({ ...run, ...within(sphere, own.length === 0 ? estimate : Math.min(error, estimate), above) });
     });
-    if (!isLeaf || (usable.length === 0 && volumes.length > 0)) continue;
-    const run = packPart(placed, usable, scene, boxOf(undefined, above));
+    if (rest.length === 0 && volumes.length > 0) continue;
+    const run = packPart(placed, rest, scene, boxOf(undefined, above));
     drawn.push({ ...run, sphere: sphereAround(run.chunks), error: 0 });
   }
   return {
@@ -122,6 +131,18 @@ function boxOf(volume: readonly number[] | undefined, above: RunError | undefine
       ]
     : [above ?? [0, 0, 0], [0, 1, 2].map(() => above?.[3] ?? 0)];
   return { min: half.map((x, axis) => center[axis] - x), max: half.map((x, axis) => center[axis] + x) };
+}
+
+/** Returns the splats after those of all parts, then those of each part. @param usable Indices of the splats, ascending. */
+function cut(usable: Uint32Array, parts: readonly number[]): Uint32Array<ArrayBuffer>[] {
+  let [first, at] = [0, 0];
+  const own = parts.map((count) => {
+    first += count;
+    const from = at;
+    while (at < usable.length && usable[at] < first) at++;
+    return usable.slice(from, at);
+  });
+  return [usable.slice(at), ...own];
 }
 
 /** Divides splats among volumes: each belongs to the nearest one, or to the first of those that contain it. */

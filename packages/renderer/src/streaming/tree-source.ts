@@ -1,5 +1,6 @@
 import { GaussianSplatError } from '@gaussian-splat/core';
-import { pageLayout } from './manifest.js';
+import { constants } from '../generated/shaders.js';
+import { pageLayout, SLOT_CHUNKS } from './manifest.js';
 import type { NodePage, RunError } from './pack-nodes.js';
 import { GrowingList } from './page-list.js';
 import type { PageSource, StreamedScene } from './page-source.js';
@@ -11,6 +12,8 @@ const MAX_PAGES = 1 << 17;
 const PAGES_AHEAD = 1 << 15;
 /** Assumed maximum number of slots of a page, 65,536 splats, which bounds the memory of a small tree. */
 const PAGE_SLOTS = 64;
+/** Minimum number of slots of a tree whose number of splats is known. */
+const FIRST_SLOTS = 64;
 
 /** A node whose known children can be counted. */
 export interface TreeNode<Node> {
@@ -26,6 +29,8 @@ export interface OpenedTree<Node> {
   readonly children: readonly Node[];
   /** Whether {@link children} probably contain all nodes; otherwise reading a node finds more. */
   readonly isComplete: boolean;
+  /** Number of splats of all nodes; undefined if unknown. */
+  readonly splats?: number | undefined;
 }
 
 /** A page of a node, and the nodes that refine it. */
@@ -47,7 +52,7 @@ export function treeSource<Node extends TreeNode<Node>>(
   const chunkWords = pageLayout(opened.scene, 1).total;
   const known = 1 + countOf(opened.children);
   const capacity = Math.min(MAX_PAGES, Math.max(PAGES_AHEAD, 2 * known));
-  const list = new GrowingList(capacity, opened.isComplete ? PAGE_SLOTS * known : Infinity);
+  const list = new GrowingList(capacity, slotsOf(opened, known));
   const nodes: Node[] = [];
   const above: RunError[] = [];
   /** Number of splats that each page replaces. */
@@ -85,6 +90,12 @@ export function treeSource<Node extends TreeNode<Node>>(
       return slotBySlot(fetched.words, scene);
     },
   };
+}
+
+/** Returns the maximum number of slots: twice those that all splats need, because runs leave gaps. */
+function slotsOf({ isComplete, splats = Infinity }: OpenedTree<unknown>, known: number): number {
+  const needed = FIRST_SLOTS + (2 * splats) / (SLOT_CHUNKS * constants.CULL_GROUP);
+  return Math.ceil(Math.min(isComplete ? PAGE_SLOTS * known : Infinity, needed));
 }
 
 /** Returns the number of nodes in some trees. */

@@ -10,7 +10,7 @@ import { images, unlessWrong } from '../../gpu/initial-frames.js';
 import { limitScenes } from '../../gpu/memory-budget.js';
 import type { LodSettings } from '../../gpu/backend.js';
 import type { OpenOptions, OpenSource } from '../source-kind.js';
-import { nameIn } from '../source-kinds.js';
+import { nameIn, openSource } from '../source-kinds.js';
 import { streamCaps } from './stream-caps.js';
 
 interface StreamedOptions extends OpenOptions {
@@ -37,10 +37,14 @@ const DETAIL = 1;
 
 /**
  * Opens a streamed scene: fetches its manifest or index, and its coarsest level. Failures of parts are added to
- * `warnings` later.
+ * `warnings` later. Resolves to undefined for a file without levels.
  * @throws GaussianSplatError `network/*`, `decode/*`, `out-of-memory/*`, or the signal's reason.
  */
-async function openStreamed(request: SceneRequest, device: GPUDevice, options: StreamedOptions): Promise<OpenedStream> {
+async function openStreamed(
+  request: SceneRequest,
+  device: GPUDevice,
+  options: StreamedOptions,
+): Promise<OpenedStream | undefined> {
   const { signal, memoryBudget = Infinity, onChange } = options;
   const caps = streamCaps();
   const warnings: string[] = [];
@@ -62,7 +66,9 @@ async function openStreamed(request: SceneRequest, device: GPUDevice, options: S
   };
   const name = nameIn(request.url);
   const open = /detail\.json$/i.test(name) ? openPages : /lod-meta\.json$/i.test(name) ? openBoxes : openNodes;
-  const { gaussians, credits } = await open(request, device, options, pool);
+  const streamed = await open(request, device, options, pool);
+  if (!streamed) return undefined;
+  const { gaussians, credits } = streamed;
   const { bounds, order } = gaussians;
   const splatBudget = Math.min(caps.splats, request.limits?.maxSplats ?? Infinity);
   if (!signal.aborted)
@@ -104,7 +110,7 @@ type Open = (
   device: GPUDevice,
   options: StreamedOptions,
   pool: PoolOptions,
-) => Promise<{ readonly gaussians: StreamedGaussians; readonly credits: Credits | undefined }>;
+) => Promise<{ readonly gaussians: StreamedGaussians; readonly credits: Credits | undefined } | undefined>;
 
 const openPages: Open = async (request, device, { loader, signal, onProgress }, pool) => {
   const { limits = {} } = request;
@@ -139,7 +145,9 @@ const openBoxes: Open = async (request, device, { loader, signal, onProgress }, 
 };
 
 const openNodes: Open = async (request, device, { loader, signal, onProgress }, pool) => {
-  const { tree, warnings, ...opened } = await loader.ask('tree', request, signal, { onProgress });
+  const answer = await loader.ask('tree', request, signal, { onProgress });
+  if (!answer) return undefined;
+  const { tree, warnings, ...opened } = answer;
   const report = (sentences: readonly string[]): void =>
     sentences.forEach((sentence) => pool.onError?.(new Error(sentence)));
   report(warnings);
@@ -158,7 +166,7 @@ const openNodes: Open = async (request, device, { loader, signal, onProgress }, 
   return { gaussians: await StreamedGaussians.openSource(device, source, pool), credits: opened.credits };
 };
 
-/** Opens a streamed scene. */
+/** Opens a streamed scene; a file without levels as a whole. */
 export const open: OpenSource = async (request, options, acquiring) => {
   const lease = await acquiring;
   const opened: { scene?: LoadedGaussians } = {};
@@ -168,7 +176,9 @@ export const open: OpenSource = async (request, options, acquiring) => {
   options.signal.throwIfAborted();
   // The size of the scene is unknown until the manifest is loaded, so its limit is reported.
   options.beforeUpload(options.memoryBudget ?? 0);
-  const { gaussians, bounds, ...rest } = await openStreamed(request, lease.device, { ...options, onChange });
+  const streamed = await openStreamed(request, lease.device, { ...options, onChange });
+  if (!streamed) return openSource({ ...request, isWhole: true }, options, acquiring);
+  const { gaussians, bounds, ...rest } = streamed;
   opened.scene = new LoadedGaussians(lease, gaussians, bounds, options.submissions, rest);
   return opened.scene;
 };
