@@ -1,10 +1,12 @@
 /**
- * `npm run test:exporter`: the Python exporter in a virtual environment of its own (.cache/exporter): ruff, mypy, pytest.
+ * `npm run test:exporter`: the Python exporter in a virtual environment of its own (.cache/exporter): ruff, mypy, pytest; then OpenUSD
+ * files of the commands with usd-core.
  * `-- --torch` installs PyTorch, too (gigabytes), for what trains, for modules and for comparisons with public code.
  * `-- --webgpu` runs the files on ONNX Runtime's WebGPU provider, in an environment beside it. Other arguments go to pytest.
  */
 import { join } from 'node:path';
 import { gpuEnvironment } from './lib/gpu-environment.mjs';
+import { ensureDependencies, ensureElement } from './lib/prepare.mjs';
 import { environment } from './lib/python-environment.mjs';
 import { must, root } from './lib/run.mjs';
 
@@ -25,4 +27,7 @@ if (webgpu) {
   must(python, ['-m', 'ruff', 'format', '--check', '.'], { cwd: folder });
   must(python, ['-m', 'mypy'], { cwd: folder });
   must(python, ['-m', 'pytest', '-rs', ...rest], { cwd: folder });
+  ensureDependencies();
+  ensureElement();
+  must(process.execPath, ['--import', 'tsx', '--test', 'tests/formats/usd-core.alone.test.ts'], { cwd: root });
 }

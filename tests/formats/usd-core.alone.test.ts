@@ -1,4 +1,4 @@
-/** OpenUSD against usd-core of PyPI, by the Python of `npm run test:exporter` or of `USD_PYTHON`: 200 random stages, and files that `optimize` writes. */
+/** OpenUSD against usd-core of PyPI, by the Python of `npm run test:exporter` or of `USD_PYTHON`: 200 random stages, and files that `optimize` and `page` write. */
 import assert from 'node:assert/strict';
 import { execFileSync, spawnSync } from 'node:child_process';
 import { existsSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
@@ -13,7 +13,7 @@ import {
   type ShDegree,
   type Vector3,
 } from '@gaussian-splat/core';
-import { encodingsFor } from '@gaussian-splat/optimize';
+import { encodingsFor, fewerSplats } from '@gaussian-splat/optimize';
 import { readScene } from '@gaussian-splat/formats';
 import { shBasis } from '../oracle/sh.js';
 import { needsSharedData, sharedFile } from '../support/data.js';
@@ -151,6 +151,66 @@ test('200 random stages are as usd-core reads them, within 1e-6', { skip }, asyn
     rmSync(folder, { recursive: true });
   }
 });
+
+/** Captured scenes of the repository, of up to 450,000 splats. */
+const CAPTURES = ['apartment', 'garden', 'hall', 'product', 'walker'];
+const MAX_ON_PHONES = 200_000;
+
+test(
+  '`page --usdz` writes five captures for phones as usd-core accepts them, within 1e-6',
+  { skip },
+  async (context) => {
+    const folder = mkdtempSync(join(tmpdir(), 'usd-'));
+    try {
+      const sources = CAPTURES.map((name) => join(root, `demo/scenes/studio/${name}.spz`));
+      const command = [join(root, 'packages/cli/bin/gaussian-splat.mjs'), 'page', ...sources, folder];
+      execFileSync(process.execPath, [...command, '--no-serve', '--usdz'], { stdio: 'pipe' });
+      const files = CAPTURES.map((name) => join(folder, `${name}-ar.usdz`));
+      const output = execFileSync(python!, [script, 'dump', ...files], { encoding: 'utf8' });
+      const stages = JSON.parse(output) as { up: string; degree: ShDegree; faults: readonly string[] }[];
+      for (const [k, { up, degree, faults }] of stages.entries()) {
+        assert.deepEqual(faults, [], CAPTURES[k]);
+        const whole = await readScene(readFileSync(sources[k]), { name: sources[k] });
+        const cloud = fewerSplats(whole, MAX_ON_PHONES);
+        const kept = Math.min(whole.count, MAX_ON_PHONES);
+        assert.deepEqual([cloud.count, degree, cloud.hints?.up ?? [0, -1, 0]], [kept, whole.shDegree, [0, -1, 0]]);
+        assert.equal(up, 'Y', 'the stage is turned by half a turn about x');
+        const numbers = (name: string): Float32Array => {
+          const { buffer, byteOffset, length } = readFileSync(join(folder, `${CAPTURES[k]}-ar.${name}`));
+          return new Float32Array(buffer.slice(byteOffset, byteOffset + length));
+        };
+        const [positions, scales, turns, opacities, sh] = [
+          ...['positions', 'scales', 'orientations', 'opacities', 'sphericalHarmonicsCoefficients'].map(numbers),
+        ];
+        const places = cloud.positions.map((value, i) => (i % 3 === 0 ? value : -value));
+        const stride = 3 * (degree + 1) ** 2;
+        const [d, turned] = [DIRECTIONS[0], [DIRECTIONS[0][0], -DIRECTIONS[0][1], -DIRECTIONS[0][2]] as const];
+        const colors = Float64Array.from(
+          { length: cloud.count },
+          (_, i) => colorOf(cloud.sh, stride * i, degree, d)[1],
+        );
+        const found = colors.map((_, i) => colorOf(sh, stride * i, degree, turned)[1]);
+        // Half a turn, (0, 1, 0, 0), times (w, x, y, z) is (-x, w, -z, y); the real part is stored last.
+        const expected = new Float32Array(4 * cloud.count);
+        for (let i = 0; i < expected.length; i += 4) {
+          const [w, x, y, z] = cloud.rotations.subarray(i, i + 4);
+          expected.set([w, -z, y, -x], i);
+        }
+        const differences = {
+          positions: largestDifference(positions, places),
+          scales: largestDifference(scales, cloud.scales),
+          rotations: largestDifference(turns, expected),
+          opacities: largestDifference(opacities, cloud.opacities),
+          colors: largestDifference(found, colors),
+        };
+        for (const [what, value] of Object.entries(differences)) assertAtMost(value, 1e-6, `${CAPTURES[k]}, ${what}`);
+        context.diagnostic(`${CAPTURES[k]}: ${cloud.count} of ${whole.count} splats, ${JSON.stringify(differences)}`);
+      }
+    } finally {
+      rmSync(folder, { recursive: true });
+    }
+  },
+);
 
 /** Scenes of the shared data. The test takes a few thousand splats of each. */
 const SCENES = ['skull.ply', 'angel.compressed.ply', 'massa.sog', 'st-peter.sog', 'plant.splat'];

@@ -151,7 +151,7 @@ test('optimize, detail and page keep the credits of five formats', async () => {
   }
   command('page', ...sources, 'page', '--no-serve', '--usdz');
   for (const name of sources)
-    for (const copy of [name, name.replace(/\w+$/, 'usdz')])
+    for (const copy of [name, name.replace('.', '-ar.').replace(/\w+$/, 'usdz')])
       assert.deepEqual(await read(`page/${copy}`), CREDITS, `page ${name}: ${copy}`);
 });
 

@@ -103,12 +103,16 @@ test('gaussian-splat page brings the files that a scene or a model names, and no
   assert.deepEqual(filesOfPage('external.onnx'), ['external.onnx', 'external.weights']);
 });
 
-test('gaussian-splat page --usdz also writes the splats as OpenUSD', async () => {
+test('gaussian-splat page --usdz also writes the splats as OpenUSD, and links them', async () => {
   const { status, text } = command('page', 'gltf/scene.gltf', 'page', '--no-serve', '--usdz');
   assert.equal(status, 0, text);
-  const cloud = await readScene(readFileSync(inFolder('page', 'scene.usdz')), { name: 'scene.usdz' });
-  assert.match(text, new RegExp(`scene\\.usdz: ${cloud.count} splats as OpenUSD`));
+  const cloud = await readScene(readFileSync(inFolder('page', 'scene-ar.usdz')), { name: 'scene-ar.usdz' });
+  assert.match(text, new RegExp(`scene-ar\\.usdz: ${cloud.count} of ${cloud.count} splats as OpenUSD`));
   assert.deepEqual(cloud.hints, { up: [0, 1, 0], metersPerUnit: 1 });
+  assert.match(
+    readFileSync(inFolder('page', 'index.html'), 'utf8'),
+    / camera-controls ios-splats="scene-ar\.usdz" ar>/,
+  );
   const refused = command('page', 'link.onnx', 'page', '--no-serve', '--usdz');
   assert.match(refused.text, /--usdz takes a scene file/);
   rmSync(inFolder('page'), { recursive: true });

@@ -24,12 +24,15 @@ import { obstacleToFolder, writeWhole } from './lib/output-file.mjs';
 import { serve } from './lib/server.mjs';
 import { tagShowing } from './lib/shown-as.mjs';
 
+/** Number of splats that phones draw, by reports. */
+const MAX_USDZ = 200_000;
+
 const USAGE = `usage: gaussian-splat page SCENE... FOLDER [options]
 
   SCENE         scene, clip, generator or mesh; several are shown one below the other
   FOLDER        gets the element, the scenes with the files that they name, and an index.html unless there is one
   --single      an index.html that contains the element and the scene, and can be opened from a disk
-  --usdz        also writes the splats as OpenUSD (.usdz) into the folder, for programs that read ParticleField3DGaussianSplat
+  --usdz        also writes at most ${MAX_USDZ} splats as OpenUSD (.usdz) beside the page, which links them for AR on iPhones
   --port N      port of the server that shows the page (default 8000, or a free one if it is taken)
   --no-serve    ends when the page is written
   --catalogue   lists the scenes, and shows one at a time; the default for a folder or a pattern
@@ -47,42 +50,43 @@ async function makePage({ scenes, folder, port, isServed, isSingle, isSceneOnly,
   mkdirSync(folder, { recursive: true });
   if (isSceneOnly)
     for (const [k, scene] of scenes.entries()) report({ source: await copyScene(scene, folder), tag: tags[k] });
-  else if (isSingle) await writeSingle(scenes[0], tags[0], page, credits);
-  else await writeFolder(scenes, tags, folder, page, credits);
+  else if (isSingle) await writeSingle(scenes[0], tags[0], page, attributesOf(scenes[0], { credits, hasUsdz }));
+  else await writeFolder(scenes, tags, folder, page, { credits, hasUsdz });
   for (const scene of hasUsdz ? scenes : []) await writeUsdz(scene, folder, credits);
   if (!isSceneOnly) console.log(`\nThe page is ${isSingle ? page : `in ${folder}`}`);
   if (isServed) await show(folder, port);
 }
 
-async function writeFolder(scenes, tags, folder, page, credits) {
+async function writeFolder(scenes, tags, folder, page, options) {
   copyElement(join(folder, 'cdn'), scenes.some(isModel));
   if (scenes.some(isModel)) await copyRuntime(join(folder, 'cdn/onnxruntime'));
   const elements = [];
   for (const [i, scene] of scenes.entries()) {
     const source = await copyScene(scene, folder);
-    elements.push((attributes) => elementOf(tags[i], titleOf(scene), ` src="${addressOf(source)}"`, attributes));
+    const own = attributesOf(scene, options);
+    elements.push((style) => elementOf(tags[i], titleOf(scene), ` src="${addressOf(source)}"`, own + style));
   }
-  const markup = (style) => elements.map((element) => element(attributesOf(credits) + style)).join('\n  ');
+  const markup = (style) => elements.map((element) => element(style)).join('\n  ');
   const size = ' style="display: block; width: 100%; height: 80vh"';
   if (existsSync(page))
     console.log(`\n${page} exists and was not changed. Paste into it:\n\n${SCRIPT}\n${markup(size)}`);
   else writeWhole(page, htmlOf(`${markup('')}\n  ${SCRIPT}\n${FROM_DISK}`, titleOf(scenes[0])));
 }
 
-/** Writes all splats of a scene as OpenUSD. */
+/** Writes the splats of a scene as OpenUSD, fewer if there are too many for phones. */
 async function writeUsdz(scene, folder, credits) {
-  if (isModel(scene)) throw new CommandError(`${scene} is a generator: --usdz takes a scene file.`);
-  const [{ startReading }, { changeFormat, lossesIn }, { inline }] = await Promise.all([
+  const [{ startReading }, { changeFormat, fewerSplats, lossesIn }, { inline }] = await Promise.all([
     import('./lib/scene-in-parts.mjs'),
     import('@gaussian-splat/optimize'),
     import('@gaussian-splat/optimize/parts'),
   ]);
-  const out = join(folder, `${plainTitleOf(scene)}.usdz`);
-  if (resolve(scene) === out) return;
-  const cloud = credited(await (await startReading(scene, inline)).cloud, credits);
-  sayWarnings(scene, cloud, lossesIn(out, cloud));
+  const out = join(folder, usdzOf(scene));
+  const whole = credited(await (await startReading(scene, inline)).cloud, credits);
+  const losses = whole.antialiased ? ['Its filter is left out of the USDZ, so it looks fuller from afar in AR.'] : [];
+  sayWarnings(scene, whole, [...lossesIn(out, whole), ...losses]);
+  const cloud = { ...fewerSplats(whole, MAX_USDZ), antialiased: false, filterVariance: undefined };
   writeWhole(out, (await changeFormat(cloud, { name: out })).bytes);
-  console.log(`\n${out}: ${cloud.count} splats as OpenUSD`);
+  console.log(`\n${out}: ${cloud.count} of ${whole.count} splats as OpenUSD`);
 }
 
 /** Maximum bytes of a scene in a page of one file: its text must fit into a string of JavaScript. */
@@ -92,7 +96,7 @@ const MAX_SINGLE = 384e6;
  * Writes an index.html that contains the element and the scene as text. The page converts the scene to a file with its
  * name, because the name identifies some formats.
  */
-async function writeSingle(scene, tag, page, credits) {
+async function writeSingle(scene, tag, page, attributes) {
   if (existsSync(page)) throw new CommandError(`${page} exists. With --single name a folder without an index.html.`);
   const { found, missing } = await filesBeside(scene);
   if (isJson(scene) || found.length + missing.length > 0 || isModel(scene))
@@ -115,7 +119,7 @@ async function writeSingle(scene, tag, page, credits) {
     await customElements.whenDefined('${tag}');
     document.querySelector('${tag}').src = new File([await data.blob()], ${name});
   </script>`;
-  writeWhole(page, htmlOf(`${elementOf(tag, title, '', attributesOf(credits))}\n  ${script}`, title));
+  writeWhole(page, htmlOf(`${elementOf(tag, title, '', attributes)}\n  ${script}`, title));
 }
 
 function parseOptions(args) {
@@ -138,6 +142,11 @@ function parseOptions(args) {
   const nameOf = (scene) => (/\.(json|gltf)$/i.test(scene) ? basename(dirname(scene)) : '') + basename(scene);
   const twin = scenes.find((scene, i) => scenes.findIndex((other) => nameOf(other) === nameOf(scene)) !== i);
   if (twin) throw new UsageError(`There are two files ${basename(twin)}: rename one`);
+  for (const [k, scene] of values.usdz ? scenes.entries() : []) {
+    if (isModel(scene)) throw new UsageError(`${scene} is a generator: --usdz takes a scene file`);
+    if (scenes.findIndex((other) => usdzOf(other) === usdzOf(scene)) < k)
+      throw new UsageError(`--usdz: there are two scenes for ${usdzOf(scene)}: rename one`);
+  }
   if (values.single && scenes.length > 1) throw new UsageError('--single takes one scene');
   if (existsSync(folder) && !statSync(folder).isDirectory())
     throw new UsageError(`${folder} is a file: a folder is needed`);
@@ -221,11 +230,14 @@ function titleOf(scene) {
   return escaped(plainTitleOf(scene));
 }
 
-/** Returns the attributes of credits. */
-const attributesOf = ({ attribution, license }) =>
-  Object.entries({ attribution, license })
+/** Returns the name of the file of {@link writeUsdz}. */
+const usdzOf = (scene) => `${plainTitleOf(scene)}-ar.usdz`;
+
+/** Returns the attributes of credits, and of AR. */
+const attributesOf = (scene, { credits: { attribution, license }, hasUsdz }) =>
+  Object.entries({ attribution, license, ...(hasUsdz && { 'ios-splats': addressOf(usdzOf(scene)) }) })
     .map(([name, text]) => (text === undefined ? '' : ` ${name}="${escaped(text)}"`))
-    .join('');
+    .join('') + (hasUsdz ? ' ar' : '');
 
 /** Returns the HTML that shows a scene, or a mesh, which is a child of the element. */
 function elementOf(tag, title, src = '', attributes = '') {

@@ -2,7 +2,7 @@
 import './gaussian-splat.min.js';
 
 /** Attributes that are addresses. */
-const ADDRESSES = ['src', 'poster', 'views', 'skybox-image', 'walk-map', 'ios-src'];
+const ADDRESSES = ['src', 'poster', 'views', 'skybox-image', 'walk-map', 'ios-src', 'ios-splats'];
 /**
  * Attributes that a link may set. Attributes that name further models, send cookies to other servers, or set texts are
  * excluded, because the author of the link is

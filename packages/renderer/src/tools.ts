@@ -3,7 +3,7 @@
  * the renderer.
  */
 export { constants } from './generated/shaders.js';
-export { levelsAbove } from './levels/build-levels.js';
+export { levelOf, levelsAbove } from './levels/build-levels.js';
 export {
   boundLevel,
   detailRows,

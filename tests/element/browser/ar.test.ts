@@ -136,6 +136,9 @@ describe('AR', () => {
     const lowest = heights[Math.floor(0.01 * heights.length)];
     assert(Math.abs(lowest - PLANE) < 0.01, `lowest splats at ${lowest}`);
     const middle = inRoom(m, bounds.center);
+    const beside = Math.hypot(middle[0] - 0.2, middle[2] + 1.5);
+    const [up, aside, size_] = [lowest - PLANE, beside, size / 0.1 - 1].map((value) => (1000 * value).toFixed(2));
+    console.log(`AR: ${up} mm above the plane, ${aside} mm beside the hit, ${size_} mm too long for each meter`);
     assert(Math.hypot(middle[0] - 0.2, middle[2] + 1.5) < 0.02, `middle at ${middle}`);
     element.exitXR!();
     await until(() => element.getAttribute('ar-status') === 'not-presenting', 'an end', LIMIT_MS);
@@ -257,6 +260,14 @@ describe('AR', () => {
       await until(() => link() !== null, 'the link', LIMIT_MS);
       assert(link()!.href.endsWith('/compass.usdz'), link()!.href);
       assertEqual(link()!.querySelector('img')!.alt, 'View a simplified model in AR', 'its name');
+      element.setAttribute('ios-splats', 'compass-ar.usdz');
+      await frames(4);
+      assert(link()!.href.endsWith('/compass.usdz'), 'a system that draws no splats has the mesh');
+      Object.assign(globalThis, { HTMLModelElement: class {} });
+      element.requestUpdate();
+      await until(() => link()!.href.endsWith('/compass-ar.usdz'), 'the splats', LIMIT_MS);
+      element.setAttribute('ios-splats', 'javascript:alert(1)');
+      await until(() => link()!.href.endsWith('/compass.usdz'), 'the mesh in place of code', LIMIT_MS);
       element.setAttribute('ios-src', 'javascript:alert(1)');
       await until(() => link() === null, 'no link to code', LIMIT_MS);
       const other = await showLoaded({ src: COMPASS, ar: '', ...STILL });
@@ -274,6 +285,7 @@ describe('AR', () => {
     } finally {
       Object.defineProperty(navigator, 'userAgent', userAgent);
       Reflect.deleteProperty(navigator, 'userAgent');
+      Reflect.deleteProperty(globalThis, 'HTMLModelElement');
     }
   });
 });

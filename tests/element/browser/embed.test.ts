@@ -95,7 +95,7 @@ describe('embed.html', () => {
       assert(page.querySelector('gaussian-splat') === null, src);
       assert(/^src: expected a file of http/.test(page.querySelector('p')!.textContent), src);
     }
-    for (const name of ['poster', 'views', 'skybox-image', 'walk-map', 'ios-src']) {
+    for (const name of ['poster', 'views', 'skybox-image', 'walk-map', 'ios-src', 'ios-splats']) {
       const page = await open(String(new URLSearchParams({ src: COMPASS, [name]: refused[0] })));
       assert(page.querySelector('p')!.textContent.startsWith(`${name}: expected`), name);
     }

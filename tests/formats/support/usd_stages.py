@@ -3,6 +3,7 @@
 `write FOLDER COUNT SEED` writes random stages, and their splats as usd-core evaluates them to expected.json.
 `read FILES` prints the same for other stages, with the faults that the validators of usd-core find, and writes the root
 layer of each again, as again-NAME.usda and .usdc.
+`dump FILES` prints the up axis and the faults of stages with one prim of float32 arrays, and writes these to FILE.ATTRIBUTE.
 """
 
 import json
@@ -234,6 +235,16 @@ def faults_of(path):
     return [error.GetMessage() for error in context.Validate(Usd.Stage.Open(str(path)))]
 
 
+def dump_stage(path):
+    """Write the arrays of the only prim as their bytes; quaternions with the real part last."""
+    stage = Usd.Stage.Open(str(path))
+    [prim] = [prim for prim in stage.Traverse() if prim.GetTypeName() == TYPE]
+    for name in ARRAYS:
+        path.with_suffix(f".{name.split(':')[-1]}").write_bytes(memoryview(prim.GetAttribute(name).Get()).tobytes())
+    degree = prim.GetAttribute("radiance:sphericalHarmonicsDegree").Get()
+    return {"file": path.name, "up": UsdGeom.GetStageUpAxis(stage), "degree": degree, "faults": faults_of(path)}
+
+
 def main():
     """Run a command."""
     command, *rest = sys.argv[1:]
@@ -244,6 +255,8 @@ def main():
         for path in paths:
             write_stage(path)
         (folder / "expected.json").write_text(json.dumps([read_stage(path) for path in paths]))
+    elif command == "dump":
+        print(json.dumps([dump_stage(Path(path)) for path in rest]))
     else:
         found = []
         for path in map(Path, rest):

@@ -33,21 +33,32 @@ export function* buildLevelsAbove(finest: LevelSource, count?: number): Generato
   const levels: SplatLevel[] = [];
   let level = finest;
   while (count === undefined ? chunksOf(level.count) > 1 : levels.length < count) {
-    const next: SplatLevel = yield* buildNextLevel(level);
+    const next: SplatLevel = yield* buildNextLevel(level, (end) => Math.ceil(end * KEPT));
     levels.push(next);
     level = next;
   }
   return levels;
 }
 
-/** Builds the next coarser level, in steps. Its chunk k represents chunks 4 k to 4 k + 3 of the given level. */
-function* buildNextLevel(level: LevelSource): Generator<void, SplatLevel> {
+/**
+ * Builds a level of `max` splats from one of up to four times as many. Its chunks do not correspond to those of the given
+ * level.
+ */
+export const levelOf = (finest: LevelSource, max: number): SplatLevel =>
+  finish(buildNextLevel(finest, (end) => Math.ceil((end * max) / finest.count)));
+
+/**
+ * Builds the next coarser level, in steps. If it has a quarter of the splats, its chunk k represents chunks 4 k to
+ * 4 k + 3 of the given level.
+ * @param keptOf Returns how many splats remain of the first `end` splats.
+ */
+function* buildNextLevel(level: LevelSource, keptOf: (end: number) => number): Generator<void, SplatLevel> {
   const reducer = new BlockReducer();
   const block = new Block();
-  const next = emptyLevel(Math.ceil(level.count * KEPT), level);
+  const next = emptyLevel(keptOf(level.count), level);
   for (let first = 0, at = 0; first < level.count; first += BLOCK) {
     block.load(level, first, Math.min(BLOCK, level.count - first));
-    reducer.reduce(block, Math.ceil(block.count * KEPT));
+    reducer.reduce(block, keptOf(first + block.count) - at);
     block.store(next, at);
     at += block.count;
     if ((first / BLOCK) % BLOCKS_A_STEP === BLOCKS_A_STEP - 1) yield;

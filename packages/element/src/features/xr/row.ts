@@ -16,7 +16,7 @@ export const XR_ATTRIBUTES = {
    */
   ar: flag(),
   /**
-   * How AR is shown: `webxr` in the page; `quick-look` on iPhones, with the model of `ios-src`. `scene-viewer` is known and never chosen: it reads no splats.
+   * How AR is shown: `webxr` in the page; `quick-look` on iPhones, with the model of `ios-src` or the splats of `ios-splats`. `scene-viewer` is known and never chosen: it reads no splats.
    * @default `webxr quick-look`
    * @example ar-modes="webxr"
    */
@@ -39,6 +39,13 @@ export const XR_ATTRIBUTES = {
    * @example ios-src="vase.usdz"
    */
   iosSrc: text(),
+  /**
+   * URL of a USDZ with splats, as `gaussian-splat page --usdz` writes it, for iPhones whose system draws splats: those
+   * with `<model>` (Safari 27). They get it in place of `ios-src`. Not tried on a device.
+   * @default none
+   * @example ios-splats="vase-ar.usdz"
+   */
+  iosSplats: text(),
 };
 type Table = typeof XR_ATTRIBUTES;
 
@@ -69,7 +76,7 @@ export const vr: FeatureRow = {
  * @csspart vr-button - The button of the attribute `vr`.
  * @csspart ar-button - The button of the attribute `ar`.
  * @csspart exit-ar-button - The button that ends AR on a phone.
- * @csspart ar-link - The link to the model of `ios-src`.
+ * @csspart ar-link - The link to the model of `ios-src` or `ios-splats`.
  * @fires {CustomEvent<ImmersiveStatusDetail>} vr-status - Fired when VR becomes available, starts, ends, or fails.
  * @fires {CustomEvent<ImmersiveStatusDetail>} ar-status - Fired when AR becomes available, starts, ends, or fails, and when the object is placed in the room.
  */

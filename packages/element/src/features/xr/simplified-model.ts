@@ -12,6 +12,12 @@ const opensModels = (page: Document): boolean =>
   page.createElement('a').relList.supports('ar') || /iPhone|iPad/.test(page.defaultView?.navigator.userAgent ?? '');
 
 /**
+ * Whether the system draws splats of OpenUSD. No interface answers that; RealityKit draws them in the systems whose
+ * browser has `<model>`. Older ones would show an empty room.
+ */
+const drawsSplats = (page: Document): boolean => 'HTMLModelElement' in (page.defaultView ?? {});
+
+/**
  * Returns the address of the model for the link; null for an address of code, because sites fill attributes with texts of
  * others.
  */
@@ -22,8 +28,8 @@ function modelUrl(address: string | null, base: string): string | null {
 }
 
 /**
- * Replacements of AR on devices without WebXR: a link to the author's own mesh for iPhones, if the page names one;
- * otherwise the author's content in the slot `ar-fallback`.
+ * Replacements of AR on devices without WebXR: a link to the splats or to the author's own mesh for iPhones, if the page
+ * names one; otherwise the author's content in the slot `ar-fallback`.
  */
 export class SimplifiedModel implements ReactiveController {
   readonly #core: Viewer;
@@ -49,13 +55,15 @@ export class SimplifiedModel implements ReactiveController {
   hostUpdated(): void {
     const { attributes, strings } = this.#core;
     const modes = attributes.arModes?.trim() || 'webxr quick-look';
-    const model = modelUrl(attributes.iosSrc, this.#element.baseURI);
+    const { baseURI, ownerDocument: page } = this.#element;
+    const splats = drawsSplats(page) ? modelUrl(attributes.iosSplats, baseURI) : null;
+    const model = splats ?? modelUrl(attributes.iosSrc, baseURI);
     const isOffered =
       attributes.ar &&
       model !== null &&
       !this.#offer.canActivate &&
       /(^|\s)quick-look(\s|$)/.test(modes) &&
-      opensModels(this.#element.ownerDocument);
+      opensModels(page);
     const isReplaced =
       !isOffered && attributes.ar && this.#offer.isUnsupported && this.#element.querySelector('[slot=ar-fallback]');
     if (!isReplaced) this.#fallback.remove();
