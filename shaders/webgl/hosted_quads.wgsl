@@ -6,8 +6,7 @@
 
 @group(0) @binding(0) var<uniform> raster: HostedView;
 
-@group(0) @binding(4) var geometry: texture_2d<u32>;
-@group(0) @binding(5) var stored_depth: texture_2d<f32>;
+@group(0) @binding(4) var stored_depth: texture_2d<f32>;
 
 struct HostedView {
   // Pixels.
@@ -16,13 +15,6 @@ struct HostedView {
   count: u32,
   // Clear value of the depth buffer.
   nothing: f32,
-  // The optical axis in block-local coordinates: see `in_camera`.
-  axis: vec3f,
-  unused: f32,
-  eye: vec3f,
-  unused_too: f32,
-  eye_rest: vec3f,
-  unused_as_well: f32,
   // See SceneDepth.
   inverse: vec4f,
   // Texels for each drawn pixel.
@@ -42,14 +34,10 @@ struct HostedQuad {
 @vertex
 fn vertex(@builtin(vertex_index) vertex_index: u32, @builtin(instance_index) instance: u32) -> HostedQuad {
   let rank = instance * QUAD_BATCH + vertex_index / 4u;
-  let found = raster.count - 1u - min(rank, raster.count - 1u);
-  let s = splat_at(found);
+  let s = splat_at(raster.count - 1u - min(rank, raster.count - 1u));
   if (rank >= raster.count || s.paint.w == 0u) { return HostedQuad(vec4f(2.0, 2.0, 0.0, 1.0), vec4f(0.0), vec4f(0.0), 0.0, 0.0); }
-  let slot = textureLoad(order, texel_of(found), 0).x;
-  let position = bitcast<vec3f>(textureLoad(geometry, texel_of(2u * slot), 0).xyz);
-  let depth = dot(raster.axis, (position - raster.eye) - raster.eye_rest);
   let color = vec4f(splat_color(s), bitcast<f32>(s.paint.w));
-  return HostedQuad(place_of(s, vertex_index), s.shape, color, bitcast<f32>(s.paint.x), depth);
+  return HostedQuad(place_of(s, vertex_index), s.shape, color, bitcast<f32>(s.paint.x), splat_depth(s));
 }
 
 @fragment

@@ -1,5 +1,5 @@
 // Finds the densest depths of splats along the rays of points: one fragment for each point and fraction of the light. The last
-// row of ranges is copied.
+// row of ranges is copied. Splats of other scenes are left to their own draws.
 #import shared/densest
 #import shared/stored_gaussian
 #import webgl/probe_range
@@ -21,7 +21,8 @@ fn fragment(@builtin(position) position: vec4f) -> @location(0) vec4u {
   if (place.y + 1u == textureDimensions(ranges).y) { return found; }
   if (range.first == range.end) { return vec4u(0u); }
   let question = bitcast<vec4f>(textureLoad(asked, vec2u(place.x, 0u), 0));
-  let i = textureLoad(order, texel_of(range.first), 0).x;
+  let i = textureLoad(order, texel_of(range.first), 0).x - view.first_group * DATA_WIDTH;
+  if (i >= view.splat_count) { discard; }
   let surface = surface_at(view, unpack_gaussian(gaussian_at(i)), question.xy);
-  return vec4u(bitcast<u32>(surface.depth), i, 1u, bitcast<u32>(surface.thickness));
+  return vec4u(bitcast<u32>(surface.depth), i, view.page + 1u, bitcast<u32>(surface.thickness));
 }

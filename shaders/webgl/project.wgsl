@@ -1,4 +1,5 @@
-// `cull` and `project` in one: one fragment for each splat of the scene. Invisible splats get an opacity of 0.
+// `cull` and `project` in one: one fragment for each splat of the scene, whose rows begin at `first_group`. Invisible
+// splats get an opacity of 0.
 #import shared/projection
 #import shared/stored_gaussian
 #import shared/sh_color
@@ -21,7 +22,7 @@ struct Projected {
 
 @fragment
 fn fragment(@builtin(position) position: vec4f) -> Projected {
-  let i = u32(position.y) * DATA_WIDTH + u32(position.x);
+  let i = (u32(position.y) - view.first_group) * DATA_WIDTH + u32(position.x);
   if (i >= view.splat_count) { return Projected(vec4u(0u), vec4u(0u)); }
   let found = gaussian_at(i);
   let g = unpack_gaussian(found);

@@ -6,10 +6,14 @@ import {
   isSameImage,
   isSameView,
   orderView,
+  positionsIn,
   SplatOrder,
   type OrderView,
 } from '@gaussian-splat/renderer/webgl';
-import { cameraAt } from '../support/scenes.js';
+import { constants, packWithDetail } from '@gaussian-splat/renderer/tools';
+import { cameraAt, room } from '../support/scenes.js';
+
+const CHUNK = constants.CULL_GROUP;
 
 /** Ascending depth as float32, equal ones by number. */
 function plainOrder(positions: Float32Array, { axis: [x, y, z], offset, near, far }: OrderView): number[] {
@@ -42,6 +46,61 @@ test('as a plain sort has it', () => {
       const view = orderView({ ...moved, worldToCamera: movedBy(moved.worldToCamera, origin) }, origin);
       assert.deepEqual(sorted(positions, view), plainOrder(positions, view));
     }
+});
+
+test('several scenes are in one order, each with its own view', () => {
+  const [a, b] = [random.slice(0, 3 * 500), random.slice(3 * 500, 3 * 900)];
+  const first = 512;
+  const positions = new Float32Array(3 * (first + b.length / 3)).fill(NaN);
+  positions.set(a);
+  const offset = [2, 0, -1] as const;
+  positions.set(
+    b.map((value, i) => value + offset[i % 3]),
+    3 * first,
+  );
+  const moved = { ...camera, worldToCamera: movedBy(camera.worldToCamera, offset) };
+  const views = [orderView(camera, [0, 0, 0]), { ...orderView(moved, [0, 0, 0]), first }];
+  const target = new Uint32Array(positions.length / 3);
+  const found = target.subarray(0, new SplatOrder(positions).sort(views, target));
+  const depthOf = (i: number): number => {
+    const [p, k] = i < first ? [a, i] : [b, i - first];
+    const { axis, offset: start } = views[0];
+    return axis.reduce((sum, value, c) => sum + value * p[3 * k + c], start);
+  };
+  assert.ok(found.some((i) => i < first) && found.some((i) => i >= first));
+  const visible = [...a.keys()].slice(0, 500).concat([...b.keys()].slice(0, 400).map((k) => first + k));
+  assert.equal(found.length, visible.filter((i) => depthOf(i) >= camera.near && depthOf(i) <= camera.far).length);
+  for (let k = 1; k < found.length; k++) assert.ok(depthOf(found[k]) - depthOf(found[k - 1]) > -1e-5, `rank ${k}`);
+});
+
+test('of levels of detail, exactly one chunk is listed for each part of the scene', () => {
+  const { cloud } = room();
+  const packed = packWithDetail(cloud);
+  const details = packed.details!;
+  const leaves = Math.ceil(packed.leafCount! / CHUNK);
+  const chunks = packed.count / CHUNK;
+  const splats = new SplatOrder(positionsIn(packed.geometry));
+  splats.details = details;
+  const far = cameraAt([0.3, -1, -40], [0, 0, 0]);
+  const counts = [0, 0.5, 2, 8, 64].map((allowed) => {
+    const levels = { eye: [0.3, -1, -40] as const, focal: far.fx, nearest: far.near, isParallel: false, allowed };
+    const target = new Uint32Array(packed.count);
+    const view = { ...orderView(far, packed.origin), near: 1e-3, far: 1e6, levels };
+    const listed = target.subarray(0, splats.sort(view, target));
+    const drawnChunks = new Set(listed.map((i) => Math.floor(i / CHUNK)));
+    for (let leaf = 0; leaf < leaves; leaf++) {
+      let drawn = 0;
+      for (let [chunk, start, size] = [leaf, 0, leaves]; start < chunks;) {
+        if (drawnChunks.has(start + chunk)) drawn++;
+        [start, chunk, size] = [start + size, chunk >> 2, size === 1 ? 0 : Math.ceil(size / 4)];
+        if (size === 0) break;
+      }
+      assert.equal(drawn, 1, `leaf ${leaf} at ${allowed} px`);
+    }
+    return drawnChunks.size;
+  });
+  assert.equal(counts[0], leaves, 'without an error the finest level');
+  assert.ok(counts.slice(1).every((count, k) => count <= counts[k]) && counts[4] < counts[0] / 4, counts.join());
 });
 
 test('the same again with the same view, another with another', () => {

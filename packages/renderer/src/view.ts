@@ -98,8 +98,11 @@ function stretchOf(worldToCamera: ArrayLike<number>): number {
  */
 export function scaled(camera: Camera, scale: number): Camera {
   if (scale === 1) return camera;
-  const width = Math.max(1, Math.round(camera.width * scale));
-  const height = Math.max(1, Math.round(camera.height * scale));
+  return resized(camera, Math.max(1, Math.round(camera.width * scale)), Math.max(1, Math.round(camera.height * scale)));
+}
+
+/** Returns a camera of the same view with an image of another size. */
+export function resized(camera: Camera, width: number, height: number): Camera {
   const [x, y] = [width / camera.width, height / camera.height];
   return { ...camera, width, height, fx: camera.fx * x, fy: camera.fy * y, cx: camera.cx * x, cy: camera.cy * y };
 }

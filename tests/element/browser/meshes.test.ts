@@ -117,6 +117,29 @@ describe('meshes', () => {
     assert(hidden[0] <= green[0] + 12, `glass behind the ball: ${hidden.join()}`);
   });
 
+  it('of glass show those behind them, in the order of their depth and not of their loading', async () => {
+    const element = place();
+    const pane = (color: readonly [number, number, number], position: string): SplatMeshElement =>
+      mesh({ surface: 'unlit', color, alpha: 0.5, half: [0.4, 0.4, 0.01] }, { position });
+    const box = mesh({ surface: 'unlit', color: [0, 0, 1], half: [3, 3, 0.1] }, { position: '0 0 -3' });
+    // Left the near pane comes first, right the far one.
+    const panes = [
+      ...[pane([1, 0, 0], '-0.6 0 0.5'), pane([0, 1, 0], '-0.6 0 -0.5')],
+      ...[pane([0, 1, 0], '0.6 0 -0.5'), pane([1, 0, 0], '0.6 0 0.5')],
+    ];
+    element.append(box, ...panes);
+    await until(() => [box, ...panes].every(({ loaded }) => loaded), 'all');
+    await frames();
+    const screen = await screenOf(element);
+    for (const x of [-0.6, 0.6]) {
+      const found = screen.at(60 + x * METER, 50);
+      // Half red before a quarter of green before a quarter of blue.
+      const expected = [127.5, 63.75, 63.75];
+      const off = Math.max(...found.map((value, k) => Math.abs(value - expected[k])));
+      assert(off <= 3, `two panes at ${x}: ${found.join()}`);
+    }
+  });
+
   it('without light keep their base colors, and lit by even light nearly so', async () => {
     const grays = [0, 0.02, 0.1, 0.214, 0.5, 1];
     const shown = [0, 39, 89, 127, 188, 255];

@@ -1,6 +1,7 @@
 /** Splats in the frame of a page that draws with WebGL itself: hidden by its depth, and its state as it was. */
 import type { Camera, GaussianCloud } from '@gaussian-splat/core';
 import { packGaussians } from '@gaussian-splat/renderer';
+import { packWithDetail } from '@gaussian-splat/renderer/tools';
 import {
   DATA_WIDTH,
   GlGaussians,
@@ -11,7 +12,7 @@ import {
   SplatOrder,
 } from '@gaussian-splat/renderer/webgl';
 import { assert, assertEqual } from '../../element/browser/support/harness.js';
-import { proceduralScenes, resized, thinned } from '../../support/scenes.js';
+import { cameraAt, proceduralScenes, resized, thinned } from '../../support/scenes.js';
 
 const SPLATS = 4_000;
 const WIDTH = 160;
@@ -227,6 +228,111 @@ describe("splats in a host's frame", () => {
       splats.destroy();
       gl.getExtension('WEBGL_lose_context')?.loseContext();
     });
+
+  /** Every second splat of the scene, moved by `offset`. */
+  function halfOf(parity: 0 | 1, offset: readonly [number, number, number]): GaussianCloud {
+    const numbers = Array.from({ length: cloud.count }, (_, i) => i).filter((i) => i % 2 === parity);
+    const take = (values: Float32Array): Float32Array => {
+      const width = values.length / cloud.count;
+      return Float32Array.from({ length: width * numbers.length }, (_, k) => {
+        return values[width * numbers[Math.floor(k / width)] + (k % width)];
+      });
+    };
+    const { positions, scales, rotations, opacities, sh } = cloud;
+    const moved = take(positions).map((value, k) => value + offset[k % 3]);
+    return {
+      ...{ ...cloud, count: numbers.length, positions: moved, scales: take(scales), rotations: take(rotations) },
+      ...{ opacities: take(opacities), sh: take(sh) },
+    } as GaussianCloud;
+  }
+
+  /** Largest difference of two images, in 255ths. */
+  const apart = (a: Uint8Array, b: Uint8Array): number =>
+    a.reduce((max, value, i) => Math.max(max, Math.abs(value - b[i])), 0);
+
+  it('of two scenes are in one order, as if they were one scene, and picks name the scene', async () => {
+    const gl = context(camera.width, camera.height, { antialias: false, depth: true });
+    const host = new GlHost(gl);
+    const OFFSET = [3, -2, 5] as const;
+    const parts = [halfOf(0, [0, 0, 0]), halfOf(1, OFFSET)].map((part) => packGaussians(part));
+    const moved = Float64Array.from(camera.worldToCamera, (value, i) => {
+      const row = camera.worldToCamera.slice(i - (i % 4), i - (i % 4) + 3) as number[];
+      return i % 4 === 3 && i < 12 ? value - row.reduce((sum, v, k) => sum + v * OFFSET[k], 0) : value;
+    });
+    const cameras = [camera, { ...camera, worldToCamera: moved }];
+    const paint = (draw: () => void): Uint8Array => {
+      gl.clearColor(0, 0, 0, 1);
+      gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
+      draw();
+      return read(gl, 0, 0, camera);
+    };
+    const splats = await host.load(parts);
+    const found = paint(() => assert(splats.draw(cameras, { depth: null }), 'not sorted'));
+    const expected = await alone(cloud, camera, 0);
+    assert(apart(found, expected) <= 2, `${apart(found, expected)} of 255 from the one scene`);
+    const separate = await Promise.all(parts.map((part) => host.load(part)));
+    const over = paint(() => separate.forEach((one, k) => one.draw(cameras[k], { depth: null })));
+    assert(apart(over, expected) > 20, 'the order of two scenes makes no difference');
+    const seen = new Set<number>();
+    for (let k = 0; k < 60; k++) {
+      const [x, y] = [((k % 10) + 0.5) * (camera.width / 10), (Math.floor(k / 10) + 0.5) * (camera.height / 6)];
+      const place = await splats.pick(x, y);
+      if (!place) continue;
+      seen.add(place.scene);
+      const at = cameras[place.scene].worldToCamera;
+      const [px, py, pz] = [0, 1, 2].map((r) =>
+        place.position.reduce((sum, v, c) => sum + at[4 * r + c] * v, at[4 * r + 3]),
+      );
+      const off = [(camera.fx * px) / pz + camera.cx - x, (camera.fy * py) / pz + camera.cy - y];
+      assert(
+        off.every((pixels) => Math.abs(pixels) < 1e-6),
+        `${off} pixels from the pick`,
+      );
+    }
+    assertEqual([...seen].sort(), [0, 1], 'scenes of picks');
+    let refused = '';
+    try {
+      splats.draw(camera);
+    } catch (error) {
+      refused = (error as Error).message;
+    }
+    assert(/a camera for each of 2 scenes/.test(refused), refused);
+    assertEqual(gl.getError(), gl.NO_ERROR, 'errors');
+    for (const one of [splats, ...separate]) one.destroy();
+    host.destroy();
+    gl.getExtension('WEBGL_lose_context')?.loseContext();
+  });
+
+  it('with levels of detail are those of the scene, or as near as the pixels that they may be off', async () => {
+    const gl = context(WIDTH, WIDTH, { antialias: false, depth: true });
+    const host = new GlHost(gl);
+    const whole = proceduralScenes[0]().cloud;
+    const afar = { ...resized(cameraAt([0.3, -1, -40], [0, 0, 0]), WIDTH), near: 0.1, far: 1000 };
+    const packed = packWithDetail(whole);
+    assert(packed.count > whole.count && packed.details, 'levels');
+    const splats = await host.load([packed, packGaussians(halfOf(0, [0, 0, 0]))]);
+    const draw = (detail: number): Uint8Array => {
+      gl.clearColor(0, 0, 0, 1);
+      gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
+      // The second scene is behind the camera.
+      const behind = Float64Array.from(afar.worldToCamera);
+      behind[11] -= 1e4;
+      splats.draw([afar, { ...afar, worldToCamera: behind }], { depth: null }, { detail });
+      return read(gl, 0, 0, afar);
+    };
+    const expected = await alone(whole, afar, 0);
+    assert(apart(draw(0), expected) <= 1, `${apart(draw(0), expected)} of 255 from the scene without levels`);
+    const squares = [0.5, 4, 64].map((detail) => {
+      const image = draw(detail);
+      return image.reduce((sum, value, i) => sum + (value - expected[i]) ** 2, 0) / image.length;
+    });
+    const decibels = squares.map((square) => 10 * Math.log10(255 ** 2 / square));
+    console.log(`levels in a host: ${decibels.map((value) => value.toFixed(1)).join(', ')} dB at 0.5, 4 and 64 px`);
+    assert(decibels[0] > 30 && decibels[2] < decibels[0], `${decibels} dB`);
+    splats.destroy();
+    host.destroy();
+    gl.getExtension('WEBGL_lose_context')?.loseContext();
+  });
 
   it('are sorted by a worker of the page, in the order of the main thread', async () => {
     const gl = context(camera.width, camera.height, { antialias: false, depth: true });

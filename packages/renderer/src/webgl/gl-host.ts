@@ -1,11 +1,20 @@
-import { GaussianSplatError, type Camera } from '@gaussian-splat/core';
+import { GaussianSplatError, validateCamera, type Camera } from '@gaussian-splat/core';
 import { deviceReading, type DepthPlanes } from '../depth-reading.js';
+import { constants } from '../generated/shaders.js';
+import { DETAIL_NUMBERS, DETAIL_PLACES, ENDLESS } from '../levels/chunk-detail.js';
 import { pickedSurface, placeOfSurface, surfacePoints, type PickedPlace } from '../picked-surface.js';
-import { cameraValues } from '../view.js';
 import { GlProgram, makeTarget, makeTexture, requireMemory } from './gl.js';
 import type { PackedGaussians } from '../pack/pack.js';
 import { GlGaussians, positionsIn, type RunGl } from './gl-gaussians.js';
-import { GlRenderer, type GlFrameRequest, type GlFrameTarget, type GlQuads, type GlQuadsFrame } from './gl-renderer.js';
+import { levelChoice } from './level-choice.js';
+import {
+  firstSplats,
+  GlRenderer,
+  type GlFrameRequest,
+  type GlFrameTarget,
+  type GlQuads,
+  type GlQuadsFrame,
+} from './gl-renderer.js';
 import { borrowState } from './gl-state.js';
 import { DATA_WIDTH, hostedQuadsFragment, hostedQuadsVertex, HostedView } from './shaders.js';
 import type { SortAnswer, SortRequest } from './sort-splats.js';
@@ -13,7 +22,8 @@ import { isSameView, orderView, SplatOrder, type OrderView } from './splat-order
 
 /** Sorts that take more than these milliseconds do not run for each frame. They use at most this fraction of the time. */
 const [QUICK_SORT_MS, SORT_SHARE] = [8, 0.25];
-const TEXTURES = ['shapes', 'paints', 'order', 'geometry', 'stored_depth'];
+const { CULL_GROUP } = constants;
+const TEXTURES = ['shapes', 'paints', 'order', 'stored_depth'];
 
 /** Destination of splats in a host's frame, and the host's depth. */
 export interface GlHostFrame extends Omit<GlFrameTarget, 'keeps'>, DepthPlanes {
@@ -60,6 +70,8 @@ interface DepthCopy {
  * const camera = cameraFromProjection(view, projection, { width, height, clipDepth: '-1..1' });
  * if (!splats.draw(camera, { framebuffer, x, y })) requestFrame();
  * ```
+ * `load([a, b])` sorts several scenes together, and `draw([cameraOfA, cameraOfB])` draws them. Splats are hidden with the
+ * precision of their stored depth, 0.05 %.
  */
 export class GlHost {
   readonly #gl: WebGL2RenderingContext;
@@ -96,20 +108,34 @@ export class GlHost {
   }
 
   /**
-   * Uploads a scene to the GPU, in parts.
+   * Uploads a scene to the GPU, in parts; or several scenes, whose splats are sorted together. Scenes of
+   * `packWithDetail` have levels of detail.
    * @throws GaussianSplatError `out-of-memory/*` if memory is insufficient; `unsupported/webgl` if the browser does not
    * compile the shaders.
    */
-  async load(packed: PackedGaussians, { worker }: GlHostOptions = {}): Promise<HostedSplats> {
-    const gaussians = await GlGaussians.upload(this.#gl, packed, this.run);
+  async load(
+    packed: PackedGaussians | readonly PackedGaussians[],
+    { worker }: GlHostOptions = {},
+  ): Promise<HostedSplats> {
+    const all = [packed].flat();
+    const counts = all.map(({ count }) => count);
+    const gaussians: GlGaussians[] = [];
     try {
+      for (const scene of all) gaussians.push(await GlGaussians.upload(this.#gl, scene, this.run));
       await this.run(() => GlRenderer.prepare(this.#gl));
-      const renderer = this.run(() => new GlRenderer(this.#gl, gaussians));
-      const positions = positionsIn(packed.geometry);
-      const sorter = worker ? portOf(worker, positions) : new SplatOrder(positions);
-      return new HostedSplats(this, renderer, gaussians, sorter);
+      const renderer = this.run(() => new GlRenderer(this.#gl, ...gaussians));
+      const { first, count } = firstSplats(this.#gl, counts);
+      const { positions, details } = joined(all, first, count);
+      const sorter = worker ? portOf(worker, positions, details) : new SplatOrder(positions);
+      if (sorter instanceof SplatOrder) sorter.details = details;
+      const scenes = gaussians.map((own, k) => ({
+        gaussians: own,
+        first: first[k],
+        hasLevels: all[k].details !== undefined,
+      }));
+      return new HostedSplats(this, renderer, scenes, { sorter, count });
     } catch (error) {
-      gaussians.destroy();
+      for (const own of gaussians) own.destroy();
       throw error;
     }
   }
@@ -128,13 +154,9 @@ export class GlHost {
     const program = this.#program;
     const { x = 0, y = 0 } = frame;
     return {
-      use({ camera, count, origin, textures }: GlQuadsFrame): void {
-        const { eye, eye_rest } = cameraValues(camera, origin);
-        const m = camera.worldToCamera;
+      use({ camera, count, textures }: GlQuadsFrame): void {
         const values = {
-          ...{ viewport: [camera.width, camera.height], count, eye, eye_rest },
-          axis: [m[8], m[9], m[10]],
-          ...{ unused: 0, unused_too: 0, unused_as_well: 0 },
+          ...{ viewport: [camera.width, camera.height], count },
           ...deviceReading(frame, whole, gl.getParameter(gl.DEPTH_RANGE) as [number, number]),
           scale: [whole.width / camera.width, whole.height / camera.height],
           corner: [x, y + whole.height],
@@ -190,29 +212,48 @@ export class GlHost {
   }
 }
 
-/** A scene in the frames of a host, which sorts its splats by depth. */
+/** A scene of {@link HostedSplats}. */
+interface HostedScene {
+  readonly gaussians: GlGaussians;
+  /** Index of its first splat. */
+  readonly first: number;
+  readonly hasLevels: boolean;
+}
+
+/** How a host's scene is drawn. */
+export interface GlHostDrawing extends Partial<Omit<GlFrameRequest, 'camera' | 'cameras'>> {
+  /** Maximum error of levels of detail, pixels. Default: 0, which draws the finest level. */
+  readonly detail?: number;
+}
+
+/** One scene, or several in one order, in the frames of a host. */
 export class HostedSplats {
   readonly #host: GlHost;
   readonly #renderer: GlRenderer;
-  readonly #gaussians: GlGaussians;
+  readonly #scenes: readonly HostedScene[];
   /** Sorts on the main thread, or by the messages of a worker. */
   readonly #sorter: SplatOrder | MessagePort;
   /** Empty while the worker has it. */
   #order: Uint32Array<ArrayBuffer>;
-  #sorted: OrderView | undefined;
+  #sorted: readonly OrderView[] | undefined;
   #sortedAt = -Infinity;
   #sortMs = 0;
-  #camera: Camera | undefined;
+  #cameras: readonly Camera[] | undefined;
 
   /** @internal */
-  constructor(host: GlHost, renderer: GlRenderer, gaussians: GlGaussians, sorter: SplatOrder | MessagePort) {
+  constructor(
+    host: GlHost,
+    renderer: GlRenderer,
+    scenes: readonly HostedScene[],
+    { sorter, count }: { sorter: SplatOrder | MessagePort; count: number },
+  ) {
     this.#host = host;
     this.#renderer = renderer;
-    this.#gaussians = gaussians;
+    this.#scenes = scenes;
     this.#sorter = sorter;
-    this.#order = new Uint32Array(DATA_WIDTH * Math.max(1, Math.ceil(gaussians.facts.count / DATA_WIDTH)));
+    this.#order = new Uint32Array(DATA_WIDTH * Math.max(1, Math.ceil(count / DATA_WIDTH)));
     if (sorter instanceof SplatOrder) return;
-    sorter.onmessage = ({ data: { view, order, count } }: MessageEvent<SortAnswer>) => {
+    sorter.onmessage = ({ data: { view, order, count } }: MessageEvent<SortAnswer<readonly OrderView[]>>) => {
       this.#order = order;
       this.#take(view, count);
     };
@@ -220,49 +261,58 @@ export class HostedSplats {
 
   /**
    * Draws the scene over the host's frame.
-   * @param camera Camera of the host: see `cameraFromProjection`, with `clipDepth: '-1..1'`. Its view includes the
-   * position of the scene.
+   * @param given Camera of the host: see `cameraFromProjection`, with `clipDepth: '-1..1'`. Its view includes the
+   * position of the scene. Several scenes have a camera each, all with the same projection.
    * @returns False if splats have the order of an older view: draw again soon.
    * @throws GaussianSplatError `argument/camera` for a camera out of range; `argument/value` for a framebuffer whose
    * depth cannot be copied; `out-of-memory/allocation` if the device has too little memory.
    */
-  draw(camera: Camera, frame?: GlHostFrame, how: Partial<Omit<GlFrameRequest, 'camera'>> = {}): boolean {
-    const isSorted = this.#sort(camera);
-    const request = { camera, accumulation: 'rgba16float', shDegree: 3, resolutionScale: 1, ...how } as const;
+  draw(given: Camera | readonly Camera[], frame?: GlHostFrame, { detail = 0, ...how }: GlHostDrawing = {}): boolean {
+    const cameras = [given].flat();
+    if (cameras.length !== this.#scenes.length) throw wrongCameras(this.#scenes.length, cameras.length);
+    for (const camera of cameras) validateCamera(camera);
+    const isSorted = this.#sort(cameras, detail);
+    const camera = cameras[0];
+    const request = { camera, cameras, accumulation: 'rgba16float', shDegree: 3, resolutionScale: 1, ...how } as const;
     this.#host.draw(this.#renderer, request, frame);
-    this.#camera = camera;
+    this.#cameras = cameras;
     return isSorted;
   }
 
   /**
-   * Returns the visible surface at a point of the last frame, in the space of the scene. The host's own objects hide
-   * nothing. The thread does not wait for the GPU.
+   * Returns the visible surface at a point of the last frame, in the space of its scene, and the number of that scene.
+   * The host's own objects hide nothing. The thread does not wait for the GPU.
    * @param x Pixels from the left edge of the camera's image.
    * @param y Pixels from its top edge.
    * @returns null outside the scene, on parts less than half opaque, and before the first frame. Rejects if the context
    * is lost.
    */
-  async pick(x: number, y: number): Promise<PickedPlace | null> {
-    const camera = this.#camera;
-    if (!camera) return null;
-    const points = surfacePoints(camera, x, y);
+  async pick(x: number, y: number): Promise<(PickedPlace & { readonly scene: number }) | null> {
+    const cameras = this.#cameras;
+    if (!cameras) return null;
+    const points = surfacePoints(cameras[0], x, y);
     const answers = await this.#host.run(() => this.#renderer.probe(points));
-    const surface = pickedSurface(camera, points, answers);
-    return surface && placeOfSurface(camera, x, y, surface);
+    const scene = answers[0]?.splat?.scene ?? 0;
+    const surface = pickedSurface(cameras[scene], points, answers);
+    return surface && { ...placeOfSurface(cameras[scene], x, y, surface), scene };
   }
 
   destroy(): void {
     if (!(this.#sorter instanceof SplatOrder)) this.#sorter.close();
     this.#renderer.destroy();
-    this.#gaussians.destroy();
+    for (const { gaussians } of this.#scenes) gaussians.destroy();
   }
 
-  #sort(camera: Camera): boolean {
-    const view = orderView(camera, this.#gaussians.facts.origin);
-    if (this.#sorted && isSameView(view, this.#sorted)) return true;
+  #sort(cameras: readonly Camera[], detail: number): boolean {
+    const view = this.#scenes.map(({ gaussians: { facts }, first, hasLevels }, k): OrderView => {
+      const levels = hasLevels ? levelChoice(cameras[k], facts.origin, detail) : undefined;
+      return { ...orderView(cameras[k], facts.origin), first, levels };
+    });
+    if (this.#sorted?.every((old, k) => isSameView(view[k], old))) return true;
     if (!(this.#sorter instanceof SplatOrder)) {
       const order = this.#order;
-      if (order.length > 0) this.#sorter.postMessage({ view, order } satisfies SortRequest, [order.buffer]);
+      if (order.length > 0)
+        this.#sorter.postMessage({ view, order } satisfies SortRequest<readonly OrderView[]>, [order.buffer]);
       this.#order = NO_ORDER;
       return false;
     }
@@ -274,7 +324,7 @@ export class HostedSplats {
     return true;
   }
 
-  #take(view: OrderView, count: number): void {
+  #take(view: readonly OrderView[], count: number): void {
     this.#host.run(() => this.#renderer.setOrder(this.#order, count));
     this.#sorted = view;
   }
@@ -283,11 +333,41 @@ export class HostedSplats {
 const NO_ORDER = new Uint32Array(0);
 
 /** Gives positions to a worker, and returns the port for its orders. */
-function portOf(worker: Worker, positions: Float32Array<ArrayBuffer>): MessagePort {
+function portOf(
+  worker: Worker,
+  positions: Float32Array<ArrayBuffer>,
+  details: Float32Array<ArrayBuffer> | undefined,
+): MessagePort {
   const { port1, port2 } = new MessageChannel();
   worker.postMessage({ port: port2, positions }, [port2, positions.buffer]);
+  if (details) port1.postMessage({ details }, [details.buffer]);
   return port1;
 }
+
+/** Returns the positions and levels of all splats. Indices between scenes have the position NaN, which is not listed. */
+function joined(
+  all: readonly PackedGaussians[],
+  first: readonly number[],
+  count: number,
+): { positions: Float32Array<ArrayBuffer>; details: Float32Array<ArrayBuffer> | undefined } {
+  const positions = new Float32Array(3 * count).fill(NaN);
+  for (const [k, { geometry }] of all.entries()) positions.set(positionsIn(geometry), 3 * first[k]);
+  if (!all.some(({ details }) => details)) return { positions, details: undefined };
+  const details = new Float32Array(DETAIL_NUMBERS * (count / CULL_GROUP));
+  // Chunks of a scene without levels are the finest, and have no parent.
+  for (let at = DETAIL_PLACES.parentError; at < details.length; at += DETAIL_NUMBERS) details[at] = ENDLESS;
+  for (const [k, { details: own }] of all.entries())
+    if (own) details.set(own, DETAIL_NUMBERS * (first[k] / CULL_GROUP));
+  return { positions, details };
+}
+
+const wrongCameras = (expected: number, found: number): GaussianSplatError =>
+  new GaussianSplatError('argument/value', {
+    where: 'HostedSplats.draw()',
+    expected: `a camera for each of ${expected} scenes`,
+    found: String(found),
+    remedy: 'pass the cameras as an array, in the order of load()',
+  });
 
 /** Returns the formats that the depth buffer of the bound framebuffer may have, the most likely one first. */
 function depthFormats(gl: WebGL2RenderingContext, isCanvas: boolean): GLenum[] {

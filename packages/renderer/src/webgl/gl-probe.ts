@@ -33,12 +33,11 @@ const NOTHING: ProbeAnswer = {
 export interface GlProbeSource {
   readonly gl: WebGL2RenderingContext;
   readonly programs: ProbePrograms;
-  /** Uniforms of the frame's projection. */
-  readonly view: StructValues<typeof layouts.View>;
+  /** Geometry of each scene, and uniforms of the frame's projection. */
+  readonly scenes: readonly { readonly view: StructValues<typeof layouts.View>; readonly geometry: WebGLTexture }[];
   /** Textures of projected shapes, paints, and the order from near to far. */
   readonly textures: readonly WebGLTexture[];
   readonly order: WebGLTexture;
-  readonly geometry: WebGLTexture;
   /** Number of splats in the order. */
   readonly count: number;
 }
@@ -76,7 +75,7 @@ async function probeGroup(source: GlProbeSource, points: readonly ProbePoint[]):
  * @param made Receives the textures and framebuffers that the caller must delete.
  */
 function draw(
-  { gl, programs, view, textures, order, geometry, count }: GlProbeSource,
+  { gl, programs, scenes, textures, order, count }: GlProbeSource,
   points: readonly ProbePoint[],
   made: { texture: WebGLTexture; target?: WebGLFramebuffer }[],
 ): WebGLFramebuffer {
@@ -88,18 +87,20 @@ function draw(
   const bits = new Uint32Array(numbers.buffer);
   gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, points.length, 1, gl.RGBA_INTEGER, gl.UNSIGNED_INT, bits);
   gl.disable(gl.BLEND);
-  /** Fills a new texture of integers with a program, and returns it with its framebuffer. */
+  /** Fills a new texture of integers with programs, and returns it with its framebuffer. */
   const fill = (
     width: number,
     height: number,
-    use: () => void,
+    ...uses: (() => void)[]
   ): { texture: WebGLTexture; target: WebGLFramebuffer } => {
     const texture = makeTexture(gl, gl.RGBA32UI, [width, height]);
     const target = makeTarget(gl, [texture]);
     made.push({ texture, target });
     gl.viewport(0, 0, width, height);
-    use();
-    gl.drawArrays(gl.TRIANGLES, 0, 3);
+    for (const use of uses) {
+      use();
+      gl.drawArrays(gl.TRIANGLES, 0, 3);
+    }
     return { texture, target };
   };
   // Not read by the first search; a sampler without a texture would be an error.
@@ -114,8 +115,12 @@ function draw(
     ranges = fill(points.length, PROBE_LEVELS + 1, use).texture;
     span = Math.ceil(span / RUNS);
   }
-  const use = (): void => programs.surface.use(view, [geometry, order, asked, ranges]);
-  return fill(points.length, PROBE_LEVELS + 1, use).target;
+  const uses = scenes.map(
+    ({ view, geometry }) =>
+      () =>
+        programs.surface.use(view, [geometry, order, asked, ranges]),
+  );
+  return fill(points.length, PROBE_LEVELS + 1, ...uses).target;
 }
 
 function answersOf(words: Uint32Array, points: number): ProbeAnswer[] {
@@ -124,9 +129,9 @@ function answersOf(words: Uint32Array, points: number): ProbeAnswer[] {
   return Array.from({ length: points }, (_, i) => {
     const layers = Float32Array.from({ length: PROBE_LEVELS }, (_, row) => numbers[at(row, i)]);
     const [light, transmittance] = numbers.subarray(at(PROBE_LEVELS, i));
-    const [, index, isFound] = words.subarray(at(PROBE_MIDDLE, i));
+    const [, index, sceneAfter] = words.subarray(at(PROBE_MIDDLE, i));
     const thickness = numbers[at(PROBE_MIDDLE, i) + 3];
-    const splat = isFound === 0 ? null : { placement: undefined, index };
+    const splat = sceneAfter === 0 ? null : { placement: undefined, scene: sceneAfter - 1, index };
     return { opacity: 1 - light, ...depthsOf(layers), layers, thickness, transmittance, splat };
   });
 }

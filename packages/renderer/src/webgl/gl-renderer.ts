@@ -1,17 +1,10 @@
-import {
-  SPLAT_FILTERS,
-  validateCamera,
-  type Camera,
-  type ShDegree,
-  type SplatFilter,
-  type Vector3,
-} from '@gaussian-splat/core';
+import { SPLAT_FILTERS, validateCamera, type Camera, type ShDegree, type SplatFilter } from '@gaussian-splat/core';
 import type { ProbeAnswer, ProbePoint } from '../depth-probe.js';
 import { constants, type layouts } from '../generated/shaders.js';
 import type { StructValues } from '../gpu/struct.js';
 import type { Rgba } from '../frame-target.js';
 import type { AccumulationFormat } from '../rasterizers/rasterizer.js';
-import { cameraValues, MAX_FLOAT32, scaled } from '../view.js';
+import { cameraValues, MAX_FLOAT32, resized, scaled } from '../view.js';
 import { makeTarget, makeTexture, requireMemory } from './gl.js';
 import { sizeOf, type GlGaussians } from './gl-gaussians.js';
 import { probeSplats } from './gl-probe.js';
@@ -35,6 +28,10 @@ const BYTES_PER_PIXEL: Record<GlAccumulationFormat, number> = { rgba8unorm: 4, r
 export interface GlFrameRequest {
   /** Camera, whose width and height must be those of the canvas. */
   readonly camera: Camera;
+  /**
+   * Cameras for each of several scenes, which differ in the position of their scene alone. Default: `camera` for all.
+   */
+  readonly cameras?: readonly Camera[] | undefined;
   /** Maximum degree of spherical harmonics to evaluate. */
   readonly shDegree: ShDegree;
   /** Low-pass filter that overrides that of the scene. */
@@ -75,9 +72,7 @@ export interface GlQuadsFrame {
   readonly camera: Camera;
   /** Number of splats to draw: the first elements of the order texture. */
   readonly count: number;
-  /** World position of the origin of the positions in textures. */
-  readonly origin: Vector3;
-  /** Textures of shapes, paints, order and geometry. */
+  /** Textures of shapes, paints and order. */
   readonly textures: readonly WebGLTexture[];
 }
 
@@ -97,16 +92,39 @@ export function blendable(gl: WebGL2RenderingContext, wanted: AccumulationFormat
   return float || gl.getExtension('EXT_color_buffer_half_float') ? 'rgba16float' : 'rgba8unorm';
 }
 
+/** A scene of a renderer, and the row of the textures where its splats begin. */
+interface Part {
+  readonly gaussians: GlGaussians;
+  readonly row: number;
+}
+
 /**
- * Draws one scene with WebGL 2, with the shaders of WebGPU. Each splat is projected once to two textures. It is then
+ * Returns the index of the first splat of each scene in the order of a renderer, and the number of indices.
+ * @param counts Splats of each scene.
+ */
+export function firstSplats(gl: WebGL2RenderingContext, counts: readonly number[]): { first: number[]; count: number } {
+  const first: number[] = [];
+  let count = 0;
+  for (const own of counts) {
+    first.push(count);
+    const [width, rows] = sizeOf(gl, own);
+    count += width * rows;
+  }
+  return { first, count };
+}
+
+/**
+ * Draws one scene, or several in one order, with WebGL 2, with the shaders of WebGPU. Each splat is projected once to two textures. It is then
  * drawn as a quad in an order that the caller computes (`SplatOrder`), blended, and composed onto the canvas.
  */
 export class GlRenderer {
   readonly #gl: WebGL2RenderingContext;
-  readonly #gaussians: GlGaussians;
+  readonly #parts: readonly Part[];
+  /** Width and rows of the textures that hold the splats of all scenes. */
+  readonly #size: readonly [width: number, rows: number];
   readonly #programs: GlPrograms;
-  /** Uniforms of the last projection; undefined before the first. */
-  #view: StructValues<typeof layouts.View> | undefined;
+  /** Uniforms of the last projection for each scene; empty before the first. */
+  #views: readonly StructValues<typeof layouts.View>[] = [];
   readonly #corners: WebGLVertexArrayObject;
   readonly #indices: WebGLBuffer;
   readonly #shapes: WebGLTexture;
@@ -133,17 +151,19 @@ export class GlRenderer {
    * @throws GaussianSplatError `unsupported/webgl` if the browser does not compile the shaders;
    * `out-of-memory/allocation` if the device has too little memory.
    */
-  constructor(gl: WebGL2RenderingContext, gaussians: GlGaussians) {
+  constructor(gl: WebGL2RenderingContext, ...scenes: readonly GlGaussians[]) {
     this.#gl = gl;
-    this.#gaussians = gaussians;
+    const counts = scenes.map(({ facts }) => facts.count);
+    const { first, count } = firstSplats(gl, counts);
+    const size = (this.#size = sizeOf(gl, count));
+    this.#parts = scenes.map((gaussians, k) => ({ gaussians, row: first[k] / size[0] }));
     this.#programs = GlPrograms.of(gl).check();
     [this.#corners, this.#indices] = makeCorners(gl);
-    const size = sizeOf(gl, gaussians.facts.count);
     this.#shapes = makeTexture(gl, gl.RGBA32UI, size);
     this.#paints = makeTexture(gl, gl.RGBA32UI, size);
     this.#order = makeTexture(gl, gl.R32UI, size);
     this.#splats = makeTarget(gl, [this.#shapes, this.#paints]);
-    requireMemory(gl, `scene of ${gaussians.facts.count} splats`);
+    requireMemory(gl, `scene of ${counts.join(' and ')} splats`);
   }
 
   /** Bytes of GPU memory of the accumulation texture, without the splats. */
@@ -214,17 +234,16 @@ export class GlRenderer {
    * @returns An answer for each point; empty before the first frame.
    */
   async probe(points: readonly ProbePoint[]): Promise<ProbeAnswer[]> {
-    if (this.#view === undefined || this.#last === undefined) return [];
+    if (this.#last === undefined) return [];
     const { camera, drawn } = this.#last;
     const [across, down] = [drawn.width / camera.width, drawn.height / camera.height];
     const inDrawn = points.map(({ x, y, depth }) => ({ x: across * x, y: down * y, depth }));
     const source = {
       gl: this.#gl,
       programs: this.#programs.probe,
-      view: this.#view,
+      scenes: this.#views.map((view, k) => ({ view, geometry: this.#parts[k].gaussians.geometry })),
       textures: this.#splatTextures,
       order: this.#order,
-      geometry: this.#gaussians.geometry,
       count: this.#count,
     };
     return probeSplats(source, inDrawn);
@@ -232,7 +251,7 @@ export class GlRenderer {
 
   /** Returns the number of splats drawn in the last frame. Reads all splats back: call it for panels. */
   async countDrawn(): Promise<number> {
-    const words = await readTexels(this.#gl, this.#splats, sizeOf(this.#gl, this.#gaussians.facts.count), 1);
+    const words = await readTexels(this.#gl, this.#splats, this.#size, 1);
     let count = 0;
     // The last word of a splat is its opacity.
     for (let at = 3; at < words.length; at += 4) if (words[at] !== 0) count++;
@@ -254,28 +273,31 @@ export class GlRenderer {
     return [this.#shapes, this.#paints, this.#order];
   }
 
-  #projectSplats({ camera, shDegree, filter }: GlFrameRequest, drawn: Camera): void {
-    const what = JSON.stringify([camera, drawn.width, drawn.height, shDegree, filter]);
+  #projectSplats({ camera: whole, cameras, shDegree, filter }: GlFrameRequest, { width, height }: Camera): void {
+    const what = JSON.stringify([whole, cameras, width, height, shDegree, filter]);
     if (what === this.#projected) return;
     this.#projected = what;
     const gl = this.#gl;
-    const { facts, geometry, sh } = this.#gaussians;
-    const pixelArea = (drawn.width * drawn.height) / (camera.width * camera.height);
-    const { antialiased, filterVariance = constants.DILATION } = filter ? SPLAT_FILTERS[filter] : facts;
-    const values = {
-      ...cameraValues(drawn, facts.origin, filterVariance * pixelArea),
-      ...{ splat_count: facts.count, page: 0, first_group: 0 },
-      ...{ sh_degree: facts.shDegree, sh_cap: shDegree, sh_encoding: SH_PRECISION[facts.shPrecision] },
-      ...{ antialiased: antialiased ? 1 : 0, key_bits: 32 },
-      ...{ has_detail: 0, detail: 0, detail_fade: 0, splat_budget: 0 },
-      ...{ opacity: 1, crop_low: EVERYWHERE.map((side) => -side), crop_high: EVERYWHERE },
-    };
+    const pixelArea = (width * height) / (whole.width * whole.height);
+    this.#views = this.#parts.map(({ gaussians: { facts }, row }, page) => {
+      const drawn = resized(cameras?.[page] ?? whole, width, height);
+      const { antialiased, filterVariance = constants.DILATION } = filter ? SPLAT_FILTERS[filter] : facts;
+      return {
+        ...cameraValues(drawn, facts.origin, filterVariance * pixelArea),
+        ...{ splat_count: facts.count, page, first_group: row },
+        ...{ sh_degree: facts.shDegree, sh_cap: shDegree, sh_encoding: SH_PRECISION[facts.shPrecision] },
+        ...{ antialiased: antialiased ? 1 : 0, key_bits: 32 },
+        ...{ has_detail: 0, detail: 0, detail_fade: 0, splat_budget: 0 },
+        ...{ opacity: 1, crop_low: EVERYWHERE.map((side) => -side), crop_high: EVERYWHERE },
+      };
+    });
     gl.bindFramebuffer(gl.FRAMEBUFFER, this.#splats);
-    gl.viewport(0, 0, ...sizeOf(gl, facts.count));
     gl.disable(gl.BLEND);
-    this.#view = values;
-    this.#programs.project.use(values, [geometry, sh]);
-    gl.drawArrays(gl.TRIANGLES, 0, 3);
+    for (const [k, { gaussians, row }] of this.#parts.entries()) {
+      gl.viewport(0, row, ...sizeOf(gl, gaussians.facts.count));
+      this.#programs.project.use(this.#views[k], [gaussians.geometry, gaussians.sh]);
+      gl.drawArrays(gl.TRIANGLES, 0, 3);
+    }
   }
 
   #drawQuads(target: WebGLFramebuffer, request: GlFrameRequest, quads?: GlQuads): number {
@@ -293,9 +315,8 @@ export class GlRenderer {
     const { width, height } = camera;
     gl.enable(gl.BLEND);
     gl.blendFuncSeparate(gl.ONE, gl.ONE_MINUS_SRC_ALPHA, gl.ZERO, gl.ONE_MINUS_SRC_ALPHA);
-    const { facts, geometry } = this.#gaussians;
     const [count, textures] = [this.#count, this.#splatTextures];
-    if (quads) quads.use({ camera, count, origin: facts.origin, textures: [...textures, geometry] });
+    if (quads) quads.use({ camera, count, textures });
     else this.#programs.quads.use({ viewport: [width, height], count, first: from }, textures);
     gl.bindVertexArray(this.#corners);
     // One incomplete batch, or complete ones. Quads beyond the last splat are invisible.

@@ -1,7 +1,7 @@
 /** WebGL 2 backend for browsers without WebGPU: whole scenes, sorted on the CPU, with the same shaders. */
 export { drawn, GlClock } from './gl-clock.js';
 export { glBytes, GlGaussians, positionsIn, type GlGaussianFacts, type RunGl } from './gl-gaussians.js';
-export { GlHost, HostedSplats, type GlHostFrame, type GlHostOptions } from './gl-host.js';
+export { GlHost, HostedSplats, type GlHostDrawing, type GlHostFrame, type GlHostOptions } from './gl-host.js';
 export {
   blendable,
   GlRenderer,

@@ -1,13 +1,16 @@
 /** Sorts the splats of one scene for each view of the WebGL renderer, in a worker that is started for this purpose. */
 import { SplatOrder, type OrderView } from './splat-order.js';
 
-export interface SortRequest {
-  readonly view: OrderView;
+type Views = OrderView | readonly OrderView[];
+
+export interface SortRequest<V extends Views = OrderView> {
+  /** View of the scene, or of each of several scenes. */
+  readonly view: V;
   /** Buffer for the order, one index for each splat. It is transferred to the worker and back. */
   readonly order: Uint32Array<ArrayBuffer>;
 }
 
-export interface SortAnswer extends SortRequest {
+export interface SortAnswer<V extends Views = OrderView> extends SortRequest<V> {
   readonly count: number;
   /** Sum over the splats of the fraction of the image that each covers; 0 if it is not computed. */
   readonly covered: number;
@@ -27,11 +30,13 @@ export interface SortAnswer extends SortRequest {
  */
 export function sortSplats(port: MessagePort, positions: Float32Array, areas?: Float32Array): void {
   const splats = new SplatOrder(positions, areas);
-  port.onmessage = ({ data: { view, order } }: MessageEvent<SortRequest>) => {
+  port.onmessage = ({ data }: MessageEvent<SortRequest<Views> | Pick<SplatOrder, 'details'>>) => {
+    if ('details' in data) return void (splats.details = data.details);
+    const { view, order } = data;
     const begin = performance.now();
     const count = splats.sort(view, order);
     const { covered } = splats;
-    const answer: SortAnswer = { view, order, count, covered, milliseconds: performance.now() - begin };
+    const answer: SortAnswer<Views> = { view, order, count, covered, milliseconds: performance.now() - begin };
     port.postMessage(answer, [order.buffer]);
   };
 }

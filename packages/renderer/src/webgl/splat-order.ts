@@ -3,6 +3,7 @@
  * worker runs this code.
  */
 import { eyeOf, subtract, type Camera, type Vector3 } from '@gaussian-splat/core';
+import { drawnChunks, type LevelChoice } from './level-choice.js';
 
 /**
  * Parameters of an order. Splats are sorted by the depth axis · p + offset of their position p, or by their distance
@@ -26,6 +27,10 @@ export interface OrderView {
   readonly shareOfArea: number;
   /** Whether the camera is orthographic. */
   readonly isParallel: boolean;
+  /** Index of the first splat of the scene among those of several scenes; default: 0. */
+  readonly first?: number;
+  /** Selection of levels of detail; undefined for a scene without levels. */
+  readonly levels?: LevelChoice | undefined;
 }
 
 /** Returns the parameters for an order by depth. @param origin World position of the origin of the splat positions. */
@@ -53,7 +58,12 @@ export function distanceView(camera: Camera, origin: Vector3, eye: Vector3 = eye
 export const isSameView = (a: OrderView, b: OrderView): boolean =>
   a.point || b.point
     ? isSamePlace(a.point, b.point)
-    : a.offset === b.offset && a.near === b.near && a.far === b.far && isSamePlace(a.axis, b.axis);
+    : a.offset === b.offset &&
+      a.near === b.near &&
+      a.far === b.far &&
+      isSamePlace(a.axis, b.axis) &&
+      a.levels?.allowed === b.levels?.allowed &&
+      (a.levels === b.levels || isSamePlace(a.levels?.eye, b.levels?.eye));
 
 /** Whether two views also show the same part of the scene, so that splats cover the image equally in both. */
 export const isSameImage = (a: OrderView, b: OrderView): boolean =>
@@ -77,9 +87,13 @@ const DIGITS = 1 << 16;
 export class SplatOrder {
   /** Coverage of the image by the splats of the last order, as a multiple of the image; computed from their areas. */
   covered = 0;
+  /** [ceil(N / 256), 12] levels of detail of the splats: see `packWithDetail`; undefined without levels. */
+  details: Float32Array | undefined;
   readonly #positions: Float32Array;
   readonly #areas: Float32Array | undefined;
   readonly #keys: Uint32Array;
+  /** The memory of the keys. */
+  readonly #depths: Float32Array;
   readonly #listed: Uint32Array;
   readonly #halfSorted: Uint32Array;
   readonly #low = new Uint32Array(DIGITS);
@@ -95,17 +109,21 @@ export class SplatOrder {
     const count = positions.length / 3;
     this.#positions = positions;
     this.#keys = new Uint32Array(count);
+    this.#depths = new Float32Array(this.#keys.buffer);
     this.#listed = new Uint32Array(count);
     this.#halfSorted = new Uint32Array(count);
   }
 
   /**
-   * Lists the splats from near to far.
+   * Lists the splats of one or several scenes from near to far.
+   * @param given View of each scene, in the order of their splats. An order by distance is that of one scene.
    * @param target Receives the indices; at least N elements.
    * @returns Number of listed splats.
    */
-  sort(view: OrderView, target: Uint32Array): number {
-    const count = view.point ? this.#findDistances(view.point) : this.#findKeys(view);
+  sort(given: OrderView | readonly OrderView[], target: Uint32Array): number {
+    const views = [given].flat();
+    const [view] = views;
+    const count = view.point ? this.#findDistances(view.point) : this.#findKeys(views);
     this.covered = this.#areas ? this.#sumShares(view, count, this.#areas) : 0;
     const [keys, listed, halfSorted] = [this.#keys, this.#listed, this.#halfSorted];
     startPlaces(this.#low);
@@ -150,13 +168,24 @@ export class SplatOrder {
    * Computes the keys and indices of the splats within the range of depths, and a histogram of each digit. Returns the
    * number of these splats.
    */
-  #findKeys({ axis: [x, y, z], offset, near, far }: OrderView): number {
-    const [positions, keys, listed, low, high] = [this.#positions, this.#keys, this.#listed, this.#low, this.#high];
-    const depths = new Float32Array(keys.buffer);
-    low.fill(0);
-    high.fill(0);
+  #findKeys(views: readonly OrderView[]): number {
+    this.#low.fill(0);
+    this.#high.fill(0);
     let count = 0;
-    for (let i = 0, at = 0; i < keys.length; i++, at += 3) {
+    for (const [k, view] of views.entries()) {
+      const [first, end] = [view.first ?? 0, views[k + 1]?.first ?? this.#keys.length];
+      const drawn = view.levels && this.details && drawnChunks(this.details, first, end, view.levels);
+      if (drawn) for (const [from, to] of drawn) count = this.#addKeys(view, from, to, count);
+      else count = this.#addKeys(view, first, end, count);
+    }
+    return count;
+  }
+
+  /** Does the same for the splats from `first` to `end`, after `count` listed splats. */
+  #addKeys({ axis: [x, y, z], offset, near, far }: OrderView, first: number, end: number, count: number): number {
+    const [positions, keys, listed, low, high] = [this.#positions, this.#keys, this.#listed, this.#low, this.#high];
+    const depths = this.#depths;
+    for (let i = first, at = 3 * first; i < end; i++, at += 3) {
       const depth = x * positions[at] + y * positions[at + 1] + z * positions[at + 2] + offset;
       if (!(depth >= near && depth <= far)) continue;
       depths[i] = depth;

@@ -15,7 +15,10 @@ import {
   WebGPURenderer,
   type CubeRenderTarget,
   type Group,
+  type Material,
   type Mesh,
+  type RenderItem,
+  type RenderObject,
 } from './three.js';
 import type { ViewerFrame } from '../../viewer/camera/orbit.js';
 import type { MeshModel } from '../../gpu/loaded-gaussians.js';
@@ -34,6 +37,17 @@ const MAX_LIGHTS = 128;
 
 /** Kinds of triangles, which are drawn in this order. Each is a layer number of three.js. */
 const [OPAQUE, TRANSPARENT] = [0, 1];
+
+/**
+ * Passes of transparent surfaces. A surface that writes depth hides those that are drawn after it, so colors are blended
+ * from back to front without that. Before them, nearly opaque parts hide what is behind them. After them, all write depth,
+ * because each splat is drawn either in front of the nearest surface or behind it.
+ */
+const GLASS_PASSES: Readonly<Record<string, Partial<Material>>> = {
+  solid: { depthWrite: true, alphaTest: 0.99, forceSinglePass: true },
+  colors: { depthWrite: false },
+  depth: { depthWrite: true, colorWrite: false, forceSinglePass: true },
+};
 
 /** Result of drawing one kind of triangles: `color` is three.js's texture, `texture` has one depth per pixel. */
 interface Drawn {
@@ -63,6 +77,8 @@ export class MeshLayer {
    */
   readonly #glass = new RenderTarget(1, 1, { type: HalfFloatType, samples: SAMPLES });
   readonly #resolve: MeshResolve;
+  readonly #center = new Vector3();
+  readonly #glassPasses: readonly RenderObject[];
   #depth: { readonly key: readonly unknown[]; readonly ofSplats: SceneDepth } | undefined;
   /** Projection of the camera of the last frame. */
   #drawnFrom: Pick<Camera, 'near' | 'far' | 'orthographic'> = { near: 1, far: Infinity };
@@ -82,6 +98,16 @@ export class MeshLayer {
     this.#camera.matrixAutoUpdate = false;
     this.#camera.coordinateSystem = WebGPUCoordinateSystem;
     this.#camera._reversedDepth = true;
+    // three.js sorts by the depth of clip space, which this projection keeps constant.
+    renderer.setTransparentSort((a, b) => this.#nearness(a) - this.#nearness(b));
+    this.#glassPasses = Object.entries(GLASS_PASSES).map(([name, own]): RenderObject => (...of) => {
+      const material = of[4];
+      const { depthWrite, colorWrite, alphaTest, forceSinglePass } = material;
+      if (own.alphaTest && material.alphaTestNode) return;
+      Object.assign(material, own);
+      renderer.renderObject(...of, name);
+      Object.assign(material, { depthWrite, colorWrite, alphaTest, forceSinglePass });
+    });
   }
 
   static async create(device: GPUDevice): Promise<MeshLayer> {
@@ -123,13 +149,16 @@ export class MeshLayer {
       [TRANSPARENT, this.#glass],
     ] as const) {
       this.#camera.layers.set(kind);
-      this.#renderer.setRenderTarget(target);
-      // compileAsync collects the objects before its first await. Culling is disabled until then, so that no object is
-      // missing.
-      const culled = model.setCulling(false);
-      const compiled = this.#renderer.compileAsync(this.#scene, this.#camera);
-      model.setCulling(culled);
-      await compiled;
+      for (const pass of this.#passesOf(kind)) {
+        this.#renderer.setRenderTarget(target);
+        this.#renderer.setRenderObjectFunction(pass);
+        // compileAsync collects the objects before its first await. Culling is disabled until then, so that no object is
+        // missing.
+        const culled = model.setCulling(false);
+        const compiled = this.#renderer.compileAsync(this.#scene, this.#camera);
+        model.setCulling(culled);
+        await compiled;
+      }
     }
   }
 
@@ -147,6 +176,17 @@ export class MeshLayer {
     return { depth: this.#depthFor(opaque, glass, depth?.out) };
   }
 
+  /** Returns the functions that draw the objects of a kind, one for each pass; null for three.js's own. */
+  #passesOf(kind: number): readonly (RenderObject | null)[] {
+    return kind === OPAQUE ? [null] : this.#glassPasses;
+  }
+
+  /** Returns the distance of an object in front of the camera, as a negative number. */
+  #nearness({ object, geometry: { boundingSphere } }: RenderItem): number {
+    const center = boundingSphere ? this.#center.copy(boundingSphere.center) : this.#center.set(0, 0, 0);
+    return center.applyMatrix4(object.matrixWorld).applyMatrix4(this.#camera.matrixWorldInverse).z;
+  }
+
   #resize(width: number, height: number): void {
     for (const target of [this.#target, this.#glass]) {
       target.setSize(width, height);
@@ -161,7 +201,12 @@ export class MeshLayer {
     this.#camera.layers.set(kind);
     renderer.autoClearDepth = kind === OPAQUE;
     renderer.setRenderTarget(target);
-    renderer.render(this.#scene, this.#camera);
+    for (const pass of this.#passesOf(kind)) {
+      renderer.setRenderObjectFunction(pass);
+      renderer.render(this.#scene, this.#camera);
+      renderer.autoClear = false;
+    }
+    renderer.autoClear = true;
     const color = renderer.backend.get(target.texture).texture!;
     const samples = renderer.backend.get(target.depthTexture!).texture!;
     return { color, texture: this.#resolve.run(kind, samples) };
@@ -273,11 +318,7 @@ export class MeshLayer {
       materials.forEach(showAsDisplayed);
       const isGlass = materials.some(({ transparent }) => transparent);
       mesh.layers.set(isGlass ? TRANSPARENT : OPAQUE);
-      // Transparent surfaces write depth, because each splat is drawn either in front of them or behind them.
-      for (const material of isGlass ? materials : []) {
-        material.depthWrite = true;
-        material.alphaTest = Math.max(material.alphaTest, 1 / 255);
-      }
+      for (const material of isGlass ? materials : []) material.alphaTest = Math.max(material.alphaTest, 1 / 255);
     });
     if (model.hasLights) return;
     for (const material of model.materials) light(material, this.#environment.texture);

@@ -13,6 +13,9 @@ export class Vector3 {
   x: number;
   y: number;
   z: number;
+  set(x: number, y: number, z: number): this;
+  copy(other: Vector3): this;
+  applyMatrix4(matrix: Matrix4): this;
 }
 /** Intersection of a ray with a triangle. `distance` is from the origin of the ray. */
 export interface Intersection {
@@ -29,6 +32,7 @@ export class Raycaster {
   intersectObject(object: Object3D, recursive: boolean): Intersection[];
 }
 export class Sphere {
+  center: Vector3;
   radius: number;
 }
 export class Box3 {
@@ -125,6 +129,9 @@ export class Material {
   transparent: boolean;
   opacity: number;
   depthWrite: boolean;
+  colorWrite: boolean;
+  /** Whether both sides of a transparent `DoubleSide` material are drawn at once. */
+  forceSinglePass: boolean;
   alphaTest: number;
   /** Value that is used instead of {@link alphaTest}. */
   alphaTestNode?: ShaderNode;
@@ -174,6 +181,20 @@ export class DynamicLighting {
     readonly maxSpotLights: number;
   });
 }
+export interface RenderItem {
+  readonly object: Object3D;
+  readonly geometry: BufferGeometry;
+}
+export type RenderObject = (
+  object: Object3D,
+  scene: Scene,
+  camera: Camera,
+  geometry: BufferGeometry,
+  material: Material,
+  group: unknown,
+  lights: unknown,
+  clipping: unknown,
+) => void;
 export class WebGPURenderer {
   constructor(options: object);
   lighting: DynamicLighting;
@@ -182,7 +203,14 @@ export class WebGPURenderer {
   setRenderTarget(target: RenderTarget | null): void;
   initRenderTarget(target: RenderTarget | CubeRenderTarget): void;
   setClearColor(color: number, alpha: number): void;
+  autoClear: boolean;
   autoClearDepth: boolean;
+  /** Replaces the order of transparent objects: negative if `a` is drawn first. */
+  setTransparentSort(compare: (a: RenderItem, b: RenderItem) => number): void;
+  /** Replaces the function that draws an object, which calls {@link renderObject}. */
+  setRenderObjectFunction(draw: RenderObject | null): void;
+  /** Draws an object. @param pass Name of a pass: pipelines are kept for each. */
+  renderObject(...parameters: [...Parameters<RenderObject>, pass: string]): void;
   render(scene: Scene, camera: Camera): void;
   compileAsync(scene: Scene, camera: Camera): Promise<unknown>;
   dispose(): unknown;
