@@ -13,7 +13,8 @@ import {
   type ShDegree,
   type Vector3,
 } from '@gaussian-splat/core';
-import { encodingsFor, fewerSplats } from '@gaussian-splat/optimize';
+import { encodingsFor } from '@gaussian-splat/optimize';
+import { fewerSplats } from '@gaussian-splat/optimize/pages';
 import { readScene } from '@gaussian-splat/formats';
 import { shBasis } from '../oracle/sh.js';
 import { needsSharedData, sharedFile } from '../support/data.js';

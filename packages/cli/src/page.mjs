@@ -75,9 +75,10 @@ async function writeFolder(scenes, tags, folder, page, options) {
 
 /** Writes the splats of a scene as OpenUSD, fewer if there are too many for phones. */
 async function writeUsdz(scene, folder, credits) {
-  const [{ startReading }, { changeFormat, fewerSplats, lossesIn }, { inline }] = await Promise.all([
+  const [{ startReading }, { changeFormat, lossesIn }, { fewerSplats }, { inline }] = await Promise.all([
     import('./lib/scene-in-parts.mjs'),
     import('@gaussian-splat/optimize'),
+    import('@gaussian-splat/optimize/pages'),
     import('@gaussian-splat/optimize/parts'),
   ]);
   const out = join(folder, usdzOf(scene));

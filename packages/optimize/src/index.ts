@@ -9,7 +9,6 @@ export {
 export { optimize, type Optimized, type OptimizeOptions } from './optimize.js';
 export type { CutFigures, Evaluator, EvaluationViews } from './evaluator.js';
 export { GpuEvaluator, type GpuEvaluatorOptions } from './gpu/gpu-evaluator.js';
-export { fewerSplats } from './merge/fewer-splats.js';
 export { MergingEvaluator, type MergingOptions } from './merge/merging-evaluator.js';
 export { decibels, meanSquare, type Image } from './measure.js';
 export type { TaskPool } from './parts/task-pool.js';

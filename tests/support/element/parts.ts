@@ -29,3 +29,4 @@ export { SourceController, type SourceHost } from '../../../packages/element/src
 export { statsOf, type StatsContext } from '../../../packages/element/src/viewer/stats.js';
 export type { Viewer } from '../../../packages/element/src/viewer/viewer.js';
 export { DepthSorter } from '../../../packages/element/src/webgl/depth-sorter.js';
+export { perpendicularOf } from '../../../packages/element/src/features/ruler/perpendicular.js';

@@ -1,4 +1,5 @@
 /** Writers of folders of LOD pages, which the renderer streams and docs/lod-format.md describes. */
+export { fewerSplats } from '../merge/fewer-splats.js';
 export {
   buildDetailTree,
   cutPages,

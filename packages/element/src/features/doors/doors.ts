@@ -38,7 +38,11 @@ export class Doors implements ReactiveController, Feature {
     this.#viewer = viewer;
     const { element } = viewer;
     element.addEventListener('click', this.#onClick);
-    element.addEventListener('load', () => this.#isPassing || this.#fetchAhead());
+    element.addEventListener('load', () => {
+      if (this.#isPassing) return;
+      this.#fetchAhead();
+      this.#showPlan();
+    });
     element.addController(this);
   }
 
@@ -63,7 +67,7 @@ export class Doors implements ReactiveController, Feature {
     import('./floor-plan.js').then(({ FloorPlan }) => {
       if (this.#plan || !this.#viewer.attributes.floorPlan) return;
       this.#plan = new FloorPlan(this.#viewer, (room) => void this.#enter(room));
-      this.#plan.show(this.#first, this.#firstMap, this.#doors, this.#room);
+      this.#showPlan();
     }, warnOf);
   }
 
@@ -152,7 +156,13 @@ export class Doors implements ReactiveController, Feature {
   /** Shows the doors of the present room alone. */
   #showDoors(): void {
     for (const { element, room } of this.#doors) element.hidden = room !== this.#room;
-    this.#plan?.show(this.#first, this.#firstMap, this.#doors, this.#room);
+    this.#showPlan();
+  }
+
+  /** Draws the plan. Maps are read with the request of the scene, so that this waits for the first one. */
+  #showPlan(): void {
+    const { shownRequest } = this.#viewer.sources.ownEntry.scene;
+    if (shownRequest) this.#plan?.show(this.#first, this.#firstMap, this.#doors, this.#room);
   }
 
   /** Fetches the files behind the doors of the present room, one after the other. */

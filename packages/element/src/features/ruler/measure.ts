@@ -4,6 +4,7 @@ import { buttonBarOf } from '../../viewer/button-bar.js';
 import { project } from '../../viewer/camera/projection.js';
 import { toScene } from '../../viewer/camera/orbit.js';
 import type { PickedPoint } from '../../viewer/camera/values.js';
+import { perpendicularOf } from './perpendicular.js';
 import type { Viewer } from '../../viewer/viewer.js';
 import { adoptStyles } from '../../viewer/styles.js';
 import { languageOf } from '../../viewer/strings.js';
@@ -63,9 +64,6 @@ const SVG = 'http://www.w3.org/2000/svg';
 const DRAG = 5;
 /** Number of significant digits of a length. */
 const DIGITS = 3;
-/** Minimum cosine of the angle of two surfaces that count as parallel: 12 degrees. */
-const PARALLEL = Math.cos((12 * Math.PI) / 180);
-
 /** A ruler: two ends on surfaces of the scene, a line, and its length with its uncertainty. */
 export class Measure implements ReactiveController {
   readonly #element: ReactiveControllerHost & HTMLElement;
@@ -283,17 +281,6 @@ function shownPart(camera: Camera, [a, b]: readonly Vector3[]): readonly [Vector
   const at = (share: number): Vector3 => [0, 1, 2].map((k) => a[k] + share * (b[k] - a[k])) as unknown as Vector3;
   const crossing = (): Vector3 => at((cut - from) / (to - from));
   return [from < cut ? crossing() : a, to < cut ? crossing() : b];
-}
-
-/** Returns the distance of two surfaces at right angles to them; null unless they are parallel. */
-function perpendicularOf(from: PickedPoint, to: PickedPoint): number | null {
-  const [a, b] = [from.normal, to.normal];
-  const cosine = a.x * b.x + a.y * b.y + a.z * b.z;
-  if (Math.abs(cosine) < PARALLEL) return null;
-  const sign = Math.sign(cosine);
-  const n = [a.x + sign * b.x, a.y + sign * b.y, a.z + sign * b.z];
-  const way = [to.x - from.x, to.y - from.y, to.z - from.z];
-  return Math.abs(n[0] * way[0] + n[1] * way[1] + n[2] * way[2]) / Math.hypot(...n);
 }
 
 /**

@@ -24,7 +24,7 @@ export interface MeasureDetail {
   readonly uncertainty: number;
   /**
    * Distance of the two surfaces at right angles to them, in units of the scene, for example the height of a room; null
-   * unless they are parallel within 12 degrees.
+   * unless they are parallel within 12 degrees, and for two points of one surface.
    */
   readonly perpendicular: number | null;
   /** Length in meters; null unless the attribute `unit` defines the unit. */
