@@ -40,8 +40,8 @@ declare global {
   const imageBitmap: ImageBitmap;
   const bytes: Uint8Array<ArrayBuffer>;
   const ref: React.RefObject<GaussianSplatElement | null>;
-  const camera: core.Camera;
-  const cloud: core.GaussianCloud;
+  const [camera, cameraOfHouse, cameraOfGarden]: core.Camera[];
+  const [cloud, house, garden]: core.GaussianCloud[];
   const { positions, scales, rotations, opacities, sh }: core.GaussianCloud;
   const element: GaussianSplatElement & { updateSplats(first: number, arrays: object): Promise<void> };
   const response: Response & { readonly body: ReadableStream<Uint8Array<ArrayBuffer>> };
