@@ -49,7 +49,10 @@ const SECTIONS = [
       /^demo\/generators\/README/,
     ],
   ],
-  ['Accuracy and speed', [/^docs\/accuracy/, /^docs\/benchmark/, /^docs\/stability/, /^packages\/optimize\//]],
+  [
+    'Accuracy and speed',
+    [/^docs\/accuracy/, /^docs\/benchmark/, /^docs\/stability/, /^docs\/papers/, /^packages\/optimize\//],
+  ],
   [
     'Without the element',
     [guide(''), /^packages\/(renderer|three|formats|core|cli)\/README/, /^docs\/(lod-format|sequences)/],

@@ -19,6 +19,7 @@ from gaussian_exporter.contract import Coordinates
 from gaussian_exporter.errors import ExportError
 from gaussian_exporter.header import header_faults
 from gaussian_exporter.module.capture import widened
+from gaussian_exporter.placement import gpu_findings
 
 from .running import run
 
@@ -608,12 +609,40 @@ def test_largest_sign_and_parametric_rectifiers_stay_on_the_gpu(tmp_path: Path) 
     assert "Sign" not in used
 
 
-def test_the_diffusion_of_the_guide_converges_in_steps(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def of_the_guide(name: str) -> dict[str, Any]:
+    """The names of a class's example in docs/guide/own-generator.md, which writes its file into the current folder."""
     guide = (Path(__file__).parents[3] / "docs/guide/own-generator.md").read_text()
-    code = next(part for part in guide.split("```python\n") if "class Diffusion" in part).split("```")[0]
-    monkeypatch.chdir(tmp_path)
+    code = next(part for part in guide.split("```python\n") if f"class {name}" in part).split("```")[0]
     scope: dict[str, Any] = {}
     exec(code, scope)
+    return scope
+
+
+def test_the_world_of_the_guide_reacts_to_actions(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    scope = of_the_guide("Pond")
+    model, side = onnx.load("pond.onnx"), scope["SIDE"]
+    assert gpu_findings(model) == []
+    heights: dict[float, list[Any]] = {0.0: [], 1.0: []}
+    for push, seen in heights.items():
+        kept = np.zeros((3, side, side), np.float32)
+        for frame in range(120):
+            given = {"t": np.array([frame / 60]), "push": np.array([push * (frame < 10)]), "at": np.array([-0.5, 0.25])}
+            written = run(model, {**given, "previous": kept})
+            kept = next(values for values in written.values() if values.shape == kept.shape)
+            seen.append(written["positions"][:, 2].reshape(side, side))
+    assert not np.any(heights[0.0])
+    highest = np.unravel_index(heights[1.0][12].argmax(), (side, side))
+    # The rows are x, from -1 to 1.
+    assert abs(highest[0] - 16) <= 1 and abs(highest[1] - 39) <= 1, highest
+    far = [np.abs(each[40:, :]).max() for each in heights[1.0]]
+    assert far[12] < 1e-3 and max(far[60:]) > 0.01, (far[12], max(far[60:]))
+    assert np.abs(heights[1.0][-1]).max() < heights[1.0][12].max(), "waves lose height"
+
+
+def test_the_diffusion_of_the_guide_converges_in_steps(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    scope = of_the_guide("Diffusion")
     model, count, points = onnx.load("diffusion.onnx"), scope["N"], scope["Diffusion"]().data[:, :3].numpy()
     ends = []
     for seed in (0, 1):

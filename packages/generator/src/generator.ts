@@ -1,6 +1,6 @@
 import { ContractError, type GaussianLayout } from '@gaussian-splat/core/contract';
 import { batchOf, type BatchSlot } from './batch/batch.js';
-import { Chain } from './chain/chain.js';
+import { Chain, requireNoneBefore } from './chain/chain.js';
 import { sameInputs, type Inputs } from './input-value.js';
 import { RunLoop } from './run-loop.js';
 import type { GeneratorSession } from './runtime/generator-session.js';
@@ -79,6 +79,7 @@ export class Generator {
   /** Time of the last requested run, seconds. An earlier time resets the state of the models. */
   #timeSeconds = 0;
   #runs = 0;
+  readonly #followers = new Set<(outputs: RunOutputs) => void>();
 
   private constructor(chain: Chain, options: GeneratorOptions) {
     this.#chain = chain;
@@ -106,6 +107,7 @@ export class Generator {
     };
     const chain = await Chain.open(source, device, { ...options, onFallback });
     try {
+      requireNoneBefore(chain.models[0]);
       requireGaussians(chain.models.at(-1)!);
       return (generator = new Generator(chain, options));
     } catch (error) {
@@ -146,7 +148,18 @@ export class Generator {
     this.#askFor(this.#asked);
   }
 
-  /** Requests the last state again, because a session that failed its check has written the current content. */
+  /**
+   * Calls a function with the outputs of each run, and runs the last state again for it. The function must submit its
+   * GPU work before it returns, because the runtime then reuses the buffers.
+   * @returns A function that ends the calls.
+   */
+  follow(take: (outputs: RunOutputs) => void): () => void {
+    this.#followers.add(take);
+    this.#askAgain();
+    return () => void this.#followers.delete(take);
+  }
+
+  /** Requests the last state again: after a failed check of the session, or for a follower. */
   #askAgain(): void {
     this.#chain.forget();
     this.#shown = undefined;
@@ -187,9 +200,10 @@ export class Generator {
     return this.sink !== undefined && !isShown;
   }
 
-  #take(inputs: RunRequest['inputs'], { tensors, rows }: RunOutputs, instance: number): void {
+  #take(inputs: RunRequest['inputs'], outputs: RunOutputs, instance: number): void {
     if (this.#runner.isClosed) return;
-    this.sink?.ingest(tensors, rows, instance);
+    this.sink?.ingest(outputs.tensors, outputs.rows, instance);
+    for (const take of this.#followers) take(outputs);
     this.#shown = inputs;
     this.#runs++;
   }

@@ -1,8 +1,9 @@
 import { ContractError, type ContractFault } from '@gaussian-splat/core/contract';
-import { Chain } from './chain/chain.js';
+import { Chain, requireNoneBefore } from './chain/chain.js';
 import { imageShapeOf } from './bind-images.js';
 import { sameInputs, type GpuTensor, type Inputs } from './input-value.js';
 import { RunLoop } from './run-loop.js';
+import type { Generator } from './generator.js';
 import type { SessionKind } from './runtime/ort-session.js';
 import type { GeneratorModel, ModelSource } from './runtime/open-model.js';
 import type { AcquireOptions } from './runtime/shared-sessions.js';
@@ -53,6 +54,8 @@ export class PostProcessor {
   /** Number of consecutive runs with the same inputs, for models with state. */
   #repeats = 0;
   #version = 0;
+  #followed: Generator | undefined;
+  #unfollow: (() => void) | undefined;
 
   private constructor(chain: Chain, options: PostProcessorOptions) {
     this.#chain = chain;
@@ -118,15 +121,41 @@ export class PostProcessor {
     return this.#loop.idle;
   }
 
+  /** Whether the first model takes the Gaussians of the frame's generator beside its image: see {@link follow}. */
+  get takesGaussians(): boolean {
+    return this.#chain.takesGaussians;
+  }
+
+  /**
+   * Sets the generator whose Gaussians the first model takes. The generator runs once more, for the first ones. A call
+   * with the same generator has no effect.
+   * @throws ContractError `contract/chain` if the outputs of the generator do not match the inputs, if it declares
+   * instances, or if there is no generator, as with a file.
+   */
+  follow(generator: Generator | undefined): void {
+    if (!this.takesGaussians || (generator && generator === this.#followed)) return;
+    this.#unfollow?.();
+    this.#followed = undefined;
+    if (generator === undefined) return requireNoneBefore(this.models[0]);
+    const gaussians = this.#chain.follow(generator.model);
+    const unfollow = generator.follow((outputs) => gaussians.take(outputs));
+    this.#unfollow = () => {
+      unfollow();
+      void this.#loop.idle.then(() => gaussians.destroy());
+    };
+    this.#followed = generator;
+  }
+
   /**
    * Requests the processed image, and returns at once. Replaces a request that has not started yet. A request with the
-   * inputs of the last run is skipped; models with state run it 32 times, to converge.
+   * inputs of the last run is skipped; models with state run it 32 times, to converge. A request before the first
+   * Gaussians of {@link follow} is skipped, too.
    * @param image Image for {@link input}; its `version` identifies its content.
    * @param state State of the page, with `depth` if a model takes it: see {@link depth}.
    * @throws GaussianSplatError `argument/value` if the image or the state does not match the model.
    */
   request(image: GpuTensor, state: GeneratorState = {}): void {
-    if (this.#loop.isClosed) return;
+    if (this.#loop.isClosed || (this.takesGaussians && !this.#chain.hasGaussians)) return;
     const images = { ...state.images, [this.input.name]: image };
     this.#loop.request({ inputs: this.#chain.bind({ ...state, images }) });
   }
@@ -134,6 +163,7 @@ export class PostProcessor {
   /** Closes the post-processor. A run in progress has no effect anymore. */
   close(): void {
     this.#loop.close();
+    this.#unfollow?.();
     this.#chain.release(this.#loop.idle);
   }
 

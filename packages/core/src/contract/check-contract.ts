@@ -28,7 +28,7 @@ export function checkContract(file: OnnxHeader, contract: Contract, options: Che
     ...checkInstances(file, contract),
     ...header.inputs.flatMap((input) => checkInput(input, contract, header)),
     ...missingInputs(header, contract),
-    ...inputsOfOtherModels(contract),
+    ...depthOfGenerators(contract),
     ...checkOutputTensors(header, contract.outputs),
     ...checkGaussians(header, contract),
   ];
@@ -74,21 +74,18 @@ function missingInputs(header: OnnxHeader, { inputs }: Contract): ContractFault[
     );
 }
 
-/** Rejects inputs with the role `depth` in generators, and inputs with the role `gaussians` in post-processors. */
-function inputsOfOtherModels({ inputs, outputs }: Contract): ContractFault[] {
-  const isPost = outputs.layout === 'image';
-  const role = isPost ? 'gaussians' : 'depth';
+/** Rejects inputs with the role `depth` in generators. */
+function depthOfGenerators({ inputs, outputs }: Contract): ContractFault[] {
+  if (outputs.layout === 'image') return [];
   return Object.keys(inputs)
-    .filter((name) => inputs[name].role === role)
+    .filter((name) => inputs[name].role === 'depth')
     .map((name) => ({
       code: 'contract/schema',
       tensor: name,
-      where: `input ${name} (${role})`,
-      expected: isPost ? 'a generator, which follows another in a chain' : 'a post-processor, with the layout image',
+      where: `input ${name} (depth)`,
+      expected: 'a post-processor, with the layout image',
       found: `a model with the layout ${outputs.layout}`,
-      remedy: isPost
-        ? 'give a post-processor the depth of the frame: an input with the role depth'
-        : 'remove the input: no frame is drawn before a generator runs',
+      remedy: 'remove the input: no frame is drawn before a generator runs',
     }));
 }
 

@@ -16,7 +16,7 @@ import onnx
 from google.protobuf.message import DecodeError
 
 from .checkpoints.avatar_file import read_avatar
-from .checkpoints.body_model import read_skinned
+from .checkpoints.body_model import is_bound, read_bound, read_skinned
 from .checkpoints.clouds import read_cloud
 from .checkpoints.files import existing
 from .checkpoints.hexplane_folder import read_hexplane
@@ -28,6 +28,7 @@ from .contract import METADATA_KEY, Coordinates, DType, Facts, Filter, Json, Lay
 from .cost import cost_of, report
 from .errors import ExportError
 from .families.avatar import PoseFormat, export_avatar
+from .families.bound_avatar import export_bound
 from .families.classic import Colors, export_classic
 from .families.deformable import export_deformable
 from .families.feed_forward import export_feed_forward
@@ -243,10 +244,11 @@ def _scaffold_options(family: Command) -> None:
 
 def _avatar_options(family: Command) -> None:
     family.add_argument("--pose", choices=get_args(PoseFormat), default="axis-angle")
-    what = "body model of SMPL, SMPL-H, SMPL-X or FLAME; the checkpoint is then Gaussians in its rest pose"
+    what = "body model of SMPL, SMPL-H, SMPL-X or FLAME, for Gaussians in its rest pose or of GaussianAvatars"
     family.add_argument("--smplx", type=Path, metavar="MODEL.npz", help=what)
     family.add_argument("--shapes", type=positive, default=10, help="with --smplx: coefficients of the body's shape")
-    family.add_argument("--expressions", type=positive, default=10, help="with --smplx: coefficients of expressions")
+    what = "with --smplx: coefficients of expressions; default 10, with GaussianAvatars all"
+    family.add_argument("--expressions", type=positive, help=what)
 
 
 def _no_options(family: Command) -> None:
@@ -293,11 +295,14 @@ def _gaussian4d(given: argparse.Namespace, facts: Facts, options: Options) -> on
 
 
 def _avatar(given: argparse.Namespace, facts: Facts, options: Options) -> onnx.ModelProto:
+    pose_format = cast(PoseFormat, given.pose)
     if given.smplx is None:
-        avatar = read_avatar(given.checkpoint, given.ignore)
-    else:
-        avatar = read_skinned(given.checkpoint, given.smplx, given.ignore, given.shapes, given.expressions)
-    return export_avatar(avatar, facts, options, cast(PoseFormat, given.pose))
+        return export_avatar(read_avatar(given.checkpoint, given.ignore), facts, options, pose_format)
+    if is_bound(given.checkpoint):
+        bound = read_bound(given.checkpoint, given.smplx, given.ignore, given.expressions)
+        return export_bound(bound, facts, options, pose_format)
+    avatar = read_skinned(given.checkpoint, given.smplx, given.ignore, given.shapes, given.expressions or 10)
+    return export_avatar(avatar, facts, options, pose_format)
 
 
 def _feed_forward(given: argparse.Namespace, facts: Facts, options: Options) -> onnx.ModelProto:

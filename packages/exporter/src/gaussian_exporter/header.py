@@ -221,7 +221,7 @@ def _tensors(model: onnx.ModelProto, contract: Mapping[str, Any]) -> Iterator[Fa
     for name, binding in contract["inputs"].items():
         if name not in inputs:
             yield _missing("input", name, binding["role"], inputs)
-        yield from _of_another_model(name, binding["role"], contract["outputs"]["layout"])
+        yield from _depth_of_generator(name, binding["role"], contract["outputs"]["layout"])
     yield from _outputs(outputs, contract)
 
 
@@ -267,16 +267,12 @@ def _instances(inputs: Sequence[Tensor], outputs: Mapping[str, Tensor], contract
         yield fault("instances", f"an input whose first dimension is {axis}", "none", remedy)
 
 
-def _of_another_model(name: str, role: str, layout: str) -> Iterator[Fault]:
-    """Only post-processors receive the depth of a frame, and only generators the Gaussians of the previous model."""
-    is_post = layout == "image"
-    if role != ("gaussians" if is_post else "depth"):
-        return
-    expected = "a generator, which follows another in a chain" if is_post else "a post-processor, with the layout image"
-    remedy = "give a post-processor the depth of the frame: an input with the role depth"
-    if not is_post:
+def _depth_of_generator(name: str, role: str, layout: str) -> Iterator[Fault]:
+    """Only post-processors receive the depth of a frame."""
+    if role == "depth" and layout != "image":
+        expected, found = "a post-processor, with the layout image", f"a model with the layout {layout}"
         remedy = "remove the input: no frame is drawn before a generator runs"
-    yield _fault("schema", name, f"input {name} ({role})", expected, f"a model with the layout {layout}", remedy)
+        yield _fault("schema", name, f"input {name} ({role})", expected, found, remedy)
 
 
 def _input(tensor: Tensor, binding: Mapping[str, Any], outputs: Mapping[str, Tensor]) -> Iterator[Fault]:

@@ -21,13 +21,14 @@ export class Chain {
   /** Inputs from the page in each model's last run. A missing element means that the model must run again. */
   readonly #ran: (Inputs | undefined)[] = [];
   readonly #endProgress: () => void;
+  /** Gaussians for the first model, from a generator that is not part of the chain. */
+  #before: HandOver | undefined;
 
   private constructor(leases: readonly SessionLease[], device: GPUDevice, endProgress: () => void) {
     this.device = device;
     this.#leases = leases;
     this.#endProgress = endProgress;
     const models = leases.map(({ session }) => session.model);
-    requireNoneBefore(models[0]);
     if (models.length > 1) requireNoInstances(models);
     this.#handOvers = models.slice(1).map((after, i) => new HandOver(device, models[i], connect(models[i], after)));
     this.#states = models.map((model) => StateOf.of(model, device));
@@ -83,9 +84,32 @@ export class Chain {
     return SLOWEST_FIRST.find((kind) => kinds.includes(kind));
   }
 
+  /** Whether the first model takes Gaussians of another one: see {@link follow}. */
+  get takesGaussians(): boolean {
+    return this.models[0].header.inputs.some(({ name }) => this.models[0].contract.inputs[name].role === 'gaussians');
+  }
+
+  /** Whether the last run of the generator that the chain follows has written rows. */
+  get hasGaussians(): boolean {
+    return (this.#before?.rows ?? 0) > 0;
+  }
+
+  /**
+   * Makes a generator the source of the Gaussians that the first model takes.
+   * @returns Takes the outputs of the generator's runs, instead of the one that an earlier call has returned.
+   * @throws ContractError `contract/chain` if the models do not match, or the generator declares instances.
+   */
+  follow(model: GeneratorModel): HandOver {
+    requireNoInstances([model]);
+    return (this.#before = new HandOver(this.device, model, connect(model, this.models[0])));
+  }
+
   /** Returns the inputs of every model for a state of the page. @throws GaussianSplatError `argument/value` */
   bind(state: GeneratorState): readonly Inputs[] {
-    return this.#leases.map(({ session }, i) => session.bind(state, this.#handOvers[i - 1]?.inputs));
+    return this.#leases.map(({ session }, i) => ({
+      ...session.bind(state, this.#handOvers[i - 1]?.inputs),
+      ...(i === 0 && this.#before?.tensors),
+    }));
   }
 
   /** Resets the state tensors of all models to their defaults. */
@@ -127,7 +151,7 @@ export class Chain {
   release(idle: Promise<void> = Promise.resolve()): void {
     this.#endProgress();
     for (const { release } of this.#leases) release();
-    void idle.then(() => [...this.#handOvers, ...this.#states].forEach((kept) => kept?.destroy()));
+    void idle.then(() => [...this.#handOvers, ...this.#states, this.#before].forEach((kept) => kept?.destroy()));
   }
 
   #session(i: number): GeneratorSession {
@@ -141,7 +165,7 @@ const SLOWEST_FIRST: readonly SessionKind[] = ['wasm', 'webgpu', 'captured'];
  * Requires that the first model of a chain has no inputs for another model's Gaussians.
  * @throws ContractError `contract/chain`
  */
-function requireNoneBefore({ header, contract }: GeneratorModel): void {
+export function requireNoneBefore({ header, contract }: GeneratorModel): void {
   const faults = header.inputs
     .filter(({ name }) => contract.inputs[name].role === 'gaussians')
     .map(({ name }): ContractFault => {
@@ -151,7 +175,7 @@ function requireNoneBefore({ header, contract }: GeneratorModel): void {
         where: `input ${name} of ${header.name}`,
         expected: 'a model before this one, whose Gaussians the input takes',
         found: 'none',
-        remedy: 'open both as a chain, the one that makes Gaussians first',
+        remedy: 'open both as a chain, the one that makes Gaussians first; a post-processor follows a generator',
       };
     });
   if (faults.length > 0) throw new ContractError(faults);

@@ -1,4 +1,5 @@
 import type { Camera, Credits } from '@gaussian-splat/core';
+import type { Generator } from '@gaussian-splat/generator';
 import type { DynamicGaussians } from '@gaussian-splat/renderer';
 import type { SceneBounds } from '../../viewer/camera/settings.js';
 import type { GeneratorInput } from './inputs.js';
@@ -46,6 +47,8 @@ export interface Timeline {
   readonly inputs?: readonly GeneratorInput[];
   /** Names of the inputs that `control-NAME` sets; absent if there are none. */
   readonly settable?: readonly string[];
+  /** The generator, whose Gaussians a post-processor may take; absent for files. */
+  readonly generator?: Generator;
   /** Requests the Gaussians of a state. The latest request wins, and a request of the same state costs nothing. */
   request(state: DynamicState, camera: Camera): void;
   /**

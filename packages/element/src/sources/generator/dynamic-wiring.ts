@@ -81,7 +81,7 @@ export class DynamicWiring implements PostHost {
       loader: services.sceneLoader,
       limits: services.sceneLimits,
       state: () => this.state,
-      others: () => this.#host.shown.flatMap(({ live }) => live?.settable ?? []),
+      shown: () => this.#host.shown.flatMap(({ live }) => live ?? []),
       onError: (error) => this.#fail(error),
       onFallback: (reason) => this.#fallBack(reason),
     };

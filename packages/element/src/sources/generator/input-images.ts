@@ -111,7 +111,10 @@ export class InputImages {
         );
         if (this.#isDestroyed || this.#sources.get(name) !== source) return;
         const tensor = this.#tensorFor(name, all[0]);
-        all.forEach((pixels, view) => tensor.upload(pixels, 'cover', view));
+        all.forEach((pixels, view) => {
+          tensor.upload(pixels, 'cover', view);
+          if (pixels instanceof HTMLVideoElement) this.#follow(name, source, pixels, view);
+        });
       } finally {
         // Decoded images are closed in any case, also if the page has replaced them.
         for (const pixels of made) pixels.close();
@@ -121,6 +124,17 @@ export class InputImages {
       const isCurrent = this.#sources.get(name) === source;
       if (isCurrent && !this.#isDestroyed && !this.#options.signal.aborted) this.#options.onError(error);
     }
+  }
+
+  /** Uploads each later frame of a video, between two runs. Frames that arrive during a run are left out. */
+  #follow(name: string, source: ImageSources, video: HTMLVideoElement, view: number): void {
+    const upload = (): void => {
+      if (this.#isDestroyed || this.#sources.get(name) !== source) return;
+      this.#tensorFor(name, video).upload(video, 'cover', view);
+      this.#options.onChange();
+      this.#follow(name, source, video, view);
+    };
+    video.requestVideoFrameCallback(() => void this.#options.whenIdle().then(upload).catch(this.#options.onError));
   }
 
   #tensorFor(name: string, pixels: GPUCopyExternalImageSource): ImageTensor {

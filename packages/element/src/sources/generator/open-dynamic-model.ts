@@ -203,6 +203,7 @@ function liveModel(
   let isClosed = false;
   return {
     gaussians,
+    generator,
     inputs: inputsOf(models),
     settable: reader.settable,
     readBounds: async () => ({ ...(await gaussians.readBounds()), up }),

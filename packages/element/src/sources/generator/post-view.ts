@@ -3,7 +3,7 @@ import { PostProcessor, setRuntimeLocation, type GpuTensor } from '@gaussian-spl
 import { FilteredFrame } from '@gaussian-splat/renderer';
 import type { Frame, FrameFilter } from './frame-filter.js';
 import { inputsOf, type GeneratorInput } from './inputs.js';
-import type { DynamicRequest } from './dynamic-model.js';
+import type { DynamicRequest, Timeline } from './dynamic-model.js';
 import { InputImages } from './input-images.js';
 import { gpuCheckOf, offerPanel } from './of-element.js';
 import { readsHeaders } from './model-files.js';
@@ -16,8 +16,8 @@ export interface PostRequest extends Pick<
   /** Absolute addresses of post-processors, in execution order. */
   readonly urls: readonly string[];
   readonly signal: AbortSignal;
-  /** Returns the names of other models' inputs that `control-NAME` sets, which are not reported as unknown. */
-  readonly others: () => readonly string[];
+  /** Returns the changing scenes that are drawn. */
+  readonly shown: () => readonly Timeline[];
   /** Called when the next frame would differ, so that it must be drawn. */
   readonly onChange: () => void;
   readonly onError: (error: unknown) => void;
@@ -218,10 +218,15 @@ export class PostView implements FrameFilter {
       shown.handed = shown.drawn;
     }
     [this.#pending, this.#pendingSurface] = [shown, surface];
+    const scenes = this.#request.shown();
+    // Names of other models' inputs are not reported as unknown.
+    const others = scenes.flatMap(({ settable }) => settable ?? []);
     try {
-      const read = this.#reader.read(state, camera, this.#images.tensors, this.#request.others());
+      this.#post.follow(scenes.find(({ generator }) => generator)?.generator);
+      const read = this.#reader.read(state, camera, this.#images.tensors, others);
       this.#post.request(shown.tensor, { ...read, depth: shown.depth });
     } catch (error) {
+      this.#failed = this.#tried;
       this.#request.onError(error);
     }
     void this.#post.idle.then(() => {

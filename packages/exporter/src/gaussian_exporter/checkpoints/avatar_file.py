@@ -38,7 +38,7 @@ def read_avatar(path: Path, ignored: Sequence[str] = ()) -> Avatar:
 
 # Files that identify the folder of an avatar repository: pattern, name of the repository, reason of the refusal.
 _FOLDERS = (
-    ("**/flame_param.npz", "GaussianAvatars", "it moves FLAME"),
+    ("**/flame_param.npz", "GaussianAvatars", "it moves FLAME, which --smplx HEAD.npz gives"),
     ("**/mlp_ckpt", "GauHuman", "its network moves SMPL"),
     ("**/offset.ply", "LAM", "skin.glb and animation.glb beside offset.ply are a mesh of FLAME"),
     ("**/smplx_params*", "an avatar of SMPL-X (ExAvatar, LHM)", "its network moves SMPL-X"),

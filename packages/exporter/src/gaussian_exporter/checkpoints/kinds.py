@@ -22,8 +22,7 @@ _BY_PROPERTY = {
     "trbf_center": ("SpacetimeGaussians", "run gaussian-export spacetime"),
     "binding_0": (
         "GaussianAvatars",
-        "its places are local to triangles of FLAME, which a page may not have: export a module that holds the mesh "
-        "(gaussian_exporter.export_module)",
+        "run gaussian-export avatar with --smplx HEAD.npz, your FLAME (README of the exporter: GaussianAvatars)",
     ),
     "f_anchor_feat_0": ("Scaffold-GS or Octree-GS", "run gaussian-export scaffold"),
     "f_offset_0": ("Scaffold-GS or Octree-GS", "run gaussian-export scaffold"),

@@ -33,22 +33,17 @@ from ..pieces.view import direction_and_distance
 PoseFormat = Literal["axis-angle", "quaternion"]
 
 
-@dataclass(frozen=True)
-class Avatar:
-    """N Gaussians at rest and a skeleton of J joints, parents first (root: parent -1).
+@dataclass(frozen=True, kw_only=True)
+class Skinned:
+    """N points at rest and a skeleton of J joints, parents first (root: parent -1).
 
-    positions (N,3), scales (N,3) standard deviations, rotations (N,4) w x y z, opacities (N,1) 0..1, sh (N,(d+1)^2,3);
-    weights (N,J), rows sum to 1; joints (J,3) at rest. Blend shapes, all optional: shape_directions (N,3,B) and
-    joint_directions (J,3,B) move Gaussians and joints by the coefficients of `shape`, expression_directions (N,3,E) and
-    expression_joint_directions (J,3,E) by those of `expression`, pose_directions (N,3,9(J-1)) by the entries of every
-    non-root rotation less the identity.
+    positions (N,3); weights (N,J), rows sum to 1; joints (J,3) at rest. Blend shapes, all optional: shape_directions
+    (N,3,B) and joint_directions (J,3,B) move points and joints by the coefficients of `shape`, expression_directions
+    (N,3,E) and expression_joint_directions (J,3,E) by those of `expression`, pose_directions (N,3,9(J-1)) by the
+    entries of every non-root rotation less the identity.
     """
 
     positions: Floats
-    scales: Floats
-    rotations: Floats
-    opacities: Floats
-    sh: Floats
     weights: Floats
     joints: Floats
     parents: Sequence[int]
@@ -58,6 +53,27 @@ class Avatar:
     expression_directions: Floats | None = None
     expression_joint_directions: Floats | None = None
     pose_directions: Floats | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Avatar(Skinned):
+    """N Gaussians at rest on a skeleton: scales (N,3) standard deviations, rotations (N,4) w x y z, opacities (N,1)
+    0..1, sh (N,(d+1)^2,3), beside the arrays of `Skinned`.
+    """
+
+    scales: Floats
+    rotations: Floats
+    opacities: Floats
+    sh: Floats
+
+
+@dataclass(frozen=True)
+class Posed:
+    """Points in world coordinates, placed (...,N,3); carried (...,N,3,4), the matrix of each; inputs of both."""
+
+    placed: Tensor
+    carried: Tensor
+    inputs: list[Input]
 
 
 def export_avatar(
@@ -71,17 +87,25 @@ def export_avatar(
     check(avatar)
     options = options or Options()
     graph = Graph("avatar", options.weights, options.instances is not None)
+    body = posed(avatar, graph, pose_format)
+    gaussians = skinned(avatar, graph, body)
+    bounds = avatar.positions.min(0), avatar.positions.max(0)
+    return finish(graph, gaussians, body.inputs, bounds, facts, options)
+
+
+def posed(body: Skinned, graph: Graph, pose_format: PoseFormat) -> Posed:
+    """Points of a skinned body for its inputs: pose, translation, and coefficients of the blend shapes that it has."""
     quaternions = pose_format == "quaternion"
-    given = graph.input("pose", *graph.lead, len(avatar.parents), 4 if quaternions else 3)
+    given = graph.input("pose", *graph.lead, len(body.parents), 4 if quaternions else 3)
     products = products_of_parts(unit_quaternions(given) if quaternions else quaternions_of_axis_angle(given))
-    inputs = [pose("pose", avatar.joint_names, avatar.parents, quaternions)]
-    points, joints = blended(avatar, graph, products, inputs)
-    carried = blended_matrices(avatar, skinning_matrices(products, joints, avatar.parents))
+    inputs = [pose("pose", body.joint_names, body.parents, quaternions)]
+    points, joints = blended(body, graph, products, inputs)
+    carried = blended_matrices(body, skinning_matrices(products, joints, body.parents))
     translation = row_of(graph, "translation", 3)
     inputs.append(control("translation", 0.0, -10.0, 10.0))
-    gaussians = skinned(avatar, graph, points, carried, translation, inputs)
-    bounds = avatar.positions.min(0), avatar.positions.max(0)
-    return finish(graph, gaussians, inputs, bounds, facts, options)
+    count = len(body.positions)
+    placed = (carried @ points.reshape(*points.shape, 1)).reshape(*graph.lead, count, 3) + translation
+    return Posed(placed, carried, inputs)
 
 
 def check(avatar: Avatar) -> None:
@@ -118,7 +142,7 @@ def _demand(holds: bool, where: str, expected: str, found: str) -> None:
         )
 
 
-def blended(avatar: Avatar, graph: Graph, products: Tensor, inputs: list[Input]) -> tuple[Tensor, Tensor]:
+def blended(avatar: Skinned, graph: Graph, products: Tensor, inputs: list[Input]) -> tuple[Tensor, Tensor]:
     """Points x y z 1 (...,N,4) and joints (...,J,3) at rest, for the current shape, expression and pose. Adds the
     inputs that these need.
     """
@@ -169,7 +193,7 @@ def along(row: Tensor, directions: Floats, start: Tensor, name: str) -> Tensor:
     return ended.reshape(*lead, count, columns)
 
 
-def blended_matrices(avatar: Avatar, matrices: Tensor) -> Tensor:
+def blended_matrices(avatar: Skinned, matrices: Tensor) -> Tensor:
     """Blend (...,N,3,4) for each Gaussian of its joints' matrices (...,R,12), R joints or more."""
     graph, (count, joints) = matrices.graph, avatar.weights.shape
     weights = graph.constant(avatar.weights, "weights", errors="even")
@@ -178,19 +202,16 @@ def blended_matrices(avatar: Avatar, matrices: Tensor) -> Tensor:
     return blend.reshape(*graph.lead, count, 3, 4)
 
 
-def skinned(
-    avatar: Avatar, graph: Graph, points: Tensor, carried: Tensor, translation: Tensor, inputs: list[Input]
-) -> Gaussians:
-    """Gaussians in world coordinates; points (...,N,4) x y z 1 at rest; carried (...,N,3,4), the matrix of each."""
-    count = len(avatar.positions)
-    placed = (carried @ points.reshape(*points.shape, 1)).reshape(*graph.lead, count, 3) + translation
+def skinned(avatar: Avatar, graph: Graph, body: Posed) -> Gaussians:
+    """Gaussians in world coordinates."""
+    placed, carried = body.placed, body.carried
     half = graph.constant(rotation_matrices(avatar.rotations) * avatar.scales[:, None, :], "halves")
     # The blended matrix also stretches if joints disagree; covariances follow it exactly.
     stretched = carried @ in_four_rows(half)
     sh = graph.constant(avatar.sh, "sh")
     if avatar.sh.shape[1] > 1:
         camera = row_of(graph, "camera_position", 3)
-        inputs.append(camera_position())
+        body.inputs.append(camera_position())
         direction, _ = direction_and_distance(placed, camera)
         # Transposed, the blend rotates the direction back to the axes in which the harmonics were trained.
         own = (carried * direction.reshape(*direction.shape, 1)).sum(-2).part(0, 3)

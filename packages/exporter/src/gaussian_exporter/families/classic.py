@@ -11,7 +11,7 @@ from typing import Literal
 import numpy as np
 import onnx
 
-from ..arrays import Floats, covariances, sigmoid
+from ..arrays import AnyArray, Floats, covariances, sigmoid
 from ..checkpoints.ply import Vertices
 from ..contract import Facts, Filter, Up, camera_position
 from ..errors import ExportError
@@ -82,10 +82,19 @@ def filtered(cloud: Cloud, widths: Floats) -> Cloud:
 
 
 def usable(cloud: Cloud) -> Cloud:
-    """Without Gaussians that cannot be drawn: not finite, or with a zero quaternion. Infinite opacities are fine."""
+    """Without Gaussians that cannot be drawn."""
+    kept = usable_rows(cloud)
+    names = ("positions", "log_scales", "rotations", "opacity_logits", "sh")
+    return replace(cloud, **{name: getattr(cloud, name)[kept] for name in names})
+
+
+def usable_rows(cloud: Cloud) -> AnyArray:
+    """Whether each Gaussian (N) can be drawn: it is finite, its quaternion not 0. Opacities may be infinite."""
     sh = cloud.sh.reshape(len(cloud.sh), -1)
     numbers = np.concatenate([cloud.positions, cloud.log_scales, cloud.rotations, sh], 1)
-    kept = np.isfinite(numbers).all(1) & (np.abs(cloud.rotations).max(1) > 0) & ~np.isnan(cloud.opacity_logits[:, 0])
+    kept: AnyArray = (
+        np.isfinite(numbers).all(1) & (np.abs(cloud.rotations).max(1) > 0) & ~np.isnan(cloud.opacity_logits[:, 0])
+    )
     if not kept.any():
         raise ExportError(
             "checkpoint/unreadable",
@@ -94,8 +103,7 @@ def usable(cloud: Cloud) -> Cloud:
             found=f"{len(kept)} with numbers that are not finite",
             remedy="training diverged; export an earlier checkpoint",
         )
-    names = ("positions", "log_scales", "rotations", "opacity_logits", "sh")
-    return replace(cloud, **{name: getattr(cloud, name)[kept] for name in names})
+    return kept
 
 
 def export_classic(
