@@ -193,7 +193,7 @@ def _person(path: Path, vertices: int) -> dict[str, Doubles]:
 
 
 # The template of FLAME has no teeth, which the class of GaussianAvatars adds.
-_HEAD = "write the head of the training, with its teeth, as the exporter's README shows (GaussianAvatars)"
+_HEAD = 'write the head of the training, with its teeth: "GaussianAvatars" in packages/exporter/README.md'
 
 
 def _of_training(both: Doubles, shapes: int, expressions: int, where: Path) -> tuple[Doubles, Doubles]:

@@ -22,7 +22,8 @@ _BY_PROPERTY = {
     "trbf_center": ("SpacetimeGaussians", "run gaussian-export spacetime"),
     "binding_0": (
         "GaussianAvatars",
-        "run gaussian-export avatar with --smplx HEAD.npz, your FLAME (README of the exporter: GaussianAvatars)",
+        "run gaussian-export avatar with --smplx HEAD.npz, your FLAME: "
+        '"GaussianAvatars" in packages/exporter/README.md',
     ),
     "f_anchor_feat_0": ("Scaffold-GS or Octree-GS", "run gaussian-export scaffold"),
     "f_offset_0": ("Scaffold-GS or Octree-GS", "run gaussian-export scaffold"),

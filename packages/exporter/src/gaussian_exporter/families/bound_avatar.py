@@ -133,5 +133,5 @@ def check(avatar: BoundAvatar) -> None:
                 where=f"avatar: {name}",
                 expected=f"indices of the {count} {what} of the mesh",
                 found=f"{int(indices.min())} to {int(indices.max())}",
-                remedy="give the mesh of the training, with its teeth (README of the exporter: GaussianAvatars)",
+                remedy='give the head of the training, with teeth: "GaussianAvatars" in packages/exporter/README.md',
             )
