@@ -152,12 +152,13 @@ async function addChild(scene, attributes, signal) {
 }
 
 async function pose(scene, handle, slider, signal) {
+  // With the press: what it moves aside is then not moved later.
+  handle.hidden = false;
+  signal.addEventListener('abort', () => (handle.hidden = true));
   const { jointsOf } = await import('./joints.js');
   const joints = await jointsOf(new URL(WALKER, document.baseURI));
   const added = await addChild(scene, `src="${WALKER}" ${PERSON}`, signal);
   const set = () => (added.pose = poseOf(joints, { arms: slider.valueAsNumber, knees: 0, head: 0 }));
-  signal.addEventListener('abort', () => (handle.hidden = true));
   slider.addEventListener('input', set, { signal });
-  handle.hidden = false;
   set();
 }

@@ -100,6 +100,12 @@ export const COMMANDS = {
     command: ['scripts/grid/run-grid.mjs'],
     smallest: ['--seconds', '4'],
   },
+  lighthouse: {
+    what: 'paints and layout shift of the site, on a simulated phone',
+    in: 'chromium',
+    command: ['scripts/lighthouse.mjs'],
+    smallest: ['--only', '^/docs/guide/start/$', '--runs', '1'],
+  },
   lives: {
     what: 'elements that are added and removed',
     in: 'chromium',

@@ -1,6 +1,6 @@
 """Trained splats rounded to small archives, and archives to PLY. Rounding comes before measuring.
 
-`python pack.py ply ARCHIVE OUT.ply`, `python pack.py frames ARCHIVE MOTION FOLDER`.
+`python pack.py ply ARCHIVE OUT.ply`, `python pack.py frames ARCHIVE MOTION FOLDER [RADIUS]`. With a radius in meters, frames are splats around the middle, with harmonics of degree 1.
 """
 
 import io
@@ -63,17 +63,25 @@ def _morton(points: np.ndarray) -> np.ndarray:
     return code
 
 
+def near(values: dict, radius: float) -> np.ndarray:
+    """Small splats within a radius of the vertical axis, from just below the floor to above a person."""
+    x, y, z = values["means"].T
+    is_small = np.exp(values["scales"]).max(axis=1) < 0.1 * radius
+    return (np.hypot(x, z) < radius) & (y > -2.2) & (y < 0.1) & is_small
+
+
 def write_ply(path: Path, values: dict) -> None:
     """The layout of the first trainers, without normals."""
-    count, rest = len(values["means"]), values["shN"].reshape(len(values["means"]), 15, 3)
-    names = ["x", "y", "z"] + [f"f_dc_{k}" for k in range(3)] + [f"f_rest_{k}" for k in range(45)]
+    count = len(values["means"])
+    rest = values["shN"].reshape(count, -1, 3)
+    names = ["x", "y", "z"] + [f"f_dc_{k}" for k in range(3)] + [f"f_rest_{k}" for k in range(3 * rest.shape[1])]
     names += ["opacity"] + [f"scale_{k}" for k in range(3)] + [f"rot_{k}" for k in range(4)]
     quats = values["quats"] / np.maximum(np.linalg.norm(values["quats"], axis=1, keepdims=True), 1e-9)
     color = values["sh0"].reshape(count, 3)
     columns = [
         values["means"],
         color,
-        rest.transpose(0, 2, 1).reshape(count, 45),
+        rest.transpose(0, 2, 1).reshape(count, -1),
         values["opacities"][:, None],
         values["scales"],
         quats,
@@ -121,4 +129,9 @@ if __name__ == "__main__":
     else:
         scene, chosen = opened(Path(sys.argv[2]).read_bytes()), np.load(sys.argv[3] + ".chosen.npy")
         for number, values in enumerate(frames_of(scene, chosen, Path(sys.argv[3]).read_bytes())):
+            if len(sys.argv) > 5:
+                # Chosen in the first frame: a splat of the walker may leave the circle, and must not come and go.
+                kept = near(scene, float(sys.argv[5]))
+                values = {k: v[kept] for k, v in values.items()}
+                values["shN"] = values["shN"].reshape(len(values["means"]), -1, 3)[:, :3]
             write_ply(Path(sys.argv[4]) / f"{number:03}.ply", values)

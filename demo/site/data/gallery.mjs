@@ -143,7 +143,7 @@ export default function gallery() {
       poster,
       size: sizeOf(scene.src),
       splats: counts[scene.id]?.toLocaleString('en'),
-      tag: tagOf([...attributes, ['poster', poster]], (file) => `../../${file}`, ' '),
+      tag: tagOf(attributes, (file) => `../../${file}`, ' '),
       children: doorsOf(scene, (file) => `../../${file}`),
       code: `<gaussian-splat ${tagOf(attributes, shortOf, '\n  ')}>${doorsOf(scene, shortOf)}</gaussian-splat>`,
       playground: new URLSearchParams(
