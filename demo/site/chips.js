@@ -152,7 +152,7 @@ async function addChild(scene, attributes, signal) {
 }
 
 async function pose(scene, handle, slider, signal) {
-  // With the press: what it moves aside is then not moved later.
+  // The slider appears with the press, so that nothing moves when the person has loaded.
   handle.hidden = false;
   signal.addEventListener('abort', () => (handle.hidden = true));
   const { jointsOf } = await import('./joints.js');
