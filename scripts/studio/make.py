@@ -206,13 +206,13 @@ class Making:
         return points * TRAINER, image[v, u] / 255
 
     def keep(self, splats, check) -> dict:
-        """Rounds, measures and writes the splats; returns the figures."""
+        """Rounds, orders, measures and writes the splats; returns the figures."""
         import pack
 
         values = {k: v.detach().float().cpu().numpy().reshape(len(v), -1) for k, v in splats.items()}
         values["quats"] /= np.maximum(np.linalg.norm(values["quats"], axis=1, keepdims=True), 1e-9)
         values["opacities"] = values["opacities"][:, 0]
-        values = {k: v for k, v in pack.rounded(values).items()}
+        values = pack.ordered(pack.rounded(values))
         for name, value in values.items():
             splats[name].data = self.torch.from_numpy(value).to(splats[name]).reshape(splats[name].shape)
         figures = check(splats)

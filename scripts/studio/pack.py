@@ -24,12 +24,17 @@ def _codes(name: str, values: np.ndarray) -> np.ndarray:
     return np.rint(np.clip(values, -LIMITS[name], LIMITS[name]) / STEPS[name]).astype(np.int32)
 
 
+def ordered(values: dict) -> dict:
+    """The splats in the order of archives: motion is kept by the numbers of splats."""
+    order = np.argsort(_morton(values["means"]), kind="stable")
+    return {k: v[order] for k, v in values.items()}
+
+
 def archive(values: dict) -> bytes:
     """Byte planes of all codes, splats in Morton order, compressed."""
-    order = np.argsort(_morton(values["means"]), kind="stable")
     out = {}
-    for name, array in values.items():
-        codes = _codes(name, array.reshape(len(order), -1)[order]).T
+    for name, array in ordered(values).items():
+        codes = _codes(name, array.reshape(len(array), -1)).T
         if name == "means":
             codes = np.diff(codes, axis=1, prepend=0)
         zigzag = ((codes << 1) ^ (codes >> 31)).astype("<u4")
