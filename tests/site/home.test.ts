@@ -2,8 +2,9 @@
 import assert from 'node:assert/strict';
 import { after, before, describe, it } from 'node:test';
 import { join } from 'node:path';
+import type { Page } from 'playwright-core';
 import { checkPage } from './page-check.js';
-import { isBuilt, openSite, root, withCompass, type OpenSite, type Visit } from './support.js';
+import { isBuilt, openSite, root, withCompass, withScenesToCome, type OpenSite, type Visit } from './support.js';
 
 interface Splat extends HTMLElement {
   readonly loaded: boolean;
@@ -11,6 +12,19 @@ interface Splat extends HTMLElement {
   jumpCameraToGoal(): void;
 }
 const TIMEOUT = { timeout: 100_000, polling: 100 };
+
+/** Sum of all layout shifts of a page until now. */
+const shiftsOf = (tab: Page): Promise<number> =>
+  tab.evaluate(
+    () =>
+      new Promise<number>((resolve) => {
+        let sum = 0;
+        new PerformanceObserver((list) => {
+          for (const entry of list.getEntries()) sum += (entry as PerformanceEntry & { value: number }).value;
+        }).observe({ type: 'layout-shift', buffered: true });
+        setTimeout(() => resolve(sum), 300);
+      }),
+  );
 
 describe('the first page', { skip: isBuilt ? false : 'no site: npm run build' }, () => {
   let open: OpenSite;
@@ -24,17 +38,18 @@ describe('the first page', { skip: isBuilt ? false : 'no site: npm run build' },
   it('does not move when the scene comes', async () => {
     const { tab } = only;
     await tab.waitForFunction(() => document.querySelector<Splat>('#hero')!.loaded, undefined, TIMEOUT);
-    const shifts = await tab.evaluate(
-      () =>
-        new Promise<number>((resolve) => {
-          let sum = 0;
-          new PerformanceObserver((list) => {
-            for (const entry of list.getEntries()) sum += (entry as PerformanceEntry & { value: number }).value;
-          }).observe({ type: 'layout-shift', buffered: true });
-          setTimeout(() => resolve(sum), 300);
-        }),
-    );
+    const shifts = await shiftsOf(tab);
     assert.ok(shifts < 0.01, `cumulative layout shift ${shifts}`);
+  });
+
+  it('does not move when an app of React or Vue starts', async () => {
+    for (const path of ['/react/', '/vue/']) {
+      const { tab } = await open.visit(path, { width: 1280, prepare: withScenesToCome });
+      await tab.waitForFunction(() => document.querySelector('#app gaussian-splat:defined'), undefined, TIMEOUT);
+      const shifts = await shiftsOf(tab);
+      await tab.close();
+      assert.ok(shifts < 0.01, `${path}: cumulative layout shift ${shifts}`);
+    }
   });
 
   it('shows its words and chips in the first screen, and never over the middle of the scene', async () => {
