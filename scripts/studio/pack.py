@@ -25,7 +25,7 @@ def _codes(name: str, values: np.ndarray) -> np.ndarray:
 
 
 def ordered(values: dict) -> dict:
-    """The splats in the order of archives: motion is kept by the numbers of splats."""
+    """The splats in the order of archives: motion is kept by the indices of splats."""
     order = np.argsort(_morton(values["means"]), kind="stable")
     return {k: v[order] for k, v in values.items()}
 
