@@ -50,7 +50,10 @@ for (const path of PAGES.filter((each) => new RegExp(values.only).test(each))) {
       (each) => audits.push(each),
       (error) => console.error(`${path}: ${error.stderr || error.message}`),
     );
-  if (audits.length === 0) continue;
+  if (audits.length === 0) {
+    process.exitCode = 1;
+    continue;
+  }
   const figure = (name) => middle(audits.map((each) => each[name].numericValue));
   const shift = Math.max(...audits.map((each) => each['cumulative-layout-shift'].numericValue));
   const largest = audits[0]['largest-contentful-paint-element']?.details?.items[0]?.items[0]?.node.selector;
