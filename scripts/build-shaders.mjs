@@ -56,6 +56,7 @@ const MODIFIED = {
   },
   called: {
     may_be_visible: 'may_be_modified',
+    gaussian_at: 'loaded_gaussian_at',
     unpack_gaussian: 'modified_gaussian',
     pack_splat: 'pack_modified',
   },

@@ -82,18 +82,42 @@ const sources = [
     ].map((name) => path(`./dist/${name}.js`)),
   }),
 ];
+/** Options of Terser for all chunks. */
+const SHORT = {
+  module: true,
+  ecma: 2022,
+  // A bundler of an app replaces an import whose address it does not know by one that throws, unless a comment in it says otherwise.
+  format: { comments: /@vite-ignore|webpackIgnore/ },
+};
+
+/** Minimum number of exports that other chunks import, for a second pass of Terser. */
+const MANY_EXPORTS = 20;
+/**
+ * Names variables as Rollup has named their exports, so that the list of exports has no pairs: 380 bytes of gzip less for
+ * the element's script.
+ */
+const exportedNames = {
+  name: 'exported-names',
+  renderChunk(code, ...rest) {
+    const [, list = ''] = /\bexport\{([^}]*)\}/.exec(code) ?? [];
+    const pairs = list.split(',').map((each) => each.split(' as '));
+    const short = pairs.filter(([, exported]) => exported?.length <= 2);
+    if (short.length < MANY_EXPORTS) return null;
+    const props = Object.fromEntries(short.map(([variable, exported]) => [`$${variable}`, exported]));
+    return terser({ ...SHORT, compress: false, nameCache: { vars: { props } } }).renderChunk.call(this, code, ...rest);
+  },
+};
+
 const plugins = [
   ...sources,
   shortPrivates,
   // Statements compress better than what they can be joined to with commas. No property is read here for what its getter does.
   terser({
-    module: true,
-    ecma: 2022,
+    ...SHORT,
     // More passes save 3 bytes of gzip, and take a quarter of the time of a build.
     compress: { passes: 2, sequences: false, inline: 1, keep_fargs: false, pure_getters: true },
-    // A bundler of an app replaces an import whose address it does not know by one that throws, unless a comment in it says otherwise.
-    format: { comments: /@vite-ignore|webpackIgnore/ },
   }),
+  exportedNames,
 ];
 
 /** Here the worker's script lies beside the element's. */

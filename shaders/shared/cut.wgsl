@@ -32,6 +32,7 @@ struct CutSlab {
 }
 
 fn slab_count(shape: u32) -> u32 {
+  if (shape == CUT_EVERYWHERE) { return 0u; }
   return select(select(1u, 2u, shape == CUT_CYLINDER), 3u, shape == CUT_BOX);
 }
 

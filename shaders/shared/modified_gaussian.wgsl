@@ -1,7 +1,8 @@
 // Applies modifiers to splats: cuts, then the hook of the page, then the reveal effect. Variants of the stages that
 // read Gaussians (`cull_modified` of `cull` and so on: scripts/build-shaders.mjs) call these functions instead of
-// `unpack_gaussian` and `pack_splat`.
+// `gaussian_at`, `unpack_gaussian` and `pack_splat`.
 #import shared/cut
+#import shared/splat_groups
 #import shared/splat_hook
 #import shared/stored_gaussian
 #import shared/scene_opacity
@@ -17,8 +18,9 @@ const LARGEST_SCALE = 1000.0;
 // Minimum scale: a splat without a size would have no image.
 const SMALLEST_SCALE = 1e-4;
 
-// State of the current splat: rows of the affine map of colors that the cuts make together, and the arguments of the
-// hook.
+// State of the current splat: its index in the block, rows of the affine map of colors that the cuts make together, and
+// the arguments of the hook.
+var<private> splat_index: u32;
 var<private> cut_has_color: bool;
 var<private> cut_red: vec4f;
 var<private> cut_green: vec4f;
@@ -65,8 +67,9 @@ fn apply_cuts(g: ptr<function, Gaussian>) {
   cut_red = vec4f(1.0, 0.0, 0.0, 0.0);
   cut_green = vec4f(0.0, 1.0, 0.0, 0.0);
   cut_blue = vec4f(0.0, 0.0, 1.0, 0.0);
+  let cuts = cuts_of_group(splat_index);
   for (var k = 0u; k < modifiers.cut_count; k++) {
-    let inside = share_in_shape(k, found);
+    let inside = select(0.0, share_in_shape(k, found), ((cuts >> k) & 1u) != 0u);
     let share = select(inside, 1.0 - inside, modifiers.cuts[k].is_outside != 0u);
     if (share <= 0.0) { continue; }
     if (modifiers.cuts[k].has_color != 0u) { compose_colors(k, share); }
@@ -123,6 +126,12 @@ fn apply_reveal(g: ptr<function, Gaussian>) {
   }
 }
 
+fn loaded_gaussian_at(i: u32) -> FoundGaussian {
+  splat_index = i;
+  return gaussian_at(i);
+}
+
+// The splat that was loaded last.
 fn modified_gaussian(found: FoundGaussian) -> Gaussian {
   var g = unpack_gaussian(found);
   apply_cuts(&g);

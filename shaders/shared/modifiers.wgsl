@@ -9,6 +9,7 @@ const CUT_BOX = 0u;
 const CUT_SPHERE = 1u;
 const CUT_CYLINDER = 2u;
 const CUT_PLANE = 3u;
+const CUT_EVERYWHERE = 4u;
 
 struct ModifierCut {
   // Rows of the affine map to the coordinates of the shape.
@@ -57,8 +58,9 @@ struct Modifiers {
   share: f32,
   // 1 if splats may leave the bounds of their chunks.
   moves: u32,
-  reserved_a: u32,
-  reserved_b: u32,
+  // Rows of `groups` with the cuts of groups; 0 for a scene without groups.
+  group_rows: u32,
+  reserved: u32,
   values: array<vec4f, MAX_VALUES>,
   cuts: array<ModifierCut, MAX_CUTS>,
 }

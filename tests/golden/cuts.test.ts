@@ -1,18 +1,18 @@
-/** Cuts against the float64 oracle: four shapes, soft and hard, of two scenes, with each action. */
+/** Cuts against the float64 oracle: four shapes, soft and hard, of two scenes, with each action; and groups. */
 import assert from 'node:assert/strict';
 import { after, test } from 'node:test';
 import { lookAt, multiply, type Camera, type GaussianCloud, type Matrix4 } from '@gaussian-splat/core';
 import { capture, GaussianBuffers, packGaussians, settings, Viewpoint, World } from '@gaussian-splat/renderer';
+import { packedOrder } from '@gaussian-splat/renderer/tools';
 import {
   lightened,
   recolored,
   SplatModifier,
   SplatProgram,
   tinted,
-  type CutShape,
   type SplatCut,
 } from '@gaussian-splat/renderer/modifiers';
-import { cutCloud, normalBelow } from '../oracle/cut.js';
+import { cutCloud, normalBelow, type GroupedCloud } from '../oracle/cut.js';
 import { renderOracleWorld } from '../oracle/oracle.js';
 import { closeness } from '../support/compare.js';
 import { randomSource } from '../support/gpu.js';
@@ -46,22 +46,22 @@ const turn = (angle: number): Matrix4 => {
 };
 const all = (...matrices: Matrix4[]): Matrix4 => matrices.reduce((a, b) => multiply(a, b));
 
-const SHAPES: Record<CutShape, (size: number) => Omit<SplatCut, 'shapeToWorld'> & { shapeToWorld: Matrix4 }> = {
-  box: (size) => ({
+const SHAPES = {
+  box: (size: number): SplatCut => ({
     shape: 'box',
     side: 'outside',
     opacity: 0,
     shapeToWorld: all(turn(0.4), stretch(1.2 * size, size, 1.4 * size)),
   }),
-  sphere: (size) => ({
+  sphere: (size: number): SplatCut => ({
     ...{ shape: 'sphere', color: recolored(2), offset: [0.1 * size, -0.05 * size, 0] },
     shapeToWorld: all(move(0.2 * size, 0, 0), stretch(1.3 * size, 0.9 * size, size)),
   }),
-  cylinder: (size) => ({
+  cylinder: (size: number): SplatCut => ({
     ...{ shape: 'cylinder', surfaceOpacity: 0.3, color: tinted([1, 0.4, 0.3], 0.8) },
     shapeToWorld: all(turn(-0.3), stretch(size, 1.5 * size, size)),
   }),
-  plane: (size) => ({
+  plane: (size: number): SplatCut => ({
     shape: 'plane',
     opacity: 0.2,
     color: lightened(0.5),
@@ -71,7 +71,7 @@ const SHAPES: Record<CutShape, (size: number) => Omit<SplatCut, 'shapeToWorld'> 
 
 interface Case {
   readonly name: string;
-  readonly cloud: GaussianCloud;
+  readonly cloud: GroupedCloud;
   readonly camera: Camera;
   readonly sceneToWorld?: Matrix4;
   readonly size: number;
@@ -94,7 +94,11 @@ const SCENES: readonly Case[] = [
 async function drawn({ cloud, camera, sceneToWorld }: Case, cuts: readonly SplatCut[]): Promise<Float32Array> {
   const device = await serialDevice();
   const scene = await GaussianBuffers.upload(device, packGaussians(cloud, { sh: 'float16' }));
-  const modifier = new SplatModifier(device, await SplatProgram.compile(device, [scene]));
+  const groups = cloud.groups && {
+    ids: Object.keys(cloud.groups).map(Number),
+    of: Uint16Array.from(packedOrder(cloud), (i) => cloud.groups![i]),
+  };
+  const modifier = new SplatModifier(device, await SplatProgram.compile(device, [scene]), groups);
   const world = new World();
   const placement = world.add({ scene, sceneToWorld, modifier });
   modifier.write({ cuts }, placement);
@@ -125,6 +129,33 @@ for (const scene of SCENES) {
     }
   }
 }
+
+test('cuts are limited to groups, of which there may be more than a row of the texture', async () => {
+  const [scene] = SCENES;
+  const { camera, sceneToWorld } = scene;
+  const whole = blobs(4200);
+  // Splats are grouped by their index in the file, which packing changes; each of the last 2,100 is a group.
+  const groups = Array.from({ length: whole.count }, (_, i) => (i < 2100 ? i % 3 : i));
+  const cloud: GroupedCloud = { ...whole, scales: whole.scales.map((scale) => scale / 2), groups };
+  const everywhere = { shape: 'everywhere', shapeToWorld: stretch(1) } as const;
+  const cuts: SplatCut[] = [
+    { ...everywhere, groups: [1], opacity: 0 },
+    { ...SHAPES.sphere(1), groups: [0, 2] },
+    { ...everywhere, groups: [0, 1, 2], side: 'outside', color: tinted([0.2, 1, 0.4], 1) },
+    { ...everywhere, groups: [2101, 4199, 3000], opacity: 0 },
+    SHAPES.plane(1),
+  ];
+  const oracle = renderOracleWorld([{ cloud, mode: 'classic', sceneToWorld, cuts }], camera, { rules: 'gsplat' });
+  const pixels = await drawn({ ...scene, cloud }, cuts);
+  const { psnr } = closeness(pixels, oracle);
+  console.log(`groups: ${psnr.toFixed(1)} dB`);
+  assert.ok(psnr >= 59, `${psnr} dB`);
+  const ungrouped = { ...cloud, groups: groups.map((id) => (id + 1) % 3) };
+  const other = renderOracleWorld([{ cloud: ungrouped, mode: 'classic', sceneToWorld, cuts }], camera, {
+    rules: 'gsplat',
+  });
+  assert.ok(closeness(pixels, other).psnr < psnr - 20, 'other groups give another image');
+});
 
 test('several cuts act one after the other, and a modifier without any leaves the frame as it is', async () => {
   const [scene] = SCENES;

@@ -42,7 +42,14 @@ function slabsOf(shape: SplatCut['shape'], [x, y, z]: number[], rows: number[][]
       return [radial([x, rows[0]], [y, rows[1]], [z, rows[2]])];
     case 'cylinder':
       return [radial([x, rows[0]], [z, rows[2]]), between(y, rows[1])];
+    case 'everywhere':
+      return [];
   }
+}
+
+/** A cloud whose splats belong to groups, which cuts name. */
+export interface GroupedCloud extends GaussianCloud {
+  readonly groups?: ArrayLike<number>;
 }
 
 /** Density of the standard normal distribution, and its product with x: 0 far out. */
@@ -60,9 +67,10 @@ interface Limits {
   readonly own: number;
 }
 
-/** Limits of splat `i` in each coordinate of a cut's shape. */
-function limitsOf(cloud: GaussianCloud, i: number, cut: SplatCut, sceneToWorld: Matrix4): Limits[] {
-  const { shape, shapeToWorld, edge = 0 } = cut;
+/** Limits of splat `i` in each coordinate of a cut's shape. Splats of other groups are outside. */
+function limitsOf(cloud: GroupedCloud, i: number, cut: SplatCut, sceneToWorld: Matrix4): Limits[] {
+  const { shape, shapeToWorld, edge = 0, groups } = cut;
+  if (groups && !groups.includes(cloud.groups![i])) return [{ share: 0, spread: [0, 0, 0], low: 0, high: 0, own: 0 }];
   const toShape = multiply(inverse(shapeToWorld), sceneToWorld);
   const rows = [0, 1, 2].map((k) => [...toShape.slice(4 * k, 4 * k + 3)]);
   const position = worldPosition(cloud, i);

@@ -2,7 +2,7 @@ import { multiply, SPLAT_FILTERS, type Camera, type SplatFilter, type Vector3 } 
 import type { GaussianBlock, PageRequests } from './gaussian-scene.js';
 import type { GeometryReading } from './geometry-reading.js';
 import { constants, layouts } from './generated/shaders.js';
-import { BUFFER_USAGE } from './gpu/kernel.js';
+import { BUFFER_USAGE, type Resource } from './gpu/kernel.js';
 import { BufferOwner, GpuMemory } from './gpu/memory.js';
 import { writeStruct } from './gpu/struct.js';
 import type { ProbedSplat } from './probed-splat.js';
@@ -87,11 +87,11 @@ export class BlockTable extends BufferOwner {
   }
 
   /**
-   * Returns the buffers that the shaders of a modified block need in addition; empty for a block without a modifier.
+   * Returns the resources that the shaders of a modified block need in addition; empty for a block without a modifier.
    */
-  modifiersOf(page: number): Readonly<Record<string, GPUBuffer>> {
-    const { modifier } = this.#placementOf[page];
-    return modifier ? { modifiers: modifier.values } : {};
+  modifiersOf(page: number): Readonly<Record<string, Resource>> {
+    const { modifier, scene } = this.#placementOf[page];
+    return modifier?.resourcesOf(this.#blocks[page], scene) ?? {};
   }
 
   /** Returns the shaders that read a block; undefined for the default shaders, which read `PackedGaussian`. */

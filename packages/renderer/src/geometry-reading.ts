@@ -20,18 +20,5 @@ export interface GeometryReading {
   readonly probeSurface?: Like<typeof probeSurface>;
 }
 
-/**
- * Modifies the splats of a placement during projection: a `SplatModifier`. Pages with a modifier provide it, so that
- * other pages do not load its code.
- */
-export interface PlacementModifier {
-  /** Buffer with the `Modifiers` of the placement. */
-  readonly values: GPUBuffer;
-  /** Changes whenever the effect of the modifier changes. */
-  readonly version: number;
-  /** Returns the shaders that read a kind of geometry and modify it; default: `PackedGaussian`. */
-  reading(kind?: GeometryReading): GeometryReading;
-}
-
 /** Shaders that read `PackedGaussian`. */
 export const PACKED: GeometryReading = { cull, cullSerial, project };

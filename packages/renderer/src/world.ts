@@ -1,6 +1,6 @@
 import { GaussianSplatError, type Bounds, type Matrix4, type Vector3 } from '@gaussian-splat/core';
 import type { GaussianScene } from './gaussian-scene.js';
-import type { PlacementModifier } from './geometry-reading.js';
+import type { PlacementModifier } from './placement-modifier.js';
 
 /** An axis-aligned box. */
 export interface Box {

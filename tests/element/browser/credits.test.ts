@@ -87,4 +87,38 @@ describe('credits', () => {
     const [own, other] = [line(element)!, button()!].map((each) => each.getBoundingClientRect());
     assert(own.bottom <= other.top || own.right <= other.left, 'they do not overlap');
   });
+
+  it('are in saved PNG and JPEG images, which show the same pixels', async () => {
+    const element = await showLoaded({ src: await fileWith(CREDITS), background: 'white' }, SIZE);
+    await until(() => line(element) !== null, 'the line');
+    for (const mimeType of ['image/png', 'image/jpeg']) {
+      const image = await element.toBlob({ mimeType, background: 'white' });
+      const [xmp] = /<x:xmpmeta.*<\/x:xmpmeta>/s.exec(await image.text()) ?? [''];
+      const parsed = new DOMParser().parseFromString(xmp, 'text/xml');
+      const texts = ['Credit', 'li'].map((name) => parsed.getElementsByTagNameNS('*', name)[0]?.textContent);
+      const { attribution, license } = CREDITS;
+      assertEqual(texts, [attribution, `${attribution}, ${license}`], mimeType);
+      const plain = await createImageBitmap(await withoutCredits(element, mimeType));
+      assertEqual(await pixelsOf(await createImageBitmap(image)), await pixelsOf(plain), 'pixels');
+    }
+    const webp = await element.toBlob({ mimeType: 'image/webp' });
+    assert(!(await webp.text()).includes('xmpmeta'), 'other types have none');
+  });
 });
+
+/** The same image while attributes hide the credits. */
+async function withoutCredits(element: GaussianSplatElement, mimeType: string): Promise<Blob> {
+  [element.attribution, element.license] = ['', ''];
+  const image = await element.toBlob({ mimeType, background: 'white' });
+  [element.attribution, element.license] = [null, null];
+  assert(!(await image.text()).includes('xmpmeta'), 'no credits');
+  return image;
+}
+
+async function pixelsOf(image: ImageBitmap): Promise<string> {
+  const context = new OffscreenCanvas(image.width, image.height).getContext('2d')!;
+  context.drawImage(image, 0, 0);
+  const { data } = context.getImageData(0, 0, image.width, image.height);
+  const digest = await crypto.subtle.digest('SHA-256', data);
+  return `${image.width} ${image.height} ${new Uint8Array(digest).join()}`;
+}

@@ -2,6 +2,7 @@ import type { Credits, TrainedOrder } from '@gaussian-splat/core';
 import type { GaussianScene, StreamProgress } from '@gaussian-splat/renderer';
 import { QueueClock } from '@gaussian-splat/renderer/tools';
 import type { SceneBounds } from '../viewer/camera/settings.js';
+import type { SceneGroups } from '../loading/protocol.js';
 import type { Timeline } from '../sources/generator/dynamic-model.js';
 import type { FrameSource, LodSettings, Backend, BackendEvents, Drawable } from './backend.js';
 import type { DeviceLease } from './shared-device.js';
@@ -44,7 +45,8 @@ export interface MeshModel {
 export class LoadedGaussians implements Drawable {
   /** Kind of backend that draws the scene. */
   readonly renderer: 'webgpu' | 'webgl' = 'webgpu';
-  readonly can: Backend['can'] = () => true;
+  /** Levels of detail would merge splats of different groups. */
+  readonly can: Backend['can'] = (content) => content !== 'levels' || !this.groups;
   readonly #bounds: SceneBounds;
   /** The generator, sequence or clip that writes the Gaussians; undefined for those of a file. */
   readonly live: Timeline | undefined;
@@ -58,6 +60,8 @@ export class LoadedGaussians implements Drawable {
   readonly hasMeshes: boolean;
   /** Credits that the file, the manifest or the contract declares. */
   readonly credits: Credits | undefined;
+  /** Groups of the splats; undefined if the file has none, or the page does not ask for them. */
+  readonly groups: SceneGroups | undefined;
   /** Messages about content of the file that is not drawn. */
   warnings: readonly string[];
   /** Called when another frame is required: a part has arrived, or a view has no feedback pass yet. */
@@ -83,6 +87,7 @@ export class LoadedGaussians implements Drawable {
       hasMeshes = false,
       warnings = [],
       credits,
+      groups,
     }: {
       live?: Timeline | undefined;
       detail?: LodSettings;
@@ -90,6 +95,7 @@ export class LoadedGaussians implements Drawable {
       hasMeshes?: boolean | undefined;
       warnings?: readonly string[] | undefined;
       credits?: Credits | undefined;
+      groups?: SceneGroups | undefined;
     } = {},
   ) {
     this.place = lease;
@@ -102,6 +108,7 @@ export class LoadedGaussians implements Drawable {
     this.hasMeshes = hasMeshes;
     this.warnings = warnings;
     this.credits = credits ?? live?.credits;
+    this.groups = groups;
     if (live) QueueClock.of(lease.device).isShared = true;
   }
 

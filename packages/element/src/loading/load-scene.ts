@@ -117,6 +117,10 @@ export async function loadScene(
       const { parseSequence } = await loadModule('the code that reads sequences', () => import('./sequence-of.js'));
       return parseSequence(bytes, name);
     }
+    if (request.groups !== undefined) {
+      const { loadGrouped } = await loadModule('the code that reads groups', () => import('./grouped.js'));
+      return await loadGrouped(bytes, request.groups, { name, signal, ...limits() }, pack);
+    }
     // Files beside a `blob:` or `data:` URL do not exist.
     const openFile = /^(blob|data):/.test(url) ? undefined : fileOpenerFor(url, options);
     const level = request.levels ? 'all' : 0;
@@ -187,7 +191,7 @@ class SharedReading {
    * the received bytes; `total`: size of the file in bytes.
    */
   mayBeShared(bytes: Uint8Array, total = 0, first = 0): boolean {
-    if (total < LARGE_BYTES || this.#isRefused) return false;
+    if (total < LARGE_BYTES || this.#isRefused || this.#of[1].groups !== undefined) return false;
     return first > 0 || (bytes[0] === 0x70 && bytes[1] === 0x6c && bytes[2] === 0x79);
   }
 

@@ -52,6 +52,8 @@ export interface SceneRequest extends FileRequest {
    * fits.
    */
   readonly streamBytes?: number;
+  /** Property of a PLY with the group of each splat, or empty for the first known one; undefined without groups. */
+  readonly groups?: string | undefined;
   /** The property `splats` of the element; absent for a source with an address. */
   readonly splats?: unknown;
   /** The contract of a generator, if the page provides one, as an address, as JSON text, or as an object. */
@@ -73,6 +75,19 @@ export interface LoadedFacts {
   /** Whether the file also contains triangle meshes. */
   readonly hasMeshes?: boolean | undefined;
   readonly credits?: Credits | undefined;
+  readonly groups?: SceneGroups | undefined;
+}
+
+/** The groups of a scene's splats, such as the objects that a segmentation has found. */
+export interface SceneGroups {
+  /** [G] numbers of the groups in the file, ascending. */
+  readonly ids: Int32Array;
+  /** [G] number of splats of each group. */
+  readonly counts: Uint32Array;
+  /** [G, 6] lower and upper corner of the box of the centers of each group, in the coordinates of the file. */
+  readonly boxes: Float64Array;
+  /** [N] index of the group of each splat, in the order of the packed scene. */
+  readonly of: Uint16Array;
 }
 
 /** A scene, fetched and packed, ready for upload. */

@@ -5,6 +5,7 @@ import { credits } from '../features/credits/row.js';
 import { doors } from '../features/doors/row.js';
 import { effects } from '../features/effects/row.js';
 import { flight } from '../features/flight/row.js';
+import { groups } from '../features/groups/row.js';
 import { announcer, input } from '../features/input/row.js';
 import { labels } from '../features/labels/row.js';
 import { print } from '../features/print/row.js';
@@ -23,11 +24,13 @@ import '../features/credits/row.js';
 import '../features/doors/row.js';
 import '../features/effects/row.js';
 import '../features/flight/row.js';
+import '../features/groups/row.js';
 import '../features/shadow/row.js';
 import '../features/sky/row.js';
 import '../features/sound/row.js';
 
 export type { CreditsChangeDetail } from '../features/credits/row.js';
+export type { MeasuredGroup } from '../features/groups/groups.js';
 export type { InteractionPrompt, InteractionPromptStyle } from '../features/input/row.js';
 export type { HotspotPlace } from '../features/labels/hotspot-controller.js';
 export type { RoomChangeDetail } from '../features/doors/row.js';
@@ -41,7 +44,7 @@ export type { WalkReadyDetail } from '../features/walk/row.js';
 export type { ImmersiveStatusDetail } from '../features/xr/row.js';
 
 const FEATURES: FeatureTable = {
-  ...{ children, views, autoRotate, walk, flight, vr, ar, ruler, shadow, sky, sound, effects, labels, doors },
+  ...{ children, views, autoRotate, walk, flight, vr, ar, ruler, shadow, sky, sound, effects, groups, labels, doors },
   ...{ input, motion, announcer, print, recording, credits },
 };
 

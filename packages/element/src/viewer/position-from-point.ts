@@ -15,6 +15,7 @@ import type { SourceEntry } from './source-entry.js';
 import type { CameraController } from './camera-controller.js';
 import type { ViewController } from './view-controller.js';
 import { isGone } from '../gpu/device-failures.js';
+import { groupAt } from '../shared/splat-groups.js';
 import type { WorldEntry } from './world-entry.js';
 import type { Meshes } from '../sources/mesh/meshes.js';
 
@@ -107,7 +108,7 @@ function whose(
   { splat }: ProbeAnswer,
   eye: Vector3,
   place: Vector3,
-): Pick<PickedPoint, 'element' | 'splat' | 'mesh' | 'material'> {
+): Pick<PickedPoint, 'element' | 'splat' | 'group' | 'mesh' | 'material'> {
   const childOf = (isIt: (member: WorldEntry) => boolean): Element =>
     [...element.children].find((child) => {
       const member = (child as { readonly entry?: SourceEntry }).entry?.member;
@@ -117,15 +118,17 @@ function whose(
     const { placement, index } = splat;
     // WebGL draws one scene, whose splats have no placement.
     const of = (member: WorldEntry): boolean => !placement || member.placement === placement;
-    const live = sources.members.find(of)?.scene.live;
+    const { live, groups } = sources.members.find(of)?.scene ?? {};
     const row = index === null ? null : (live?.rowOf?.(index) ?? index);
-    return { element: childOf((member) => member.placement === placement), splat: row, mesh: null, material: null };
+    const owner = childOf((member) => member.placement === placement);
+    const group = groups && index !== null ? groupAt(groups, groups.of[index], owner) : null;
+    return { element: owner, splat: row, group, mesh: null, material: null };
   }
   const [origin, direction] = [eye, subtract(place, eye)].map((v) => toViewer(camera.viewerFrame, v));
   const length = Math.hypot(...direction);
   const ahead: Vector3 = [direction[0] / length, direction[1] / length, direction[2] / length];
   const hit = sources.meshes.value?.hit(origin, ahead);
-  if (!hit) return { element, splat: null, mesh: null, material: null };
+  if (!hit) return { element, splat: null, group: null, mesh: null, material: null };
   const { member: owner, mesh, material } = hit;
-  return { element: childOf((member) => member === owner), splat: null, mesh, material };
+  return { element: childOf((member) => member === owner), splat: null, group: null, mesh, material };
 }

@@ -474,5 +474,6 @@ const isSame = (a: SceneRequest, b: SceneRequest | null): boolean =>
   a.url === b?.url &&
   a.credentials === b.credentials &&
   a.renderer === b.renderer &&
+  a.groups === b.groups &&
   isSameContract(a.contract, b.contract) &&
   (a.chain ?? []).join(' ') === (b.chain ?? []).join(' ');

@@ -13,7 +13,7 @@ export interface SceneBox {
  * Returns the box around nearly all visible splats in viewer space; null if there are none. `bounds` are in the frame
  * of the world.
  */
-export function boxOf(frame: ViewerFrame, bounds: SceneBounds | null): SceneBox | null {
+export function boxOf(frame: ViewerFrame, bounds: Pick<SceneBounds, 'min' | 'max'> | null): SceneBox | null {
   if (bounds === null) return null;
   // A rotated box is farthest along each axis at the corner with the extreme of each product.
   const corner = (pick: (p: number, q: number) => number): ScenePoint =>

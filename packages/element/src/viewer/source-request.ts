@@ -3,6 +3,9 @@ import { credentialsOf, type Attributes } from './attributes.js';
 import type { SceneRequest } from '../loading/protocol.js';
 import type { Source } from './element-host.js';
 
+/** Attributes that select how a scene is loaded. */
+type RequestAttribute = 'crossorigin' | 'quality' | 'detail' | 'renderer' | 'groups';
+
 /** Function of the page that rewrites each address; null or undefined for none. */
 export type UrlModifier = ((url: string) => string) | null | undefined;
 
@@ -35,7 +38,7 @@ export class Addresses {
   /** Returns the request for the element's scene; null without `splats`, and if `src` is missing or empty. */
   request(
     { src, contract, chain, isMesh, splats }: Source,
-    { crossorigin, quality, detail, renderer }: Pick<Attributes, 'crossorigin' | 'quality' | 'detail' | 'renderer'>,
+    { crossorigin, quality, detail, renderer, groups }: Pick<Attributes, RequestAttribute>,
     modifier: UrlModifier,
   ): SceneRequest | null {
     const [url] = splats ? ['splats:'] : this.#src.of(src ? [src] : [], modifier);
@@ -47,7 +50,7 @@ export class Addresses {
       levels: typeof detail === 'number' && detail > 0,
       isWhole: !detail || detail === 'off',
       renderer,
-      ...{ isMesh, splats },
+      ...{ isMesh, splats, groups: groups ?? undefined },
       contract,
       chain: this.#chain.of(listed(chain), modifier),
     };

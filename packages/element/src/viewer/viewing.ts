@@ -133,7 +133,8 @@ export abstract class ViewingMethods extends MediaProperties {
 
   /**
    * Draws the current image again and encodes it, with the CSS filters of the element. A transparent image cannot
-   * contain colors that exceed their alpha: set `background` if the scene has such colors.
+   * contain colors that exceed their alpha: set `background` if the scene has such colors. PNG and JPEG contain the
+   * credits of the scene as XMP.
    * @returns Rejects with an `InvalidStateError` if no scene is shown or the element has no size, with a `RangeError`
    * for a size that the GPU cannot draw, and with a `TypeError` for an invalid background color.
    */
@@ -184,7 +185,7 @@ export abstract class ViewingMethods extends MediaProperties {
   }
 
   /**
-   * Synchronous form of {@link toBlob}: returns a `data:` URL, without CSS filters.
+   * Synchronous form of {@link toBlob}: returns a `data:` URL, without CSS filters and credits.
    * @throws DOMException `InvalidStateError` if no scene is shown or the element has no size
    */
   toDataURL(mimeType = 'image/png', qualityArgument?: number): string {

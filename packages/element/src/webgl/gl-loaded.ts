@@ -36,11 +36,12 @@ export class GlLoaded extends LoadedGaussians {
   private constructor(
     lease: GlLease,
     content: GlContent,
-    { bounds, warnings = [], hasMeshes = false, credits }: LoadedScene,
+    { bounds, warnings = [], hasMeshes = false, credits, groups }: LoadedScene,
     spawn: () => Worker,
     live: Timeline | undefined,
   ) {
-    super(lease, content.gaussians, bounds, 1, { warnings: hasMeshes ? [...warnings, NO_MESHES] : warnings, credits });
+    const all = hasMeshes ? [...warnings, NO_MESHES] : warnings;
+    super(lease, content.gaussians, bounds, 1, { warnings: all, credits, groups });
     this.lease = lease;
     this.#content = content;
     this.spawn = spawn;

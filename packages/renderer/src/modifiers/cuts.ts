@@ -5,11 +5,11 @@ import type { StructValues } from '../gpu/struct.js';
 import { opticalFactor } from '../block-table.js';
 import { UNCHANGED, type ColorMap } from './color-maps.js';
 
-export const CUT_SHAPES = ['box', 'sphere', 'cylinder', 'plane'] as const;
+export const CUT_SHAPES = ['box', 'sphere', 'cylinder', 'plane', 'everywhere'] as const;
 
 /**
  * Shape of a cut. `box`: a unit cube about the origin. `sphere` and `cylinder` (axis y): diameter and height 1, about
- * the origin. `plane`: the half-space below y = 0.
+ * the origin. `plane`: the half-space below y = 0. `everywhere`: the whole space.
  */
 export type CutShape = (typeof CUT_SHAPES)[number];
 
@@ -21,6 +21,11 @@ export interface SplatCut {
   readonly shape: CutShape;
   /** Matrix from shape coordinates to world coordinates: row-major 4x4, last row (0, 0, 0, 1). */
   readonly shapeToWorld: Matrix4;
+  /**
+   * Groups to which the inside of the cut is limited: indices of {@link SplatGroupIds}. Default: no limit. Scenes without
+   * groups ignore a cut with groups.
+   */
+  readonly groups?: readonly number[] | undefined;
   /** Side of the surface on which splats change. Default: `inside`. */
   readonly side?: 'inside' | 'outside' | undefined;
   /**
@@ -47,6 +52,7 @@ const NUMBERS: Readonly<Record<CutShape, number>> = {
   sphere: constants.CUT_SPHERE,
   cylinder: constants.CUT_CYLINDER,
   plane: constants.CUT_PLANE,
+  everywhere: constants.CUT_EVERYWHERE,
 };
 
 /** Row of the matrix to a shape without volume. It places all points outside the shape. */

@@ -1,11 +1,14 @@
 import { inverse, multiply, type Matrix4, type Vector3 } from '@gaussian-splat/core';
 import { ModifierCut, Modifiers } from '../generated/modified-layouts.js';
 import { constants } from '../generated/shaders.js';
-import type { GeometryReading, PlacementModifier } from '../geometry-reading.js';
-import { BUFFER_USAGE } from '../gpu/kernel.js';
+import type { GaussianBlock, GaussianScene } from '../gaussian-scene.js';
+import type { GeometryReading } from '../geometry-reading.js';
+import { BUFFER_USAGE, type Resource } from '../gpu/kernel.js';
 import { writeStruct } from '../gpu/struct.js';
+import type { PlacementModifier } from '../placement-modifier.js';
 import type { Placement } from '../world.js';
 import { cutValues, directionIn, type SplatCut } from './cuts.js';
+import { GroupTextures, noGroups, type SplatGroupIds } from './group-textures.js';
 import type { SplatProgram } from './splat-program.js';
 import type { SplatUniform } from './splat-shader.js';
 
@@ -34,7 +37,7 @@ const IDENTITY = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1];
 
 /** Cuts, tints, reveals and moves the splats of one placement. A change writes a single uniform buffer. */
 export class SplatModifier implements PlacementModifier {
-  readonly values: GPUBuffer;
+  readonly #values: GPUBuffer;
   readonly program: SplatProgram;
   /** Changes whenever the effect of the modifier changes. */
   version = 0;
@@ -42,12 +45,15 @@ export class SplatModifier implements PlacementModifier {
   readonly #bytes = new ArrayBuffer(Modifiers.size);
   /** Words of the last written uniform. */
   readonly #written = new Uint32Array(Modifiers.size / 4);
+  readonly #groups: GroupTextures | undefined;
 
-  constructor(device: GPUDevice, program: SplatProgram) {
+  /** @param groups Groups of the splats of the scene; undefined if it has none. */
+  constructor(device: GPUDevice, program: SplatProgram, groups?: SplatGroupIds) {
     this.#device = device;
+    this.#groups = groups && new GroupTextures(device, groups);
     this.program = program;
     const { uniform, copyDestination } = BUFFER_USAGE;
-    this.values = device.createBuffer({
+    this.#values = device.createBuffer({
       label: 'gs.modifiers',
       size: Modifiers.size,
       usage: uniform | copyDestination,
@@ -56,6 +62,10 @@ export class SplatModifier implements PlacementModifier {
 
   reading(kind?: GeometryReading): GeometryReading {
     return this.program.reading(kind);
+  }
+
+  resourcesOf(block: GaussianBlock, scene: GaussianScene): Readonly<Record<string, Resource>> {
+    return { modifiers: this.#values, groups: this.#groups?.viewOf(block, scene) ?? noGroups(this.#device) };
   }
 
   /** Writes the changes for subsequent frames of a placement. @returns Whether they differ from the previous ones. */
@@ -69,7 +79,8 @@ export class SplatModifier implements PlacementModifier {
     const { shader } = this.program;
     const row = (k: number): Float64Array => toViewer.subarray(4 * k, 4 * k + 4);
     const column = (k: number): number[] => [fromViewer[k], fromViewer[4 + k], fromViewer[8 + k]];
-    const used = cuts.slice(0, MAX_CUTS);
+    const used = cuts.filter((cut) => !cut.groups || this.#groups).slice(0, MAX_CUTS);
+    const isRegrouped = this.#groups?.write(used) ?? false;
     const moves = grown < 1 || share < 1 || used.some(({ offset }) => offset?.some((by) => by !== 0));
     const moved = directionIn(toLocal, center).map((at, k) => at + toLocal[4 * k + 3]);
     const values = {
@@ -77,7 +88,7 @@ export class SplatModifier implements PlacementModifier {
       ...{ from_viewer_x: column(0), from_viewer_y: column(1), from_viewer_z: column(2) },
       ...{ cut_count: used.length, is_hooked: shader ? 1 : 0, time },
       ...{ center: moved, grown, share, moves: moves || (shader && shader.moves !== false) ? 1 : 0 },
-      ...{ reserved_a: 0, reserved_b: 0, cuts: [] },
+      ...{ group_rows: this.#groups?.rows ?? 0, reserved: 0, cuts: [] },
       values: Object.keys(shader?.uniforms ?? {}).flatMap((name) => fourOf(uniforms[name] ?? shader!.uniforms![name])),
     };
     writeStruct(Modifiers, values, this.#bytes);
@@ -87,15 +98,18 @@ export class SplatModifier implements PlacementModifier {
       writeStruct(ModifierCut, cutValues(cut, toWorld, toLocal), this.#bytes, offset + k * size),
     );
     const words = new Uint32Array(this.#bytes);
-    if (words.every((word, k) => word === this.#written[k])) return false;
-    this.#written.set(words);
+    const isSame = words.every((word, k) => word === this.#written[k]);
+    if (isSame && !isRegrouped) return false;
     this.version++;
-    this.#device.queue.writeBuffer(this.values, 0, this.#bytes);
+    if (isSame) return true;
+    this.#written.set(words);
+    this.#device.queue.writeBuffer(this.#values, 0, this.#bytes);
     return true;
   }
 
   destroy(): void {
-    this.values.destroy();
+    this.#values.destroy();
+    this.#groups?.destroy();
   }
 }
 

@@ -4,6 +4,7 @@
  */
 import { bareKeyword, flag, read, text } from '../../viewer/attribute.js';
 import { upGrammar } from '../../viewer/camera/grammar.js';
+import type { GroupNames } from '../../shared/splat-groups.js';
 import type { Numbers } from '../../sources/generator/values.js';
 import {
   anglesGrammar,
@@ -91,6 +92,17 @@ export const SCENE_ATTRIBUTES = {
    * @example crop="-1 -1 -1 1 1 1"
    */
   crop: read<readonly number[] | undefined, string | readonly number[] | null>(boxGrammar),
+  /**
+   * Reads the group of each splat from this property of a PLY, as on `<gaussian-splat>`.
+   * @example groups="object_id"
+   */
+  groups: text(),
+  /**
+   * Names of groups by their numbers, as on `<gaussian-splat>`: JSON. The property takes the object as well.
+   * @default the numbers
+   * @example group-names='{"4": "chair"}'
+   */
+  groupNames: text<GroupNames | string | null>(),
   /**
    * Contract of a generator: a URL or its JSON. The property takes the object as well.
    * @default in the model or beside it

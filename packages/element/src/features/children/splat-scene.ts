@@ -1,4 +1,5 @@
 import type { PropertyDeclarations } from 'lit';
+import type { Attributes } from '../../viewer/attributes.js';
 import type { Source } from '../../viewer/element-host.js';
 import { CONTROL_PREFIX, readControls, readNumbers, type ControlValues } from '../../sources/generator/values.js';
 import type { SplatMethods, Splats } from '../../sources/splats/splat-input.js';
@@ -52,6 +53,8 @@ export class SplatSceneElement extends SplatChild {
   declare contract: Properties['contract'];
   declare chain: Properties['chain'];
   declare pose: Properties['pose'];
+  declare groups: Properties['groups'];
+  declare groupNames: Properties['groupNames'];
 
   /** Splats that the page shows instead of `src`, as on `<gaussian-splat>`; null for none. */
   declare splats: Splats | null;
@@ -78,6 +81,11 @@ export class SplatSceneElement extends SplatChild {
   /** @internal */
   override get dynamicValues(): Omit<DynamicState, 'timeSeconds'> {
     return (this.#dynamicValues ??= this.#readDynamicValues());
+  }
+
+  /** @internal */
+  override get overrides(): Partial<Attributes> {
+    return { ...super.overrides, groups: this.groups };
   }
 
   /** @internal */

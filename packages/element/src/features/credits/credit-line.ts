@@ -46,7 +46,7 @@ export class CreditLine implements ReactiveController, Feature {
   }
 
   hostUpdated(): void {
-    const credits = this.#credits;
+    const credits = this.credits;
     const text = JSON.stringify(credits);
     if (text === this.#reported) return;
     this.#reported = text;
@@ -54,7 +54,7 @@ export class CreditLine implements ReactiveController, Feature {
   }
 
   view({ showPoster }: TemplateModel): TemplateResult | undefined {
-    const credits = this.#credits;
+    const credits = this.credits;
     if (showPoster || credits.length === 0) return undefined;
     return html`<div class="credits">
       <slot name="credits"
@@ -64,7 +64,7 @@ export class CreditLine implements ReactiveController, Feature {
   }
 
   /** Credits of all sources, each once. The attributes replace those of the element's own source. */
-  get #credits(): readonly Credits[] {
+  get credits(): readonly Credits[] {
     const { attributes, sources } = this.#viewer;
     const distinct = new Map<string, Credits>();
     for (const entry of sources.entries) {

@@ -1,6 +1,7 @@
 /** Attributes of `<splat-cut>`. Each is defined once, like those of `<gaussian-splat>` in ../attributes.ts. */
 import type { Vector3 } from '@gaussian-splat/core';
-import { read } from '../../viewer/attribute.js';
+import { CUT_SHAPES } from '@gaussian-splat/renderer/modifiers';
+import { read, text } from '../../viewer/attribute.js';
 import {
   angleGrammar,
   keywordGrammar,
@@ -53,12 +54,18 @@ const edgeGrammar: AttributeGrammar<number | 'hard'> = {
 
 export const CUT_ATTRIBUTES = {
   /**
-   * `box`, `sphere`, `cylinder` with an upright axis, or `plane`. The first three are 1 m wide and high before `scale`.
-   * The inside of a plane is below it.
-   * @default `box`
+   * `box`, `sphere`, `cylinder` with an upright axis, `plane`, or `everywhere`. The first three are 1 m wide and high
+   * before `scale`. The inside of a plane is below it.
+   * @default `box`; with `group` `everywhere`
    * @example shape="sphere"
    */
-  shape: read<'box' | 'sphere' | 'cylinder' | 'plane'>(keywordGrammar(['box', 'sphere', 'cylinder', 'plane'])),
+  shape: read<'box' | 'sphere' | 'cylinder' | 'plane' | 'everywhere'>(keywordGrammar(CUT_SHAPES)),
+  /**
+   * Names or numbers of groups, separated by commas: only their splats are inside. Needs the attribute `groups` of the scene.
+   * @default all splats
+   * @example group="chair, table"
+   */
+  group: text(),
   /**
    * Position of the center: x y z in meters of viewer space, or of the coordinates of its parent scene, y up. The
    * property takes `[x, y, z]` as well.

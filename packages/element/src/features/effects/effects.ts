@@ -14,11 +14,18 @@ import type { Viewer } from '../../viewer/viewer.js';
 import { MAX_MOVER_STEP_MS, prefersReducedMotion } from '../../viewer/motion.js';
 import type { Feature } from '../../viewer/features.js';
 import type { LoadedGaussians } from '../../gpu/loaded-gaussians.js';
+import type { SceneGroups } from '../../loading/protocol.js';
+import { groupsNamed } from '../../shared/splat-groups.js';
 import type { WorldEntry } from '../../viewer/world-entry.js';
 import type { SourceEntry, SourceOwner } from '../../viewer/source-entry.js';
 import { defineCuts } from './define.js';
 import { NO_REVEAL, parseReveal, revealedBy, REVEAL_FORM, type RevealEffect } from './reveal.js';
 import { SplatCutElement, showers, type PlacedCut } from './splat-cut.js';
+
+/** A cut in world coordinates, with the names of its groups. */
+interface NamedCut extends SplatCut {
+  readonly names?: readonly string[] | undefined;
+}
 
 /** Applies the cuts of children, the reveal effect, and the page's shader to the splats of all scenes. */
 export class Effects implements Feature {
@@ -129,7 +136,7 @@ export class Effects implements Feature {
   }
 
   /** Changes that apply to all scenes: the reveal effect, and cuts that are children of the element. */
-  get #sharedChanges(): SplatChanges {
+  get #sharedChanges(): SplatChanges & { readonly cuts: readonly NamedCut[] } {
     const { frame, sources, element } = this.#viewer;
     const bounds = this.#isRevealing ? sources.bounds : null;
     const toWorld = transposed(matrixOfFrame(frame));
@@ -142,18 +149,19 @@ export class Effects implements Feature {
   }
 
   /** Returns the cuts that are children of a parent, in world coordinates. */
-  #cutsOf(parent: Element, toWorld: Matrix4): SplatCut[] {
+  #cutsOf(parent: Element, toWorld: Matrix4): NamedCut[] {
     return this.#children
       .filter(({ parentElement }) => parentElement === parent)
       .flatMap(({ cut }) => (cut ? [inWorld(cut, toWorld)] : []));
   }
 
-  #modify(member: WorldEntry, owner: SourceOwner, shared: SplatChanges): void {
+  #modify(member: WorldEntry, owner: SourceOwner, shared: SplatChanges & { readonly cuts: readonly NamedCut[] }): void {
     const { placement, scene } = member;
     const toWorld = owner.frameToWorld?.(member);
     const own = toWorld ? this.#cutsOf(owner.element, toWorld) : [];
-    const changes = own.length > 0 ? { ...shared, cuts: [...own, ...(shared.cuts ?? [])] } : shared;
-    const { grown = 1, share = 1, cuts = [] } = changes;
+    const cuts = [...own, ...shared.cuts].flatMap((each) => this.#withGroups(each, scene, owner.element));
+    const changes = { ...shared, cuts };
+    const { grown = 1, share = 1 } = changes;
     const isChanged = cuts.length > 0 || grown < 1 || share < 1 || this.#shader !== null;
     let modifier = this.#modifiers.get(member);
     if (cuts.length > MAX_CUTS) this.#viewer.warn(tooManyCuts(cuts.length));
@@ -166,9 +174,19 @@ export class Effects implements Feature {
     if (!program) return void this.#compile(scene).then(() => this.#viewer.requestFrame());
     if (modifier?.program !== program) {
       modifier?.destroy();
-      this.#modifiers.set(member, (modifier = new SplatModifier(scene.place.device, program)));
+      this.#modifiers.set(member, (modifier = new SplatModifier(scene.place.device, program, scene.groups)));
     }
     if (modifier.write(changes, placement) || placement.modifier !== modifier) placement.modifier = modifier;
+  }
+
+  /** Finds the groups that a cut names. Scenes without groups ignore such a cut. */
+  #withGroups(named: NamedCut, { groups }: LoadedGaussians, owner: Element): SplatCut[] {
+    const { names, ...cut } = named;
+    if (!names) return [cut];
+    const indices = groups && groupsNamed(groups, names, owner);
+    // If there are several scenes, the others may have the groups.
+    if (!indices?.length && this.#viewer.sources.members.length === 1) this.#viewer.warn(noGroup(names, groups));
+    return indices ? [{ ...cut, groups: indices }] : [];
   }
 
   /** Frees the modifiers of scenes that are not shown any more. Their placements have left the world. */
@@ -284,6 +302,17 @@ const tooManyCuts = (found: number): string =>
     remedy: 'put cuts of one scene into its <splat-scene>, and hide those that are not needed',
   }).message;
 
+/** Message for a cut whose groups the scene lacks. */
+const noGroup = (names: readonly string[], groups: SceneGroups | undefined): string =>
+  new GaussianSplatError('argument/splat-cut', {
+    where: '<splat-cut group>',
+    expected: groups
+      ? `groups with names or the numbers ${groups.ids.join(', ').slice(0, 200)}`
+      : 'a scene with groups',
+    found: names.join(', '),
+    remedy: 'set the attributes groups and group-names of the element with the scene',
+  }).message;
+
 const NO_WEBGL =
   '<gaussian-splat>: WebGL 2 draws the scene without <splat-cut>, reveal-effect and splatShader, which need WebGPU.';
 
@@ -295,7 +324,7 @@ const isSameCode = (a: SplatShader, b: SplatShader): boolean => {
 };
 
 /** Converts a cut from the coordinates of its parent to the world. */
-function inWorld({ placed, offset, edge, ...cut }: PlacedCut, toWorld: Matrix4): SplatCut {
+function inWorld({ placed, offset, edge, ...cut }: PlacedCut, toWorld: Matrix4): NamedCut {
   const size = Math.cbrt(Math.abs(determinant(toWorld)));
   return {
     ...cut,

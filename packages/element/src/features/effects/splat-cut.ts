@@ -1,6 +1,6 @@
 import { ReactiveElement, type PropertyDeclarations } from 'lit';
 import type { Matrix4, Vector3 } from '@gaussian-splat/core';
-import { lightened, recolored, tinted, type SplatCut } from '@gaussian-splat/renderer/modifiers';
+import { lightened, recolored, tinted, type CutShape, type SplatCut } from '@gaussian-splat/renderer/modifiers';
 import { declarations } from '../../viewer/attributes.js';
 import { readAttribute, type AttributeGrammar } from '../../viewer/camera/grammar.js';
 import type { PropertiesOf } from '../../viewer/attribute.js';
@@ -12,6 +12,8 @@ type Name = keyof typeof CUT_ATTRIBUTES;
 /** A cut in the coordinates of its parent element, y up. `placed` maps the unit shape to these coordinates. */
 export interface PlacedCut extends Omit<SplatCut, 'shapeToWorld'> {
   readonly placed: Matrix4;
+  /** Names of the groups to which the cut is limited; undefined for all splats. */
+  readonly names: readonly string[] | undefined;
 }
 
 /** For each `<gaussian-splat>`, the listener that is notified when one of its cuts changes. */
@@ -92,7 +94,9 @@ export class SplatCutElement extends ReactiveElement {
     };
     const placed = (matrix && readMatrix(matrix)) || matrixOf(vectors);
     const edge = this.#value<number | 'hard'>('edge');
-    return { placed, shape: this.#value('shape'), side: this.#value('side'), edge, ...this.#readEffect() };
+    const names = this.group?.split(',').map((name) => name.trim());
+    const shape = names && !this.shape ? 'everywhere' : this.#value<CutShape>('shape');
+    return { placed, names, shape, side: this.#value('side'), edge, ...this.#readEffect() };
   }
 
   #readEffect(): Partial<SplatCut> {

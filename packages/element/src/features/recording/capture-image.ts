@@ -1,5 +1,5 @@
 /** Takes images for scripts: of any size, with a background color and the CSS filters of the element. */
-import { loadModule } from '@gaussian-splat/core';
+import { loadModule, type Credits } from '@gaussian-splat/core';
 import type { PixelSize } from '../../viewer/size-controller.js';
 import type { Viewer } from '../../viewer/viewer.js';
 import type { Backend } from '../../gpu/backend.js';
@@ -70,7 +70,15 @@ export async function takeImage(host: Viewer, options: ImageOptions): Promise<Bl
   // If the device was lost before drawing, the image is empty, and the loss is reported only later.
   if (backend && (await wasLost(backend))) throw new DOMException(LOST, 'InvalidStateError');
   if (taken === null) throw new DOMException(`The image could not be written as ${mimeType}`, 'EncodingError');
-  return taken;
+  const { credits = [] } = host.features.get<Credited>('credits').value ?? {};
+  if (credits.length === 0) return taken;
+  const { withCredits } = await loadModule('the code that writes credits', () => import('./image-credits.js'));
+  return withCredits(taken, credits);
+}
+
+/** Part of the feature `credits`. */
+interface Credited {
+  readonly credits: readonly Credits[];
 }
 
 /** Waits for all submitted work, then returns whether the device is lost. */

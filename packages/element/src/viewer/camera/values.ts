@@ -2,6 +2,7 @@
  * Values of the camera for scripts. Each `toString()` returns a valid attribute, so that pages can store and restore
  * the values.
  */
+import type { SplatGroup } from '../../shared/splat-groups.js';
 
 /** Position of the camera around its target. */
 export class CameraOrbit {
@@ -80,6 +81,8 @@ export interface PickedPoint extends ScenePoint {
    * For a file, `packedOrder` of `@gaussian-splat/renderer/tools` maps it to a row.
    */
   readonly splat: number | null;
+  /** Group of the splat, if the attribute `groups` reads them; otherwise null. */
+  readonly group: SplatGroup | null;
   /** Name of the triangle mesh in its file, empty if it has none; null for splats. */
   readonly mesh: string | null;
   /** Name of the mesh's material in its file, empty if it has none; null for splats. */
