@@ -1,26 +1,13 @@
 /** Shortens the shaders in a bundle: see short-wgsl.mjs. The packages keep readable shaders for debugging. */
-import { readFileSync } from 'node:fs';
+import { readdirSync, readFileSync } from 'node:fs';
 import { fileURLToPath } from 'node:url';
 import { shortened } from './short-wgsl.mjs';
 
 const FOLDER = fileURLToPath(new URL('../../renderer/dist/generated/', import.meta.url));
 /** Modules in which scripts/build-shaders.mjs and the compiler store the pieces of shaders. */
-export const SHADER_FILES = [
-  'shaders.js',
-  'few-shaders.js',
-  'auxiliary-shaders.js',
-  'budget-shaders.js',
-  'live-shaders.js',
-  'clip-shaders.js',
-  'streamed-shaders.js',
-  'quantized-shaders.js',
-  'probe-shaders.js',
-  'depth-shaders.js',
-  'linear-shaders.js',
-  'rectangle-shaders.js',
-  'order-shaders.js',
-  'modified-shaders.js',
-].map((file) => FOLDER + file);
+export const SHADER_FILES = readdirSync(FOLDER)
+  .filter((file) => /(^|-)shaders\.js$/.test(file))
+  .map((file) => FOLDER + file);
 
 const PIECE = /^(export const (\w+Part) = )("(?:[^"\\]|\\.)*");$/gm;
 
