@@ -219,11 +219,12 @@ class ClipCoder {
     const judges = new FrameJudges(this.#options.draw, (frame) => this.#shown(begin + frame));
     const still = this.#stillParts.map(({ content }) => content);
     try {
-      const { contents, encoding, steps, ...group } = await codeGroup({
+      const { contents, encoding, steps, frames, parts, errors } = await codeGroup({
         ...{ tracks, whole, chosen, still, judges, maxBytes, target: this.#target, seed: this.#groups.length },
         ...{ encoding: this.#encoding!, steps: this.#steps, onStep: this.#onStep },
       });
       if (this.#groups.length === 0) this.#grow = await growthIn(judges, [...still.slice(0, 1), contents[0]]);
+      const group = { frames, parts, errors };
       this.#groups.push(group);
       [this.#encoding, this.#steps] = [encoding, steps];
       const { frame, error } = group.errors.reduce((worst, own) => (own.error > worst.error ? own : worst));

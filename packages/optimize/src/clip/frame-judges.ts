@@ -4,10 +4,18 @@ import { clipFrame, LoadBudget, type ClipPartContent } from '@gaussian-splat/for
 import { CloudBuffers } from '../gpu/cloud-buffers.js';
 import { ImageErrors } from '../gpu/image-errors.js';
 import { exactViewpoint } from '../gpu/show.js';
-import { viewsAround } from '../views.js';
+import { viewsAround, type ViewOptions } from '../views.js';
 
-/** Number of views of each frame. They differ between frames. */
+/** Number of views of each frame that are measured in full size. They differ between frames. */
 const VIEWS = 3;
+/**
+ * Number and size of the views that find the worst ones of a result. Quantized splats may exchange their order in depth,
+ * which few views show.
+ */
+const SCOUTS = 48;
+const SCOUT_SIZE = { width: 160, height: 90 };
+/** Views during the search for steps. */
+const FIRST_VIEWS = [0, 1, 2];
 
 /** Images of a frame, with which those of other clouds are compared. */
 export interface FrameImages {
@@ -65,7 +73,17 @@ export class FrameJudges {
     return images.compare(cloud);
   }
 
-  /** Returns the errors of all views of some frames of a group's parts, and keeps the images of these frames. */
+  /** Keeps images of the views of some errors, so that {@link errorsIn} measures these views, too. */
+  async remember(errors: readonly FrameError[]): Promise<void> {
+    for (const frame of new Set(errors.map((own) => own.frame))) {
+      this.#images.get(frame)?.destroy();
+      this.#images.delete(frame);
+      const views = errors.filter((own) => own.frame === frame).flatMap(({ view }) => view ?? []);
+      this.#images.set(frame, await this.#imagesOf(frame, [...new Set([...FIRST_VIEWS, ...views])]));
+    }
+  }
+
+  /** Returns the errors of some frames of a group's parts, and keeps the images of these frames. */
   async errorsIn(frames: readonly number[], parts: readonly ClipPartContent[]): Promise<FrameError[]> {
     const errors: FrameError[] = [];
     for (const frame of frames)
@@ -73,14 +91,20 @@ export class FrameJudges {
     return errors;
   }
 
-  /** Returns the errors of all views of the first `count` frames. Images that were not kept before are not kept. */
+  /** Returns the errors of the first `count` frames in {@link SCOUTS} views. Of each frame, the worst are in full size. */
   async errorsInAll(count: number, parts: readonly ClipPartContent[]): Promise<FrameError[]> {
     const errors: FrameError[] = [];
     for (let frame = 0; frame < count; frame++) {
-      const kept = this.#images.get(frame);
-      const images = kept ?? (await this.#imagesOf(frame));
-      for (const error of await images.compare(frameOf(parts, frame))) errors.push({ frame, error });
-      if (!kept) images.destroy();
+      const [source, coded] = [await this.#openFrame(frame), frameOf(parts, frame)];
+      const measure = async (views: readonly Camera[]): Promise<readonly number[]> => {
+        const images = await this.#draw(source, views);
+        return images.compare(coded).finally(() => images.destroy());
+      };
+      const found = [...(await measure(viewsOf(source, frame, SCOUT_SIZE)))];
+      const worst = [...found.keys()].sort((a, b) => found[b] - found[a]).slice(0, VIEWS);
+      const views = viewsOf(source, frame);
+      for (const [k, error] of (await measure(worst.map((view) => views[view]))).entries()) found[worst[k]] = error;
+      for (const [view, error] of found.entries()) errors.push({ frame, view, error });
     }
     return errors;
   }
@@ -89,15 +113,24 @@ export class FrameJudges {
     for (const images of this.#images.values()) images.destroy();
   }
 
-  async #imagesOf(frame: number): Promise<FrameImages> {
+  async #imagesOf(frame: number, views: readonly number[] = FIRST_VIEWS): Promise<FrameImages> {
     const cloud = await this.#openFrame(frame);
-    return this.#draw(cloud, viewsAround(boundsOf(cloud), VIEWS, { seed: 7 + frame }));
+    const all = viewsOf(cloud, frame);
+    return this.#draw(
+      cloud,
+      views.map((view) => all[view]),
+    );
   }
 }
+
+const viewsOf = (cloud: GaussianCloud, frame: number, size?: ViewOptions): Camera[] =>
+  viewsAround(boundsOf(cloud), SCOUTS, { seed: 7 + frame, ...size });
 
 /** Mean squared error of a view of a frame, peak 1. */
 export interface FrameError {
   readonly frame: number;
+  /** Index among all views of the frame; undefined during the search. */
+  readonly view?: number;
   readonly error: number;
 }
 

@@ -57,12 +57,14 @@ export interface FoundGroup extends CodedGroup {
   readonly contents: readonly ClipPartContent[];
   readonly encoding: Encoding;
   readonly steps: MotionSteps;
+  /** Whether all frames were measured, in all views. */
+  readonly isChecked: boolean;
 }
 
 /**
  * Codes a group. The frames with the largest estimated errors are measured first, and some others. If they reach the
- * target, all frames are measured, because the order of splats in depth may change in any frame. The worst ones are among
- * the first of the next attempt. If no steps reach the target, those with the smallest error are used.
+ * target, all frames are measured in many views, because the order of splats in depth may change in any frame and view.
+ * The worst ones are among the first of the next attempt. If no steps reach the target, those with the smallest error are used.
  */
 export async function codeGroup(coding: GroupCoding): Promise<FoundGroup> {
   const { target, maxBytes } = coding;
@@ -83,8 +85,8 @@ export async function codeGroup(coding: GroupCoding): Promise<FoundGroup> {
     },
   });
   const best = [...tried.values()].reduce((one, next) => betterOf(one, next, coding));
-  const { frames, contents, errors } = best;
-  if (new Set(errors.map(({ frame }) => frame)).size === frames) return best;
+  const { frames, contents, isChecked } = best;
+  if (isChecked) return best;
   // A group that misses the target is measured in all frames, too, so that its printed error is that of the worst one.
   return { ...best, errors: await coding.judges.errorsInAll(frames, [...coding.still, ...contents]) };
 }
@@ -101,17 +103,14 @@ async function attempt(coding: GroupCoding, encoding: Encoding, steps: MotionSte
   const frames = [...new Set([...judges.frames, ...judgedFrames(estimated, coding.seed)])];
   const shown = [...still, ...contents];
   let errors = await judges.errorsIn(frames, shown);
-  if (worstOf(errors) <= target) {
+  const isChecked = worstOf(errors) <= target;
+  if (isChecked) {
     errors = await judges.errorsInAll(tracks.frames.length, shown);
     const worst = [...errors].sort((a, b) => b.error - a.error).slice(0, REMEMBERED);
-    if (worstOf(worst) > target)
-      await judges.errorsIn(
-        worst.map(({ frame }) => frame),
-        shown,
-      );
+    if (worstOf(worst) > target) await judges.remember(worst);
   }
   const written = parts.map((part) => part.write(steps));
-  return { frames: tracks.frames.length, parts: written, errors, contents, encoding, steps };
+  return { frames: tracks.frames.length, parts: written, errors, contents, encoding, steps, isChecked };
 }
 
 /** Returns the parts of a group with fixed quantization, unmeasured. */
