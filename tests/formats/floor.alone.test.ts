@@ -182,9 +182,10 @@ const CAPTURES: Readonly<Record<string, CaptureOptions>> = {
   '3 % far': { ...CAPTURE, far: 0.03 },
   '15 % far': { ...CAPTURE, far: 0.15 },
   'all of it, tilted': { ...CAPTURE, hasGarden: true, floaters: 0.005, haze: 150, ghosts: 0.3, far: 0.05, tilt: 0.26 },
+  'a box, a chair and a table in a row': { ...CAPTURE, hasChain: true, floaters: 0.005, haze: 150, far: 0.01 },
 };
 /** Names of the captures of `npm test`; the laboratory has all. */
-const EACH_TIME = ['all of it, tilted'];
+const EACH_TIME = ['a box, a chair and a table in a row'];
 
 /** Returns the rows of a frame whose up axis is tilted about z, radians. */
 const tiltedFrame = (tilt: number): FloorOptions['frame'] => [
@@ -219,11 +220,11 @@ function houseIn(map: FloorMap): { area: number; gallery: number; wrong: number;
 }
 
 /** Square meters on which a body of 20 cm fits, on all floors of the house. */
-function areaOfHouse(): number {
+function areaOfHouse({ hasChain }: CaptureOptions): number {
   let area = 0;
   for (let x = -2.975; x < 9; x += 0.05)
     for (let z = -2.475; z < 2.5; z += 0.05)
-      for (const y of floorsOfHouse(x, z)) if (!isBlockedInHouse([x, y, z], 0.2)) area += 0.05 ** 2;
+      for (const y of floorsOfHouse(x, z)) if (!isBlockedInHouse([x, y, z], 0.2, hasChain)) area += 0.05 ** 2;
   return area;
 }
 
@@ -234,19 +235,18 @@ for (const [name, options] of Object.entries(CAPTURES))
     const { area, gallery, wrong, errors } = houseIn(map);
     const [half, high] = [0.5, 0.95].map((share) => 100 * errors[Math.floor(share * errors.length)]);
     console.log(
-      `${name}: ${area.toFixed(1)} of ${areaOfHouse().toFixed(1)} m², gallery ${gallery.toFixed(1)}, no floor ${wrong.toFixed(2)}; heights off by ${half.toFixed(1)} cm, 95 % within ${high.toFixed(1)} cm`,
+      `${name}: ${area.toFixed(1)} of ${areaOfHouse(options).toFixed(1)} m², gallery ${gallery.toFixed(1)}, no floor ${wrong.toFixed(2)}; heights off by ${half.toFixed(1)} cm, 95 % within ${high.toFixed(1)} cm`,
     );
-    assert.ok(Math.abs(area / areaOfHouse() - 1) < 0.06, `${area} of ${areaOfHouse()} m²`);
+    assert.ok(Math.abs(area / areaOfHouse(options) - 1) < 0.06, `${area} of ${areaOfHouse(options)} m²`);
     assert.ok(gallery > 3.8, `${gallery} m² of the gallery`);
     assert.ok(wrong < 0.25, `${wrong} m² are no floor`);
     assert.ok(half < 1, `heights are off by ${half} cm`);
-    assert.ok(name.startsWith('clean') || high < 2, `95 % of the heights are within ${high} cm`);
+    assert.ok(high < 2, `95 % of the heights are within ${high} cm`);
+    if (options.hasChain) assertStopped(map);
   });
 
-test('a box, a chair and a table in a row are not climbed, and the edge of a hole stops the body', () => {
-  const map = makeFloorMap(capturedHouse({ ...CAPTURE, hasChain: true }), {
-    ...{ frame: tiltedFrame(0), near: [2, 1.6, -1.5], height: 1.7 },
-  });
+/** Asserts that furniture in a row is not climbed, and that the edge of the hole stops the body. */
+function assertStopped(map: FloorMap): void {
   for (const [x, z] of [
     [0, 0],
     [0.8, 0],
@@ -257,7 +257,7 @@ test('a box, a chair and a table in a row are not climbed, and the edge of a hol
   const stopped = stepOn(map, [-1.8, 0, -0.2], 0, 1.6);
   assert.ok(stopped[2] < 0.95, `walked to z = ${stopped[2]}, into the hole`);
   assert.equal(floorAt(map, -1.8, 1.4, 0), undefined);
-});
+}
 
 test('a path does not leave one side of the map to enter it at the other', async () => {
   // Two arms at the left and the right edge, which meet only at the far end.
@@ -346,8 +346,13 @@ test('a step over cells of a millimeter is bounded', async () => {
   assert.ok(all < 20_000, `${all} heights`);
 });
 
+let emptyMap: FloorMap | undefined;
+/** The room without stairs and gallery. */
+const emptyRoom = (): FloorMap =>
+  (emptyMap ??= makeFloorMap(cloudOf(ROOM.slice(0, 5)), { frame: FRAME, near: [0, 1.5, 2] }));
+
 test('a walk map is stored in centimeters and read again', () => {
-  const map = makeFloorMap(cloudOf(ROOM.slice(0, 5)), { frame: FRAME, near: [0, 1.5, 2] });
+  const map = emptyRoom();
   const file = encodeFloorMap(map);
   assert.ok(file.length < 3000, `${file.length} bytes`);
   const { layers, ...rest } = decodeFloorMap(file);
@@ -362,7 +367,7 @@ test('a walk map is stored in centimeters and read again', () => {
 });
 
 test('damaged walk maps are refused by name', () => {
-  const file = encodeFloorMap(makeFloorMap(cloudOf(ROOM.slice(0, 5)), { frame: FRAME }));
+  const file = encodeFloorMap(emptyRoom());
   const damaged = [new Uint8Array(), new Uint8Array(3), file.subarray(0, 40), new Uint8Array(100).fill(31)];
   for (let i = 0; i < 200; i++)
     damaged.push(file.map((byte, at) => (at === (i * 37) % file.length ? byte ^ 0x55 : byte)));

@@ -190,7 +190,7 @@ export function floorsOfHouse(x: number, z: number): readonly number[] {
 }
 
 /** Whether a body of `radius` meters that stands at a height of {@link floorsOfHouse} touches a wall, stairs or furniture. */
-export function isBlockedInHouse([x, y, z]: Vector3, radius: number): boolean {
+export function isBlockedInHouse([x, y, z]: Vector3, radius: number, hasChain = false): boolean {
   const touches = (min: Vector3, max: Vector3): boolean =>
     max[1] > y + 0.3 &&
     min[1] < y + 1.7 &&
@@ -203,7 +203,7 @@ export function isBlockedInHouse([x, y, z]: Vector3, radius: number): boolean {
     ]; // prettier-ignore
   }).flat();
   return [
-    ...furniture(false),
+    ...furniture(hasChain),
     ...stairs,
     ...[[[-3, 0, -2.6], [9, 6, -2.5]], [[-3, 0, 2.5], [9, 6, 2.6]], [[-3.1, 0, -2.5], [-3, 6, 2.5]], [[9, 0, -2.5], [9.1, 6, 2.5]]] as [Vector3, Vector3][], // prettier-ignore
     ...[[[3, 0, -2.5], [3.1, 6, -0.45]], [[3, 0, 0.45], [3.1, 6, 2.5]], [[EDGE, GALLERY - 0.15, -2.5], [EDGE + 0.01, GALLERY + 1, STAIRS.z]]] as [Vector3, Vector3][], // prettier-ignore

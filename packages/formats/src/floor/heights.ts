@@ -1,5 +1,6 @@
 import type { ExtinctionGrid } from './extinction.js';
 import type { FloorWork } from './floor-work.js';
+import { widened } from './solids.js';
 
 /** Connected cells of a floor: indices x + nx · z of columns, and the height in meters of each. */
 export interface Cells {
@@ -7,14 +8,22 @@ export interface Cells {
   readonly heights: readonly number[];
 }
 
+/** Maximum difference in height in meters between neighboring cells of one piece of a floor: less than any step. */
+export const LEVEL = 0.12;
 /** Distance in meters above and below a height within which the surface is searched again. */
 const SEARCH = 0.3;
 /** Maximum optical depth of a voxel that counts. A captured opaque surface has 2 or more, a floater or a faint floor less. */
 const MAX_DEPTH = 2;
 /** Costs, in optical depths, of a difference of one voxel between neighboring cells, and of a larger one. */
 const [SLOPE_COST, JUMP_COST] = [0.6, 6];
+/** Radius in meters of the square that has the usual heights around a cell. */
+const LEVELED = 1;
+/** Cost, in optical depths, of a height that is `e` times as rare in that square as another, for a cell without a surface. */
+const RARE_COST = 5;
+/** Minimum fraction of the optical depth of that square at a height. */
+const RAREST = 1e-3;
 /** Radius in meters of the square over which heights of one surface are averaged. */
-const AVERAGED = 0.2;
+const AVERAGED = 0.5;
 /** Number of cells for which the search over neighbors is done at a time; it bounds its memory, 52 MB. */
 const MAX_LABELS = 2 ** 23;
 
@@ -32,23 +41,31 @@ export function refinedHeights(grid: ExtinctionGrid, { cells, heights }: Cells, 
   const bases = Int32Array.from(heights, (height) => Math.round((height - corner[1]) / voxel - 0.5) - reach);
   const columnOf = (index: number): number => (cells[index] % nx) + nx * ny * Math.floor(cells[index] / nx);
   const depthAt = (column: number, y: number): number => (y < 0 || y >= ny ? 0 : vertical[column + nx * y]);
+  const level = widened(grid, Math.round(LEVELED / voxel), work);
+  const levelAt = (column: number, y: number): number => (y < 0 || y >= ny ? 0 : Math.max(0, level[column + nx * y]));
   const costs = new Float32Array(cells.length * labels);
   work.take(costs.length);
   for (let index = 0; index < cells.length; index++) {
     const column = columnOf(index);
     // A surface hides those below it, such as the floor under stairs.
     let passed = 1;
+    let [peak, sum] = [0, 1e-6];
     for (let y = bases[index] + labels - 1, at = (index + 1) * labels - 1; y >= bases[index]; y--, at--) {
+      if (y < bases[index] + labels - 2) passed *= Math.exp(-depthAt(column, y + 2));
       const depth = depthAt(column, y) + 0.5 * (depthAt(column, y - 1) + depthAt(column, y + 1));
       costs[at] = MAX_DEPTH - passed * Math.min(MAX_DEPTH, depth);
-      if (y < bases[index] + labels - 2) passed *= Math.exp(-depthAt(column, y + 2));
+      peak = Math.max(peak, MAX_DEPTH - costs[at]);
+      sum += levelAt(column, y);
     }
+    // Single columns of a faint trained floor are off by 10 cm, but together they have a usual height.
+    const weight = RARE_COST * (1 - peak / MAX_DEPTH) ** 3;
+    for (let label = 0, at = index * labels; label < labels; label++, at++)
+      costs[at] -= weight * Math.log(levelAt(column, bases[index] + label) / sum + RAREST);
   }
   const totals = new Float32Array(costs.length);
   const links = linksOf({ cells, heights }, nx, SEARCH);
   for (const next of links) {
-    const before = new Int32Array(cells.length).fill(-1);
-    next.forEach((to, from) => to >= 0 && (before[to] = from));
+    const before = inverseOf(next);
     addPaths({ costs, totals, bases, labels }, next, before, work);
     addPaths({ costs, totals, bases, labels }, before, next, work);
   }
@@ -67,6 +84,13 @@ interface Labels {
   /** Index along y of the first label of each cell. */
   readonly bases: Int32Array;
   readonly labels: number;
+}
+
+/** Returns, for links to the next cells, those to the previous ones; -1 for cells that none is linked to. */
+function inverseOf(next: Int32Array): Int32Array {
+  const before = new Int32Array(next.length).fill(-1);
+  next.forEach((to, from) => to >= 0 && (before[to] = from));
+  return before;
 }
 
 /** Adds the minimum costs of all paths that end in a cell and follow `next`. */
@@ -149,8 +173,7 @@ function averaged(
     }
   const radius = Math.max(1, Math.round(AVERAGED / voxel));
   for (const next of links) {
-    const before = new Int32Array(count).fill(-1);
-    next.forEach((to, from) => to >= 0 && (before[to] = from));
+    const before = inverseOf(next);
     const [oldDepths, oldMoments] = [depths.slice(), moments.slice()];
     for (let index = 0; index < count; index++)
       for (const way of [next, before])

@@ -1,8 +1,6 @@
 import type { FloorWork } from './floor-work.js';
-import { linksOf, type Cells } from './heights.js';
+import { LEVEL, linksOf, type Cells } from './heights.js';
 
-/** Maximum difference in height in meters between neighboring cells of one piece of a floor: less than any step. */
-export const LEVEL = 0.12;
 /** Minimum area in m² of a piece beyond a step that leads nowhere else. Smaller ones are furniture, or the bottom of a pit. */
 const MIN_END = 2;
 
