@@ -27,7 +27,7 @@ const FAINT_DEPTH = 0.2;
 /** Maximum number of cells along the radius of a body. With smaller voxels, only some cells under it are examined. */
 const MAX_RADIUS = 8;
 /** Optical depth below which a column has no surface of its own. */
-const EMPTY_DEPTH = 0.1;
+const EMPTY_DEPTH = 0.05;
 /** Minimum fraction of the optical depth within a step above and below a faint floor that is within its three voxels. */
 const FAINT_SHARE = 0.4;
 /** Horizontal distances in meters of the floor from the point `near`: the first with a large floor is used. */

@@ -54,7 +54,7 @@ export function refinedHeights(grid: ExtinctionGrid, { cells, heights }: Cells, 
       if (y < bases[index] + labels - 2) passed *= Math.exp(-depthAt(column, y + 2));
       const depth = depthAt(column, y) + 0.5 * (depthAt(column, y - 1) + depthAt(column, y + 1));
       costs[at] = MAX_DEPTH - passed * Math.min(MAX_DEPTH, depth);
-      peak = Math.max(peak, MAX_DEPTH - costs[at]);
+      peak = Math.max(peak, Math.min(MAX_DEPTH, depth));
       sum += levelAt(column, y);
     }
     // Single columns of a faint trained floor are off by 10 cm, but together they have a usual height.
