@@ -3,9 +3,6 @@ import { credentialsOf, type Attributes } from './attributes.js';
 import type { SceneRequest } from '../loading/protocol.js';
 import type { Source } from './element-host.js';
 
-/** Attributes that select how a scene is loaded. */
-type RequestAttribute = 'crossorigin' | 'quality' | 'detail' | 'renderer' | 'groups';
-
 /** Function of the page that rewrites each address; null or undefined for none. */
 export type UrlModifier = ((url: string) => string) | null | undefined;
 
@@ -38,7 +35,7 @@ export class Addresses {
   /** Returns the request for the element's scene; null without `splats`, and if `src` is missing or empty. */
   request(
     { src, contract, chain, isMesh, splats }: Source,
-    { crossorigin, quality, detail, renderer, groups }: Pick<Attributes, RequestAttribute>,
+    { crossorigin, quality, detail, renderer, groups }: Attributes,
     modifier: UrlModifier,
   ): SceneRequest | null {
     const [url] = splats ? ['splats:'] : this.#src.of(src ? [src] : [], modifier);
