@@ -65,7 +65,7 @@ for (const name of fixtureNames().filter((name) => !ENDLESS.includes(name))) {
     assert.deepEqual(codes(report), FAULTS[name] ?? []);
     const runs = report.sections.find(({ title }) => title === 'Runs');
     const isRun = !codes(report).some((code) => /run|inference|operator/.test(code));
-    const hasControls = /^(packed-sh-half|post(?!-temporal|-seen).*|link-.*|state)\.onnx$/.test(name);
+    const hasControls = /^(packed-sh-half|post(?!-temporal|-seen|-reached).*|link-.*|state)\.onnx$/.test(name);
     // Models that know the time also get six fractions of it.
     const rows = runs?.rows.filter(([label]) => !label.endsWith(' of the time'));
     assert.equal(rows?.length, isRun ? (hasControls ? 5 : 3) : undefined);
