@@ -7,7 +7,7 @@ const SOCKETS = '--experimental-websocket';
  * For each name: the purpose, and the command. `in` says what it needs besides the packages: headless Chromium, Dawn in
  * Node, or nothing, because the command prepares all itself. `smallest`: arguments of the shortest run, which a test
  * of the laboratory makes; {folder} is an empty folder, {shared} that of the captured scenes, {detail} one of levels of detail.
- * Rows without it need an engine or a GPU of their own.
+ * Rows without it need an engine or a GPU of their own: without a GPU a clip takes a quarter of an hour.
  */
 export const COMMANDS = {
   attack: {
@@ -44,7 +44,6 @@ export const COMMANDS = {
     what: 'bytes and accuracy of clips',
     in: 'dawn',
     command: [...TSX, 'tests/support/clip-report.ts'],
-    smallest: ['--splats', '400', '--frames', '4', '--per-file', '4', '--min-psnr', '35', '--jobs', '1'],
   },
   'detail-chart': {
     what: 'levels of detail: error, splats, time',

@@ -22,7 +22,7 @@ function node(...args: string[]): string {
 
 for (const [name, { smallest }] of Object.entries(COMMANDS)) {
   const needsData = smallest?.some((word) => word.includes('{shared}')) && !existsSync(shared);
-  const skip = smallest ? needsData && `no ${shared}` : 'needs another engine, or an NVIDIA GPU';
+  const skip = smallest ? needsData && `no ${shared}` : 'needs another engine, or a GPU';
   test(`npm run lab -- ${name}`, { skip }, () => {
     if (smallest?.includes('{detail}'))
       node('packages/cli/bin/gaussian-splat.mjs', 'detail', 'demo/scenes/skull.spz', '--out', detail);
