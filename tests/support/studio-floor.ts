@@ -11,6 +11,8 @@ const CELL = 0.025;
 const MARGIN = 6;
 /** Dimensions of the body of `FloorOptions`, meters. */
 const [HEIGHT, RADIUS, STEP] = [1.6, 0.2, 0.3];
+/** Height in meters by which a step may be too high, because the stones of the hall are exactly as high as a step. */
+const ROUNDING = 0.005;
 /** Distance in meters from a wall at which the middle of a body is in it. */
 const IN_WALL = RADIUS / 2;
 
@@ -97,31 +99,36 @@ export class StudioFloor {
     return i >= 0 && i < this.#size[0] ? i + this.#size[0] * j : -1;
   }
 
-  /** Marks what a triangle obstructs between a step and the height of a body, and the heights below: halves it down to cells. */
+  /** Marks what a triangle obstructs between a step and the height of a body, and the heights below: at points half a cell apart. */
   #add(corners: readonly Point[], floor: number, solid: Uint8Array): void {
-    const ends = [
+    const ranges = [
       [this.#corner[0], this.#corner[0] + this.#size[0] * CELL],
       [floor - STEP, floor + HEIGHT],
       [this.#corner[1], this.#corner[1] + this.#size[1] * CELL],
     ];
-    if (ends.some(([low, high], k) => corners.every((p) => p[k] < low) || corners.every((p) => p[k] > high))) return;
-    const [a, b, c] = corners;
-    const sides = [
-      [a, b, c],
-      [b, c, a],
-      [c, a, b],
-    ].sort((one, other) => lengthOf(other) - lengthOf(one));
-    const [from, to, third] = sides[0];
-    if (lengthOf(sides[0]) > CELL / 2) {
-      const middle = from.map((value, k) => (value + to[k]) / 2) as unknown as Point;
-      this.#add([from, middle, third], floor, solid);
-      this.#add([middle, to, third], floor, solid);
-      return;
+    if (ranges.some(([low, high], k) => corners.every((p) => p[k] < low) || corners.every((p) => p[k] > high))) return;
+    const turns = [0, 1, 2].map((k) => [corners[k], corners[(k + 1) % 3], corners[(k + 2) % 3]] as const);
+    // Lines from the corner that is opposite of the shortest side.
+    const [apex, from, to] = turns.sort((one, other) => distance(one[1], one[2]) - distance(other[1], other[2]))[0];
+    const rows = Math.max(1, Math.ceil(distance(from, to) / (CELL / 2)));
+    for (let row = 0; row <= rows; row++) {
+      const way = [0, 1, 2].map((k) => from[k] + ((to[k] - from[k]) * row) / rows - apex[k]);
+      const count = Math.max(1, Math.ceil(Math.hypot(...way) / (CELL / 2)));
+      let [first, last] = [0, count];
+      ranges.forEach((range, k) => {
+        const ends = range.map((end) => (count * (end - apex[k])) / way[k]).sort((a, b) => a - b);
+        if (!ends.every(Number.isFinite)) return;
+        [first, last] = [Math.max(first, Math.ceil(ends[0])), Math.min(last, Math.floor(ends[1]))];
+      });
+      for (let k = first; k <= last; k++) {
+        const at = this.#at(apex[0] + (way[0] * k) / count, apex[2] + (way[2] * k) / count);
+        if (at < 0 || at >= solid.length) continue;
+        const height = apex[1] + (way[1] * k) / count;
+        if (height > floor + HEIGHT || height < floor - STEP) continue;
+        if (height - floor > STEP + ROUNDING) solid[at] = 1;
+        else if (!(this.#heights[at] > height)) this.#heights[at] = height;
+      }
     }
-    const at = this.#at(a[0], a[2]);
-    if (at < 0 || at >= solid.length) return;
-    if (a[1] - floor > STEP) solid[at] = 1;
-    else if (!(this.#heights[at] > a[1])) this.#heights[at] = a[1];
   }
 
   #distances(solid: Uint8Array): Float32Array {
@@ -151,7 +158,7 @@ export class StudioFloor {
         if (
           reached[to] === 0 &&
           this.#clearance[to] >= RADIUS &&
-          Math.abs(this.#heights[to] - this.#heights[at]) <= STEP
+          Math.abs(this.#heights[to] - this.#heights[at]) <= STEP + ROUNDING
         ) {
           reached[to] = 1;
           open.push(to);
@@ -161,7 +168,7 @@ export class StudioFloor {
   }
 }
 
-const lengthOf = ([a, b]: readonly Point[]): number => Math.hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]);
+const distance = (a: Point, b: Point): number => Math.hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]);
 
 /** Yields the triangles of a scene's mesh, meters, y up. */
 function* trianglesOf(name: string): Generator<readonly Point[]> {

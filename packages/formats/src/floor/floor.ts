@@ -102,9 +102,9 @@ interface Region {
   readonly heights: readonly number[];
   /** Index in `cells` of the cell nearest to the point `near`. */
   readonly nearest: number;
-  /** Horizontal distance in meters of the nearest cell from the point `near`. */
+  /** Horizontal distance in meters of the nearest cell from the point `near`; infinite if all cells are above it. */
   readonly distance: number;
-  /** Height in meters of the first cell of the flood fill. */
+  /** Minimum height in meters. */
   readonly bottom: number;
 }
 
@@ -158,7 +158,7 @@ class FloorFinder {
       return floors;
     });
     this.#seen = this.#floors.map(() => []);
-    this.#disc = discOf(Math.ceil(body.radius / grid.voxel));
+    this.#disc = discOf(body.radius / grid.voxel);
   }
 
   find(near: Vector3): FloorMap {
@@ -170,14 +170,13 @@ class FloorFinder {
         regions.push(this.#fill(c, height, near));
       }
     });
-    const below = regions.filter(({ bottom }) => bottom <= near[1]);
     const isLarge = ({ cells }: Region): boolean => cells.length * this.#grid.voxel ** 2 >= LARGE;
     // The floor under the point, even if a larger one is behind a wall. A point at infinity is above the roof, too.
     const [reach] = REACHES.slice(-1);
     const reached =
       (near[1] === Infinity ? [] : REACHES)
-        .map((each) => below.filter((region) => region.distance <= each && isLarge(region)))
-        .find((found) => found.length > 0) ?? below.filter(({ distance }) => distance <= reach);
+        .map((each) => regions.filter((region) => region.distance <= each && isLarge(region)))
+        .find((found) => found.length > 0) ?? regions.filter(({ distance }) => distance <= reach);
     const region = largestOf(reached) ?? lowestOf(regions);
     if (region.cells.length === 0) return this.#mapOf(region);
     const { cells, nearest } = region;
@@ -316,11 +315,12 @@ class FloorFinder {
     const cells = [start];
     const heights = [height];
     this.#seen[start].push(height);
-    let [nearest, shortest] = [0, Infinity];
+    let [nearest, shortest, bottom] = [0, Infinity, height];
     for (const open = [0]; open.length > 0;) {
       const index = open.pop()!;
       const [c, y] = [cells[index], heights[index]];
       const [x, z] = [c % nx, Math.floor(c / nx)];
+      bottom = Math.min(bottom, y);
       const distance = Math.hypot(x + 0.5 - nearX, z + 0.5 - nearZ);
       // The floor under the point, not the ceiling above it.
       const isHigher = distance === shortest && y > heights[nearest];
@@ -338,7 +338,7 @@ class FloorFinder {
         heights.push(reached);
       }
     }
-    return { cells, heights, nearest, distance: shortest * voxel, bottom: height };
+    return { cells, heights, nearest, distance: shortest * voxel, bottom };
   }
 
   /** Converts a region to a map, cropped to the rectangle of its cells. */
@@ -393,12 +393,14 @@ const DIRECTIONS = [
   [1, -1],
 ] as const;
 
-/** Returns the cells under a body, relative to its center. @param radius Radius in cells. */
+/**
+ * Returns the cells under a body, relative to its center. The voxels of a surface reach half a voxel beyond it.
+ * @param radius Radius in cells.
+ */
 function discOf(radius: number): (readonly [number, number])[] {
   const step = Math.max(1, Math.ceil(radius / MAX_RADIUS));
   const count = Math.floor(radius / step);
   const side = Array.from({ length: 2 * count + 1 }, (_, i) => step * (i - count));
-  return side.flatMap((z) =>
-    side.flatMap((x): [number, number][] => (x * x + z * z <= radius * radius ? [[x, z]] : [])),
-  );
+  const max = Math.max(0, radius - 0.5) ** 2;
+  return side.flatMap((z) => side.flatMap((x): [number, number][] => (x * x + z * z <= max ? [[x, z]] : [])));
 }
