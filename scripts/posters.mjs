@@ -1,5 +1,5 @@
 /**
- * `npm run lab -- posters [--only REGEX] [--small FILE.sog]`: the posters of the gallery and of the first page, as the built site draws the first frames of its scenes, and the
+ * `npm run lab -- posters [--only REGEX] [--small FILE.sog] [--out FOLDER]`: the posters of the gallery and of the first page, as the built site draws the first frames of its scenes, and the
  * number of splats of each. `tests/site/posters.alone.lab.test.ts` compares them again.
  */
 import { copyFileSync, mkdirSync, readFileSync, statSync, writeFileSync } from 'node:fs';
@@ -25,10 +25,14 @@ const VERSIONS = { view: '12', ply: 'version-splats', small: 'version-small', im
 /** Bytes of a splat of degree 3 in the PLY file of a trainer: 62 numbers. */
 const PLY_BYTES = 248;
 
-const { values } = parseArgs({ options: { only: { type: 'string', default: '' }, small: { type: 'string' } } });
-const folder = join(root, 'demo/scenes/posters');
-const countsPath = join(folder, 'counts.json');
+const OWN = join(root, 'demo/scenes/posters');
+const { values } = parseArgs({
+  options: { only: { type: 'string', default: '' }, small: { type: 'string' }, out: { type: 'string', default: OWN } },
+});
+const folder = values.out;
 mkdirSync(folder, { recursive: true });
+if (folder !== OWN) copyFileSync(join(OWN, 'counts.json'), join(folder, 'counts.json'));
+const countsPath = join(folder, 'counts.json');
 const server = await serve({ '/': `${root}demo/dist` });
 const browser = await chromium.launch({ executablePath: findChromium(), args: SWIFTSHADER_FLAGS });
 const wanted = ({ id }) => new RegExp(values.only).test(id);

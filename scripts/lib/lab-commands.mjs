@@ -7,7 +7,7 @@ const SOCKETS = '--experimental-websocket';
  * For each name: the purpose, and the command. `in` says what it needs besides the packages: headless Chromium, Dawn in
  * Node, or nothing, because the command prepares all itself. `smallest`: arguments of the shortest run, which a test
  * of the laboratory makes; {folder} is an empty folder, {shared} that of the captured scenes, {detail} one of levels of detail.
- * Rows without it need an engine or a GPU of their own: without a GPU a clip takes a quarter of an hour.
+ * Rows without it need an engine, packages of Python, or a GPU: without one a clip takes a quarter of an hour.
  */
 export const COMMANDS = {
   attack: {
@@ -91,13 +91,12 @@ export const COMMANDS = {
     what: 'the smallest files within a target of accuracy',
     in: 'dawn',
     command: ['scripts/gate/run-gate.mjs'],
-    smallest: ['--kept', '--data', '{shared}/data', '--work', '{folder}/gate', '--out', '{folder}/gate.json'],
   },
   grid: {
     what: 'many elements on one page',
     in: 'chromium',
     command: ['scripts/grid/run-grid.mjs'],
-    smallest: ['--seconds', '4'],
+    smallest: ['--seconds', '30'],
   },
   lighthouse: {
     what: 'paints and layout shift of the site, on a simulated phone',
@@ -109,7 +108,7 @@ export const COMMANDS = {
     what: 'elements that are added and removed',
     in: 'chromium',
     command: ['scripts/lives.mjs'],
-    smallest: ['2'],
+    smallest: ['40'],
   },
   load: {
     what: 'times from navigation to the first frame',
@@ -120,7 +119,7 @@ export const COMMANDS = {
   posters: {
     what: 'posters of the site, as its scenes are first drawn',
     command: ['scripts/posters.mjs'],
-    smallest: ['--only', 'no such page'],
+    smallest: ['--only', '^robot$', '--out', '{folder}/posters'],
   },
   scale: {
     what: 'builds of streamed scenes in parts, and what a billion splats take',

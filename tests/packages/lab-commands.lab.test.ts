@@ -22,10 +22,10 @@ function node(...args: string[]): string {
 
 for (const [name, { smallest }] of Object.entries(COMMANDS)) {
   const needsData = smallest?.some((word) => word.includes('{shared}')) && !existsSync(shared);
-  const skip = smallest ? needsData && `no ${shared}` : 'needs another engine, or a GPU';
+  const skip = smallest ? needsData && `no ${shared}` : 'needs another engine, packages of Python, or a GPU';
   test(`npm run lab -- ${name}`, { skip }, () => {
     if (smallest?.includes('{detail}'))
-      node('packages/cli/bin/gaussian-splat.mjs', 'detail', 'demo/scenes/skull.spz', '--out', detail);
+      node('packages/cli/bin/gaussian-splat.mjs', 'detail', 'demo/scenes/skull.spz', '--quantized', '--out', detail);
     const words = smallest?.map((word) =>
       word.replace('{shared}', shared).replace('{folder}', folder).replace('{detail}', detail),
     );

@@ -8,7 +8,7 @@ import { fly, type FlightSecond } from './flight.js';
 const [given, ...values] = process.argv.slice(2);
 if (given === undefined)
   throw new Error(
-    'usage: npm run lab -- detail-flight FOLDER [slots] [latency in ms] [bytes of a slot] [--copies] [--speed=SHARE]',
+    'usage: npm run lab -- detail-flight FOLDER (of detail --quantized) [slots] [latency in ms] [bytes of a slot] [--copies] [--speed=SHARE]',
   );
 const folder = resolve(process.env.INIT_CWD ?? process.cwd(), given);
 const [slots = 17_500, latencyMs = 7, bytes = 65_856] = values.filter((value) => !value.startsWith('--')).map(Number);
