@@ -30,7 +30,8 @@ export interface Job {
 }
 
 /** Returns whether the file of a job is downloaded, so that its worker only reads. */
-export const isDownloaded = ({ request: { request } }: Job): boolean => 'downloaded' in request;
+export const isDownloaded = ({ request: { request } }: Job): boolean =>
+  'downloaded' in ((request as object | null) ?? {});
 
 /** Returns whether a job shares no worker: it cannot restart, has restarted, or reads for long. */
 const isAlone = (job: Job): boolean => job.transfer !== undefined || job.moves > 0 || isDownloaded(job);
