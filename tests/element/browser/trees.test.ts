@@ -314,7 +314,13 @@ describe('RAD', () => {
       return sum + Number(last) + 1 - Number(first);
     }, 0);
     const reference = await whole(await rad(), viewAt(0));
-    const decibels = psnr(await pixelsOf(element), await pixelsOf(reference));
+    const compared = async (): Promise<number> => psnr(await pixelsOf(element), await pixelsOf(reference));
+    // On a busy machine the GPU's answer for the new view may follow the requests of the old one by many frames.
+    let decibels = await compared();
+    for (let rounds = 0; decibels <= 55 && rounds < 10; rounds++) {
+      await calm(element, served);
+      decibels = await compared();
+    }
     console.log(`${far.length}, then ${near.length} requests, ${bytes} bytes of ${all} kB; ${decibels.toFixed(1)} dB`);
     assert(decibels > 55, `${decibels} dB`);
     await close(element);
