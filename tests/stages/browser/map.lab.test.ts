@@ -119,7 +119,7 @@ describe('maps', () => {
 
   it('show a tileset at its place on the Earth, at the level that fits', async () => {
     const { SplatLayer } = (await import('/demo/map/splat-layer.js' as string)) as { SplatLayer: LayerClass };
-    const address = `/net/kept/map-${Date.now()}/`;
+    const address = `/net/kept/map-${crypto.randomUUID()}/`;
     for (const [path, bytes] of splatTileset(redCube(), { levels: 2, transform: onEarth() }))
       await fetch(address + path, { method: 'PUT', body: bytes.slice() });
     const counts: number[] = [];
