@@ -1,18 +1,11 @@
 /** Groups of splats by name. Picks and cuts use this module, which is loaded with them. */
+import type { SplatGroup } from '@gaussian-splat/formats/groups';
 import type { SceneGroups } from '../loading/protocol.js';
+
+export type { SplatGroup };
 
 /** Names of groups by their numbers in the file. */
 export type GroupNames = Readonly<Record<number, string>>;
-
-/** A group of splats of a scene, such as an object. */
-export interface SplatGroup {
-  /** Number in the file. */
-  readonly id: number;
-  /** Name that the page gave it; its number as text by default. */
-  readonly name: string;
-  /** Number of its splats. */
-  readonly count: number;
-}
 
 /** Names that texts of JSON contain. */
 const parsed = new Map<string, GroupNames>();

@@ -37,11 +37,12 @@ export async function readGroups(file: FileBytes, options: ReadGroupsOptions = {
   const source = { bytes, name, budget: new LoadBudget(bytes.length, options) };
   try {
     const header = withPlainNames(parsePlyHeader(source));
-    const whole = await readPly(source);
-    const data = openElement(source, header, 'vertex');
-    const present = data.element.properties.filter(({ listCountType }) => !listCountType).map((own) => own.name);
+    const { properties = [] } = header.elements.find((element) => element.name === 'vertex') ?? {};
+    const present = properties.filter(({ listCountType }) => !listCountType).map((own) => own.name);
     const property = (asked === undefined ? GROUP_PROPERTIES : [asked]).find((each) => present.includes(each));
     if (property === undefined) throw noGroups(name, asked, present);
+    const whole = await readPly(source);
+    const data = openElement(source, header, 'vertex');
     source.budget.take(12 * whole.count, name);
     const values = new Float64Array(whole.count);
     readColumns(data, [{ property, array: values, stride: 1, offset: 0 }]);
@@ -59,6 +60,6 @@ const noGroups = (where: string, asked: string | undefined, present: readonly st
   new GaussianSplatError('argument/value', {
     where,
     expected: asked === undefined ? `one of the properties ${GROUP_PROPERTIES.join(', ')}` : `the property ${asked}`,
-    found: present.join(', ').slice(0, 400),
+    found: present.join(', ').slice(0, 400) || 'none',
     remedy: 'name the property that has the object of each splat, or write one',
   });
