@@ -6,7 +6,7 @@ import time
 import numpy as np
 
 MOST = 1.75  # meters from the middle within which anything may move
-PER_FRAME = 260  # steps
+PER_FRAME = 800  # steps
 
 
 def make(making) -> None:
@@ -125,7 +125,7 @@ def _follow(torch, splats, images, chosen, names, seconds: float) -> None:
     """Moves the chosen splats to the next frame; scales and harmonics stay."""
     from train import draw, similarity
 
-    rates = {"means": 7e-4, "quats": 2e-3, "opacities": 1e-2, "sh0": 2.5e-3}
+    rates = {"means": 1.2e-3, "quats": 2e-3, "opacities": 1e-2, "sh0": 2.5e-3}
     frozen = torch.ones(len(splats["means"]), dtype=torch.bool, device="cuda")
     frozen[chosen] = False
     adams = {k: torch.optim.Adam([splats[k]], lr=rates[k], eps=1e-15, fused=True) for k in names}
