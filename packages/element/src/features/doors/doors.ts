@@ -1,4 +1,4 @@
-import { GaussianSplatError, type Vector3 } from '@gaussian-splat/core';
+import { GaussianSplatError, loadModule, type Vector3 } from '@gaussian-splat/core';
 import type { ReactiveController } from 'lit';
 import { eyeOfPose } from '../../viewer/camera/orbit.js';
 import type { Feature } from '../../viewer/features.js';
@@ -64,7 +64,7 @@ export class Doors implements ReactiveController, Feature {
     }
     if (!attributes.floorPlan) return this.#removePlan();
     if (this.#plan) return;
-    import('./floor-plan.js').then(({ FloorPlan }) => {
+    loadModule('the code of the plan', () => import('./floor-plan.js')).then(({ FloorPlan }) => {
       if (this.#plan || !this.#viewer.attributes.floorPlan) return;
       this.#plan = new FloorPlan(this.#viewer, (room) => void this.#enter(room));
       this.#showPlan();
