@@ -114,6 +114,15 @@ test('the marks of writers decide the frame of files that name none, which the c
     const start = await readPrefix(writeSpz(splats, { ...options, axes }), { name: 'a.spz' });
     assert.equal(start?.warnings, undefined, 'the records are at the end of a file');
   }
+  // Spark's header, and a gzip library of Rust, which names no system: byte 9 of the file.
+  for (const fractionalBits of [10, 12]) {
+    const options = { version: 2, antialiased: true, fractionalBits, axes: [1, 1, 1] } as const;
+    const bySpark = writeSpz(splats, options);
+    bySpark[9] = 255;
+    const cloud = await readScene(bySpark);
+    assertAtMost(largestDifference(cloud.positions, splats.positions.flat()), 2 ** -(fractionalBits + 1), 'positions');
+    assert.match(cloud.warnings!.join(), /does not name its axes/);
+  }
   const named = extensionRecord(0xadbe0003, Uint8Array.of(4, 0, 0, 0));
   const cloud = await readScene(writeSpz(splats, { version: 3, extensions: named, axes: [1, -1, -1] }));
   assert.deepEqual([cloud.hints?.isUpAssumed, cloud.warnings], [undefined, undefined]);

@@ -53,9 +53,13 @@ async function unpackFrame(header: SpzHeader, scene: PackedScene, source: SceneS
   return cloud;
 }
 
-/** Parses the header, and adds whether the axes are those of the specification (right, up, back), as within glTF. */
-const headerOf = ({ name, isWithinGltf }: SceneSource, start: Uint8Array): SpzHeader => ({
+/**
+ * Parses the header, and adds the marks outside of it: the system of the gzip file, and whether the axes are those of the
+ * specification (right, up, back), as within glTF.
+ */
+const headerOf = ({ name, bytes, isWithinGltf }: SceneSource, start: Uint8Array): SpzHeader => ({
   ...parseSpzHeader(start, name),
+  gzipSystem: bytes[0] === 0x1f ? bytes[9] : undefined,
   followsSpecification: isWithinGltf,
 });
 

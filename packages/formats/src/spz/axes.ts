@@ -25,6 +25,8 @@ const CREDITS = 0x47530002;
 const MAX_SKIPPED = 8;
 /** Number of fractional bits in the files of all converters. */
 const USUAL_FRACTIONAL_BITS = 12;
+/** The system that gzip libraries of Rust and Go write. Niantic's apps compress with zlib, which writes its own system. */
+const UNKNOWN_SYSTEM = 255;
 
 /**
  * Coordinate system of a file: signs of its axes and, for systems with a vertical third axis, a map [3, 4] to apply
@@ -43,16 +45,17 @@ export interface SpzFrame {
 /**
  * Axes of a file without a declared coordinate system, inferred from its writer. Version 1, and version 2 with
  * antialiasing, come from Niantic's own apps; files without extension records and with other numbers of fractional bits
- * than 12 come from tools that follow the specification. All of these use right-up-back. Current converters keep the
- * coordinates of PLY: docs/decisions/0022-the-frame-of-spz.md.
+ * than 12 come from tools that follow the specification. All of these use right-up-back. Spark writes version 2 with
+ * antialiasing, too, but keeps the coordinates of its input, as current converters keep those of PLY:
+ * docs/decisions/0022-the-frame-of-spz.md.
  */
 export function assumedAxes(header: SpzHeader): AxisSigns {
-  const { version, antialiased, fractionalBits, hasExtensions, followsSpecification } = header;
+  const { version, antialiased, fractionalBits, hasExtensions, gzipSystem, followsSpecification } = header;
+  const isOfAppsOrSpark = version === 2 && antialiased;
   const isRightUpBack =
     followsSpecification ||
     version === 1 ||
-    (version === 2 && antialiased) ||
-    (fractionalBits !== USUAL_FRACTIONAL_BITS && !hasExtensions);
+    (isOfAppsOrSpark ? gzipSystem !== UNKNOWN_SYSTEM : fractionalBits !== USUAL_FRACTIONAL_BITS && !hasExtensions);
   return isRightUpBack ? RIGHT_UP_BACK : RIGHT_DOWN_FORWARD;
 }
 

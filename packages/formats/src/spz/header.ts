@@ -10,6 +10,8 @@ export interface SpzHeader {
   readonly fractionalBits: number;
   readonly antialiased: boolean;
   readonly hasExtensions: boolean;
+  /** Operating system in the header of the gzip file: 3 Unix, 10 Windows, 19 macOS, 255 unknown. */
+  readonly gzipSystem?: number | undefined;
   /** Whether a file that declares no coordinate system has that of the specification. */
   readonly followsSpecification?: boolean | undefined;
 }
