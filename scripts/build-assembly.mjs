@@ -1,14 +1,18 @@
 /**
- * Compiles packages/renderer/assembly/pack-rows.ts (AssemblyScript) to WebAssembly, as a module of packages/renderer/src/generated/. A module needs no address, so
- * that a worker from text and every bundler can load it.
+ * Compiles files of packages/NAME/assembly (AssemblyScript) to WebAssembly, as modules of packages/NAME/src/generated/. A module needs no address, so that a worker from
+ * text and every bundler can load it.
  */
 import { createHash } from 'node:crypto';
 import { existsSync, mkdirSync, readFileSync, writeFileSync } from 'node:fs';
 import { dirname, join } from 'node:path';
 import { root } from './lib/run.mjs';
 
-const SOURCE = 'packages/renderer/assembly/pack-rows.ts';
-const TARGET = join(root, 'packages/renderer/src/generated/pack-rows.ts');
+const MODULES = [
+  { source: 'packages/renderer/assembly/pack-rows.ts', name: 'ROWS_WASM' },
+  { source: 'packages/formats/assembly/unpack-splats.ts', name: 'UNPACK_WASM' },
+];
+/** Files that those of the modules import. */
+const SHARED = ['packages/core/assembly/exp.ts'];
 const OPTIONS = [
   '-O3',
   '--enable',
@@ -22,20 +26,26 @@ const OPTIONS = [
 ];
 
 const { version } = JSON.parse(readFileSync(join(root, 'node_modules/assemblyscript/package.json'), 'utf8'));
-const inputs = [version, OPTIONS.join(' '), readFileSync(join(root, SOURCE), 'utf8')];
-const stamp = `// ${createHash('sha256').update(inputs.join('\n')).digest('hex')}`;
 
-// Loading the compiler takes longer than checking that its result is current.
-if (!existsSync(TARGET) || !readFileSync(TARGET, 'utf8').startsWith(stamp)) {
+for (const { source, name } of MODULES) {
+  const target = join(root, source.replace('/assembly/', '/src/generated/'));
+  const inputs = [
+    version,
+    OPTIONS.join(' '),
+    ...[source, ...SHARED].map((file) => readFileSync(join(root, file), 'utf8')),
+  ];
+  const stamp = `// ${createHash('sha256').update(inputs.join('\n')).digest('hex')}`;
+  // Loading the compiler takes longer than checking that its result is current.
+  if (existsSync(target) && readFileSync(target, 'utf8').startsWith(stamp)) continue;
   const { default: asc } = await import('assemblyscript/asc');
   let wasm;
-  const { error, stderr } = await asc.main([SOURCE, ...OPTIONS], {
-    readFile: (name, base) => {
-      const path = join(root, base === '.' ? '' : base, name);
+  const { error, stderr } = await asc.main([source, ...OPTIONS], {
+    readFile: (file, base) => {
+      const path = join(root, base === '.' ? '' : base, file);
       return existsSync(path) ? readFileSync(path, 'utf8') : null;
     },
-    writeFile: (name, contents) => {
-      if (name === 'out.wasm') wasm = contents;
+    writeFile: (file, contents) => {
+      if (file === 'out.wasm') wasm = contents;
     },
     listFiles: () => [],
   });
@@ -43,10 +53,10 @@ if (!existsSync(TARGET) || !readFileSync(TARGET, 'utf8').startsWith(stamp)) {
     console.error(stderr.toString());
     process.exit(1);
   }
-  mkdirSync(dirname(TARGET), { recursive: true });
+  mkdirSync(dirname(target), { recursive: true });
   const text = Buffer.from(wasm).toString('base64');
   writeFileSync(
-    TARGET,
-    `${stamp}\n/** WebAssembly of ${SOURCE}, in base64. */\nexport const ROWS_WASM =\n  '${text}';\n`,
+    target,
+    `${stamp}\n/** WebAssembly of ${source}, in base64. */\nexport const ${name} =\n  '${text}';\n`,
   );
 }

@@ -3,11 +3,14 @@ import { grouped } from '../bytes.js';
 import { allocateCloud, expInPlace, keptDegree, SH_C0, type DraftCloud } from '../cloud.js';
 import { harmonicTargets, loadMetadata, shDegreeOf } from '../ply/gaussian-layout.js';
 import { parsePlyHeader, type PlyElement, type PlyHeader } from '../ply/header.js';
-import { openElement, readColumns } from '../ply/rows.js';
+import { openElement, readColumns, type ElementData } from '../ply/rows.js';
+import { unpackSplats } from '../ply/unpack-splats.js';
 import type { SceneSource } from '../scene-format.js';
 
 /** Number of splats that a row of the element `chunk` describes. */
 const CHUNK_SPLATS = 256;
+/** Minimum number of splats that are unpacked in WebAssembly, which must be compiled for this purpose. */
+const MANY_SPLATS = 1 << 14;
 const PACKED = ['packed_position', 'packed_rotation', 'packed_scale', 'packed_color'];
 const BOUNDS = ['min_', 'max_', 'min_scale_', 'max_scale_'].flatMap((bound) => ['x', 'y', 'z'].map((a) => bound + a));
 const COLOR_BOUNDS = ['min_', 'max_'].flatMap((bound) => ['r', 'g', 'b'].map((channel) => bound + channel));
@@ -27,21 +30,20 @@ export async function readCompressedPly(source: SceneSource): Promise<GaussianCl
   const { sh } = checkElements(source, header);
   // Coefficients follow all splats. A file that is still loading is read without them.
   const degree = sh && !source.isPrefix ? shDegreeOf(source, sh) : 0;
-  const chunkBounds = readChunkBounds(source, header);
-  const vertexData = openElement(source, header, 'vertex');
-  const { count } = vertexData.element;
-  const words = new Uint32Array(4 * count);
-  readColumns(
-    vertexData,
-    PACKED.map((property, offset) => ({ property, array: words, stride: 4, offset })),
-  );
-  source.signal?.throwIfAborted();
+  const bounds = readChunkBounds(source, header);
+  const vertex = openElement(source, header, 'vertex');
+  const rest = sh && !source.isPrefix ? openElement(source, header, 'sh') : undefined;
+  const { count } = vertex.element;
   const cloud = allocateCloud(count, keptDegree(degree), source);
-  unpackSplats(words, chunkBounds, cloud);
+  const elements = { vertex, sh: rest, bounds, table: HARMONIC_OF_BYTE };
+  if (count < MANY_SPLATS || !(await unpackSplats(elements, PACKED, cloud))) {
+    unpackRows(vertex, bounds, cloud);
+    if (rest) readHarmonics(rest, degree, cloud);
+  }
+  source.signal?.throwIfAborted();
   const meaning = await loadMetadata(header, source.name);
   meaning?.readComments(cloud, header.comments);
   meaning?.warnDropped(cloud, header, source.name);
-  if (sh && !source.isPrefix) readHarmonics(source, header, degree, cloud);
   return cloud;
 }
 
@@ -96,8 +98,13 @@ function readChunkBounds(source: SceneSource, header: PlyHeader): Float32Array {
   return bounds;
 }
 
-function unpackSplats(words: Uint32Array, bounds: Float32Array, cloud: DraftCloud): void {
+function unpackRows(vertex: ElementData, bounds: Float32Array, cloud: DraftCloud): void {
   const { count, positions, scales, rotations, opacities, sh } = cloud;
+  const words = new Uint32Array(4 * count);
+  readColumns(
+    vertex,
+    PACKED.map((property, offset) => ({ property, array: words, stride: 4, offset })),
+  );
   const shStride = 3 * shCoefficientCount(cloud.shDegree);
   for (let i = 0; i < count; i++) {
     const chunk = CHUNK_FLOATS * Math.floor(i / CHUNK_SPLATS);
@@ -160,9 +167,9 @@ const HARMONIC_OF_BYTE = Float32Array.from({ length: 256 }, (_, byte) => {
   return (fraction - 0.5) * 8;
 });
 
-function readHarmonics(source: SceneSource, header: PlyHeader, degree: number, cloud: DraftCloud): void {
+function readHarmonics(rest: ElementData, degree: number, cloud: DraftCloud): void {
   const kept = shCoefficientCount(cloud.shDegree);
-  readColumns(openElement(source, header, 'sh'), harmonicTargets(degree, cloud));
+  readColumns(rest, harmonicTargets(degree, cloud));
   for (let i = 0; i < cloud.count; i++) {
     for (let k = 3; k < 3 * kept; k++) cloud.sh[3 * kept * i + k] = HARMONIC_OF_BYTE[cloud.sh[3 * kept * i + k]];
   }
