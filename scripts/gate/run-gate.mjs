@@ -5,7 +5,7 @@
 import { existsSync, mkdirSync, readFileSync, statSync, writeFileSync } from 'node:fs';
 import { join, resolve } from 'node:path';
 import { parseArgs } from 'node:util';
-import { encodingsFor } from '@gaussian-splat/optimize';
+import { encodingsFor, viewsBetween } from '@gaussian-splat/optimize';
 import { deviceDescriptor, pickInitialVariants } from '@gaussian-splat/renderer';
 import { checkPython, Gate, LIMITS } from '../../packages/cli/src/lib/gate/gate.mjs';
 import { holdOut, readPhotographs } from '../../packages/cli/src/lib/gate/photographs.mjs';
@@ -17,6 +17,7 @@ import { root } from '../lib/run.mjs';
 const USAGE = `usage: npm run lab -- gate [options]
 
   --data FOLDER    the captured scenes and their photographs (default ../shared/data)
+  --only A,B       of these scenes (default all: those of --data and of the studio)
   --scene NAME=PLY,CAMERAS,IMAGES  another scene: its trained file, cameras.json of the training, and the folder of its
                    photographs, with paths relative to --data. Repeatable. Scenes that are not in --data keep their figures
   --jobs N         files that are generated at a time (default 1)
@@ -28,7 +29,10 @@ const USAGE = `usage: npm run lab -- gate [options]
   --python FILE    a Python with packages/cli/src/lib/gate/requirements.txt (default python3)
 `;
 
-/** Views that photographs of a scene do not help with are left out by name. */
+/**
+ * Views that photographs of a scene do not help with are left out by name. Training held out all images of the studio's
+ * scenes: all of them judge, and cameras between them make the files.
+ */
 const SCENES = {
   skull: {
     source: 'scenes/skull.ply',
@@ -37,6 +41,14 @@ const SCENES = {
     leftOut: ['44', '45'],
   },
 };
+for (const name of ['apartment', 'garden', 'hall', 'product'])
+  SCENES[name] = {
+    source: join(root, `demo/scenes/studio/${name}.spz`),
+    cameras: join(root, `tests/fixtures/studio/${name}/views.json`),
+    images: join(root, `tests/fixtures/studio/${name}/images`),
+    leftOut: [],
+    areAllHeldOut: true,
+  };
 
 const text = (fallback) => ({ type: 'string', default: fallback });
 const { values } = parseArgs({
@@ -44,6 +56,7 @@ const { values } = parseArgs({
     data: text(join(root, '../shared/data')),
     work: text(join(root, 'bench-results/gate')),
     out: text(join(root, 'docs/frontier/gate.json')),
+    only: { type: 'string' },
     scene: { type: 'string', multiple: true, default: [] },
     jobs: text('1'),
     every: text('8'),
@@ -79,7 +92,13 @@ async function filesOf(scene, source, cloud, views) {
     read: async () => turn(await read(at)),
   });
   const whole = { cloud, degrees: new Uint8Array(cloud.count).fill(cloud.shDegree) };
-  const makers = [async () => file('PLY, float32', source)];
+  const ply = source.endsWith('.ply') ? source : made('scene.ply');
+  const makers = [
+    async () => {
+      if (ply !== source) writeFileSync(ply, await encodingsFor(ply)[0].write(whole));
+      return file('PLY, float32', ply);
+    },
+  ];
   for (const encoding of encodingsFor('a.spz', cloud).toReversed()) {
     const bits = /(\d+) bits/.exec(encoding.title)[1];
     makers.push(async () => {
@@ -122,13 +141,22 @@ async function filesOf(scene, source, cloud, views) {
   return files.filter(Boolean);
 }
 
-async function judge(scene, { source, cameras, images, leftOut }, device) {
-  const path = (file) => resolve(values.data, file);
+/** Returns a camera as files of views have it. */
+function calibrationOf({ width, height, fx, fy, cx, cy, worldToCamera }) {
+  const rows = [0, 4, 8, 12].map((start) => [...worldToCamera].slice(start, start + 4));
+  return { width, height, K: [[fx, 0, cx], [0, fy, cy], [0, 0, 1]], worldToCamera: rows }; // prettier-ignore
+}
+
+async function judge(scene, { source, cameras, images, leftOut, areAllHeldOut }, device) {
+  const path = (file) => file && resolve(values.data, file);
   const photographs = readPhotographs(path(cameras), path(images), leftOut);
-  const { judging, others } = holdOut(photographs, Number(values.every));
+  const { judging, others } = holdOut(photographs, areAllHeldOut ? 1 : Number(values.every));
+  const making = areAllHeldOut
+    ? viewsBetween(judging.map(({ camera }) => camera)).map(calibrationOf)
+    : others.map(({ calibration }) => calibration);
   // Files are made without the views that judge them.
   const views = join(values.work, `${scene}.views.json`);
-  writeFileSync(views, JSON.stringify({ views: others.map(({ calibration }) => calibration) }));
+  writeFileSync(views, JSON.stringify({ views: making }));
   const cloud = await read(path(source));
   const folder = join(values.work, 'images', scene);
   const gate = new Gate(device, { photographs: judging, python: values.python, folder });
@@ -158,6 +186,7 @@ const device = await adapter.requestDevice(deviceDescriptor(adapter));
 await pickInitialVariants(device, { format: 'rgba8unorm' });
 const scenes = existsSync(values.out) ? JSON.parse(readFileSync(values.out, 'utf8')).scenes : [];
 for (const [name, scene] of Object.entries(SCENES)) {
+  if (values.only !== undefined && !values.only.split(',').includes(name)) continue;
   if (!existsSync(resolve(values.data, scene.source))) {
     console.log(`${name}: not in ${values.data}`);
     continue;
