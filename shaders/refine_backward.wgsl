@@ -50,9 +50,8 @@ struct Pixel {
   is_finished: bool,
 }
 
-fn load_splat(k: u32, slot: u32, tile_corner: vec2f) {
+fn load_splat(k: u32, slot: u32, s: ProjectedSplat, tile_corner: vec2f) {
   slots[k] = slot;
-  let s = splats[slot];
   shapes[k] = s.shape;
   paints[k] = s.paint;
 }

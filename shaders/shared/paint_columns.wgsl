@@ -41,19 +41,21 @@ fn blend(pixels: ptr<function, Pixels>, k: u32, place: vec2f, min_power: f32) {
   let power = (bitcast<f32>(paint.y) - u * u) - v * v;
   let alpha = select(Column(0.0), min(Column(ALPHA_MAX), exp2(power)), power >= Column(min_power));
   hide(pixels, k);
-  let before = (*pixels).light;
-  let full_weight = before * alpha;
-  let after = before - full_weight;
+  let before = (*pixels).transmittance;
+  let light = (*pixels).light;
+  let after = light - light * alpha;
   var is_blended = after > Column(view.transmittance_min);
-  if (!refuses_last) { is_blended = (after > Column(REFUSED)) & (before > Column(view.transmittance_min)); }
-  let weight = select(Column(0.0), full_weight, is_blended);
+  if (!refuses_last) { is_blended = (after > Column(REFUSED)) & (light > Column(view.transmittance_min)); }
+  let behind = select(before, after, is_blended);
+  // A difference, so that one selection serves weight and transmittance.
+  let weight = before - behind;
   let red_green = unpack2x16float(paint.z);
   (*pixels).red += weight * red_green.x;
   (*pixels).green += weight * red_green.y;
   (*pixels).blue += weight * bitcast<f32>(paint.w);
   (*pixels).light = after;
-  aux_blend(k, weight, (*pixels).transmittance, after, is_blended);
-  (*pixels).transmittance = select((*pixels).transmittance, after, is_blended);
+  (*pixels).transmittance = behind;
+  aux_blend(k, weight, before, after, is_blended);
 }
 
 fn paint_batch(pixels: ptr<function, Pixels>, own_block: u32, place: vec2f, min_power: f32) {

@@ -73,8 +73,7 @@ fn hit_blocks(k: u32, s: ProjectedSplat, tile_corner: vec2f) {
   }
 }
 
-fn load_splat(k: u32, slot: u32, tile_corner: vec2f) {
-  let s = splats[slot];
+fn load_splat(k: u32, slot: u32, s: ProjectedSplat, tile_corner: vec2f) {
   load_more(k, slot, s, tile_corner);
   hit_blocks(k, s, tile_corner);
   let center = s.shape.xy - tile_corner;

@@ -82,9 +82,9 @@ fn found_pair(nth: u32) -> u32 {
   return 32u * word + bit;
 }
 
-// Loads the next `limit` splats of the tile, or fewer at the end of the list, from as many windows as necessary. A
-// barrier must follow. Returns their number.
-fn load_batch(place: ptr<function, ListPlace>, limit: u32, tile_corner: vec2f, lane: u32) -> u32 {
+// Finds the next `limit` splats of the tile, or fewer at the end of the list, in as many windows as necessary. Each
+// thread receives the slot of one of them, in order. Returns their number.
+fn find_batch(place: ptr<function, ListPlace>, limit: u32, lane: u32, slot: ptr<function, u32>) -> u32 {
   var count = 0u;
   while (count < limit) {
     if ((*place).loaded == (*place).in_window) {
@@ -96,11 +96,19 @@ fn load_batch(place: ptr<function, ListPlace>, limit: u32, tile_corner: vec2f, l
       (*place).loaded = 0u;
     }
     let taken = min((*place).in_window - (*place).loaded, limit - count);
-    if (lane < taken) {
-      load_splat(count + lane, pairs[32u * (*place).first_word + found_pair((*place).loaded + lane)], tile_corner);
+    if (lane >= count && lane < count + taken) {
+      *slot = pairs[32u * (*place).first_word + found_pair((*place).loaded + lane - count)];
     }
     (*place).loaded += taken;
     count += taken;
   }
+  return count;
+}
+
+// Finds a batch and loads it. A barrier must follow.
+fn load_batch(place: ptr<function, ListPlace>, limit: u32, tile_corner: vec2f, lane: u32) -> u32 {
+  var slot = 0u;
+  let count = find_batch(place, limit, lane, &slot);
+  if (lane < count) { load_splat(lane, slot, splats[slot], tile_corner); }
   return count;
 }

@@ -39,14 +39,21 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
   var pixels = start_pixels(position);
   if (lane == 0u) { paints[NO_SPLAT].y = bitcast<u32>(NO_POWER); }
   var list = begin_list(bin, tile_in_bin, step);
+  // The splats of the next batch are fetched before this one is rasterized, so that memory and arithmetic overlap.
+  var slot = 0u;
+  var found_ahead = find_batch(&list, BATCH, lane, &slot);
+  var splat_ahead = splats[slot];
   loop {
     if (lane < BLOCKS * BATCH_WORDS) { atomicStore(&block_hits[lane], 0u); }
     if (lane == 0u) { atomicStore(&unfinished, 0u); }
     aux_clear(lane);
     workgroupBarrier();
-    let count = load_batch(&list, BATCH, vec2f(corner), lane);
+    let count = found_ahead;
     if (count == 0u) { break; }
+    if (lane < count) { load_splat(lane, slot, splat_ahead, vec2f(corner)); }
     workgroupBarrier();
+    found_ahead = find_batch(&list, BATCH, lane, &slot);
+    splat_ahead = splats[slot];
 
     paint_batch(&pixels, own_block, place, min_power);
     if (!are_finished(pixels)) { atomicStore(&unfinished, 1u); }
