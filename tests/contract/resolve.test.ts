@@ -1,4 +1,5 @@
 import assert from 'node:assert/strict';
+import { readFileSync } from 'node:fs';
 import { test } from 'node:test';
 import {
   carriesContract,
@@ -11,8 +12,9 @@ import {
   type AttributeSlice,
   type Contract,
 } from '@gaussian-splat/core/contract';
+import type { OnnxTensor } from '@gaussian-splat/core/onnx';
 import { fixtureHeader, fixtureSidecar } from '../support/generators.js';
-import { brief, faultsOf, headerWith, PACKED, SPLIT, SPLIT_OUTPUTS, tensor } from './support.js';
+import { faultsOf, headerWith, PACKED, SPLIT, SPLIT_OUTPUTS, tensor } from './support.js';
 
 const named = (name: string): string => JSON.stringify({ ...PACKED, name });
 const header = headerWith([tensor('time', [1])], [tensor('gaussians', [5, 13])], {
@@ -64,83 +66,43 @@ test('inference from canonical names says what was taken for granted', async () 
   assert.match(notes[1], /split .*opacityActivation linear/);
 });
 
-test('what is inferred from shapes', () => {
-  const infer = (inputs: Parameters<typeof headerWith>[0], outputs: Parameters<typeof headerWith>[1]): Contract =>
-    resolveContract({ header: headerWith(inputs, outputs) }).contract;
-  const packed = (columns: number): unknown => infer([], [tensor('gaussians', [5, columns])]).outputs;
-  assert.match(JSON.stringify(packed(13)), /"rgb"/);
-  assert.match(JSON.stringify(packed(22)), /"sh","shOrder":"coefficient-major"/);
-  const poses = [['J', 3], [24, 4], [72]].map(
-    (dims) => infer([tensor('pose', dims)], [tensor('gaussians', [5, 13])]).inputs.pose,
-  );
-  assert.deepEqual(poses, [
-    { role: 'pose', format: 'axis-angle' },
-    { role: 'pose', format: 'quaternion', quaternionOrder: 'wxyz' },
-    { role: 'pose', format: 'parameters' },
-  ]);
-  // A leading 1 changes nothing.
-  const batched = infer([tensor('pose', [1, 24, 4])], [tensor('gaussians', [1, 5, 13])]);
-  assert.deepEqual(batched.inputs.pose, { role: 'pose', format: 'quaternion', quaternionOrder: 'wxyz' });
-  assert.match(JSON.stringify(batched.outputs), /"rgb"/);
-  const orders = [
-    [1, 5, 48],
-    [1, 5, 16, 3],
-    [5, 3, 16],
-    [1, 5, 3, 4],
-    [5, 27],
-  ].map((dims) => {
-    const parts = [tensor('positions', [5, 3]), tensor('covariances', [5, 6]), tensor('opacities', [5])];
-    const { outputs } = infer([], [...parts, tensor('sh', dims)]);
-    return 'shOrder' in outputs ? outputs.shOrder : undefined;
-  });
-  const [coefficients, channels] = ['coefficient-major', 'channel-major'];
-  assert.deepEqual(orders, [coefficients, coefficients, channels, channels, coefficients]);
-  const profile = infer([], [tensor('gaussians', [1, 5, 10]), tensor('color_rgb', [1, 5, 4])]).outputs;
-  assert.deepEqual(profile, { layout: 'visionary', gaussians: 'gaussians', colors: 'color_rgb' });
-  const names = ['positions', 'scales', 'rotations', 'sh', 'opacities', 'count'];
-  const shapes = [[5, 3], [5, 3], [5, 4], [5, 3, 4], [5], [1]];
-  const split = infer(
-    [],
-    names.map((name, i) => tensor(name, shapes[i])),
-  ).outputs;
-  assert.match(JSON.stringify(split), /"rotationOrder":"wxyz".*"shOrder":"channel-major".*"count":"count"/);
-  assert.deepEqual(infer([tensor('image', [1, 3, 8, 8])], [tensor('image', [1, 3, 8, 8])]).outputs.layout, 'image');
-});
+/** Held by the Python exporter, too: packages/exporter/tests/test_written.py. */
+interface Inference {
+  readonly what: string;
+  readonly inputs: readonly (readonly [string, OnnxTensor['dims'] | null])[];
+  readonly outputs: Inference['inputs'];
+  readonly contract?: Contract;
+  /** Names of the unknown inputs, and `outputs` if they are unknown. */
+  readonly faults?: readonly string[];
+}
 
-test('what cannot be inferred is named, all of it', () => {
-  const unknown = headerWith([tensor('foo', [1]), tensor('time', [1]), tensor('bar', [2])], [tensor('out', [5])]);
-  assert.deepEqual(brief(faultsOf(() => resolveContract({ header: unknown }))), [
-    'inference bar',
-    'inference foo',
-    'inference outputs',
-  ]);
-  // The name of a method of objects is no canonical name.
-  const odd = headerWith([tensor('constructor', [1])], [tensor('gaussians', [5, 13])]);
-  assert.equal(faultsOf(() => resolveContract({ header: odd }))[0].tensor, 'constructor');
-});
+const inferences = JSON.parse(
+  readFileSync(new URL('../fixtures/inference.json', import.meta.url), 'utf8'),
+) as readonly Inference[];
+
+for (const { what, inputs, outputs, contract, faults } of inferences) {
+  test(`inferred from names and shapes: ${what}`, () => {
+    const [given, written] = [inputs, outputs].map((side) =>
+      side.map(([name, dims]) => tensor(name, dims ?? undefined)),
+    );
+    const infer = (): Contract => resolveContract({ header: headerWith(given, written) }).contract;
+    if (contract) assert.deepEqual(infer(), contract);
+    else {
+      const found = faultsOf(infer);
+      assert.deepEqual(found.map(({ tensor: name, where }) => name ?? where).sort(), faults?.toSorted());
+      assert.ok(found.every(({ code }) => code === 'contract/inference'));
+    }
+  });
+}
 
 test("Visionary's profile", async () => {
   const rgb = await fixtureHeader('visionary-rgb.onnx');
   const { contract, notes } = resolveContract({ header: rgb });
-  assert.deepEqual(contract, {
-    version: 1,
-    inputs: {
-      camera: { role: 'view', order: 'column-major', axes: 'LUF' },
-      proj: { role: 'projection', order: 'column-major', axes: 'LUF' },
-      time: { role: 'time', unit: 'normalized' },
-    },
-    outputs: { layout: 'visionary', gaussians: 'gaussian_f16', colors: 'color_rgb', count: 'num_points' },
-    duration: 2.5,
-  });
   assert.match(notes.join(), /Visionary/);
   assert.deepEqual(checkContract(rgb, contract), []);
   const sh = await fixtureHeader('visionary-sh.onnx');
   const layout = gaussianLayout(sh, resolveContract({ header: sh }).contract)!;
   assert.deepEqual([layout.shDegree, layout.dtype, layout.capacity, layout.count], [3, 'float16', 64, 'num_points']);
-  const swapped = headerWith([tensor('projection_matrix', [4, 4])], rgb.outputs);
-  assert.equal(resolveContract({ header: swapped }).contract.inputs.projection_matrix.role, 'projection');
-  const pose = headerWith([tensor('pose', [24, 3])], rgb.outputs);
-  assert.equal(faultsOf(() => resolveContract({ header: pose }))[0].tensor, 'pose');
 });
 
 const place = ({ attribute, tensor: name, offset, components, rowStride }: AttributeSlice): string =>

@@ -84,7 +84,14 @@ def test_what_leaves_the_gpu_is_said_without_a_contract_too(tmp_path: Path, caps
     (tmp_path / "a.onnx").write_bytes(rule.read_bytes())
     assert main(["check", str(tmp_path / "a.onnx")]) == 1
     written = capsys.readouterr()
-    assert "export opset 18" in written.out and "gaussian_contract" in written.err
+    assert "export opset 18" in written.out and "[contract/inference]" in written.err
+
+
+def test_a_contract_inferred_from_names_counts(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "a.onnx").write_bytes((FIXTURES / "generators/canonical.onnx").read_bytes())
+    assert main(["check", str(tmp_path / "a.onnx")]) == 0
+    printed = capsys.readouterr().out
+    assert "inferred from names" in printed and "all checks passed" in printed
 
 
 def test_what_pages_refuse_fails(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

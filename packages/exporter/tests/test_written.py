@@ -11,11 +11,13 @@ from typing import Any
 import numpy as np
 import onnx
 import pytest
+from onnx import TensorProto, helper
 
 from gaussian_exporter.arrays import AnyArray
 from gaussian_exporter.cli import main
 from gaussian_exporter.conformance import check_outputs, faults_of
 from gaussian_exporter.errors import ExportError
+from gaussian_exporter.infer import infer
 
 FIXTURES = Path(__file__).parents[3] / "tests/fixtures"
 CORPUS = json.loads((FIXTURES / "written.json").read_text())
@@ -38,6 +40,18 @@ def test_what_is_wrong_with_what_a_run_wrote(case: Any) -> None:
 def test_both_checkers_say_the_same(name: str, codes: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["check", str(FIXTURES / "verdicts" / name)]) == (1 if codes else 0)
     assert sorted(set(re.findall(r"\[(contract/[a-z-]+)\]", capsys.readouterr().err))) == codes
+
+
+@pytest.mark.parametrize("case", json.loads((FIXTURES / "inference.json").read_text()), ids=lambda case: case["what"])
+def test_both_checkers_infer_the_same(case: Any) -> None:
+    inputs, outputs = (
+        [helper.make_tensor_value_info(name, TensorProto.FLOAT, dims) for name, dims in case[side]]
+        for side in ("inputs", "outputs")
+    )
+    contract, faults = infer(helper.make_model(helper.make_graph([], "g", inputs, outputs)))
+    assert sorted(fault.tensor or fault.where for fault in faults) == sorted(case.get("faults", []))
+    assert faults or contract == case["contract"]
+    assert {fault.code for fault in faults} <= {"inference"}
 
 
 @pytest.mark.parametrize("name", ["packed", "split", "instances", "state", "frames"])

@@ -24,7 +24,7 @@ from .checkpoints.moving import read_deformable, read_gaussian4d, read_spacetime
 from .checkpoints.networks import read_feed_forward, read_image_filter
 from .checkpoints.scaffold_folder import read_scaffold
 from .conformance import check_outputs
-from .contract import METADATA_KEY, Coordinates, DType, Facts, Filter, Json, Layout, Up, of_metadata
+from .contract import METADATA_KEY, Coordinates, DType, Facts, Filter, Json, Layout, Up, metadata, of_metadata
 from .cost import cost_of, report
 from .errors import ExportError
 from .families.avatar import PoseFormat, export_avatar
@@ -40,6 +40,7 @@ from .families.spacetime import export_spacetime
 from .frames import write_frames
 from .graph import Weights
 from .header import contract_faults, header_faults
+from .infer import infer
 from .outputs import Options, refuse_instances, refuse_place, save
 from .placement import finding_lines, gpu_findings
 from .written import Fault
@@ -145,7 +146,8 @@ def export(given: argparse.Namespace) -> None:
 
 def cost(given: argparse.Namespace) -> None:
     """Prints the estimated cost of a run, without running the file."""
-    model = with_contract(loaded(given.file), given.file)
+    model = loaded(given.file)
+    add_contract(model, given.file)
     for line in report(cost_of(model, given.instances), given.rows):
         print(line)
 
@@ -154,7 +156,8 @@ def frames(given: argparse.Namespace) -> None:
     """Writes moments of a generator as PLY files, and prints the command that makes a clip from them."""
     if not given.fps > 0:
         raise ExportError("argument/value", where="--fps", expected="more than 0", found=str(given.fps), remedy="30")
-    model = with_contract(loaded(given.file), given.file)
+    model = loaded(given.file)
+    raise_faults(add_contract(model, given.file) or [])
     count = write_frames(model, given.file, given.folder, given.fps, given.duration)
     manifest, clip = given.folder / "frames.json", f"{given.file.stem}.gsv"
     print(f"{manifest}: {count} frames")
@@ -165,14 +168,19 @@ def frames(given: argparse.Namespace) -> None:
 def check(given: argparse.Namespace) -> None:
     """Checks a file against its contract, and reports the nodes that would leave the GPU."""
     path = given.file
-    model = with_contract(loaded(path), path)
+    model = loaded(path)
+    inferred = add_contract(model, path)
+    # Faults and nodes that leave the GPU can be found without a contract.
+    if inferred:
+        report_findings(model)
+        raise_faults([*inferred, *header_faults(model, None, path.parent)])
     try:
         contract = of_metadata({prop.key: prop.value for prop in model.metadata_props}, str(path))
     except ExportError:
-        # Nodes that leave the GPU can be found without a contract.
         report_findings(model)
+        print_faults(header_faults(model, None, path.parent))
         raise
-    wrong = list(contract_faults(contract))
+    wrong = list(contract_faults(contract)) if inferred is None else []
     raise_faults([*wrong, *header_faults(model, None if wrong else contract, path.parent)])
     print(f"{path}: contract version {contract['version']}, {contract.get('name', 'without a name')}")
     if find_spec("onnxruntime") is None:
@@ -183,12 +191,21 @@ def check(given: argparse.Namespace) -> None:
     report_findings(model)
 
 
-def with_contract(model: onnx.ModelProto, path: Path) -> onnx.ModelProto:
-    """The model with the contract beside its file, unless it has one of its own."""
+def add_contract(model: onnx.ModelProto, path: Path) -> list[Fault] | None:
+    """Gives the model the contract beside its file, or else one inferred from names. Returns None if the file or its
+    neighbor has one, else the faults of the inference.
+    """
+    if METADATA_KEY in {prop.key for prop in model.metadata_props}:
+        return None
     beside = path.with_suffix(".contract.json")
-    if METADATA_KEY not in {prop.key for prop in model.metadata_props} and beside.exists():
+    if beside.exists():
         model.metadata_props.add(key=METADATA_KEY, value=beside.read_text(encoding="utf-8", errors="replace"))
-    return model
+        return None
+    contract, faults = infer(model)
+    if not faults:
+        print(f"note: {path} has no contract; it was inferred from names. Write one to be sure")
+        model.metadata_props.add(key=METADATA_KEY, value=metadata(contract)[METADATA_KEY])
+    return faults
 
 
 def loaded(path: Path) -> onnx.ModelProto:
@@ -219,10 +236,15 @@ _FOREIGN: dict[bytes, tuple[str, str]] = {
 
 def raise_faults(faults: Sequence[Fault]) -> None:
     """Prints all findings except the first, and raises the first."""
-    for fault in faults[1:]:
-        print(f"gaussian-export: {fault.error()}", file=sys.stderr)
+    print_faults(faults[1:])
     if faults:
         raise faults[0].error()
+
+
+def print_faults(faults: Sequence[Fault]) -> None:
+    """Prints findings as errors."""
+    for fault in faults:
+        print(f"gaussian-export: {fault.error()}", file=sys.stderr)
 
 
 def report_findings(model: onnx.ModelProto) -> None:

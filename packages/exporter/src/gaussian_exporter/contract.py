@@ -209,12 +209,11 @@ def metadata(contract: Json) -> dict[str, str]:
 
 
 def of_metadata(props: dict[str, str], where: str) -> Json:
-    """The contract of a file's metadata_props. Raises contract/violation without one."""
+    """The contract of a file's metadata_props. Raises contract/inference without one."""
     try:
         found = json.loads(props[METADATA_KEY].removeprefix("\ufeff"))
     except (KeyError, ValueError, RecursionError) as error:
         raise ExportError(
-            # Pages infer a contract from canonical names; the exporter does not.
             "contract/inference" if isinstance(error, KeyError) else "contract/json",
             where=where,
             expected=f"metadata '{METADATA_KEY}' with JSON in it",
