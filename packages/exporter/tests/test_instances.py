@@ -130,7 +130,7 @@ def test_the_file_declares_the_axis_and_stays_on_the_gpu(name: str, options: Opt
 
 
 def test_files_without_the_axis_are_as_they_were_and_say_so() -> None:
-    with pytest.raises(ExportError, match=r"avatar or hexplane.*found classic.*\[argument/value\]"):
+    with pytest.raises(ExportError, match=r"avatar, hexplane or spacetime.*found classic.*\[argument/value\]"):
         export_classic(test_classic.cloud(), FACTS, MANY)
     model = body(ONE)
     assert all(dim.dim_param == "" for value in model.graph.input for dim in value.type.tensor_type.shape.dim)

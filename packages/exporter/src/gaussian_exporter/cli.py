@@ -23,7 +23,7 @@ from .checkpoints.hexplane_folder import read_hexplane
 from .checkpoints.moving import read_deformable, read_gaussian4d, read_spacetime
 from .checkpoints.networks import read_feed_forward, read_image_filter
 from .checkpoints.scaffold_folder import read_scaffold
-from .conformance import check_outputs
+from .conformance import check_outputs, difference
 from .contract import METADATA_KEY, Coordinates, DType, Facts, Filter, Json, Layout, Up, metadata, of_metadata
 from .cost import cost_of, report
 from .errors import ExportError
@@ -42,6 +42,7 @@ from .graph import Weights
 from .header import contract_faults, header_faults
 from .infer import infer
 from .outputs import Options, refuse_instances, refuse_place, save
+from .parts import LIMIT, in_parts, large_tensors
 from .placement import finding_lines, gpu_findings
 from .written import Fault
 
@@ -53,7 +54,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Runs the command. Returns 0 on success, 1 after an error message, 2 for wrong options."""
     given = parser().parse_args(arguments)
     try:
-        {"check": check, "cost": cost, "frames": frames}.get(given.family, export)(given)
+        {"check": check, "cost": cost, "frames": frames, "parts": parts}.get(given.family, export)(given)
     except (ExportError, OSError) as error:
         # The message of the system names the file.
         print(f"gaussian-export: {error}", file=sys.stderr)
@@ -73,6 +74,16 @@ def parser() -> Command:
         describe(family)
     checker = families.add_parser("check", help="run a file on the CPU, and say what would leave the GPU")
     checker.add_argument("file", type=Path)
+    divider = families.add_parser("parts", help="write an .onnx file again, without tensors above a limit of bytes")
+    divider.add_argument("file", type=Path)
+    divider.add_argument("out", type=Path)
+    for command in (checker, divider):
+        command.add_argument(
+            "--limit",
+            type=positive,
+            default=LIMIT,
+            help="bytes of one buffer on the devices of visitors; default 134217728, which WebGPU guarantees",
+        )
     counter = families.add_parser("cost", help="where a run's time goes: dispatches, bytes, an estimate, for any file")
     counter.add_argument("file", type=Path)
     counter.add_argument("--instances", type=positive, default=1, help="instances in one run, if the file has an axis")
@@ -189,6 +200,24 @@ def check(given: argparse.Namespace) -> None:
         for name, values in check_outputs(model, path=path).items():
             print(f"ran on the CPU: {name} {list(values.shape)} {values.dtype}, all checks passed")
     report_findings(model)
+    if large := large_tensors(model, given.limit):
+        sizes = ", ".join(f"{name} of {size:,} bytes" for name, size in list(large.items())[:3])
+        print(f"{len(large)} above {given.limit:,} bytes, for which some devices have no buffer: {sizes}")
+        print("computed in parts: gaussian-export parts FILE OUT")
+
+
+def parts(given: argparse.Namespace) -> None:
+    """Writes the file without tensors above the limit, and compares its results with those of the original."""
+    refuse_place(given.out, given.file)
+    whole = onnx.load(existing(given.file, "an .onnx file"))
+    raise_faults(add_contract(whole, given.file) or [])
+    divided = in_parts(whole, given.limit)
+    if find_spec("onnxruntime") is None:
+        print("not compared: install onnxruntime (pip install 'gaussian-splat-exporter[check]')")
+    else:
+        print(f"largest difference on the CPU: {difference(whole, divided):.1e} of the largest number of a tensor")
+    size = save(divided, given.out)
+    print(f"{given.out}: {size:,} bytes, {len(divided.graph.node)} nodes instead of {len(whole.graph.node)}")
 
 
 def add_contract(model: onnx.ModelProto, path: Path) -> list[Fault] | None:

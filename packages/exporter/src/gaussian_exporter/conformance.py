@@ -148,6 +148,28 @@ def check_outputs(
     return first
 
 
+def difference(model: onnx.ModelProto, other: onnx.ModelProto) -> float:
+    """Runs two models of the same contract at its defaults. Returns the largest difference between their outputs,
+    relative to the largest number of each tensor. Raises contract/run if it is above 1e-5; needs onnxruntime.
+    """
+    import onnxruntime as ort
+
+    contract = of_metadata({prop.key: prop.value for prop in model.metadata_props}, model.graph.name)
+    feeds = default_feeds(model, contract)
+    results = []
+    for each in (model, other):
+        with running("running"):
+            session = ort.InferenceSession(each.SerializeToString(), providers=["CPUExecutionProvider"])
+            results.append([np.asarray(value, np.float64) for value in session.run(None, feeds)])
+    scales = [max(1e-30, float(np.abs(value).max(initial=0))) for value in results[0]]
+    worst = max(float(np.abs(a - b).max(initial=0)) / scale for a, b, scale in zip(*results, scales, strict=True))
+    if not worst <= _MAX_DIFFERENCE:
+        remedy = "report this with the file"
+        raise _violation("run", "the model in parts", f"{_MAX_DIFFERENCE} of the numbers", f"{worst:.1e}", remedy)
+    return float(worst)
+
+
+_MAX_DIFFERENCE = 1e-5
 # Bytes of a tensor that the 32-bit memory of a page cannot hold.
 _MAX_BYTES = 1 << 32
 
@@ -164,7 +186,7 @@ def _refuse_beyond_pages(model: onnx.ModelProto) -> None:
         found = size * helper.tensor_dtype_to_np_dtype(tensor.elem_type).itemsize if tensor.elem_type else 0
         if found >= _MAX_BYTES:
             raise _violation(
-                "run", value.name, "less than 4 GiB in a tensor", f"{found:,} bytes", "compute it in parts"
+                "run", value.name, "less than 4 GiB in a tensor", f"{found:,} bytes", "gaussian-export parts FILE OUT"
             )
 
 

@@ -14,6 +14,7 @@ ErrorCode = Literal[
     "argument/value",  # an option outside its range
     "argument/package",  # a call that needs a package that is not installed
     "graph/invalid",  # a graph that ONNX refuses
+    "graph/parts",  # a tensor above a limit of bytes, whose operators cannot be split
 ]
 
 
