@@ -30,7 +30,6 @@ from gaussian_exporter.families.gaussian4d import Gaussian4D, export_gaussian4d
 from gaussian_exporter.families.spacetime import Spacetime, export_spacetime
 from gaussian_exporter.outputs import Options
 from gaussian_exporter.pieces.mlp import Linear
-from gaussian_exporter.placement import gpu_findings
 
 from .running import FACTS, UPPER, covariance, error, parts, run, write_ply
 from .test_classic import cloud
@@ -234,16 +233,6 @@ def test_a_frame_ratio_shortens_the_time_as_the_trainer_does(tmp_path: Path) -> 
     (tmp_path / "cfg_args").write_text("Namespace(wavelets=True, bells=False)")
     with pytest.raises(ExportError, match=r"settings wavelets:"):
         read_gaussian4d(tmp_path, duration=(0, 10))
-
-
-def test_all_of_them_stay_on_the_gpu_and_are_recorded() -> None:
-    four = gaussian4d_of(Path("x"), captured(), {"time_duration": [0.0, 10.0]})
-    models = [
-        export_spacetime(spacetime(), FACTS),
-        export_deformable(cloud(COUNT, 3), deform(), FACTS),
-        export_gaussian4d(four, FACTS),
-    ]
-    assert [str(finding) for model in models for finding in gpu_findings(model)] == []
 
 
 def write_spacetime(folder: Path) -> Path:

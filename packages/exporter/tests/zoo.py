@@ -3,20 +3,25 @@
 from __future__ import annotations
 
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import onnx
 
 from gaussian_exporter.arrays import AnyArray
+from gaussian_exporter.checkpoints.moving import gaussian4d_of
 from gaussian_exporter.families.avatar import export_avatar
 from gaussian_exporter.families.classic import export_classic
+from gaussian_exporter.families.deformable import export_deformable
 from gaussian_exporter.families.feed_forward import export_feed_forward
+from gaussian_exporter.families.gaussian4d import export_gaussian4d
 from gaussian_exporter.families.hexplane import export_hexplane
 from gaussian_exporter.families.image_filter import export_image_filter
 from gaussian_exporter.families.scaffold import export_scaffold
+from gaussian_exporter.families.spacetime import export_spacetime
 from gaussian_exporter.outputs import Options
 
-from . import test_avatar, test_classic, test_hexplane, test_networks, test_scaffold
+from . import test_avatar, test_classic, test_hexplane, test_moving, test_networks, test_scaffold
 from .running import FACTS
 
 Case = tuple[onnx.ModelProto, dict[str, AnyArray]]
@@ -51,6 +56,13 @@ def every_family() -> dict[str, Case]:
     ):
         both = {key: np.stack([value, 0.8 * value]).astype(np.float32) for key, value in feeds.items()}
         cases[f"{name}-instances"] = (one, both)
+    four = gaussian4d_of(Path("x"), test_moving.captured(), {"time_duration": [0.0, 10.0]})
+    for name, moved in (
+        ("spacetime", export_spacetime(test_moving.spacetime(), FACTS)),
+        ("deformable", export_deformable(test_classic.cloud(test_moving.COUNT, 3), test_moving.deform(), FACTS)),
+        ("4dgs", export_gaussian4d(four, FACTS)),
+    ):
+        cases[name] = (moved, {"time": np.array([0.3], np.float32)})
     picture = test_networks.given()["image"]
     for kind, norm in (("style", True), ("noise", False)):
         model = test_networks.image_filter("picture" if kind == "style" else "noise", norm)

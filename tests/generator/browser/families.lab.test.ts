@@ -23,6 +23,7 @@ const DECIBELS = 55;
 const GENERATORS = [
   ...['classic-view', 'octree-round', 'hexplane', 'avatar', 'feed-forward-1'],
   ...(isLab ? ['classic', 'scaffold', 'octree-progressive', 'octree-ceil', 'feed-forward-2'] : []),
+  ...(isLab ? ['spacetime', 'deformable', '4dgs'] : []),
 ];
 
 /** The same, writing float16. */

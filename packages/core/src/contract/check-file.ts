@@ -5,6 +5,9 @@ import type { ContractFault } from './contract-error.js';
 /** Versions that ONNX Runtime 1.30 supports. */
 export const RUNTIME_LIMITS = { irVersion: 13, oldestOpset: 7, newestOpset: 26 } as const;
 
+/** Maximum number of files with weights. Exporters write one, or on request one for each large tensor. */
+const MAX_EXTERNAL_FILES = 256;
+
 /** Domains besides ONNX's own for whose operators onnxruntime-web has kernels. */
 const RUNTIME_DOMAINS = ['com.microsoft', 'ai.onnx.ml'];
 
@@ -23,7 +26,7 @@ export function checkFile(header: OnnxHeader, { files }: CheckFileOptions): Cont
     ...checkOperators(header),
     ...checkAttributes(header),
     ...uncastableTypes(header).map(uncastable),
-    ...header.externalFiles.flatMap((file) => checkExternalFile(file, files)),
+    ...checkExternalFiles(header.externalFiles, files),
   ];
 }
 
@@ -96,6 +99,19 @@ const uncastable = (dtype: OnnxDtype): ContractFault => ({
   found: `a cast from or to ${dtype}`,
   remedy: 'store such numbers as uint8 (two of them for 16 bits), float16, int32 or float32',
 });
+
+function checkExternalFiles(external: readonly ExternalFile[], files: CheckFileOptions['files']): ContractFault[] {
+  if (external.length <= MAX_EXTERNAL_FILES) return external.flatMap((file) => checkExternalFile(file, files));
+  return [
+    {
+      code: 'contract/external-data',
+      where: 'external data',
+      expected: `at most ${MAX_EXTERNAL_FILES} files of weights beside a model`,
+      found: String(external.length),
+      remedy: 'write the weights into one file: onnx.save_model(model, path, save_as_external_data=True)',
+    },
+  ];
+}
 
 function checkExternalFile({ location, byteLength }: ExternalFile, files: CheckFileOptions['files']): ContractFault[] {
   const fault = (expected: string, found: string, remedy: string): ContractFault[] => [

@@ -24,6 +24,7 @@ from .written import FIELDS, Fault, FaultCode, bare, degree_of, rules_of
 
 _SCHEMA: dict[str, Any] = json.loads(files(__package__).joinpath("contract_schema.json").read_text(encoding="utf-8"))
 _OLDEST_OPSET = 7
+_MAX_EXTERNAL_FILES = 256
 _DOMAINS = ("", "ai.onnx", "com.microsoft", "ai.onnx.ml")
 _FLOATS, _INTEGERS = ("float32", "float16"), ("int32", "int64")
 # Roles of inputs that cannot have an axis of instances.
@@ -192,6 +193,11 @@ def _external(model: onnx.ModelProto, folder: Path) -> Iterator[Fault]:
             end = int(entry.get("offset", 0) or 0) + int(entry.get("length", 0) or 0)
             location = entry.get("location", "")
             needed[location] = max(needed.get(location, 0), end)
+    if len(needed) > _MAX_EXTERNAL_FILES:
+        expected = f"at most {_MAX_EXTERNAL_FILES} files of weights beside a model"
+        remedy = "write the weights into one file: onnx.save_model(model, path, save_as_external_data=True)"
+        yield _fault("external-data", "", "external data", expected, str(len(needed)), remedy)
+        return
     for location, size in needed.items():
         where = f"external data {location!r}"
         parts = re.split(r"[/\\]", location)

@@ -130,19 +130,8 @@ async function contractOf(source: ModelSource, header: OnnxHeader, request: Fetc
   }
 }
 
-/** Maximum number of files with weights. Exporters write one, or on request one for each large tensor. */
-const MAX_FILES = 256;
 /** Maximum number of concurrent downloads, so that other requests of the page can proceed. */
 const FILES_AT_ONCE = 4;
-
-function tooManyFiles({ name, externalFiles }: OnnxHeader): GaussianSplatError {
-  return new GaussianSplatError('decode/unsupported', {
-    where: name,
-    expected: `at most ${MAX_FILES} files of weights beside a model`,
-    found: String(externalFiles.length),
-    remedy: 'write the weights into one file: onnx.save_model(model, path, save_as_external_data=True)',
-  });
-}
 
 async function fetchExternal(
   source: ModelSource,
@@ -151,7 +140,6 @@ async function fetchExternal(
   request: FetchOptions,
   reports: readonly ProgressListener[],
 ): Promise<GeneratorModel['externalData']> {
-  if (header.externalFiles.length > MAX_FILES) throw tooManyFiles(header);
   const files: { path: string; data: Uint8Array<ArrayBuffer> | undefined }[] = [];
   let next = 0;
   const fetchSome = async (): Promise<void> => {
