@@ -127,6 +127,13 @@ def test_what_cannot_be_split_is_named() -> None:
         odd.graph.initializer.append(numpy_helper.from_array(array, name))
     with pytest.raises(ExportError, match="CumSum with"):
         in_parts(odd, 4000)
+    branch = helper.make_graph([node("Identity", "1", to="b")], "b", [], [])
+    branch.output.append(helper.make_tensor_value_info("b", TensorProto.FLOAT, [4, 400]))
+    looked = chain([4, 4], [4, 4], node("MatMul", "x", "a", to="1"), node("MatMul", "1", "c"), a=[4, 400], c=[400, 4])
+    looked.graph.initializer.append(numpy_helper.from_array(np.array(True), "yes"))
+    looked.graph.node.insert(1, node("If", "yes", to="2", then_branch=branch, else_branch=branch))
+    with pytest.raises(ExportError, match=r"\[graph/parts\]"):
+        in_parts(looked, 4000)
 
 
 def test_the_command_proves_what_it_writes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -131,7 +131,12 @@ class _Splitter:
         graph.node.extend(self.nodes)
         used = {name for node in self.nodes for name in node.input} | {value.name for value in graph.output}
         graph.initializer.extend(each for name, each in self.stored.items() if name in used)
-        onnx.checker.check_model(self.model)
+        try:
+            onnx.checker.check_model(self.model)
+        except onnx.checker.ValidationError as error:
+            # A subgraph may read a tensor that is in parts now.
+            expected = "large tensors that no If, Loop or Scan reads"
+            raise _cannot(f"graph {graph.name}", expected, str(error).splitlines()[0]) from error
         for name, size in large_tensors(self.model, self.limit).items():
             raise _cannot(f"tensor {name}", f"at most {self.limit:,} bytes", f"{size:,} bytes")
         return self.model
