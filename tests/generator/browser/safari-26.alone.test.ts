@@ -1,24 +1,28 @@
 /**
  * The profile "Safari 26": a device without `adapterInfo`, without features and with the default limits of WebGPU, and no
- * JSPI. Every family runs there many times, and neither the memory of the runtime nor that of the GPU grows.
+ * JSPI. Every family runs there many times, and neither the memory of the runtime, of scripts nor of the GPU grows.
  */
-import { Generator, type GeneratorModel, type GeneratorState } from '@gaussian-splat/generator';
+import { Generator, PostProcessor, type GeneratorModel, type GeneratorState } from '@gaussian-splat/generator';
 import { ImageTensor } from '@gaussian-splat/renderer';
+import { executeServerCommand } from '@web/test-runner-commands';
 import { assert, assertEqual } from '../../element/browser/support/harness.js';
+import { holdings } from '../../element/browser/support/ledger.js';
 import { isLab } from '../../support/extent-in-pages.js';
 import { CAMERA } from './support.js';
 
 const FAMILIES = [
   ...['scaffold', 'octree-round', 'hexplane'],
   ...(isLab ? ['classic-view', 'avatar', 'feed-forward-1', 'octree-progressive', 'octree-ceil', 'feed-forward-2'] : []),
+  ...(isLab ? ['spacetime', 'deformable', '4dgs', 'avatar-instances', 'hexplane-instances', 'style', 'noise'] : []),
 ];
+const POST_PROCESSORS = ['style', 'noise'];
 /** Runs after which memory is compared; the first ones fill the caches of the runtime. */
-const [FIRST_RUNS, RUNS] = [50, isLab ? 10_000 : 100];
+const [FIRST_RUNS, RUNS] = isLab ? [500, 10_000] : [50, 100];
+/** Bytes of scripts that may remain of each run: less than a small array. The heap of a hundred runs is too noisy. */
+const HEAP_PER_RUN = isLab ? 64 : Infinity;
 
 /** Memories of the WebAssembly modules of this page. */
 const memories: WebAssembly.Memory[] = [];
-/** Bytes of the GPU buffers that exist, by the browser's own calls. */
-const ledger = { buffers: 0, bytes: 0 };
 
 function removeWhatSafariLacks(): void {
   const own = WebAssembly as unknown as Record<string, unknown>;
@@ -36,22 +40,6 @@ function watchMemory(): void {
     memories.push(...imported.filter((each) => each instanceof WebAssembly.Memory));
     return made;
   }) as unknown as typeof instantiate;
-  const { createBuffer } = GPUDevice.prototype;
-  const { destroy } = GPUBuffer.prototype;
-  const gone = new WeakSet<GPUBuffer>();
-  GPUDevice.prototype.createBuffer = function counted(this: GPUDevice, descriptor) {
-    ledger.buffers++;
-    ledger.bytes += descriptor.size;
-    return createBuffer.call(this, descriptor);
-  };
-  GPUBuffer.prototype.destroy = function counted(this: GPUBuffer) {
-    if (!gone.has(this)) {
-      ledger.buffers--;
-      ledger.bytes -= this.size;
-    }
-    gone.add(this);
-    return destroy.call(this);
-  };
 }
 
 let device: GPUDevice;
@@ -89,39 +77,65 @@ function imagesOf({ header, contract }: GeneratorModel): Record<string, ImageTen
   );
 }
 
+/** A generator or a post-processor that runs once for each state. */
+interface Repeated {
+  readonly model: GeneratorModel;
+  run(state: GeneratorState): Promise<void>;
+  close(): Promise<void>;
+}
+
+async function open(name: string, onRun: () => void, onProblem: (problem: unknown) => void): Promise<Repeated> {
+  const source = { url: `/tests/fixtures/families/${name}.onnx` };
+  const options = { gpuCheck: false, onFallback: onProblem, onError: onProblem };
+  if (!POST_PROCESSORS.includes(name)) {
+    const generator = await Generator.open(source, device, options);
+    generator.sink = { ingest: onRun };
+    const run = (state: GeneratorState): Promise<void> => (generator.request(state), generator.idle);
+    return { model: generator.model, run, close: () => (generator.close(), generator.idle) };
+  }
+  const post = await PostProcessor.open(source, device, { ...options, onImage: onRun });
+  const run = (state: GeneratorState): Promise<void> => (
+    post.request(state.images![post.input.name], state),
+    post.idle
+  );
+  return { model: post.models[0], run, close: () => (post.close(), post.idle) };
+}
+
 describe('the profile "Safari 26"', () => {
   for (const name of FAMILIES) {
     it(`${name}: ${RUNS} runs on the GPU, and no memory grows`, async () => {
       const problems: unknown[] = [];
-      const generator = await Generator.open({ url: `/tests/fixtures/families/${name}.onnx` }, device, {
-        gpuCheck: false,
-        onFallback: (reason) => problems.push(reason),
-        onError: (error) => problems.push(error),
-      });
       let runs = 0;
-      generator.sink = { ingest: () => void runs++ };
-      const images = imagesOf(generator.model);
-      const run = async (step: number): Promise<void> => {
+      const count = (): void => void runs++;
+      const repeated = await open(name, count, (problem) => problems.push(problem));
+      const images = imagesOf(repeated.model);
+      const runAt = async (step: number): Promise<void> => {
         for (const image of Object.values(images)) {
           const pixels = new ImageData(image.dims.at(-1)!, image.dims.at(-2)!);
           pixels.data.fill(step % 256);
-          image.upload(await createImageBitmap(pixels));
+          const bitmap = await createImageBitmap(pixels);
+          image.upload(bitmap);
+          bitmap.close();
         }
-        generator.request(stateAt(generator.model, step, images));
-        await generator.idle;
+        await repeated.run(stateAt(repeated.model, step, images));
       };
-      for (let step = 0; step < FIRST_RUNS; step++) await run(step);
-      await device.queue.onSubmittedWorkDone();
+      const heap = async (): Promise<number> => {
+        await device.queue.onSubmittedWorkDone();
+        return executeServerCommand<number, undefined>('heap-size');
+      };
+      for (let step = 0; step < FIRST_RUNS; step++) await runAt(step);
+      const heapBefore = await heap();
       assert(memories.length > 0, 'the memory of the runtime');
-      const sizes = (): number[] => [...memories.map(({ buffer }) => buffer.byteLength), ledger.buffers, ledger.bytes];
+      const sizes = (): unknown[] => [memories.map(({ buffer }) => buffer.byteLength), holdings()];
       const before = sizes();
-      for (let step = 0; step < RUNS; step++) await run(step + FIRST_RUNS);
-      await device.queue.onSubmittedWorkDone();
+      for (let step = 0; step < RUNS; step++) await runAt(step + FIRST_RUNS);
+      const perRun = ((await heap()) - heapBefore) / RUNS;
       assertEqual(problems.map(String), [], 'fallbacks and errors');
       assertEqual(runs, FIRST_RUNS + RUNS, 'runs');
-      assertEqual(sizes(), before, 'bytes of the runtime, GPU buffers and their bytes');
-      generator.close();
-      await generator.idle;
+      assertEqual(sizes(), before, 'bytes of the runtime, GPU buffers and textures, and their bytes');
+      console.log(`${name}: ${perRun.toFixed(1)} bytes of scripts a run, ${JSON.stringify(before)}`);
+      assert(perRun <= HEAP_PER_RUN, `${perRun.toFixed(1)} bytes of scripts remain of a run`);
+      await repeated.close();
     });
   }
 });

@@ -1,11 +1,21 @@
-/** The papers' names over the typed core, and the build that a page loads from a CDN. */
-import { GaussianModels, Generator } from '@gaussian-splat/generator';
+/** The papers' functions and their registry; in the laboratory also the build that a page loads from a CDN. */
+import {
+  addGaussianModelToScene,
+  GaussianModels,
+  Generator,
+  loadAllGenerators,
+  onFrame,
+  onGenerated,
+  registerGaussianGenerator,
+  runGenerators,
+} from '@gaussian-splat/generator';
 import { DynamicGaussians, World } from '@gaussian-splat/renderer';
 import { assert, assertEqual, delay, nextEvent, until } from '../../element/browser/support/harness.js';
+import { itInLab } from '../../support/extent-in-pages.js';
 import { FIXTURES, makeDevice } from './support.js';
 
 describe('models of a page', () => {
-  it('register, load, add, run, and are notified of frames', async () => {
+  itInLab('register, load, add, run, and are notified of frames', async () => {
     const device = await makeDevice();
     const models = new GaussianModels();
     models.registerGaussianGenerator('ball', { url: `${FIXTURES}packed.onnx` });
@@ -45,31 +55,31 @@ describe('models of a page', () => {
   });
 });
 
-describe('models of the papers', () => {
-  it('stand in a world, and take what a callback gives before each run', async () => {
+describe('the five functions of the papers', () => {
+  it('put models into a world, and take what a callback gives before each run', async () => {
     const device = await makeDevice();
-    const models = new GaussianModels();
     const world = new World();
-    models.registerGaussianGenerator('ball', { url: `${FIXTURES}packed.onnx` });
-    await models.loadAllGenerators(device);
+    registerGaussianGenerator('ball', { url: `${FIXTURES}packed.onnx` });
+    await loadAllGenerators(device);
     const sceneToWorld = [1, 0, 0, 2, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1];
-    const a = await models.addGaussianModelToScene('ball', world, { sceneToWorld });
-    const b = await models.addGaussianModelToScene('ball', world);
+    const a = await addGaussianModelToScene('ball', world, { sceneToWorld });
+    const b = await addGaussianModelToScene('ball', world);
     assertEqual([world.placements.length, a.placement.sceneToWorld?.[3], a.name], [2, 2, 'ball']);
     assert(world.placements[0].scene === a.gaussians, 'what is drawn is what it writes');
     const shown: (number | undefined)[][] = [];
-    models.onGenerated((model, { state }) => shown.push([model === a ? 0 : 1, state.timeSeconds, state.seed]));
+    const deaf = onGenerated((model, { state }) => shown.push([model === a ? 0 : 1, state.timeSeconds, state.seed]));
     let time = 3;
-    const stop = models.onFrame((state, model) =>
-      model === a ? { timeSeconds: time++, seed: state.seed } : undefined,
-    );
-    models.runGenerators({ timeSeconds: 1, seed: 5 });
-    await Promise.all([a.generator.idle, b.generator.idle]);
-    models.runGenerators();
-    await Promise.all([a.generator.idle, b.generator.idle]);
+    const stop = onFrame((state, model) => (model === a ? { timeSeconds: time++, seed: state.seed } : undefined));
+    const run = async (...given: Parameters<typeof runGenerators>): Promise<void> => {
+      runGenerators(...given);
+      await Promise.all([a.generator.idle, b.generator.idle]);
+    };
+    await run({ timeSeconds: 1, seed: 5 });
+    const { drawn, bounds } = await a.gaussians.readSample();
+    assert(drawn > 0 && bounds.max[0] > bounds.min[0], `${drawn} Gaussians to draw`);
+    await run();
     stop();
-    models.runGenerators({ timeSeconds: 7 });
-    await Promise.all([a.generator.idle, b.generator.idle]);
+    await run({ timeSeconds: 7 });
     assertEqual(
       shown.filter(([model]) => model === 0).map(([, at]) => at),
       [3, 4, 7],
@@ -77,18 +87,17 @@ describe('models of the papers', () => {
     assertEqual(shown.find(([model]) => model === 1)?.slice(1), [1, 5], 'the other has the state of the page');
     a.state = { controls: { twitst: 1 } };
     assertEqual(
-      codeOf(() => models.runGenerators()),
+      codeOf(() => runGenerators()),
       'argument/value',
     );
     a.remove();
     assertEqual(world.placements.length, 1, 'removed from the world, too');
     for (const scene of [{}, { isObject3D: true, add: () => undefined }, undefined]) {
-      const error: unknown = await models
-        .addGaussianModelToScene('ball', scene as unknown as World)
-        .catch((e: unknown) => e);
+      const error: unknown = await addGaussianModelToScene('ball', scene as unknown as World).catch((e: unknown) => e);
       assertEqual((error as { code: string }).code, 'argument/value', `a scene of ${typeof scene}`);
     }
-    models.clear();
+    deaf();
+    b.remove();
     device.destroy();
   });
 });
@@ -103,7 +112,7 @@ function codeOf(work: () => void): string {
 }
 
 describe('generators of a page that are not wanted any more', () => {
-  it('are closed: of a sink that cannot be made, of two loads at once, and cleared while they load', async () => {
+  itInLab('are closed: of a sink that cannot be made, of two loads at once, and cleared while they load', async () => {
     const device = await makeDevice();
     const models = new GaussianModels();
     const { open } = Generator;
@@ -155,7 +164,7 @@ describe('generators of a page that are not wanted any more', () => {
 });
 
 describe('the CDN build', () => {
-  it('shows a generator with the runtime that is beside it', async () => {
+  itInLab('shows a generator with the runtime that is beside it', async () => {
     const frame = document.createElement('iframe');
     document.body.append(frame);
     await (frame.contentDocument?.readyState === 'complete' ? undefined : nextEvent(frame, 'load'));
