@@ -2,12 +2,17 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { shCoefficientCount, type GaussianCloud, type ShDegree } from '@gaussian-splat/core';
+import { FINER, minCurve } from '../../packages/optimize/src/clip/curves.js';
 import { cutTracks } from '../../packages/optimize/src/clip/cut-tracks.js';
+import { followedWithin } from '../../packages/optimize/src/clip/partial-curves.js';
+import { roundMotion } from '../../packages/optimize/src/clip/round-motion.js';
 import { followSplats } from '../../packages/optimize/src/clip/tracks.js';
 import { parseClip, readClipPart, upright } from '@gaussian-splat/formats';
 import { clipOf, framesOf } from '../support/clips.js';
 import { cloudOf } from '../support/clouds.js';
+import { seededRandom } from '../support/random.js';
 import { fountain } from '../support/scenes/fountain.js';
+import { MADE_CLIPS } from '../support/scenes/made-clips.js';
 
 test('drops that are born fast and close together keep their own track', () => {
   const frameOf = fountain({ splats: 40_000, frames: 300, framesPerSecond: 30 });
@@ -25,6 +30,30 @@ test('drops that are born fast and close together keep their own track', () => {
     });
   });
   assert.ok(changes < 20, `${changes} times a track goes over to another splat`);
+});
+
+test('splats of a dense body that turns are followed, though each passes many others between two frames', async () => {
+  const spin = await MADE_CLIPS.spin({ splats: 20_000, frames: 3 });
+  assert.equal(cutTracks(followSplats([0, 1, 2].map(spin))).count, 20_000);
+});
+
+test('a splat that jumps in its short life does not make the motion of all others coarser', () => {
+  const [rows, frames, step] = [300, 50, 0.0003];
+  const random = seededRandom(3);
+  const changes = new Float32Array(rows * frames);
+  const lives = Array.from({ length: rows }, (_, row) => {
+    const first = Math.floor(random.uniform(0, 40));
+    const end = Math.min(frames, first + (row === 0 ? 4 : Math.floor(random.uniform(10, 45))));
+    const speed = random.uniform(-1, 1);
+    for (let f = first; f < end; f++) {
+      const jump = row === 0 && f >= first + 2 ? 0.5 * (f % 2 ? 1 : -1) : 0;
+      changes[frames * row + f] = (speed * (f - first)) / 30 + jump + 1e-4 * random.normal();
+    }
+    return [first, end] as const;
+  });
+  const found = followedWithin(changes, frames, (row) => lives[row], minCurve(step / FINER));
+  const { part } = roundMotion(found, step, new Float32Array(rows).fill(1));
+  assert.equal(part.step, Math.fround(step));
 });
 
 test('a track that goes over to another splat is divided, one that turns is not', () => {

@@ -33,7 +33,7 @@ export function clipOf(
   });
 }
 
-/** Returns a function that decodes the splats of a frame of a clip, as the element shows them. */
+/** Returns a function that decodes the splats of a frame of a clip, as the element shows them. Groups are decoded once. */
 export function framesOf(bytes: Uint8Array): (frame: number) => Promise<GaussianCloud> {
   const index = parseClip(bytes, 'a.gsv');
   const read = (parts: readonly ClipPart[], frames: number): Promise<ClipPartContent[]> =>
@@ -43,9 +43,13 @@ export function framesOf(bytes: Uint8Array): (frame: number) => Promise<Gaussian
         return readClipPart({ bytes: own, part, frames, shDegree: index.shDegree, name: 'a.gsv' });
       }),
     );
+  let last: { group: number; contents: ClipPartContent[] } | undefined;
   return async (frame) => {
-    const { first, frames, parts } = index.groups[clipGroupAt(index, frame)];
-    const contents = [...(await read(index.still, 1)), ...(await read(parts, frames))];
+    const group = clipGroupAt(index, frame);
+    const { first, frames, parts } = index.groups[group];
+    if (last?.group !== group)
+      last = { group, contents: [...(await read(index.still, 1)), ...(await read(parts, frames))] };
+    const { contents } = last;
     return clipFrame(contents, frame - first, 'a.gsv', new LoadBudget(1 << 28));
   };
 }

@@ -18,6 +18,10 @@ const RADIUS = 3;
 const ROUNDS = 3;
 /** Minimum fraction of matching splats with equal indices, so that indices identify splats. */
 const SAME_NUMBERS = 0.9;
+/** Ratio of the median {@link steadyCost} of equal indices to that of different ones, below which indices identify splats. */
+const ALIKE = 0.02;
+/** Number of splats that determine these medians. */
+const SAMPLED = 2000;
 /** Multiple of the median {@link lookCost} above which a pair is doubtful. */
 const DOUBT = 9;
 const MIN_DOUBT = 0.1;
@@ -41,6 +45,8 @@ export interface Features {
 }
 
 const LOOKS = 11;
+/** Number of the first ones, which do not depend on the orientation of a splat. */
+const STEADY_LOOKS = 5;
 const OPACITY = 4;
 
 export function featuresOf(cloud: GaussianCloud, origin: readonly number[]): Features {
@@ -180,17 +186,38 @@ function costOf(a: Features, i: number, b: Features, j: number, unit: number, en
   return cost;
 }
 
-/** Matches splats by index, if enough splats with equal indices match. Undefined otherwise. */
+/**
+ * Matches splats by index, if enough splats with equal indices match: in place, or only in appearance, because a splat of
+ * a dense body that turns is farther from its place than from many others. Undefined otherwise.
+ */
 function byNumber(before: Features, next: Features, unit: number): Int32Array | undefined {
   if (before.count !== next.count) return undefined;
-  const found = new Int32Array(next.count).fill(-1);
-  let same = 0;
-  for (let i = 0; i < next.count; i++) {
-    if (costOf(before, i, next, i, unit) > MAX_COST) continue;
-    found[i] = i;
-    same++;
-  }
-  return same >= SAME_NUMBERS * next.count ? found : undefined;
+  const matched = (isSame: (i: number) => boolean): Int32Array | undefined => {
+    const found = Int32Array.from({ length: next.count }, (_, i) => (isSame(i) ? i : -1));
+    return whichOf(found, (i) => i >= 0).length >= SAME_NUMBERS * next.count ? found : undefined;
+  };
+  const inPlace = matched((i) => costOf(before, i, next, i, unit) <= MAX_COST);
+  if (inPlace || !looksFollowNumbers(before, next)) return inPlace;
+  return matched((i) => steadyCost(before, i, next, i) <= MAX_COST);
+}
+
+/** Returns the cost of different colors, sizes and opacities, which do not change if a body turns. */
+function steadyCost(a: Features, i: number, b: Features, j: number): number {
+  let cost = 0;
+  for (let k = 0; k < STEADY_LOOKS; k++) cost += (a.looks[LOOKS * i + k] - b.looks[LOOKS * j + k]) ** 2;
+  return cost;
+}
+
+/** Whether splats with equal indices look alike, in contrast to those with different ones. */
+function looksFollowNumbers(before: Features, next: Features): boolean {
+  const { count } = next;
+  const sampled = Math.min(SAMPLED, count);
+  const median = (shift: number): number =>
+    Float64Array.from({ length: sampled }, (_, k) => {
+      const i = Math.floor((k * count) / sampled);
+      return steadyCost(before, i, next, (i + shift) % count);
+    }).sort()[sampled >> 1];
+  return median(0) < ALIKE * median(Math.ceil(count / 3));
 }
 
 interface Search {

@@ -9,8 +9,12 @@ const ROUNDS = 2;
 const MAX_CURVES = 10;
 /** Maximum number of curves for a row with missing frames, because the cost of a fit grows with its third power. */
 const MAX_FITTED = 20;
-/** Minimum fraction of valid frames of the rows that estimate the typical weights of parabolas. */
+/** Minimum fraction of valid frames of the rows that determine typical and largest weights. */
 const LONG = 0.3;
+/** Maximum ratio of the weights of other rows to these, or to their own values. */
+const LARGER = 2;
+/** Factors of the regularization of rows with larger weights. */
+const [FIRMER, FIRMEST] = [100, 1e14];
 /** Minimum noise of a fit, as a fraction of the typical power of rows. It limits weights of rows with few frames. */
 const MIN_NOISE = 1e-10;
 /** Approximate number of rows that are sampled for the typical weight of each curve. */
@@ -91,12 +95,11 @@ function bitsOf({ shares }: Followed, min: number): number {
 function followedPartly(changes: Float32Array, frames: number, span: Span, min: number): Followed {
   const rows = changes.length / frames;
   const complete = (curves: readonly Float64Array[], powers: readonly number[]): void => {
-    const fit = new RowFit(curves, powers, min);
+    const shares = fitted(changes, frames, span, new RowFit(curves, powers, min));
     for (let row = 0; row < rows; row++) {
-      const own = changes.subarray(frames * row, frames * (row + 1));
       const [first, end] = span(row);
-      const shares = fit.of(own, first, end);
-      for (let f = 0; f < frames; f++) if (f < first || f >= end) own[f] = sumOf(curves, shares, f);
+      for (let f = 0; f < frames; f++)
+        if (f < first || f >= end) changes[frames * row + f] = sumOf(curves, shares, row, f);
     }
   };
   const polynomials = parabolas(frames);
@@ -107,17 +110,49 @@ function followedPartly(changes: Float32Array, frames: number, span: Span, min: 
   }
   const found = followed(changes, frames, min);
   const main = found.curves.slice(0, MAX_FITTED);
-  const fit = new RowFit(main, powersOf(changes, frames, main), min);
-  for (let row = 0; row < rows && main.length > 0; row++) {
-    const own = fit.of(changes.subarray(frames * row, frames * (row + 1)), ...span(row));
-    found.shares.forEach((share, k) => (share[row] = own[k] ?? 0));
-  }
-  return found;
+  const shares = fitted(changes, frames, span, new RowFit(main, powersOf(changes, frames, main), min));
+  return { ...found, shares: found.shares.map((own, k) => shares[k] ?? own.fill(0)) };
 }
 
-const sumOf = (curves: readonly Float64Array[], shares: Float64Array, frame: number): number => {
+/**
+ * Returns the weights of curves for rows, fitted to their valid frames. In a few frames, different curves may be nearly
+ * equal, and large weights cancel each other. Such rows get smaller weights, because the range of weights limits the
+ * precision of all.
+ */
+function fitted(changes: Float32Array, frames: number, span: Span, fit: RowFit): Float32Array[] {
+  const rows = changes.length / frames;
+  const shares = Array.from({ length: fit.size }, () => new Float32Array(rows));
+  const put = (row: number, firmness: number): void =>
+    fit
+      .of(changes.subarray(frames * row, frames * (row + 1)), ...span(row), firmness)
+      .forEach((share, k) => (shares[k][row] = share));
+  const largest = new Float64Array(fit.size);
+  const short: number[] = [];
+  for (let row = 0; row < rows; row++) {
+    put(row, 1);
+    const [first, end] = span(row);
+    if (end - first < LONG * frames) short.push(row);
+    else shares.forEach((own, k) => (largest[k] = Math.max(largest[k], Math.abs(own[row]))));
+  }
+  for (const row of short.length < rows ? short : []) {
+    const [first, end] = span(row);
+    const own = changes
+      .subarray(frames * row + first, frames * row + end)
+      .reduce((max, value) => Math.max(max, Math.abs(value)), 0);
+    const isLarge = (): boolean => shares.some((all, k) => Math.abs(all[row]) > LARGER * Math.max(largest[k], own));
+    for (let firmness = FIRMER; isLarge() && firmness <= FIRMEST; firmness *= FIRMER) put(row, firmness);
+  }
+  return shares;
+}
+
+const sumOf = (
+  curves: readonly Float64Array[],
+  shares: readonly Float32Array[],
+  row: number,
+  frame: number,
+): number => {
   let sum = 0;
-  for (let k = 0; k < curves.length; k++) sum += shares[k] * curves[k][frame];
+  for (let k = 0; k < curves.length; k++) sum += shares[k][row] * curves[k][frame];
   return sum;
 };
 
@@ -184,8 +219,16 @@ class RowFit {
     this.#solution = new Float64Array(curves.length);
   }
 
-  /** Returns the weight of each curve, fitted to the frames `first` to `end` of a row. The next call reuses the array. */
-  of(row: Float32Array, first: number, end: number): Float64Array {
+  /** Number of curves. */
+  get size(): number {
+    return this.#curves.length;
+  }
+
+  /**
+   * Returns the weight of each curve, fitted to the frames `first` to `end` of a row. The next call reuses the array.
+   * @param firmness Factor of the regularization.
+   */
+  of(row: Float32Array, first: number, end: number, firmness = 1): Float64Array {
     const [curves, matrix, solution] = [this.#curves, this.#matrix, this.#solution];
     const size = curves.length;
     for (let a = 0; a < size; a++) {
@@ -193,7 +236,7 @@ class RowFit {
       for (let f = first; f < end; f++) right += row[f] * curves[a][f];
       solution[a] = right;
       for (let b = 0; b <= a; b++) {
-        let sum = a === b ? this.#weights[a] : 0;
+        let sum = a === b ? firmness * this.#weights[a] : 0;
         for (let f = first; f < end; f++) sum += curves[a][f] * curves[b][f];
         matrix[size * a + b] = sum;
       }
