@@ -45,6 +45,12 @@ export const COMMANDS = {
     in: 'dawn',
     command: [...TSX, 'tests/support/clip-report.ts'],
   },
+  'clip-errors': {
+    what: 'the accuracy that is printed of clips, beside the worst of all their frames',
+    in: 'dawn',
+    command: [...TSX, 'tests/support/clip-errors.ts'],
+    smallest: ['--only', 'drift', '--splats', '150', '--frames', '3', '--views', '4', '--min-psnr', '40', '--cpu'],
+  },
   'detail-chart': {
     what: 'levels of detail: error, splats, time',
     in: 'dawn',

@@ -62,12 +62,13 @@ test('the PSNR that is returned is that of the worst frame, and all frames were 
   assert.equal(clip.measured, FRAMES);
   assert.ok(clip.worstPsnr >= target, `${clip.worstPsnr} dB`);
   const frameAt = framesOf(clip.bytes);
+  assert.ok(clip.worstViewPsnr <= clip.worstPsnr);
   // Other views than those that were measured.
-  const views = viewsAround(parseClip(clip.bytes, 'a.gsv').bounds, 2, { seed: 77 });
+  const views = viewsAround(parseClip(clip.bytes, 'a.gsv').bounds, 12, { seed: 7777 });
   for (let frame = 0; frame < FRAMES; frame++) {
     const errors = await (await draw(flashing(frame), views)).compare(await frameAt(frame));
-    const found = -10 * Math.log10(Math.max(...errors));
-    assert.ok(found > target - 3.5, `frame ${frame}: ${found.toFixed(1)} dB`);
+    const found = -10 * Math.log10(errors.reduce((sum, error) => sum + error, 0) / errors.length);
+    assert.ok(found > clip.worstPsnr - 2, `frame ${frame}: ${found.toFixed(1)} dB`);
   }
 });
 

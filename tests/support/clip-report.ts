@@ -5,7 +5,7 @@
  * --splats N    splats at any time (default 150000)
  * --frames N    frames (default 300)
  * --per-file N  frames of a group (default 100)
- * --min-psnr DB PSNR of the worst held-out view (default 45)
+ * --min-psnr DB PSNR of the worst frame, in its held-out views (default 45)
  * --jobs N      processes that code the groups (default: a quarter of the CPU cores); each finds its own rounding
  * --out FILE    path of the clip (default: none)
  */
@@ -21,6 +21,7 @@ import { deviceDescriptor, pickInitialVariants } from '@gaussian-splat/renderer'
 import { encodeWebp } from '../../packages/cli/src/lib/encoders.mjs';
 import { requestNodeAdapter } from '../../packages/cli/src/lib/node-gpu.mjs';
 import { fountain } from './scenes/fountain.js';
+import { remembered } from './scenes/made-clips.js';
 
 const FRAMES_PER_SECOND = 30;
 const text = (fallback: string) => ({ type: 'string', default: fallback }) as const;
@@ -47,7 +48,7 @@ async function codeFrames(from: number, until: number, out: string): Promise<voi
   const adapter = await requestNodeAdapter({ isTrusted: true });
   const device = await adapter.requestDevice(deviceDescriptor(adapter));
   await pickInitialVariants(device, { format: 'rgba8unorm' });
-  const frameOf = fountain({ splats, frames, framesPerSecond: FRAMES_PER_SECOND });
+  const frameOf = remembered(fountain({ splats, frames, framesPerSecond: FRAMES_PER_SECOND }));
   const begin = performance.now();
   const { bytes, ...facts } = await codeClip({
     ...{ frameCount: until - from, framesPerSecond: FRAMES_PER_SECOND, framesPerGroup },
@@ -104,6 +105,7 @@ function joined(files: readonly Uint8Array[]): Uint8Array<ArrayBuffer> {
 function printTable(bytes: Uint8Array, facts: readonly Facts[], seconds: number): void {
   const index = parseClip(bytes, 'a clip');
   const sum = (of: (facts: Facts) => number): number => facts.reduce((total, own) => total + of(own), 0);
+  const minimum = (of: (facts: Facts) => number): string => Math.min(...facts.map(of)).toFixed(2);
   const rate = (length: number): string => `${((8e-6 * length) / index.durationSeconds).toFixed(2)} Mbit/s`;
   const lengths = (of: 'sceneBytes' | 'motionBytes'): number =>
     index.groups.reduce((total, { parts }) => total + parts.reduce((own, part) => own + part[of], 0), 0);
@@ -115,7 +117,8 @@ function printTable(bytes: Uint8Array, facts: readonly Facts[], seconds: number)
     ['measure', 'aim', 'seen'],
     ['splats at any time, frames, groups', '', `${splats}, ${frames}, ${index.groups.length} of ${framesPerGroup}`],
     ['splats of all groups, of some frames only', '', `${sum((own) => own.splats)}, ${sum((own) => own.passing)}`],
-    ['worst held-out view', `${values['min-psnr']} dB`, `${Math.min(...facts.map((f) => f.worstPsnr)).toFixed(2)} dB`],
+    ['worst frame, in held-out views', `${values['min-psnr']} dB`, `${minimum((own) => own.worstPsnr)} dB`],
+    ['worst view', '', `${minimum((own) => own.worstViewPsnr)} dB`],
     ['rate', '8 Mbit/s', rate(bytes.length)],
     ['  of scenes, of motion', '', `${rate(lengths('sceneBytes'))}, ${rate(lengths('motionBytes'))}`],
     ['first frame at 2 Mbit/s', '1.7 s', at(2)],

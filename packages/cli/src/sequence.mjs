@@ -16,8 +16,8 @@ const USAGE = `usage: gaussian-splat sequence MANIFEST --out CLIP.gsv [options]
 
   MANIFEST          {"gaussianSplatSequence": 1, ...}: a list of scene files; docs/sequences.md describes it
   --out CLIP.gsv    a clip: one file that is played by byte ranges. Splats may come and go; the command follows them from frame to frame
-  --min-psnr DB     PSNR of each frame to its scene file, over covered pixels, 30 to 60 (default 45): files are as small as that allows.
-                    All frames are measured. If a frame has less, the clip is written, and the status is 1
+  --min-psnr DB     PSNR of each frame to its scene file, over covered pixels of 16 views together, 30 to 60 (default 45):
+                    files are as small as that allows. All frames are measured. If a frame has less, the clip is written, and the status is 1
   --max-mbps RATE   most megabits a second; the PSNR may then be below the default of --min-psnr
   --per-file N      frames of a group, 2 to 480 (default 100): with more, the result is smaller, and its fine image comes later.
                     Groups of large frames are shorter, so that their memory is bounded
@@ -89,7 +89,8 @@ async function main({ manifest, out, minPsnr, isDemanded, maxMbps, framesPerGrou
     `${frameCount} frames in ${megabytes(clip.bytes.length)}, ${((8e-6 * clip.bytes.length) / seconds).toFixed(2)} Mbit/s, ` +
       `${(clip.firstBytes / 1e3).toFixed(0)} kB before the first one; the scene files have ${megabytes(sourceBytes)}. ` +
       `${clip.still} splats that never change, ${clip.splats} in ${clip.groups} groups, ${clip.passing} of them in some frames only; ` +
-      `${clip.psnr.toFixed(2)} dB in held-out views of ${clip.measured} frames, ${clip.worstPsnr.toFixed(2)} dB in the worst: ${out}`,
+      `${clip.psnr.toFixed(2)} dB in held-out views of ${clip.measured} frames, ${clip.worstPsnr.toFixed(2)} dB in the worst frame, ` +
+      `${clip.worstViewPsnr.toFixed(2)} dB in the worst single view: ${out}`,
   );
   if (isDemanded && clip.worstPsnr < minPsnr)
     throw new CommandError(

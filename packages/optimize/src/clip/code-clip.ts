@@ -23,7 +23,7 @@ export interface CodeClipOptions {
   /** Credits of the clip, in place of those of its frames. */
   readonly credits?: Credits | undefined;
   readonly framesPerGroup: number;
-  /** Target PSNR of frames against their sources in dB, over covered pixels. */
+  /** Target PSNR of each frame against its source in dB, over covered pixels of its views together. */
   readonly minPsnr: number;
   /** Draws the frames that are measured, for example {@link drawOn} a device. Unused with `rounding`. */
   readonly draw: DrawFrame;
@@ -61,8 +61,10 @@ export interface CodedClip {
   readonly still: number;
   /** Number of measured frames. */
   readonly measured: number;
-  /** PSNR of the view with the largest error in dB; NaN if none was measured. */
+  /** PSNR of the frame with the largest error, in its views together, in dB; NaN if none was measured. */
   readonly worstPsnr: number;
+  /** PSNR of the view with the largest error in dB; NaN if none was measured. */
+  readonly worstViewPsnr: number;
 }
 
 /** Maximum bytes of the frames of a group in memory. Groups of large frames are shorter. */
@@ -72,8 +74,8 @@ const MIN_GROUP_FRAMES = 2;
 const TUNED = 0.2;
 
 /**
- * Encodes frames with arbitrary splats as a clip. Quantization is as coarse as `minPsnr` allows in the worst frames, in
- * held-out views. Frames with an up direction other than (0, -1, 0) are rotated, as in all formats without one. All
+ * Encodes frames with arbitrary splats as a clip. Quantization is as coarse as `minPsnr` allows in the worst frame, in
+ * its held-out views together. Frames with an up direction other than (0, -1, 0) are rotated, as in all formats without one. All
  * frames of a group get the highest degree of spherical harmonics until then. Splats that never change are stored once.
  */
 export async function codeClip(options: CodeClipOptions): Promise<CodedClip> {
@@ -175,9 +177,10 @@ class ClipCoder {
       firstBytes: head.length + ofFirst,
       ...{ groups: groups.length, splats: this.#splats, passing: this.#passing },
       still: still.reduce((sum, { splats }) => sum + splats, 0),
-      measured: groups.reduce((sum, own) => sum + new Set(own.errors.map(({ frame }) => frame)).size, 0),
+      measured: errors.length,
       psnr: errors.length > 0 ? decibels(mean(errors.map(({ error }) => error))) : NaN,
       worstPsnr: errors.length > 0 ? decibels(worstOf(errors)) : NaN,
+      worstViewPsnr: errors.length > 0 ? decibels(Math.max(...errors.map(({ worst }) => worst))) : NaN,
     };
   }
 
@@ -230,7 +233,7 @@ class ClipCoder {
       const { frame, error } = group.errors.reduce((worst, own) => (own.error > worst.error ? own : worst));
       this.#onStep(
         `  ${sizeOf(group.parts)} bytes, ${group.parts[0].bytes.length} of them coarse; ` +
-          `${decibels(error).toFixed(2)} dB in the worst view, of frame ${begin + frame}`,
+          `${decibels(error).toFixed(2)} dB in the worst frame, ${begin + frame}`,
       );
     } finally {
       judges.destroy();
@@ -273,7 +276,7 @@ class ClipCoder {
     const judges = new FrameJudges(draw, () => Promise.resolve(cloud));
     const whole = { cloud, degrees: new Uint8Array(cloud.count).fill(cloud.shDegree) };
     const measure = async (bytes: Uint8Array): Promise<number> =>
-      Math.max(...(await judges.compare(0, await readScene(bytes, { name: 'a group of frames' }))));
+      mean(await judges.compare(0, await readScene(bytes, { name: 'a group of frames' })));
     try {
       const encoding = await tuneSog(encodeWebp).tune!(whole, measure, SCENE_SHARE * this.#target);
       this.#onStep(`scenes of groups: ${encoding.title}`);

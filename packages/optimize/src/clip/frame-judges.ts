@@ -4,18 +4,11 @@ import { clipFrame, LoadBudget, type ClipPartContent } from '@gaussian-splat/for
 import { CloudBuffers } from '../gpu/cloud-buffers.js';
 import { ImageErrors } from '../gpu/image-errors.js';
 import { exactViewpoint } from '../gpu/show.js';
-import { viewsAround, type ViewOptions } from '../views.js';
+import { mean } from '../measure.js';
+import { viewsAround } from '../views.js';
 
-/** Number of views of each frame that are measured in full size. They differ between frames. */
-const VIEWS = 3;
-/**
- * Number and size of the views that find the worst ones of a result. Quantized splats may exchange their order in depth,
- * which few views show.
- */
-const SCOUTS = 48;
-const SCOUT_SIZE = { width: 160, height: 90 };
-/** Views during the search for steps. */
-const FIRST_VIEWS = [0, 1, 2];
+/** Number of views of each frame, which differ between frames, and of those during the search for steps. */
+const [VIEWS, SEARCHED_VIEWS] = [16, 3];
 
 /** Images of a frame, with which those of other clouds are compared. */
 export interface FrameImages {
@@ -68,43 +61,34 @@ export class FrameJudges {
    * @param cloud The frame as a clip shows it.
    */
   async compare(frame: number, cloud: GaussianCloud): Promise<readonly number[]> {
-    const images = this.#images.get(frame) ?? (await this.#imagesOf(frame));
+    const images = this.#images.get(frame) ?? (await this.#imagesOf(frame, SEARCHED_VIEWS));
     this.#images.set(frame, images);
     return images.compare(cloud);
   }
 
-  /** Keeps images of the views of some errors, so that {@link errorsIn} measures these views, too. */
-  async remember(errors: readonly FrameError[]): Promise<void> {
-    for (const frame of new Set(errors.map((own) => own.frame))) {
+  /** Keeps images of some frames in all views, in which {@link errorsIn} measures them from now on. */
+  async remember(frames: readonly number[]): Promise<void> {
+    for (const frame of frames) {
       this.#images.get(frame)?.destroy();
       this.#images.delete(frame);
-      const views = errors.filter((own) => own.frame === frame).flatMap(({ view }) => view ?? []);
-      this.#images.set(frame, await this.#imagesOf(frame, [...new Set([...FIRST_VIEWS, ...views])]));
+      this.#images.set(frame, await this.#imagesOf(frame));
     }
   }
 
-  /** Returns the errors of some frames of a group's parts, and keeps the images of these frames. */
+  /** Returns the errors of some frames of a group's parts, in few views, and keeps the images of these frames. */
   async errorsIn(frames: readonly number[], parts: readonly ClipPartContent[]): Promise<FrameError[]> {
     const errors: FrameError[] = [];
-    for (const frame of frames)
-      for (const error of await this.compare(frame, frameOf(parts, frame))) errors.push({ frame, error });
+    for (const frame of frames) errors.push(errorOf(frame, await this.compare(frame, frameOf(parts, frame))));
     return errors;
   }
 
-  /** Returns the errors of the first `count` frames in {@link SCOUTS} views. Of each frame, the worst are in full size. */
+  /** Returns the errors of the first `count` frames, in all views. */
   async errorsInAll(count: number, parts: readonly ClipPartContent[]): Promise<FrameError[]> {
     const errors: FrameError[] = [];
     for (let frame = 0; frame < count; frame++) {
-      const [source, coded] = [await this.#openFrame(frame), frameOf(parts, frame)];
-      const measure = async (views: readonly Camera[]): Promise<readonly number[]> => {
-        const images = await this.#draw(source, views);
-        return images.compare(coded).finally(() => images.destroy());
-      };
-      const found = [...(await measure(viewsOf(source, frame, SCOUT_SIZE)))];
-      const worst = [...found.keys()].sort((a, b) => found[b] - found[a]).slice(0, VIEWS);
-      const views = viewsOf(source, frame);
-      for (const [k, error] of (await measure(worst.map((view) => views[view]))).entries()) found[worst[k]] = error;
-      for (const [view, error] of found.entries()) errors.push({ frame, view, error });
+      const images = await this.#imagesOf(frame);
+      const found = await images.compare(frameOf(parts, frame)).finally(() => images.destroy());
+      errors.push(errorOf(frame, found));
     }
     return errors;
   }
@@ -113,26 +97,26 @@ export class FrameJudges {
     for (const images of this.#images.values()) images.destroy();
   }
 
-  async #imagesOf(frame: number, views: readonly number[] = FIRST_VIEWS): Promise<FrameImages> {
+  async #imagesOf(frame: number, views = VIEWS): Promise<FrameImages> {
     const cloud = await this.#openFrame(frame);
-    const all = viewsOf(cloud, frame);
-    return this.#draw(
-      cloud,
-      views.map((view) => all[view]),
-    );
+    return this.#draw(cloud, viewsAround(boundsOf(cloud), VIEWS, { seed: 7 + frame }).slice(0, views));
   }
 }
 
-const viewsOf = (cloud: GaussianCloud, frame: number, size?: ViewOptions): Camera[] =>
-  viewsAround(boundsOf(cloud), SCOUTS, { seed: 7 + frame, ...size });
-
-/** Mean squared error of a view of a frame, peak 1. */
+/** Mean squared error of a frame, peak 1. */
 export interface FrameError {
   readonly frame: number;
-  /** Index among all views of the frame; undefined during the search. */
-  readonly view?: number;
+  /** Mean over its views. */
   readonly error: number;
+  /** Largest error of a view. */
+  readonly worst: number;
 }
+
+const errorOf = (frame: number, errors: readonly number[]): FrameError => ({
+  frame,
+  error: errors.length > 0 ? mean(errors) : 0,
+  worst: Math.max(0, ...errors),
+});
 
 export const frameOf = (parts: readonly ClipPartContent[], frame: number): GaussianCloud =>
   clipFrame(parts, frame, 'a group of frames', new LoadBudget(2 ** 40));

@@ -37,7 +37,7 @@ export interface GroupCoding {
   readonly encoding: Encoding;
   /** Steps of the last group; undefined for the first group. */
   readonly steps: MotionSteps | undefined;
-  /** Maximum mean squared error of a view, peak 1. */
+  /** Maximum mean squared error of a frame, peak 1. */
   readonly target: number;
   /** Maximum size of the group, bytes. It takes precedence over `target`. */
   readonly maxBytes: number;
@@ -57,14 +57,13 @@ export interface FoundGroup extends CodedGroup {
   readonly contents: readonly ClipPartContent[];
   readonly encoding: Encoding;
   readonly steps: MotionSteps;
-  /** Whether all frames were measured, in all views. */
+  /** Whether all frames were measured. */
   readonly isChecked: boolean;
 }
 
 /**
  * Codes a group. The frames with the largest estimated errors are measured first, and some others. If they reach the
- * target, all frames are measured in many views, because the order of splats in depth may change in any frame and view.
- * The worst ones are among the first of the next attempt. If no steps reach the target, those with the smallest error are used.
+ * target, all frames are measured, in more views. The worst ones are among the first of the next attempt. If no steps reach the target, those with the smallest error are used.
  */
 export async function codeGroup(coding: GroupCoding): Promise<FoundGroup> {
   const { target, maxBytes } = coding;
@@ -79,7 +78,7 @@ export async function codeGroup(coding: GroupCoding): Promise<FoundGroup> {
       const found = tried.get(scale) ?? (await attempt(coding, encoding, scaledSteps(first, scale)));
       tried.set(scale, found);
       const error = worstOf(found.errors);
-      coding.onStep(`  ${sizeOf(found.parts)} bytes, ${decibels(error).toFixed(2)} dB in the worst view`);
+      coding.onStep(`  ${sizeOf(found.parts)} bytes, ${decibels(error).toFixed(2)} dB in the worst frame`);
       // A group that is too large must become coarser, as if its error were too small.
       return { error: isWanted(found) ? error : (0.5 * target * maxBytes) / sizeOf(found.parts) };
     },
@@ -107,7 +106,7 @@ async function attempt(coding: GroupCoding, encoding: Encoding, steps: MotionSte
   if (isChecked) {
     errors = await judges.errorsInAll(tracks.frames.length, shown);
     const worst = [...errors].sort((a, b) => b.error - a.error).slice(0, REMEMBERED);
-    if (worstOf(worst) > target) await judges.remember(worst);
+    if (worstOf(worst) > target) await judges.remember(worst.map(({ frame }) => frame));
   }
   const written = parts.map((part) => part.write(steps));
   return { frames: tracks.frames.length, parts: written, errors, contents, encoding, steps, isChecked };
