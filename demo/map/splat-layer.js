@@ -1,6 +1,10 @@
-/** Gaussian splats as a custom layer of MapLibre GL JS: they stand at a place of the earth, and buildings of the map hide them. */
+/**
+ * Gaussian splats as a custom layer of MapLibre GL JS: they stand at a place of the earth, and buildings of the map hide them.
+ * Scenes with levels of detail are streamed by view.
+ */
 import { cameraFromClip, multiply } from '@gaussian-splat/core';
-import { fetchScene, fileOpenerFor, readScene } from '@gaussian-splat/formats';
+import { openPages } from '@gaussian-splat/element/pages.js';
+import { fetchScene, readScene } from '@gaussian-splat/formats';
 import { packGaussians } from '@gaussian-splat/renderer';
 import { GlHost } from '@gaussian-splat/renderer/webgl';
 import { MercatorCoordinate } from 'maplibre-gl';
@@ -39,6 +43,8 @@ function placementOnEarth(origin) {
   return placementAt([(180 * lon) / Math.PI, (180 * lat) / Math.PI], altitude, 1, axes);
 }
 
+const STREAMED = /(^|\/)(detail|lod-meta|tileset)\.json$|\.(lcc|rad)$/i;
+
 export class SplatLayer {
   type = 'custom';
   renderingMode = '3d';
@@ -46,12 +52,14 @@ export class SplatLayer {
   /**
    * @param lngLat place of the scene; by default that of its file, if that has earth-centered coordinates (3D Tiles)
    * @param metersPerUnit length of a unit of the scene's file
-   * @param maxSplats of a file with levels, the finest level that has fewer is shown
+   * @param maxSplats of a streamed scene on the GPU; default: one million
+   * @param detail maximum error of a streamed scene, pixels
+   * @param worker that sorts the splats, in place of the main thread: see `GlHostOptions`
    */
-  constructor({ id, src, lngLat, altitude = 0, metersPerUnit = 1, maxSplats }) {
+  constructor({ id, src, lngLat, altitude = 0, metersPerUnit = 1, maxSplats, detail = 1, worker }) {
     this.id = id;
     this.src = src;
-    this.maxSplats = maxSplats;
+    Object.assign(this, { maxSplats, detail, worker });
     // Captures have x to the right, y down and z forward: east, down and north.
     if (lngLat)
       this.placement = placementAt(lngLat, altitude, metersPerUnit, [
@@ -68,19 +76,29 @@ export class SplatLayer {
   }
 
   async load() {
-    const { host } = this;
-    const url = new URL(this.src, document.baseURI);
-    const options = { openFile: fileOpenerFor(url, () => ({})), maxSplats: this.maxSplats };
-    const cloud = await readScene(await fetchScene(url), options);
-    this.placement ??= placementOnEarth(cloud.origin);
-    // Float64 of the Earth is in the placement; what is left are meters around it.
-    const packed = packGaussians({ ...cloud, origin: [0, 0, 0] });
-    this.count = packed.count;
-    const splats = await host.load(packed);
+    const { host, src } = this;
+    const { pathname } = new URL(src, document.baseURI);
+    const splats = await (STREAMED.test(pathname) ? this.stream() : this.loadWhole());
     // The map may have removed the layer meanwhile.
     if (host !== this.host) return splats.destroy();
     this.splats = splats;
     this.map.triggerRepaint();
+  }
+
+  async loadWhole() {
+    const cloud = await readScene(await fetchScene(new URL(this.src, document.baseURI)));
+    this.placement ??= placementOnEarth(cloud.origin);
+    // Float64 of the Earth is in the placement; what is left are meters around it.
+    return this.host.load(packGaussians({ ...cloud, origin: [0, 0, 0] }), { worker: this.worker });
+  }
+
+  async stream() {
+    const { maxSplats, worker, host, map } = this;
+    const { source } = await openPages(this.src);
+    this.placement ??= placementOnEarth(source.scene.origin);
+    const onError = (error) => map.fire('error', { error });
+    const local = { ...source, scene: { ...source.scene, origin: [0, 0, 0] } };
+    return host.stream(local, { maxSplats, worker, onError, onChange: () => map.triggerRepaint() });
   }
 
   render(gl, { defaultProjectionData }) {
@@ -90,7 +108,7 @@ export class SplatLayer {
     const { drawingBufferWidth: width, drawingBufferHeight: height } = gl;
     const camera = cameraFromClip(matrix, { width, height, clipDepth: '-1..1' });
     const framebuffer = gl.getParameter(gl.FRAMEBUFFER_BINDING);
-    if (!this.splats.draw(camera, { framebuffer })) this.map.triggerRepaint();
+    if (!this.splats.draw(camera, { framebuffer }, { detail: this.detail })) this.map.triggerRepaint();
   }
 
   onRemove() {

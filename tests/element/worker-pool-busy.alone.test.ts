@@ -264,3 +264,29 @@ test('a scene that has had its time waits for those that have had none', async (
   await settle();
   assert.deepEqual(outcomes, ['honest']);
 });
+
+test('requests for parts of one file have one worker, also if it is busy or others are free', async (context) => {
+  const { pool, workers, pass } = poolOf(context);
+  const ask = (url: string, keeper?: string): void =>
+    void pool
+      .run({ type: 'node', request: { url } } as unknown as WorkerRequest, signal, never, { keeper })
+      .catch(() => undefined);
+  ask('other');
+  await settle();
+  await pass(300);
+  ask('chunk 0', 'park.rad');
+  await settle();
+  workers[0].say({ type: 'pong' });
+  ask('chunk 1', 'park.rad');
+  ask('another');
+  await pass(300);
+  ask('chunk 2', 'park.rad');
+  await settle();
+  assert.deepEqual(
+    workers.map(({ reads }) => reads),
+    [
+      ['other', 'another'],
+      ['chunk 0', 'chunk 1', 'chunk 2'],
+    ],
+  );
+});

@@ -56,6 +56,7 @@ export { packLevelRuns } from './streaming/pack-runs.js';
 export { layoutLevels, type LevelBox, type LevelPage, type LevelScene } from './streaming/level-pages.js';
 export { levelSource, packLevelPage } from './streaming/level-source.js';
 export { packNodes, type NodeContent, type NodePage, type RunError } from './streaming/pack-nodes.js';
+export { folderSource, type FetchPage } from './streaming/page-source.js';
 export { treeSource, type FetchedNode, type OpenedTree } from './streaming/tree-source.js';
 export { readPacked } from './pack/packed-scene.js';
 export type { PackedGaussians, PackedHead, PackOptions } from './pack/pack.js';

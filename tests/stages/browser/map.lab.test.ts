@@ -1,6 +1,7 @@
 /** Splats as a layer of MapLibre: at their place, without errors of WebGL, while the map turns. */
 import { Map as MapLibre, setWorkerUrl, type CustomLayerInterface } from 'maplibre-gl';
 import type { GaussianCloud } from '@gaussian-splat/core';
+import type { HostedSplats } from '@gaussian-splat/renderer/webgl';
 import { assert, assertEqual } from '../../element/browser/support/harness.js';
 import { splatTileset } from '../../support/tileset.js';
 
@@ -9,7 +10,7 @@ const PLACE: [number, number] = [13.4, 52.52];
 
 interface Layer {
   readonly loaded: Promise<void>;
-  readonly count: number;
+  readonly splats: HostedSplats;
 }
 type LayerClass = new (options: object) => Layer & CustomLayerInterface;
 
@@ -117,20 +118,38 @@ describe('maps', () => {
     assert(blocked.x > free.x + 5, `the left half is hidden: ${JSON.stringify(found)}`);
   });
 
-  it('show a tileset at its place on the Earth, at the level that fits', async () => {
+  it('stream a tileset at its place on the Earth: the tiles that the view needs, and no more than fit', async () => {
     const { SplatLayer } = (await import('/demo/map/splat-layer.js' as string)) as { SplatLayer: LayerClass };
-    const address = `/net/kept/map-${crypto.randomUUID()}/`;
-    for (const [path, bytes] of splatTileset(redCube(), { levels: 2, transform: onEarth() }))
-      await fetch(address + path, { method: 'PUT', body: bytes.slice() });
-    const counts: number[] = [];
-    for (const maxSplats of [undefined, 500]) {
+    for (const { maxSplats, isWhole } of [
+      { maxSplats: undefined, isWhole: true },
+      { maxSplats: 12 * 1024, isWhole: false },
+    ]) {
+      const address = `/net/kept/map-${crypto.randomUUID()}/`;
+      for (const [path, bytes] of splatTileset(redCube(), { levels: 3, transform: onEarth() }))
+        await fetch(address + path, { method: 'PUT', body: bytes.slice() });
+      const log = async (): Promise<string[]> => (await (await fetch(`${address}log`)).json()) as string[];
       const map = await openMap(false);
       const errors: unknown[] = [];
       map.on('error', ({ error }) => errors.push(error));
+      map.setZoom(10);
       const layer = new SplatLayer({ id: 'cube', src: `${address}tileset.json`, maxSplats });
       map.addLayer(layer);
       await layer.loaded;
+      const settled = async (): Promise<void> => {
+        for (let calm = 0; calm < 3;) {
+          const drawn = map.once('render');
+          map.triggerRepaint();
+          await drawn;
+          await new Promise((resolve) => setTimeout(resolve, 60));
+          calm = layer.splats.progress!.coming === 0 ? calm + 1 : 0;
+        }
+      };
+      await settled();
+      const afar = await log();
+      assertEqual(afar.join(' '), 'tileset.json 0/0-0.glb', 'requests from afar');
+      map.setZoom(17.5);
       const gl = map.getCanvas().getContext('webgl2')!;
+      await settled();
       for (const bearing of [0, 120, 240]) {
         map.jumpTo({ bearing });
         await map.once('render');
@@ -139,11 +158,15 @@ describe('maps', () => {
         const text = `${bearing} degrees: ${JSON.stringify(seen)}, the place is ${place.x} ${place.y}`;
         assert(seen.count > 300 && Math.hypot(seen.x - place.x, seen.y - place.y) < 10, text);
       }
-      counts.push(layer.count);
+      await settled();
+      const near = await log();
+      const { limit, resident, error } = layer.splats.progress!;
+      const text = `${resident} pages, ${error} px, ${limit}; ${near.join(' ')}`;
+      assertEqual(new Set(near).size, near.length, `each file once: ${text}`);
+      if (isWhole) assert(limit === null && near.some((path) => path.startsWith('2/')), text);
+      else assert(limit === 'memory' && resident <= 12, text);
       map.remove();
     }
-    assertEqual(counts[0], SIDE ** 3);
-    assert(counts[1] < 500 && counts[1] > 100, counts.join(' '));
   });
 });
 

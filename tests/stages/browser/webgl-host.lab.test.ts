@@ -1,7 +1,7 @@
 /** Splats in the frame of a page that draws with WebGL itself: hidden by its depth, and its state as it was. */
 import type { Camera, GaussianCloud } from '@gaussian-splat/core';
-import { packGaussians } from '@gaussian-splat/renderer';
-import { packWithDetail } from '@gaussian-splat/renderer/tools';
+import { packGaussians, type PageSource, type StreamedScene } from '@gaussian-splat/renderer';
+import { packNodes, packWithDetail, treeSource } from '@gaussian-splat/renderer/tools';
 import {
   DATA_WIDTH,
   GlGaussians,
@@ -12,6 +12,7 @@ import {
   SplatOrder,
 } from '@gaussian-splat/renderer/webgl';
 import { assert, assertEqual } from '../../element/browser/support/harness.js';
+import { pick } from '../../support/lod-folder.js';
 import { cameraAt, proceduralScenes, resized, thinned } from '../../support/scenes.js';
 
 const SPLATS = 4_000;
@@ -20,6 +21,16 @@ const WIDTH = 160;
 const [X, Y] = [24, 40];
 const GRAY = 102;
 const REQUEST = { accumulation: 'rgba16float', shDegree: 3, resolutionScale: 1 } as const;
+
+/** The worker of a page that sorts. */
+const SORTER = `import { sortSplats } from '${location.origin}/packages/renderer/dist/webgl/index.js';
+onmessage = ({ data: { port, positions } }) => sortSplats(port, positions);`;
+
+/** The matrix of a camera for positions relative to an origin. */
+const cameraOf = ({ worldToCamera: m }: Camera, origin: readonly number[]): Float64Array =>
+  Float64Array.from(m, (value, i) =>
+    i % 4 === 3 && i < 12 ? value + [0, 1, 2].reduce((sum, k) => sum + m[i - 3 + k] * origin[k], 0) : value,
+  );
 
 /** Bytes of a rectangle of a host's canvas, from its upper row on. */
 function read(gl: WebGL2RenderingContext, x: number, y: number, { width, height }: Camera): Uint8Array {
@@ -301,6 +312,80 @@ describe("splats in a host's frame", () => {
     for (const one of [splats, ...separate]) one.destroy();
     host.destroy();
     gl.getExtension('WEBGL_lose_context')?.loseContext();
+  });
+
+  it('of a streamed scene are those of the whole scene, or a coarser level if they do not fit', async () => {
+    const whole = { ...cloud, origin: [0, 0, 0] as const };
+    const middle = [0, 1, 2].map(
+      (axis) => cloud.positions.reduce((sum, x, i) => sum + (i % 3 === axis ? x : 0), 0) / cloud.count,
+    );
+    const quarters: number[][] = [[], [], [], []];
+    for (let i = 0; i < cloud.count; i++) {
+      const [x, , z] = whole.positions.subarray(3 * i);
+      quarters[(x > middle[0] ? 1 : 0) + (z > middle[2] ? 2 : 0)].push(i);
+    }
+    const SIDE = 100;
+    const volumes = quarters.map((_, k) => {
+      const [x, z] = [k & 1 ? SIDE : -SIDE, k & 2 ? SIDE : -SIDE];
+      const center = [middle[0] + x, middle[1], middle[2] + z];
+      return [...center, SIDE, 0, 0, 0, 2 * SIDE, 0, 0, 0, SIDE, 3 * SIDE];
+    });
+    const { shDegree, antialiased } = whole;
+    const bounds = { min: [-1, -1, -1], max: [1, 1, 1], center: [0, 0, 0], radius: 1 } as const;
+    const format = { shDegree, shPrecision: 'float16', geometry: 'quantized', antialiased } as const;
+    const scene: StreamedScene = { ...format, splats: cloud.count, origin: [0, 0, 0], bounds };
+    const coarse = pick(
+      whole,
+      Array.from({ length: Math.ceil(cloud.count / 4) }, (_, k) => 4 * k),
+      2,
+    );
+    const content = { cloud: coarse, volumes, isAdded: false, error: Infinity };
+    const opened = {
+      scene,
+      first: packNodes([content], scene),
+      children: quarters.map((own) => ({ children: [], own })),
+      isComplete: true,
+    };
+    const fetched: number[] = [];
+    const source = (): PageSource =>
+      treeSource(opened, async ({ own }, above) => {
+        fetched.push(own.length);
+        const finest = { cloud: pick(whole, own), volumes: [], isAdded: false, error: 0 };
+        return Promise.resolve({ ...packNodes([finest], scene, above), found: [] });
+      });
+    const at = { ...camera, worldToCamera: cameraOf(camera, cloud.origin) };
+    const expected = await alone(whole, at, 0);
+    const worker = new Worker(URL.createObjectURL(new Blob([SORTER], { type: 'text/javascript' })), { type: 'module' });
+    const found: number[] = [];
+    for (const options of [{}, { worker }, { maxSplats: 1024 * (Math.ceil(coarse.count / 1024) + 4) }]) {
+      fetched.length = 0;
+      const gl = context(camera.width, camera.height, { antialias: false, depth: true });
+      const host = new GlHost(gl);
+      let changes = 0;
+      const splats = await host.stream(source(), { ...options, onChange: () => void changes++ });
+      const draw = (): boolean => {
+        gl.clearColor(0, 0, 0, 1);
+        gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
+        return splats.draw(at, { depth: null }, { detail: 0.01 });
+      };
+      for (let calm = 0; calm < 5; await new Promise((resolve) => setTimeout(resolve, 60)))
+        calm = draw() && splats.progress!.coming === 0 ? calm + 1 : 0;
+      const image = read(gl, 0, 0, camera);
+      const sum = image.reduce((total, value, i) => total + (value - expected[i]) ** 2, 0);
+      found.push(10 * Math.log10(255 ** 2 / (sum / image.length)));
+      const { limit, resident, bytes } = splats.progress!;
+      const text = `${resident} pages, ${limit}, ${bytes} bytes, ${fetched.join(' ')}, ${found.join(' ')} dB`;
+      assertEqual(gl.getError(), gl.NO_ERROR, 'errors');
+      assert(new Set(fetched).size === fetched.length && changes >= fetched.length, `each page once: ${text}`);
+      if ('maxSplats' in options) assert(limit === 'memory' && resident < 5, text);
+      else assert(limit === null && resident === 5, text);
+      splats.destroy();
+      host.destroy();
+      gl.getExtension('WEBGL_lose_context')?.loseContext();
+    }
+    worker.terminate();
+    console.log(`streamed in a host: ${found.map((value) => value.toFixed(1)).join(', ')} dB`);
+    assert(found[0] > 50 && found[1] > 50 && found[2] < found[0] && found[2] > 12, found.join(' '));
   });
 
   it('with levels of detail are those of the scene, or as near as the pixels that they may be off', async () => {

@@ -76,6 +76,8 @@ export class WorkerPool {
   readonly #slots = new Set<WorkerSlot>();
   readonly #queue: Job[] = [];
   readonly #turns = new FairTurns();
+  /** The workers that keep parts of files: see `Job.keeper`. */
+  readonly #keepers = new Map<string | undefined, WorkerSlot>();
   #isRefused = false;
   #hasWarned = false;
   /** Whether a worker has started before. If a later one starts slowly, the machine is busy, so it gets more time. */
@@ -116,7 +118,7 @@ export class WorkerPool {
     request: WorkerRequest,
     signal: AbortSignal,
     here: (request: WorkerRequest) => Promise<T>,
-    { transfer, ...listeners }: Pick<Job, 'onProgress' | 'onPreview' | 'onPart' | 'transfer'> = {},
+    options: Pick<Job, 'onProgress' | 'onPreview' | 'onPart' | 'transfer' | 'keeper'> = {},
   ): Promise<T> {
     signal.throwIfAborted();
     let cancel!: () => void;
@@ -124,7 +126,7 @@ export class WorkerPool {
     const answer = new Promise<T>((resolve, reject) => {
       const id = this.#nextId++;
       const settle = { resolve: resolve as Job['resolve'], reject };
-      job = { ...listeners, ...settle, id, request, signal, transfer, here, moves: 0, sentAt: Infinity };
+      job = { ...options, ...settle, id, request, signal, here, moves: 0, sentAt: Infinity };
       cancel = () => reject(signal.reason);
     });
     signal.addEventListener('abort', cancel, { once: true });
@@ -148,12 +150,15 @@ export class WorkerPool {
     const late = slots.find(({ isLate }) => isLate);
     // Another worker that has started does the work of a late one.
     if (late && !slots.some(({ isReady }) => isReady)) return void this.#doWithout(late, job);
-    const free = slots.find((slot) => slot.missed < BUSY && slot.mayTake(job));
+    const isFree = (slot: WorkerSlot, max: number): boolean => slot.missed < max && slot.mayTake(job);
+    const keeper = this.#keepers.get(job.keeper);
+    const free = keeper && isFree(keeper, SILENT) ? keeper : slots.find((slot) => isFree(slot, BUSY));
     const slot = free ?? (this.#mayStart(job) ? this.#start() : undefined);
     // No worker could be created, which `#start` has reported.
     if (this.#isRefused) return job.resolve(job.here(job.request));
     if (!slot) return void this.#queue.push(job);
     slot.take(job);
+    if (job.keeper) this.#keepers.set(job.keeper, slot);
     this.#watch();
   }
 
@@ -394,6 +399,7 @@ export class WorkerPool {
   #end(slot: WorkerSlot): void {
     slot.end();
     this.#slots.delete(slot);
+    for (const [name, keeper] of this.#keepers) if (keeper === slot) this.#keepers.delete(name);
   }
 }
 

@@ -13,6 +13,8 @@ export interface Job {
   readonly onPart?: PartListener | undefined;
   /** Buffers that are transferred with the request. A request with such buffers can be sent only once. */
   readonly transfer?: Transferable[] | undefined;
+  /** Name of files whose parts one worker keeps for several requests. They are assigned to it while it responds. */
+  readonly keeper?: string | undefined;
   /** Runs the request on the main thread. */
   readonly here: (request: WorkerRequest) => Promise<unknown>;
   readonly resolve: (answer: unknown) => void;

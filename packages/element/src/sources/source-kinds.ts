@@ -4,6 +4,7 @@ import type { LoadedGaussians } from '../gpu/loaded-gaussians.js';
 import type { DeviceLease } from '../gpu/shared-device.js';
 import type { LoadedSequence, SceneRequest } from '../loading/protocol.js';
 import { open } from './file/open-file.js';
+import { nameIn } from './name-in.js';
 import type { OpenOptions, SourceKind } from './source-kind.js';
 
 /** All kinds of sources. A source is of the first kind that matches its request. */
@@ -55,14 +56,4 @@ export async function openSource(
   const code = await loadModule(`the code that opens a ${name}`, load);
   const opened = await code.open(request, options, acquiring, found);
   return 'frames' in opened ? openSource(request, options, acquiring, opened) : opened;
-}
-
-/**
- * Returns the text that identifies the kind of a file: the path of an address, or the name that a page has appended to
- * an object URL.
- */
-export function nameIn(url: string): string {
-  if (!URL.canParse(url)) return url;
-  const { pathname, protocol, hash } = new URL(url);
-  return protocol === 'blob:' ? hash : pathname;
 }

@@ -1,12 +1,11 @@
 import { GaussianSplatError } from '@gaussian-splat/core';
 import { turn } from '../gpu/page-thread.js';
 import type { PackedGaussians } from '../pack/pack.js';
+import { GEOMETRY_WORDS, shWords } from '../pack/words.js';
 import { dataWidth, makeTexture, requireMemory } from './gl.js';
 
 /** Number of words uploaded in one step: 4 MB, a few milliseconds. */
 const WORDS_AT_ONCE = 1 << 20;
-/** Number of 32-bit words of a splat's geometry. The first three are its position. */
-const GEOMETRY_WORDS = 8;
 /** Number of words of each splat that frames write: the projected splat, and its entry in the order. */
 const FRAME_WORDS = 9;
 
@@ -44,14 +43,25 @@ export class GlGaussians {
   readonly geometry: WebGLTexture;
   readonly sh: WebGLTexture;
   readonly #gl: WebGL2RenderingContext;
+  /** Layouts of the geometry and of the harmonics. */
+  readonly #layouts: readonly Layout[];
 
-  private constructor(gl: WebGL2RenderingContext, packed: PackedGaussians) {
+  /**
+   * Allocates textures for `count` splats, which {@link write} fills.
+   * @throws GaussianSplatError `out-of-memory/buffer-limit` for more splats than textures can hold.
+   */
+  constructor(gl: WebGL2RenderingContext, facts: GlGaussianFacts) {
     this.#gl = gl;
-    const { count, droppedCount, shDegree, shPrecision, antialiased, filterVariance, origin } = packed;
+    const { count, droppedCount, shDegree, shPrecision, antialiased, filterVariance, origin } = facts;
     this.facts = { count, droppedCount, shDegree, shPrecision, antialiased, filterVariance, origin };
-    requireRoom(gl, packed);
-    this.geometry = makeTexture(gl, gl.RGBA32UI, sizeOf(gl, packed.geometry.length / 4));
-    this.sh = makeTexture(gl, gl.RG32UI, sizeOf(gl, packed.sh.length / 2));
+    const texels = [(GEOMETRY_WORDS * count) / 4, (shWords(shDegree, shPrecision) * count) / 2] as const;
+    requireRoom(gl, this.facts, Math.max(...texels));
+    this.geometry = makeTexture(gl, gl.RGBA32UI, sizeOf(gl, texels[0]));
+    this.sh = makeTexture(gl, gl.RG32UI, sizeOf(gl, texels[1]));
+    this.#layouts = [
+      { texture: this.geometry, format: gl.RGBA_INTEGER, texelWords: 4, splatWords: GEOMETRY_WORDS },
+      { texture: this.sh, format: gl.RG_INTEGER, texelWords: 2, splatWords: shWords(shDegree, shPrecision) },
+    ];
   }
 
   /**
@@ -68,8 +78,11 @@ export class GlGaussians {
     const made = run(() => new GlGaussians(gl, packed));
     try {
       requireMemory(gl, `scene of ${packed.count} splats`);
-      await write(gl, made.geometry, { format: gl.RGBA_INTEGER, texelWords: 4, words: packed.geometry }, run);
-      await write(gl, made.sh, { format: gl.RG_INTEGER, texelWords: 2, words: packed.sh }, run);
+      for (const [k, words] of [packed.geometry, packed.sh].entries())
+        for (const [n, part] of made.#parts(k, 0, words).entries()) {
+          if (n > 0) await turn();
+          run(part);
+        }
       return made;
     } catch (error) {
       made.destroy();
@@ -77,43 +90,52 @@ export class GlGaussians {
     }
   }
 
+  /** Replaces splats from index `first` on. */
+  write(first: number, geometry: Uint32Array, sh: Uint32Array): void {
+    for (const [k, words] of [geometry, sh].entries()) for (const part of this.#parts(k, first, words)) part();
+  }
+
   destroy(): void {
     this.#gl.deleteTexture(this.geometry);
     this.#gl.deleteTexture(this.sh);
   }
-}
 
-interface Content {
-  readonly format: GLenum;
-  readonly texelWords: number;
-  readonly words: Uint32Array;
-}
-
-async function write(gl: WebGL2RenderingContext, texture: WebGLTexture, content: Content, run: RunGl): Promise<void> {
-  const { format, texelWords, words } = content;
-  const rowTexels = dataWidth(gl);
-  const rowWords = rowTexels * texelWords;
-  const rowsAtOnce = Math.floor(WORDS_AT_ONCE / rowWords);
-  for (let first = 0; first < words.length;) {
-    if (first > 0) await turn();
-    const left = words.length - first;
-    // An incomplete row is uploaded separately.
-    const [width, rows] =
-      left < rowWords ? [left / texelWords, 1] : [rowTexels, Math.min(rowsAtOnce, Math.floor(left / rowWords))];
-    const row = first / rowWords;
-    const from = first;
-    run(() => {
-      gl.activeTexture(gl.TEXTURE0);
-      gl.bindTexture(gl.TEXTURE_2D, texture);
-      gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, row, width, rows, format, gl.UNSIGNED_INT, words, from);
-    });
-    first += width * rows * texelWords;
+  /** Returns calls that write words from splat `first` on, in rectangles of whole rows or parts of one. */
+  #parts(k: number, first: number, words: Uint32Array): (() => void)[] {
+    const gl = this.#gl;
+    const { texture, format, texelWords, splatWords } = this.#layouts[k];
+    const rowTexels = dataWidth(gl);
+    const rowsAtOnce = Math.floor(WORDS_AT_ONCE / (rowTexels * texelWords));
+    const parts: (() => void)[] = [];
+    for (let from = 0; from < words.length;) {
+      const [at, left] = [(first * splatWords + from) / texelWords, (words.length - from) / texelWords];
+      const [x, y] = [at % rowTexels, Math.floor(at / rowTexels)];
+      const [width, rows] =
+        x > 0 || left < rowTexels
+          ? [Math.min(left, rowTexels - x), 1]
+          : [rowTexels, Math.min(rowsAtOnce, Math.floor(left / rowTexels))];
+      const begin = from;
+      parts.push(() => {
+        gl.activeTexture(gl.TEXTURE0);
+        gl.bindTexture(gl.TEXTURE_2D, texture);
+        gl.texSubImage2D(gl.TEXTURE_2D, 0, x, y, width, rows, format, gl.UNSIGNED_INT, words, begin);
+      });
+      from += width * rows * texelWords;
+    }
+    return parts;
   }
 }
 
-function requireRoom(gl: WebGL2RenderingContext, { count, shDegree, geometry, sh }: PackedGaussians): void {
+/** A texture with words of each splat. */
+interface Layout {
+  readonly texture: WebGLTexture;
+  readonly format: GLenum;
+  readonly texelWords: number;
+  readonly splatWords: number;
+}
+
+function requireRoom(gl: WebGL2RenderingContext, { count, shDegree }: GlGaussianFacts, texels: number): void {
   const side = gl.getParameter(gl.MAX_TEXTURE_SIZE) as number;
-  const texels = Math.max(geometry.length / 4, sh.length / 2);
   const max = Math.floor((side * dataWidth(gl) * count) / texels);
   if (!(count > max) || gl.isContextLost()) return;
   throw new GaussianSplatError('out-of-memory/buffer-limit', {

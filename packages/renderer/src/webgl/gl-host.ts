@@ -6,7 +6,10 @@ import { pickedSurface, placeOfSurface, surfacePoints, type PickedPlace } from '
 import { GlProgram, makeTarget, makeTexture, requireMemory } from './gl.js';
 import type { PackedGaussians } from '../pack/pack.js';
 import { GlGaussians, positionsIn, type RunGl } from './gl-gaussians.js';
+import { GlStream, type GlStreamOptions } from './gl-stream.js';
 import { levelChoice } from './level-choice.js';
+import type { PageSource } from '../streaming/page-source.js';
+import type { StreamProgress } from '../streaming/progress.js';
 import {
   firstSplats,
   GlRenderer,
@@ -140,6 +143,32 @@ export class GlHost {
     }
   }
 
+  /**
+   * Opens a scene of any size, and fetches its coarsest page. Frames then request the pages that they need.
+   * @param source Pages: see `openPages` of `@gaussian-splat/element/pages.js`.
+   * @throws GaussianSplatError `out-of-memory/*` if memory or `maxSplats` is insufficient; `unsupported/webgl` if the
+   * browser does not compile the shaders; errors of the source for the first page; the reason of `signal`.
+   */
+  async stream(
+    source: PageSource,
+    { worker, ...options }: GlHostOptions & GlStreamOptions = {},
+  ): Promise<HostedSplats> {
+    await this.run(() => GlRenderer.prepare(this.#gl));
+    const stream = await GlStream.open(this.#gl, source, options, this.run);
+    try {
+      const { gaussians, count } = stream;
+      const renderer = this.run(() => new GlRenderer(this.#gl, gaussians));
+      const positions = new Float32Array(3 * count).fill(NaN);
+      const details = new Float32Array(DETAIL_NUMBERS * (count / CULL_GROUP));
+      const sorter = worker ? portOf(worker, positions, details) : new SplatOrder(positions);
+      if (sorter instanceof SplatOrder) sorter.details = details;
+      return new HostedSplats(this, renderer, [{ gaussians, first: 0, hasLevels: true }], { sorter, count, stream });
+    } catch (error) {
+      stream.destroy();
+      throw error;
+    }
+  }
+
   /** Frees the GPU memory of the host, without that of scenes. */
   destroy(): void {
     this.#program?.destroy();
@@ -222,7 +251,7 @@ interface HostedScene {
 
 /** How a host's scene is drawn. */
 export interface GlHostDrawing extends Partial<Omit<GlFrameRequest, 'camera' | 'cameras'>> {
-  /** Maximum error of levels of detail, pixels. Default: 0, which draws the finest level. */
+  /** Maximum error of levels of detail, pixels; 0 draws the finest level. Default: 0, and 1 for a streamed scene. */
   readonly detail?: number;
 }
 
@@ -233,6 +262,7 @@ export class HostedSplats {
   readonly #scenes: readonly HostedScene[];
   /** Sorts on the main thread, or by the messages of a worker. */
   readonly #sorter: SplatOrder | MessagePort;
+  readonly #stream: GlStream | undefined;
   /** Empty while the worker has it. */
   #order: Uint32Array<ArrayBuffer>;
   #sorted: readonly OrderView[] | undefined;
@@ -245,8 +275,9 @@ export class HostedSplats {
     host: GlHost,
     renderer: GlRenderer,
     scenes: readonly HostedScene[],
-    { sorter, count }: { sorter: SplatOrder | MessagePort; count: number },
+    { sorter, count, stream }: { sorter: SplatOrder | MessagePort; count: number; stream?: GlStream },
   ) {
+    this.#stream = stream;
     this.#host = host;
     this.#renderer = renderer;
     this.#scenes = scenes;
@@ -259,6 +290,11 @@ export class HostedSplats {
     };
   }
 
+  /** Resident pages of a streamed scene, and what limits them; undefined for other scenes. */
+  get progress(): StreamProgress | undefined {
+    return this.#stream?.progress;
+  }
+
   /**
    * Draws the scene over the host's frame.
    * @param given Camera of the host: see `cameraFromProjection`, with `clipDepth: '-1..1'`. Its view includes the
@@ -267,7 +303,8 @@ export class HostedSplats {
    * @throws GaussianSplatError `argument/camera` for a camera out of range; `argument/value` for a framebuffer whose
    * depth cannot be copied; `out-of-memory/allocation` if the device has too little memory.
    */
-  draw(given: Camera | readonly Camera[], frame?: GlHostFrame, { detail = 0, ...how }: GlHostDrawing = {}): boolean {
+  draw(given: Camera | readonly Camera[], frame?: GlHostFrame, drawing: GlHostDrawing = {}): boolean {
+    const { detail = this.#stream ? 1 : 0, ...how } = drawing;
     const cameras = [given].flat();
     if (cameras.length !== this.#scenes.length) throw wrongCameras(this.#scenes.length, cameras.length);
     for (const camera of cameras) validateCamera(camera);
@@ -300,24 +337,31 @@ export class HostedSplats {
   destroy(): void {
     if (!(this.#sorter instanceof SplatOrder)) this.#sorter.close();
     this.#renderer.destroy();
-    for (const { gaussians } of this.#scenes) gaussians.destroy();
+    this.#stream?.destroy();
+    for (const { gaussians } of this.#stream ? [] : this.#scenes) gaussians.destroy();
   }
 
   #sort(cameras: readonly Camera[], detail: number): boolean {
+    const stream = this.#stream;
+    stream?.follow(cameras[0], detail);
     const view = this.#scenes.map(({ gaussians: { facts }, first, hasLevels }, k): OrderView => {
       const levels = hasLevels ? levelChoice(cameras[k], facts.origin, detail) : undefined;
       return { ...orderView(cameras[k], facts.origin), first, levels };
     });
-    if (this.#sorted?.every((old, k) => isSameView(view[k], old))) return true;
+    if (!stream?.hasNews && this.#sorted?.every((old, k) => isSameView(view[k], old))) return true;
     if (!(this.#sorter instanceof SplatOrder)) {
       const order = this.#order;
-      if (order.length > 0)
-        this.#sorter.postMessage({ view, order } satisfies SortRequest<readonly OrderView[]>, [order.buffer]);
       this.#order = NO_ORDER;
+      if (order.length === 0) return false;
+      const update = stream?.take();
+      const moved = update ? [...update.positions, ...update.details].map(({ numbers }) => numbers.buffer) : [];
+      const request: SortRequest<readonly OrderView[]> = { view, order, update };
+      this.#sorter.postMessage(request, [order.buffer, ...moved]);
       return false;
     }
     const begin = performance.now();
     if (this.#sortMs > QUICK_SORT_MS && begin - this.#sortedAt < this.#sortMs / SORT_SHARE) return false;
+    if (stream) this.#sorter.replace(stream.take());
     this.#take(view, this.#sorter.sort(view, this.#order));
     this.#sortedAt = performance.now();
     this.#sortMs = this.#sortedAt - begin;
@@ -325,7 +369,10 @@ export class HostedSplats {
   }
 
   #take(view: readonly OrderView[], count: number): void {
-    this.#host.run(() => this.#renderer.setOrder(this.#order, count));
+    this.#host.run(() => {
+      if (this.#stream?.write()) this.#renderer.splatsChanged();
+      this.#renderer.setOrder(this.#order, count);
+    });
     this.#sorted = view;
   }
 }

@@ -186,6 +186,11 @@ export class GlRenderer {
     gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, width, rows, gl.RED_INTEGER, gl.UNSIGNED_INT, order);
   }
 
+  /** Projects all splats again in the next frame, because the content of a scene has changed. */
+  splatsChanged(): void {
+    this.#projected = '';
+  }
+
   /**
    * Draws one frame, or a part of it, into the accumulation texture: call {@link present} afterwards.
    * @param quads Program that replaces the renderer's own program for quads. It draws whole frames.

@@ -2,6 +2,7 @@
 export { drawn, GlClock } from './gl-clock.js';
 export { glBytes, GlGaussians, positionsIn, type GlGaussianFacts, type RunGl } from './gl-gaussians.js';
 export { GlHost, HostedSplats, type GlHostDrawing, type GlHostFrame, type GlHostOptions } from './gl-host.js';
+export type { GlStreamOptions } from './gl-stream.js';
 export {
   blendable,
   GlRenderer,

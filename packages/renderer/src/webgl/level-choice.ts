@@ -47,8 +47,8 @@ export function drawnChunks(
   return ranges;
 }
 
-/** Returns `screen_error` of detail.wgsl. */
-function pixelsOf(details: Float32Array, at: number, length: number, choice: LevelChoice): number {
+/** Returns `screen_error` of detail.wgsl, in pixels. @param at Index of the sphere. @param length World units. */
+export function pixelsOf(details: Float32Array, at: number, length: number, choice: LevelChoice): number {
   const { eye, focal, nearest, isParallel } = choice;
   const [x, y, z] = [details[at] - eye[0], details[at + 1] - eye[1], details[at + 2] - eye[2]];
   const distance = isParallel ? nearest : Math.max(Math.hypot(x, y, z) - details[at + 3], nearest);

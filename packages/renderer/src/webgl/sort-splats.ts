@@ -1,5 +1,5 @@
 /** Sorts the splats of one scene for each view of the WebGL renderer, in a worker that is started for this purpose. */
-import { SplatOrder, type OrderView } from './splat-order.js';
+import { SplatOrder, type OrderView, type SplatUpdate } from './splat-order.js';
 
 type Views = OrderView | readonly OrderView[];
 
@@ -8,9 +8,11 @@ export interface SortRequest<V extends Views = OrderView> {
   readonly view: V;
   /** Buffer for the order, one index for each splat. It is transferred to the worker and back. */
   readonly order: Uint32Array<ArrayBuffer>;
+  /** Splats that have changed since the last request. */
+  readonly update?: SplatUpdate | undefined;
 }
 
-export interface SortAnswer<V extends Views = OrderView> extends SortRequest<V> {
+export interface SortAnswer<V extends Views = OrderView> extends Omit<SortRequest<V>, 'update'> {
   readonly count: number;
   /** Sum over the splats of the fraction of the image that each covers; 0 if it is not computed. */
   readonly covered: number;
@@ -32,7 +34,8 @@ export function sortSplats(port: MessagePort, positions: Float32Array, areas?: F
   const splats = new SplatOrder(positions, areas);
   port.onmessage = ({ data }: MessageEvent<SortRequest<Views> | Pick<SplatOrder, 'details'>>) => {
     if ('details' in data) return void (splats.details = data.details);
-    const { view, order } = data;
+    const { view, order, update } = data;
+    if (update) splats.replace(update);
     const begin = performance.now();
     const count = splats.sort(view, order);
     const { covered } = splats;

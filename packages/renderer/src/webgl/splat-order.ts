@@ -33,6 +33,11 @@ export interface OrderView {
   readonly levels?: LevelChoice | undefined;
 }
 
+/** Changes of a streamed scene: numbers, and the index of the first one among those of all splats or chunks. */
+export type SplatUpdate = Readonly<
+  Record<'positions' | 'details', readonly { readonly at: number; readonly numbers: Float32Array<ArrayBuffer> }[]>
+>;
+
 /** Returns the parameters for an order by depth. @param origin World position of the origin of the splat positions. */
 export function orderView(camera: Camera, origin: Vector3): OrderView {
   const { worldToCamera: m, near, far, width, height, fx, fy, cx, cy, orthographic = false } = camera;
@@ -112,6 +117,12 @@ export class SplatOrder {
     this.#depths = new Float32Array(this.#keys.buffer);
     this.#listed = new Uint32Array(count);
     this.#halfSorted = new Uint32Array(count);
+  }
+
+  /** Replaces some splats, and some rows of {@link details}. */
+  replace(update: SplatUpdate): void {
+    for (const { at, numbers } of update.positions) this.#positions.set(numbers, at);
+    for (const { at, numbers } of update.details) this.details?.set(numbers, at);
   }
 
   /**

@@ -1,0 +1,265 @@
+/** Pages of a streamed scene in the textures of WebGL, chosen on the CPU. */
+import { GaussianSplatError, length, type Camera, type Vector3 } from '@gaussian-splat/core';
+import { constants } from '../generated/shaders.js';
+import { DETAIL_NUMBERS, DETAIL_PLACES } from '../levels/chunk-detail.js';
+import { aheadMs, CameraMotion } from '../streaming/camera-motion.js';
+import { exactGeometry } from '../streaming/exact-slot.js';
+import { SLOT_CHUNKS } from '../streaming/manifest.js';
+import { ARRIVED } from '../streaming/page-rows.js';
+import { childrenIn, NONE } from '../streaming/page-list.js';
+import type { PageSource } from '../streaming/page-source.js';
+import { PageStreamer } from '../streaming/page-streamer.js';
+import { progressOf, type StreamProgress } from '../streaming/progress.js';
+import { Residency } from '../streaming/residency.js';
+import { chunkLayout, startOf, type SlotWords } from '../streaming/slot-words.js';
+import { TranslatedRows } from '../streaming/translated-rows.js';
+import { GEOMETRY_WORDS } from '../pack/words.js';
+import { GlGaussians, positionsIn, type RunGl } from './gl-gaussians.js';
+import { levelChoice, pixelsOf } from './level-choice.js';
+import type { SplatUpdate } from './splat-order.js';
+
+const { CULL_GROUP } = constants;
+const SLOT_SPLATS = SLOT_CHUNKS * CULL_GROUP;
+const DEFAULT_SPLATS = 1_000_000;
+/** Maximum number of slots of the pages that become visible with one order, unless a page has more. */
+const SLOTS_AT_ONCE = 16;
+/** Milliseconds between two requests for pages while the camera moves. */
+const REQUEST_MS = 50;
+const IN_PLACE: Vector3 = [0, 0, 0];
+const { sphere, error, fullError } = DETAIL_PLACES;
+
+/** Factors of page_feedback.wgsl: of the allowed error, and of pages near the image and of those far from it. */
+const [SOON, NEARBY, NEARBY_SIZE, UNSEEN] = [0.93, 0.25, 2, 0.0625];
+
+export interface GlStreamOptions {
+  /** Maximum number of splats on the GPU, of all levels. Default: one million. */
+  readonly maxSplats?: number;
+  /** Cancels the opening of the scene. Has no effect once it is open. */
+  readonly signal?: AbortSignal;
+  /** Called when another frame is required, because a page has arrived. */
+  readonly onChange?: () => void;
+  /** Called at the first failure of a page; its parent stays visible. It is requested again later. */
+  readonly onError?: (error: unknown) => void;
+}
+
+/** Splats of a slot that wait for the order that contains them. */
+interface Write {
+  readonly first: number;
+  readonly geometry: Uint32Array;
+  readonly sh: Uint32Array;
+}
+
+/**
+ * The resident pages of a scene. Their number of splats is fixed, so that memory and the time of a sort are bounded; within
+ * it the pages with the largest errors in pixels are resident. A page becomes visible with the next order of the splats.
+ */
+export class GlStream {
+  readonly gaussians: GlGaussians;
+  readonly #source: PageSource;
+  readonly #residency: Residency;
+  readonly #traffic: PageStreamer<readonly SlotWords[]>;
+  readonly #rows: TranslatedRows;
+  /** [C, 12] levels of all chunks, as the sorter has them. */
+  readonly #details: Float32Array<ArrayBuffer>;
+  readonly #motion = new CameraMotion();
+  #writes: Write[] = [];
+  #requestedAt = -Infinity;
+  /** Largest error in pixels of a missing page in the last view. */
+  #lacking = 0;
+
+  private constructor(
+    gl: WebGL2RenderingContext,
+    source: PageSource,
+    { onChange, onError, maxSplats = DEFAULT_SPLATS }: GlStreamOptions,
+    run: RunGl,
+  ) {
+    const { scene, list } = source;
+    const all = list.maxSlots ?? list.slots.reduce((sum, slots) => sum + slots, 0);
+    const slots = Math.min(all, Math.floor(maxSplats / SLOT_SPLATS));
+    if (slots < list.slots[0]) throw tooFew(SLOT_SPLATS * list.slots[0], maxSplats);
+    this.#source = source;
+    this.gaussians = run(() => new GlGaussians(gl, { ...scene, count: SLOT_SPLATS * slots, droppedCount: 0 }));
+    this.#residency = new Residency(list, slots, source.isCached);
+    this.#traffic = new PageStreamer(this.#residency, {
+      fetch: source.fetch,
+      onArrival: () => onChange?.(),
+      onError: (reason) => onError?.(reason),
+    });
+    this.#rows = new TranslatedRows(list, this.#residency, scene);
+    this.#details = new Float32Array(DETAIL_NUMBERS * SLOT_CHUNKS * slots);
+  }
+
+  /** Allocates textures, and fetches the coarsest page. Rejects as `GlHost.stream` does. */
+  static async open(
+    gl: WebGL2RenderingContext,
+    source: PageSource,
+    options: GlStreamOptions,
+    run: RunGl,
+  ): Promise<GlStream> {
+    const { signal = new AbortController().signal } = options;
+    signal.throwIfAborted();
+    const stream = new GlStream(gl, source, options, run);
+    try {
+      stream.#residency.begin(0);
+      const words = await source.fetch(0, signal);
+      signal.throwIfAborted();
+      stream.#settle(0, words);
+      return stream;
+    } catch (reason) {
+      stream.destroy();
+      throw reason;
+    }
+  }
+
+  /** Number of splats for which there is memory. */
+  get count(): number {
+    return this.gaussians.facts.count;
+  }
+
+  /** Whether pages have arrived that the next order can contain. */
+  get hasNews(): boolean {
+    return this.#writes.length > 0 || this.#traffic.waiting > 0;
+  }
+
+  /** The pages on the GPU, from the last request for pages, and what limits them. */
+  get progress(): StreamProgress {
+    const { slots, slotsInUse, chunks, lacksSlots } = this.#residency;
+    const { facts } = this.gaussians;
+    const slotBytes = 4 * (chunkLayout({ ...facts, geometry: undefined }).total * SLOT_CHUNKS);
+    return progressOf({
+      ...{ resident: slots.count, total: this.#source.list.count, coming: this.#traffic.underWay },
+      ...{ splats: chunks * CULL_GROUP, bytes: slotsInUse * slotBytes, error: this.#lacking, lacksSlots },
+    });
+  }
+
+  /** Requests the pages that a view needs, now or soon. @param allowed Maximum error, pixels. */
+  follow(camera: Camera, allowed: number): void {
+    const now = performance.now();
+    this.#motion.observe(camera, now);
+    if (now - this.#requestedAt < REQUEST_MS) return;
+    this.#requestedAt = now;
+    const later = this.#motion.ahead(aheadMs(this.#traffic.arrivalMs));
+    this.#residency.note(this.#requests(later === camera ? [camera] : [camera, later], allowed));
+    this.#traffic.follow();
+  }
+
+  /** Adds pages that have arrived, and returns what has changed for the sorter. Call {@link write} with its order. */
+  take(): SplatUpdate {
+    for (let slots = 0; slots < SLOTS_AT_ONCE;) {
+      const next = this.#traffic.next();
+      if (next === undefined) break;
+      slots += next.words.length;
+      if (!this.#settle(next.page, next.words)) this.#traffic.refused();
+    }
+    this.#traffic.sendForMore();
+    const details: SplatUpdate['details'][number][] = [];
+    this.#rows.flush(this.#residency.slots.pageIn.length, (slot, rows) => {
+      const at = DETAIL_NUMBERS * SLOT_CHUNKS * slot;
+      this.#details.set(rows, at);
+      details.push({ at, numbers: rows.slice() });
+    });
+    const positions = this.#writes.map(({ first, geometry }) => ({ at: 3 * first, numbers: positionsIn(geometry) }));
+    return { positions, details };
+  }
+
+  /** Uploads the splats of the last {@link take}. @returns Whether there were any. */
+  write(): boolean {
+    const writes = this.#writes;
+    this.#writes = [];
+    for (const { first, geometry, sh } of writes) this.gaussians.write(first, geometry, sh);
+    return writes.length > 0;
+  }
+
+  destroy(): void {
+    this.#traffic.close();
+    this.gaussians.destroy();
+  }
+
+  /** Makes a page resident. @returns False if there are no slots for it. */
+  #settle(page: number, parts: readonly SlotWords[]): boolean {
+    const place = this.#residency.settle(page);
+    if (place === undefined) return false;
+    const by = this.#source.translate?.(page) ?? IN_PLACE;
+    for (const evicted of place.left) this.#rows.leave(evicted.page, evicted.slots);
+    this.#rows.load(page, parts, by);
+    this.#rows.setArrived(page, ARRIVED);
+    const { scene } = this.#source;
+    const layout = chunkLayout(scene);
+    parts.forEach((words, k) => {
+      const geometry = new Uint32Array(GEOMETRY_WORDS * SLOT_SPLATS);
+      const own = exactGeometry(words, scene, layout, by);
+      geometry.set(own);
+      // A part of a slot without splats is not listed.
+      new Float32Array(geometry.buffer).fill(NaN, own.length);
+      const at = startOf(words, 'sh', layout);
+      const sh = words.words.subarray(at, at + layout.sh * words.chunks);
+      this.#writes.push({ first: SLOT_SPLATS * place.slots[k], geometry, sh });
+    });
+    return true;
+  }
+
+  /** Returns the errors in pixels of all missing pages, and at index 0 that of the first view, as page_feedback.wgsl does. */
+  #requests(cameras: readonly Camera[], allowed: number): Float32Array {
+    const { list } = this.#source;
+    const requests = new Float32Array(list.count);
+    const { slots } = this.#residency;
+    const { origin } = this.gaussians.facts;
+    const views = cameras.map((camera) => ({
+      choice: levelChoice(camera, origin, allowed),
+      sees: sightOf(camera, origin),
+    }));
+    const details = this.#details;
+    for (const page of slots.pages())
+      for (const [k, slot] of slots.of(page).entries())
+        for (const [chunk, child] of childrenIn(list, page, k).entries()) {
+          if (child === NONE) continue;
+          const at = DETAIL_NUMBERS * (SLOT_CHUNKS * slot + chunk);
+          for (const [n, { choice, sees }] of views.entries()) {
+            const pixels = pixelsOf(details, at + sphere, details[at + fullError], choice);
+            if (pixels <= SOON * allowed) continue;
+            const needed = pixels * sees(details, at + sphere);
+            requests[child] = Math.max(requests[child], needed);
+            const isMissing = n === 0 && details[at + error] === 0 && pixels > allowed;
+            if (isMissing) requests[0] = Math.max(requests[0], needed);
+          }
+        }
+    this.#lacking = requests[0];
+    return requests;
+  }
+}
+
+/** Returns a function that weights a sphere by its place: 1 in the image, less beside it. */
+function sightOf(camera: Camera, origin: Vector3): (numbers: Float32Array, at: number) => number {
+  const { worldToCamera: m, near, fx, fy, cx, cy, width, height, orthographic = false } = camera;
+  const rows = [0, 4, 8].map((row) => {
+    const axis: Vector3 = [m[row], m[row + 1], m[row + 2]];
+    return { axis, offset: axis[0] * origin[0] + axis[1] * origin[1] + axis[2] * origin[2] + m[row + 3] };
+  });
+  const size = length(rows[2].axis);
+  const sides = [
+    { low: -cx / fx, high: (width - cx) / fx },
+    { low: -cy / fy, high: (height - cy) / fy },
+  ];
+  return (numbers, at) => {
+    const [x, y, z] = [numbers[at], numbers[at + 1], numbers[at + 2]];
+    const [across, down, depth] = rows.map(({ axis, offset }) => axis[0] * x + axis[1] * y + axis[2] * z + offset);
+    const radius = numbers[at + 3] * size;
+    if (depth + radius < near) return UNSEEN;
+    const reaches = (factor: number): boolean =>
+      sides.every(({ low, high }, k) => {
+        const [middle, half] = [(low + high) / 2, (factor * (high - low)) / 2];
+        const scale = orthographic ? 1 : Math.max(0, depth);
+        const wide = orthographic ? 1 : Math.hypot(1, Math.abs(middle) + half);
+        return Math.abs([across, down][k] - middle * scale) <= half * scale + radius * wide;
+      });
+    return reaches(1) ? 1 : reaches(NEARBY_SIZE) ? NEARBY : UNSEEN;
+  };
+}
+
+const tooFew = (needed: number, found: number): GaussianSplatError =>
+  new GaussianSplatError('out-of-memory/budget', {
+    where: 'GlHost.stream(): maxSplats',
+    expected: `at least ${needed} for the coarsest page`,
+    found: String(found),
+    remedy: 'raise maxSplats',
+  });
