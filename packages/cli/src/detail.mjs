@@ -2,7 +2,18 @@
  * Implementation of `gaussian-splat detail`: reads a scene of any size, builds its levels of detail by cells, and writes
  * them as pages with a manifest.
  */
-import { existsSync, mkdirSync, readdirSync, readFileSync, rmdirSync, rmSync, statSync, writeFileSync } from 'node:fs';
+import {
+  existsSync,
+  linkSync,
+  mkdirSync,
+  mkdtempSync,
+  readdirSync,
+  readFileSync,
+  rmdirSync,
+  rmSync,
+  statSync,
+  writeFileSync,
+} from 'node:fs';
 import { join, resolve } from 'node:path';
 import { deviceDescriptor, pickInitialVariants } from '@gaussian-splat/renderer';
 import { lossesIn } from '@gaussian-splat/optimize';
@@ -21,6 +32,7 @@ import {
   finishBuild,
   isUnfinished,
   joinParts,
+  middleTree,
   openBuild,
   parseMemory,
   UNFINISHED,
@@ -30,7 +42,7 @@ import {
 import { inputsOf } from './lib/detail/inputs.mjs';
 import { deflate, deflateQuickly } from './lib/encoders.mjs';
 import { dealViews, parseViews } from './lib/given-views.mjs';
-import { obstacleToFolder, writeWhole } from './lib/output-file.mjs';
+import { obstacleToFolder } from './lib/output-file.mjs';
 
 const USAGE = `usage: gaussian-splat detail SCENE --out FOLDER [options]
 
@@ -111,7 +123,7 @@ function parseOptions(args) {
     memory: parseMemory(values.memory),
     part: values.part === undefined ? undefined : parsePart(values.part),
     isJoining: values.join === true,
-    isMeasuring: values['min-psnr'] !== undefined || views !== undefined,
+    isMeasuring: values['min-psnr'] !== undefined,
   };
 }
 
@@ -139,31 +151,54 @@ async function deviceToMeasure() {
   }
 }
 
-/** Coding of the files of a scene in one tree, and its accuracy. */
-async function measuredCoding({ tree, cloud, minPsnr, scored, views }) {
+/**
+ * Coding of the files of a scene, and its accuracy, measured in a tree.
+ * @param isPart Whether the scene has other trees.
+ */
+async function measuredCoding({ tree, cloud, minPsnr, scored, views, isPart }) {
   const device = await deviceToMeasure();
-  if (device === undefined) return { coding: codingFor(DEFAULT_STEPS, tree), deflate };
+  const all = isPart ? undefined : tree;
+  if (device === undefined) return { coding: codingFor(DEFAULT_STEPS, all), deflate };
   const { steps, ...found } = await findPageSteps({
     ...{ tree, pages: cutPages(tree), cloud, device, minPsnr, scored, views, deflate: deflateQuickly },
     onStep: (step) => console.log(`  ${step}`),
   });
-  return { coding: codingFor(steps, tree), deflate, ...found };
+  return { coding: codingFor(steps, all), deflate, ...found };
 }
 
-/** File of an unfinished build with the coding of a scene of one cell, and its accuracy. */
+/** File of an unfinished build with the measured coding of the scene, and its accuracy. */
 const CODING = 'coding.json';
 
-/** Returns the function that `buildPart` calls for the coding of a cell. Cells of a larger scene have the usual one. */
-function codingOf(build, { minPsnr, scored, given }) {
+/**
+ * Returns the function that `buildPart` calls for the coding of a cell. That of several cells is measured in the middle of
+ * the scene, by the first part that needs it, if `--min-psnr` asks for it.
+ */
+function codingOf(build, { minPsnr, scored, given, isMeasuring }) {
   const { cells, folder, spool } = build;
-  if (minPsnr === undefined || cells.count > 1) return async () => usualCoding(minPsnr);
-  return async (tree, cloud) => {
+  const isPart = cells.count > 1;
+  if (minPsnr === undefined || (isPart && !isMeasuring)) return async () => usualCoding(minPsnr);
+  return async (...cell) => {
+    if (isPart && existsSync(join(folder, CODING))) return chosenCoding(build, minPsnr);
+    const [tree, cloud] = isPart ? Object.values(middleTree(build)) : cell;
     const views = given && dealViews(given.views, given.path, spool.turn).dealt;
-    const choice = await measuredCoding({ tree, cloud, minPsnr, scored, views });
+    const choice = await measuredCoding({ tree, cloud, minPsnr, scored, views, isPart });
     const { coding, psnr, worstPsnr } = choice;
-    writeWhole(join(folder, CODING), JSON.stringify({ coding, psnr, worstPsnr }));
-    return choice;
+    putOnce(join(folder, CODING), JSON.stringify({ coding, psnr, worstPsnr }));
+    return isPart ? chosenCoding(build, minPsnr) : choice;
   };
+}
+
+/** Writes a file, unless another part has done it meanwhile: two GPUs may choose differently. */
+function putOnce(path, content) {
+  const own = mkdtempSync(`${path}-`);
+  writeFileSync(join(own, CODING), content);
+  try {
+    linkSync(join(own, CODING), path);
+  } catch (error) {
+    if (error.code !== 'EEXIST') throw error;
+  } finally {
+    rmSync(own, { recursive: true });
+  }
 }
 
 /** Returns the coding that the parts of a build have had. */
@@ -198,7 +233,7 @@ async function main(options) {
   if (existsSync(out) && !existsSync(join(out, UNFINISHED)))
     rmSync(join(out, 'pages'), { recursive: true, force: true });
   const start = performance.now();
-  const facts = [minPsnr ?? null, scored, given?.views ?? null];
+  const facts = [minPsnr ?? null, scored, given?.views ?? null, isMeasuring];
   const build = await openBuild(out, inputs, { degree, geometry, memory, facts });
   const { cells, spool } = build;
   sayWarnings(scene, spool, lossesIn('detail.json', { ...spool.rule, warnings: spool.warnings }));
@@ -206,9 +241,9 @@ async function main(options) {
     console.log(
       `${spool.count} splats in ${cells.count} cells of ${cells.range(0).end}, for ${gigabytes(memory)} of memory`,
     );
-  if (isMeasuring && cells.count > 1)
+  if (given && cells.count > 1)
     throw new UsageError(
-      '--min-psnr, --views: expected a scene that fits into --memory, because it is measured as a whole. Without them its files have about 45 to 50 dB',
+      '--views: expected a scene that fits into --memory, because views are of the whole scene. With --min-psnr alone, a part of it is measured',
     );
   const isTiled = columns * rows > 1;
   let manifest = isTiled ? await writeCopies(build, options) : undefined;
@@ -233,7 +268,7 @@ async function main(options) {
   );
   if (choice?.psnr !== undefined)
     console.log(
-      `${choice.psnr.toFixed(2)} dB to the scene in held-out views together, ${choice.worstPsnr.toFixed(2)} dB in the worst`,
+      `${choice.psnr.toFixed(2)} dB to ${cells.count > 1 ? 'the middle of the scene' : 'the scene'} in held-out views together, ${choice.worstPsnr.toFixed(2)} dB in the worst`,
     );
   if (choice?.psnr < minPsnr)
     console.log(

@@ -66,6 +66,23 @@ export function wholeTree({ folder, spool, cells }) {
   return { tree: { ...cells.build(spool.plan, cloud), splats: spool.count }, cloud };
 }
 
+/** Merges of the run in which the coding of a scene of several cells is measured, of 65,536 splats. */
+const MEASURED_MERGES = 4;
+
+/** Returns the tree of the run in the middle of a scene of several cells, and its splats. */
+export function middleTree({ folder, spool, cells }) {
+  const merges = Math.min(MEASURED_MERGES, cells.merges);
+  const runs = new SceneCells(cells.counts[0], merges);
+  const run = runs.count >> 1;
+  const own = mkdtempSync(join(folder, 'middle-'));
+  const reader = splatsOfPart(spool, own, { first: run, end: run + 1, ...sizeOfCells(runs) });
+  const { first, end } = runs.range(run);
+  const cloud = reader.read(first, end);
+  rmSync(own, { recursive: true });
+  const tree = new SceneCells(cloud.count, merges).build(spool.plan, cloud);
+  return { tree: { ...tree, splats: cloud.count }, cloud };
+}
+
 const sizeOfCells = ({ merges }) => ({ cellSplats: SceneCells.splatsOf(merges) });
 
 /**
@@ -137,7 +154,7 @@ export function finishBuild({ out, folder }, manifest) {
   rmSync(folder, { recursive: true });
 }
 
-/** Coding of the files of a scene that is too large to be measured. */
+/** Coding of the files of a scene of several cells that is not measured. */
 export const usualCoding = (minPsnr) => minPsnr && { coding: codingFor(DEFAULT_STEPS), deflate };
 
 /** Whether a folder contains what an interrupted build leaves, and nothing else. */
