@@ -19,7 +19,6 @@ const SCRIPTS = [
   'examples/features/features.js',
   'gallery/scene.js',
   'gallery/wall.js',
-  'map/map.js',
   'playground/playground.js',
   'three/three.js',
   'three-webgl/three-webgl.js',
@@ -168,7 +167,16 @@ async function buildDemo() {
   const options = { outdir: to, outbase: from, bundle: true, format: 'esm', minify: true, logLevel: 'warning' };
   // Code that a page loads later is a separate script.
   await build({ ...options, entryPoints: SCRIPTS.map((name) => join(from, name)), external: ['./run.js'] });
-  await build({ ...options, entryPoints: [join(from, 'home.js')], splitting: true, chunkNames: 'home/[name]-[hash]' });
+  for (const [name, folder] of [
+    ['home.js', 'home'],
+    ['map/map.js', 'map'],
+  ])
+    await build({
+      ...options,
+      entryPoints: [join(from, name)],
+      splitting: true,
+      chunkNames: `${folder}/[name]-[hash]`,
+    });
 }
 
 /** Vite builds the apps from the bundle's production output. */
