@@ -290,3 +290,17 @@ test('requests for parts of one file have one worker, also if it is busy or othe
     ],
   );
 });
+
+test('nodes of a tree are spread over as many workers as the machine has cores', async (context) => {
+  const { pool, workers } = poolOf(context);
+  const node = { type: 'node', request: { url: 'tile.glb' } } as unknown as WorkerRequest;
+  const ask = (): void => void pool.run(node, signal, never).catch(() => undefined);
+  for (let count = 0; count < 12; count++) {
+    ask();
+    await settle();
+  }
+  assert.deepEqual(
+    workers.map(({ reads }) => reads.length),
+    [4, 4, 4],
+  );
+});

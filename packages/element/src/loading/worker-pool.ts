@@ -41,6 +41,9 @@ const GRACE_MS = 500;
  */
 const MAX_WORKERS = 8;
 const MAX_NEW_WORKERS = 8;
+/** Number of nodes of a tree that wait in one worker before another starts, and maximum number of workers for nodes. */
+const NODES_AT_ONCE = 3;
+const MAX_NODE_WORKERS = 6;
 /**
  * Maximum number of restarts of a load. Several restarts are allowed, because a load may share workers with scenes that
  * never finish.
@@ -152,7 +155,15 @@ export class WorkerPool {
     if (late && !slots.some(({ isReady }) => isReady)) return void this.#doWithout(late, job);
     const isFree = (slot: WorkerSlot, max: number): boolean => slot.missed < max && slot.mayTake(job);
     const keeper = this.#keepers.get(job.keeper);
-    const free = keeper && isFree(keeper, SILENT) ? keeper : slots.find((slot) => isFree(slot, BUSY));
+    const ready = slots.filter((slot) => isFree(slot, BUSY));
+    // A worker unpacks a node much longer than it waits for its bytes, so nodes are spread over workers.
+    const isNode = job.request.type === 'node';
+    if (isNode) ready.sort((a, b) => a.jobs.size - b.jobs.size);
+    const isFull =
+      isNode &&
+      ready[0]?.jobs.size >= NODES_AT_ONCE &&
+      slots.length < Math.min(MAX_NODE_WORKERS, navigator.hardwareConcurrency);
+    const free = keeper && isFree(keeper, SILENT) ? keeper : isFull ? undefined : ready[0];
     const slot = free ?? (this.#mayStart(job) ? this.#start() : undefined);
     // No worker could be created, which `#start` has reported.
     if (this.#isRefused) return job.resolve(job.here(job.request));
