@@ -57,14 +57,16 @@ async function bothForms(): Promise<{ readable: Stage[]; short: Stage[] }> {
   const plugin = shortShaders();
   plugin.buildStart();
   const [readable, short]: [Stage[], Stage[]] = [[], []];
+  const copyOf = (file: string): string => join(folder, basename(dirname(dirname(dirname(file)))), basename(file));
+  // Shader files import one another: all short ones are in place before the first is loaded.
+  for (const file of SHADER_FILES) cpSync(dirname(file), dirname(copyOf(file)), { recursive: true });
   for (const file of SHADER_FILES) {
     const { code } = plugin.transform(readFileSync(file, 'utf8'), file)!;
-    const own = join(folder, basename(dirname(dirname(dirname(file)))));
-    cpSync(dirname(file), own, { recursive: true });
     // Shaders of optimize import their shared pieces from the renderer's.
-    const copy = join(own, basename(file));
-    writeFileSync(copy, code.replace('@gaussian-splat/renderer/stages', '../renderer/shaders.js'));
-    short.push(...stagesIn((await import(pathToFileURL(copy).href)) as object));
+    writeFileSync(copyOf(file), code.replace('@gaussian-splat/renderer/stages', '../renderer/shaders.js'));
+  }
+  for (const file of SHADER_FILES) {
+    short.push(...stagesIn((await import(pathToFileURL(copyOf(file)).href)) as object));
     readable.push(...stagesIn((await import(pathToFileURL(file).href)) as object));
   }
   return { readable, short };
@@ -72,7 +74,9 @@ async function bothForms(): Promise<{ readable: Stage[]; short: Stage[] }> {
 
 const forms = await bothForms();
 
-const scan = (code: string): Token[] => new WgslScanner(code).scanTokens();
+/** wgsl_reflect takes `]-1` for a bracket and a negative number. */
+const spaced = (code: string): string => code.replace(/(?<=[\w\])])(?<!\b[\da-fx.]+[ep])-(?=[\d.])/g, '- ');
+const scan = (code: string): Token[] => new WgslScanner(spaced(code)).scanTokens();
 
 /** Words in attributes belong to the language: those behind `@`, and behind `@builtin(`. */
 function isOfAttribute(tokens: readonly Token[], at: number): boolean {
@@ -125,7 +129,7 @@ test('token by token they are the same except for names, each has one other, and
 
 test('bindings are where they were', () => {
   forms.short.forEach(({ name, bindings, code }) => {
-    const { uniforms, storage, textures } = new WgslReflect(code);
+    const { uniforms, storage, textures } = new WgslReflect(spaced(code));
     const found = [...uniforms, ...storage, ...textures].map(({ binding }) => binding).sort((a, b) => a - b);
     const expected = Object.values(bindings).map(({ binding }) => binding);
     assert.deepEqual(
