@@ -37,6 +37,24 @@ test('splats of a dense body that turns are followed, though each passes many ot
   assert.equal(cutTracks(followSplats([0, 1, 2].map(spin))).count, 20_000);
 });
 
+test('limbs that move farther than splats are apart are followed by the order of the frames', () => {
+  const random = seededRandom(5);
+  const splats = Array.from({ length: 20_000 }, () => ({
+    position: [random.uniform(0, 4), random.uniform(0, 0.02), random.uniform(0, 4)] as [number, number, number],
+    color: [random.uniform(0, 1), random.uniform(0, 1), random.uniform(0, 1)] as const,
+    ...{ opacity: 0.9, scale: random.uniform(0.01, 0.1) },
+  }));
+  const frames = [0, 0.2, 0.4].map((step) =>
+    cloudOf(
+      splats.map((splat, i) => {
+        const [x, y, z] = splat.position;
+        return { ...splat, position: [i % 20 === 0 ? x + step : x, y, z] as const };
+      }),
+    ),
+  );
+  assert.equal(cutTracks(followSplats(frames)).count, 20_000);
+});
+
 test('a splat that jumps in its short life does not make the motion of all others coarser', () => {
   const [rows, frames, step] = [300, 50, 0.0003];
   const random = seededRandom(3);

@@ -22,6 +22,8 @@ const SAME_NUMBERS = 0.9;
 const ALIKE = 0.02;
 /** Number of splats that determine these medians. */
 const SAMPLED = 2000;
+/** Fraction of the frame's extent that a splat may move between frames if its index identifies it: others begin anew. */
+const MAX_JUMP = 1 / 16;
 /** Multiple of the median {@link lookCost} above which a pair is doubtful. */
 const DOUBT = 9;
 const MIN_DOUBT = 0.1;
@@ -196,9 +198,29 @@ function byNumber(before: Features, next: Features, unit: number): Int32Array | 
     const found = Int32Array.from({ length: next.count }, (_, i) => (isSame(i) ? i : -1));
     return whichOf(found, (i) => i >= 0).length >= SAME_NUMBERS * next.count ? found : undefined;
   };
-  const inPlace = matched((i) => costOf(before, i, next, i, unit) <= MAX_COST);
-  if (inPlace || !looksFollowNumbers(before, next)) return inPlace;
-  return matched((i) => steadyCost(before, i, next, i) <= MAX_COST);
+  const isNamed = looksFollowNumbers(before, next);
+  const reach = MAX_JUMP * extentOf(next.positions);
+  const isNear = (i: number): boolean => distanceOf(before, next, i) <= reach;
+  const alike = (i: number): boolean => isNamed && steadyCost(before, i, next, i) <= MAX_COST;
+  // Limbs move farther in a frame than most splats are apart.
+  return matched((i) => costOf(before, i, next, i, unit) <= MAX_COST || (alike(i) && isNear(i))) ?? matched(alike);
+}
+
+const distanceOf = (a: Features, b: Features, i: number): number =>
+  Math.hypot(...[0, 1, 2].map((k) => a.positions[3 * i + k] - b.positions[3 * i + k]));
+
+/** Returns the largest side of the box around positions. */
+function extentOf(positions: Float32Array): number {
+  let side = 0;
+  for (let axis = 0; axis < 3; axis++) {
+    let [low, high] = [Infinity, -Infinity];
+    for (let k = axis; k < positions.length; k += 3) {
+      low = Math.min(low, positions[k]);
+      high = Math.max(high, positions[k]);
+    }
+    side = Math.max(side, high - low);
+  }
+  return side;
 }
 
 /** Returns the cost of different colors, sizes and opacities, which do not change if a body turns. */
