@@ -22,7 +22,7 @@ const SAME_NUMBERS = 0.9;
 const ALIKE = 0.02;
 /** Number of splats that determine these medians. */
 const SAMPLED = 2000;
-/** Fraction of the frame's extent that a splat may move between frames if its index identifies it: others begin anew. */
+/** Fraction of the frame's extent that a splat may move between frames if its index identifies it. Others begin a new track. */
 const MAX_JUMP = 1 / 16;
 /** Multiple of the median {@link lookCost} above which a pair is doubtful. */
 const DOUBT = 9;
