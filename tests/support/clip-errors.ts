@@ -8,7 +8,6 @@
  * --min-psnr DB target (default 45); --max-mbps RATE: most megabits a second
  * --views N     views of each frame that judge the result (default 24)
  * --jobs N      clips at a time (default 1)
- * --seconds N   time for each clip (default 3600): one that takes longer has the row `{"clip", "ended"}`
  * --coded FILE  judges this clip, in place of encoding one
  * --cpu         draws by plain code, 120 x 67 pixels: quicker than a software GPU for few splats
  * --write DIR   writes the frames as PLY files with a frames.json, for `gaussian-splat sequence`, and no clip
@@ -45,7 +44,7 @@ const { values } = parseArgs({
   options: {
     ...{ only: text(Object.keys(MADE_CLIPS).slice(0, 10).join()), splats: text('20000'), frames: text('40') },
     ...{ 'per-file': optional, 'min-psnr': text('45'), 'max-mbps': optional, views: text('24'), jobs: text('1') },
-    ...{ seconds: text('3600'), write: optional, coded: optional, cpu: { type: 'boolean', default: false } },
+    ...{ write: optional, coded: optional, cpu: { type: 'boolean', default: false } },
     // A process that another one started has its clip, or some frames to write.
     ...{ clip: optional, part: optional },
   },
@@ -56,11 +55,11 @@ if (values.clip !== undefined) await (values.part ? writeFrames(values.clip, Num
 else if (values.write !== undefined) await writeAll(values.only, values.write);
 else await judgeAll(values.only.split(','));
 
-/** Starts this file again with options of its own; resolves with its status, null if its time is over. */
+/** Starts this file again with options of its own; resolves with its status. */
 function started(own: Record<string, string>): Promise<number | null> {
   const given = Object.entries({ ...values, ...own }).filter(([, value]) => value !== false);
   const words = given.map(([name, value]) => (value === true ? `--${name}` : `--${name}=${value}`));
-  const child = fork(fileURLToPath(import.meta.url), words, { timeout: 1000 * Number(values.seconds) });
+  const child = fork(fileURLToPath(import.meta.url), words);
   return new Promise((done) => child.on('exit', (status) => done(status)));
 }
 
@@ -69,7 +68,7 @@ async function judgeAll(names: readonly string[]): Promise<void> {
   const next = async (): Promise<void> => {
     for (let clip = rest.shift(); clip; clip = rest.shift()) {
       const status = await started({ clip });
-      if (status !== 0) console.log(JSON.stringify({ clip, ended: status === null ? 'its time was over' : status }));
+      if (status !== 0) console.log(JSON.stringify({ clip, ended: status }));
     }
   };
   await Promise.all(Array.from({ length: jobs }, next));
@@ -107,17 +106,15 @@ async function judge(clip: string): Promise<void> {
 }
 
 async function encoded(clip: string, frameOf: FrameOf, draw: DrawFrame) {
-  const begin = performance.now();
-  const time = (): number => (performance.now() - begin) / 1000;
   const coded = await codeClip({
     ...{ frameCount: frames, framesPerSecond: FRAMES_PER_SECOND, framesPerGroup: Number(values['per-file'] ?? frames) },
     ...{ minPsnr: Number(values['min-psnr']), draw, encodeWebp },
     maxMbps: values['max-mbps'] === undefined ? undefined : Number(values['max-mbps']),
     openFrame: (frame) => Promise.resolve(frameOf(frame)),
-    onStep: (step) => console.error(`${time().toFixed(0)} s, ${clip}: ${step}`),
+    onStep: (step) => console.error(`${clip}: ${step}`),
   });
   const { bytes, worstPsnr: printed, worstViewPsnr: printedView, psnr: printedMean, still, passing } = coded;
-  return { ...{ bytes, printed, printedView, printedMean, still, passing }, seconds: time() };
+  return { bytes, printed, printedView, printedMean, still, passing };
 }
 
 /** Returns the errors of each frame, in each view that shows something. */
@@ -144,13 +141,13 @@ async function drawOnGpu(): Promise<DrawFrame> {
   return drawOn(device);
 }
 
-/** Draws views at a quarter of their size, and those for scouting at half of it. */
+/** Draws views at a quarter of their size. */
 async function drawPlainly(...[frame, views]: Parameters<DrawFrame>): ReturnType<DrawFrame> {
   const small = views.map((view): Camera => {
-    const share = view.width > 160 ? 0.25 : 0.5;
-    const [fx, fy, cx, cy] = [view.fx, view.fy, view.cx, view.cy].map((value) => share * value);
-    const [width, height] = [view.width, view.height].map((value) => Math.floor(share * value));
-    return { ...view, width, height, fx, fy, cx, cy };
+    const [width, height, fx, fy, cx, cy] = [view.width, view.height, view.fx, view.fy, view.cx, view.cy].map(
+      (value) => value / 4,
+    );
+    return { ...view, fx, fy, cx, cy, width: Math.floor(width), height: Math.floor(height) };
   });
   const references = await cpuPainter.draw(frame, small);
   return {

@@ -177,11 +177,11 @@ function codingOf(build, { minPsnr, scored, given, isMeasuring }) {
   const { cells, folder, spool } = build;
   const isPart = cells.count > 1;
   if (minPsnr === undefined || (isPart && !isMeasuring)) return async () => usualCoding(minPsnr);
-  return async (...cell) => {
+  return async (tree, cloud) => {
     if (isPart && existsSync(join(folder, CODING))) return chosenCoding(build, minPsnr);
-    const [tree, cloud] = isPart ? Object.values(middleTree(build)) : cell;
     const views = given && dealViews(given.views, given.path, spool.turn).dealt;
-    const choice = await measuredCoding({ tree, cloud, minPsnr, scored, views, isPart });
+    const measured = isPart ? middleTree(build) : { tree, cloud };
+    const choice = await measuredCoding({ ...measured, minPsnr, scored, views, isPart });
     const { coding, psnr, worstPsnr } = choice;
     putOnce(join(folder, CODING), JSON.stringify({ coding, psnr, worstPsnr }));
     return isPart ? chosenCoding(build, minPsnr) : choice;

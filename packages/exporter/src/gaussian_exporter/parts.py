@@ -17,27 +17,11 @@ from onnx import helper, numpy_helper
 
 from .errors import ExportError
 from .graph import ALIASES, MAX_CONCAT_INPUTS
+from .part_axes import SUMS, Axes, split_axes, summed_axes
 
 # maxStorageBufferBindingSize of a WebGPU device with default limits, in bytes.
 LIMIT = 128 << 20
 Range = tuple[int, int]
-# For each input, by its index, the axis that is split with an axis of the output.
-Axes = dict[int, int]
-
-_ELEMENTWISE = frozenset(
-    (
-        *("Abs", "Add", "And", "BiasGelu", "Cast", "Ceil", "Clip"),
-        *("Cos", "Div", "Elu", "Equal", "Erf", "Exp", "Expand"),
-        *("FastGelu", "Floor", "Gelu", "Greater", "GreaterOrEqual", "HardSigmoid", "LeakyRelu"),
-        *("Less", "LessOrEqual", "Log", "Max", "Min", "Mul", "Neg"),
-        *("Not", "Or", "Pow", "PRelu", "QuickGelu", "Reciprocal", "Relu"),
-        *("Sigmoid", "Sin", "Softplus", "Sqrt", "Sub", "Tanh", "Where"),
-    )
-)
-# Operators that compute each channel (axis 1) alone: the number of inputs after the first that have one row for each.
-_BY_CHANNEL = {"MaxPool": 0, "AveragePool": 0, "GlobalAveragePool": 0, "Resize": 0, "InstanceNormalization": 2}
-# Reductions, with the operator that joins those of two parts.
-_SUMS = {"ReduceSum": "Add", "ReduceMax": "Max", "ReduceMin": "Min"}
 
 
 @dataclass(frozen=True)
@@ -221,7 +205,7 @@ class _Splitter:
             return self._reshaped(node)
         if node.op_type == "Slice" and (parts := self._sliced(node)) is not None:
             return parts
-        summed, axes, dims = self._summed(node, given), self._axes(node, given), self.dims(output)
+        summed, axes, dims = summed_axes(node, given, self), split_axes(node, given, self), self.dims(output)
         parted = [(i, self.parted[name]) for i, name in enumerate(node.input) if name in self.parted]
         heavy = [i for i, name in enumerate(node.input) if name in self.stored and self.size(name) > self.limit]
         inner = next((parts for i, parts in parted if summed.get(i) == parts.axis), None)
@@ -313,79 +297,8 @@ class _Splitter:
             terms.append(self._again(node, parts if k == 0 else parts[:2], **changes))
         total = terms[0]
         for term in terms[1:]:
-            total = self._add(_SUMS.get(node.op_type, "Add"), [total, term])
+            total = self._add(SUMS.get(node.op_type, "Add"), [total, term])
         return total
-
-    def _summed(self, node: onnx.NodeProto, given: Mapping[str, Any]) -> Axes:
-        """Axes of the inputs over which the operator sums, if partial sums can be added."""
-        kind = node.op_type
-        if kind == "MatMul" and min(len(self.dims(name)) for name in node.input) > 1:
-            return {i: len(self.dims(name)) - (1, 2)[i] for i, name in enumerate(node.input)}
-        if kind == "Gemm":
-            return {0: 0 if given.get("transA") else 1, 1: 1 if given.get("transB") else 0}
-        if kind in ("Conv", "ConvTranspose") and given.get("group", 1) == 1:
-            return {0: 1, 1: 1 if kind == "Conv" else 0}
-        if kind in _SUMS and len(axes := self._reduced_axes(node, given)) == 1:
-            return {0: axes[0]}
-        return {}
-
-    def _reduced_axes(self, node: onnx.NodeProto, given: Mapping[str, Any]) -> list[int]:
-        rank = len(self.dims(node.input[0]))
-        axes = given.get("axes", range(rank))
-        if len(node.input) > 1 and node.input[1] in self.stored:
-            axes = numpy_helper.to_array(self.stored[node.input[1]]).reshape(-1)
-        return [int(axis) % rank for axis in axes]
-
-    def _axes(self, node: onnx.NodeProto, given: Mapping[str, Any]) -> dict[int, Axes]:
-        """For each axis of the result that can be split: the axes of inputs that are split with it."""
-        kind, rank = node.op_type, len(self.dims(node.output[0]))
-        ranks = [len(self.dims(name)) if name else 0 for name in node.input]
-        named = [i for i, name in enumerate(node.input) if name and not (kind == "Expand" and i)]
-        own = {k: {i: k - rank + ranks[i] for i in named if k - rank + ranks[i] >= 0} for k in range(rank)}
-        broadcast = {k: {i: j for i, j in each.items() if self.dims(node.input[i])[j] != 1} for k, each in own.items()}
-        if kind in _ELEMENTWISE:
-            return broadcast
-        if kind == "MatMul" and min(ranks) > 1:
-            return {**broadcast, rank - 2: {0: ranks[0] - 2}, rank - 1: {1: ranks[1] - 1}}
-        if kind == "Gemm":
-            bias = {i: ranks[2] - 2 + i for i in range(2) if len(ranks) > 2 and ranks[2] - 2 + i >= 0}
-            added = [
-                {2: j} if (j := bias.get(i)) is not None and self.dims(node.input[2])[j] > 1 else {} for i in (0, 1)
-            ]
-            return {
-                0: {0: 1 if given.get("transA") else 0, **added[0]},
-                1: {1: 0 if given.get("transB") else 1, **added[1]},
-            }
-        if kind in ("Conv", "ConvTranspose"):
-            group, bias = given.get("group", 1), {2: 0} if len(ranks) > 2 else {}
-            if group == 1:
-                return {1: {1: 0 if kind == "Conv" else 1, **bias}}
-            is_depthwise = kind == "Conv" and group == self.dims(node.input[0])[1] == self.dims(node.output[0])[1]
-            return {1: {0: 1, 1: 0, **bias}} if is_depthwise else {}
-        if kind in _BY_CHANNEL and not (kind == "Resize" and len(ranks) > 3):
-            return {1: {0: 1, **{i + 1: 0 for i in range(_BY_CHANNEL[kind])}}}
-        if kind in ("Softmax", "LayerNormalization"):
-            axis = int(given.get("axis", -1)) % rank
-            return {k: {0: k} for k in range(rank) if (k != axis if kind == "Softmax" else k < axis)}
-        if kind == "Transpose":
-            return {k: {0: int(j)} for k, j in enumerate(given.get("perm", range(rank)[::-1]))}
-        if kind.startswith("Reduce"):
-            gone = self._reduced_axes(node, given)
-            if given.get("keepdims", 1):
-                return {k: {0: k} for k in range(rank) if k not in gone}
-            return {k: {0: j} for k, j in enumerate(j for j in range(ranks[0]) if j not in gone)}
-        if kind == "Concat":
-            return {k: dict.fromkeys(range(len(ranks)), k) for k in range(rank)}
-        if kind == "Slice" and len(ranks) > 3 and node.input[3] in self.stored:
-            cut = [int(axis) % rank for axis in numpy_helper.to_array(self.stored[node.input[3]]).reshape(-1)]
-            return {k: {0: k} for k in range(rank) if k not in cut}
-        if kind == "Gather":
-            axis = int(given.get("axis", 0)) % ranks[0]
-            inside = range(axis, axis + ranks[1])
-            return {k: {1: k - axis} if k in inside else {0: k if k < axis else k - ranks[1] + 1} for k in range(rank)}
-        if kind == "GridSample":
-            return {1: {0: 1}, **{k: {1: k - 1} for k in range(2, rank)}}
-        return {}
 
     def _appended(self, node: onnx.NodeProto, axis: int) -> Parts:
         """Inputs one after the other along the axis of the parts."""

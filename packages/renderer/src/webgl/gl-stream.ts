@@ -18,7 +18,7 @@ import { GlGaussians, positionsIn, type RunGl } from './gl-gaussians.js';
 import { levelChoice, pixelsOf } from './level-choice.js';
 import type { SplatUpdate } from './splat-order.js';
 
-const { CULL_GROUP } = constants;
+const { CULL_GROUP, NEARBY, NEARBY_SIZE, SOON, UNSEEN } = constants;
 const SLOT_SPLATS = SLOT_CHUNKS * CULL_GROUP;
 const DEFAULT_SPLATS = 1_000_000;
 /** Maximum number of slots of the pages that become visible with one order, unless a page has more. */
@@ -27,9 +27,6 @@ const SLOTS_AT_ONCE = 16;
 const REQUEST_MS = 50;
 const IN_PLACE: Vector3 = [0, 0, 0];
 const { sphere, error, fullError } = DETAIL_PLACES;
-
-/** Factors of page_feedback.wgsl: of the allowed error, and of pages near the image and of those far from it. */
-const [SOON, NEARBY, NEARBY_SIZE, UNSEEN] = [0.93, 0.25, 2, 0.0625];
 
 export interface GlStreamOptions {
   /** Maximum number of splats on the GPU, of all levels. Default: one million. */
