@@ -317,7 +317,7 @@ describe('RAD', () => {
     const compared = async (): Promise<number> => psnr(await pixelsOf(element), await pixelsOf(reference));
     // On a busy machine the GPU's answer for the new view may follow the requests of the old one by many frames.
     let decibels = await compared();
-    for (let rounds = 0; decibels <= 55 && rounds < 10; rounds++) {
+    for (let rounds = 0; decibels <= 55 && rounds < 100; rounds++) {
       await calm(element, served);
       decibels = await compared();
     }
