@@ -1,6 +1,6 @@
 /**
  * `npm run build`: shaders to typed constants, TypeScript to packages, the CDN bundle, the element's data for editors, and the demo as a static site.
- * `npm run build -- --element` ends with the CDN bundle: all that a separate page needs, in half of the time; `-- --packages` with the packages, which most tests of Node need. `-- --docs` adds the API reference of renderer, formats, generator and three to the site, in 20 seconds.
+ * `npm run build -- --element` ends with the CDN bundle: all that a separate page needs, in half of the time; `-- --packages` with the packages, which most tests of Node need; `-- --rest` is all that follows these. `-- --docs` adds the API reference of renderer, formats, generator and three to the site, in 20 seconds.
  */
 import { copyFileSync, cpSync, existsSync, readdirSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
@@ -31,15 +31,7 @@ const extent = ['element', 'packages'].find((name) => process.argv.includes(`--$
 
 const noteBuilt = beginBuild(extent);
 ensureDependencies();
-const assembly = mustSoon(process.execPath, ['scripts/build-assembly.mjs']);
-must(process.execPath, ['scripts/build-shaders.mjs']);
-must(process.execPath, ['scripts/build-languages.mjs']);
-await assembly;
-must(process.execPath, [TSC, '--build', ...projects()]);
-for (const project of projects()) removeStaleOutputs(project);
-writeLicenses();
-await writeDecoders();
-if (extent !== 'element') await bundleThreads();
+if (!process.argv.includes('--rest')) await buildPackages();
 if (extent !== 'packages') {
   const others = extent === 'whole' ? buildBesideBundle() : undefined;
   await bundleElement();
@@ -51,6 +43,19 @@ if (extent !== 'packages') {
   }
 }
 noteBuilt();
+
+/** Shaders, languages and TypeScript. */
+async function buildPackages() {
+  const assembly = mustSoon(process.execPath, ['scripts/build-assembly.mjs']);
+  must(process.execPath, ['scripts/build-shaders.mjs']);
+  must(process.execPath, ['scripts/build-languages.mjs']);
+  await assembly;
+  must(process.execPath, [TSC, '--build', ...projects()]);
+  for (const project of projects()) removeStaleOutputs(project);
+  writeLicenses();
+  await writeDecoders();
+  if (extent !== 'element') await bundleThreads();
+}
 
 /** The CDN bundle, which takes longest. */
 async function bundleElement() {

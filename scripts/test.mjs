@@ -8,7 +8,7 @@
 import { changedPackages, withDependants } from './lib/changed-packages.mjs';
 import { chromiumVersion, ensureChromium } from './lib/chromium.mjs';
 import { gpuEnvironment } from './lib/gpu-environment.mjs';
-import { ensureBuilt, ensureDependencies, ensurePackages } from './lib/prepare.mjs';
+import { ensureBuiltSoon, ensureDependencies, ensurePackages } from './lib/prepare.mjs';
 import { runTests } from './lib/run-tests.mjs';
 import { buildFor, hasBreadth, isLaboratory, testFiles, TESTS_OF } from './lib/test-files.mjs';
 
@@ -25,8 +25,8 @@ if (node.length + browser.length === 0) {
 ensureDependencies();
 const chromium = ensureChromium();
 console.log(`Chromium: ${chromiumVersion(chromium)} at ${chromium}`);
-if (buildFor([...node, ...browser]) === 'whole') ensureBuilt();
-else ensurePackages();
+const isWhole = buildFor([...node, ...browser]) === 'whole';
+const built = isWhole ? ensureBuiltSoon() : Promise.resolve(ensurePackages());
 
 const extent = isFull
   ? { TESTS: 'full', STABILITY: 'full', SITE: 'full' }
@@ -35,7 +35,7 @@ const extent = isFull
     : {};
 const env = { ...gpuEnvironment(), ...extent, CHROMIUM: chromium };
 const { passed, failed, skipped, failures } = await runTests(files, {
-  env,
+  ...{ env, built },
   isStatic: files.isWhole,
   isLab,
 });

@@ -2,7 +2,7 @@
 import { existsSync, readdirSync, readFileSync, statSync, writeFileSync, mkdirSync } from 'node:fs';
 import { createHash } from 'node:crypto';
 import { join } from 'node:path';
-import { must, root } from './run.mjs';
+import { must, mustSoon, root } from './run.mjs';
 
 /** Installs the Node packages if the lock file changed since the last installation, or nothing is installed. */
 export function ensureDependencies() {
@@ -39,6 +39,13 @@ const PACKAGES = {
 /** Builds everything unless nothing changed since the last build. */
 export function ensureBuilt() {
   if (!isBuilt(WHOLE)) build();
+}
+
+/** The same in two steps: the packages are built when this returns, bundles and site when its promise resolves. */
+export async function ensureBuiltSoon() {
+  if (isBuilt(WHOLE)) return;
+  ensurePackages();
+  await mustSoon(process.execPath, ['scripts/build.mjs', '--rest']);
 }
 
 /** Builds the element alone, which takes half of the time, unless nothing changed since it was built. */

@@ -20,24 +20,28 @@ const WORDS = ['scripts/words.mjs'];
  * Chromium has CPU priority, since some of its tests measure time. Tests that draw in Node, tests without a GPU, types and the linter run beside it at the lowest priority, while pages wait. Those of the laboratory run after it: they take minutes of all CPU cores.
  * @param files paths of test files, of Node and of Chromium.
  * @param env variables of all that runs.
+ * @param built resolves when bundles and site are available. Stages, images, types and style need the packages alone, and are tested before.
  * @param isStatic whether types and style are checked, too.
  * @param isLab whether Node follows Chromium, or each file has a process of its own on machines with many CPU cores.
  * @returns how many tests passed, failed and were skipped, and a line for each that failed.
  */
-export async function runTests({ node, browser }, { env, isStatic = false, isLab = false }) {
+export async function runTests({ node, browser }, { env, built, isStatic = false, isLab = false }) {
+  if (isLab) await built;
   if (isLab && availableParallelism() >= MIN_PROCESSORS_OF_EACH) return runEach({ node, browser }, env);
   const isBeside = browser.length > 0 && !isLab;
   const { sharing, together, alone } = byProcess(node);
   const options = { env: { ...env, NODE_ENV: 'test' }, isBeside };
-  const pages = runBrowser(byGroup(browser), { ...options, isBeside: false });
+  const pages = built.then(() => runBrowser(byGroup(browser), { ...options, isBeside: false }));
   if (isLab) await pages;
   const results = await Promise.all([
     pages,
     inTurn(
       () => runSharing(sharing, options),
-      () => runSharing(together, options),
+      () => built.then(() => runSharing(together, options)),
     ),
-    inTurn(() => runAlone(alone, isBeside ? 1 : 2, options), ...(isStatic ? [() => runStatic(options)] : [])),
+    inTurn(...(isStatic ? [() => runStatic(options)] : []), () =>
+      built.then(() => runAlone(alone, isBeside ? 1 : 2, options)),
+    ),
   ]);
   return results.flat().reduce(sum, NONE);
 }
