@@ -13,7 +13,7 @@ import { checkManifest } from '@gaussian-splat/renderer';
 import { blocksOf } from '../../packages/cli/src/lib/detail/inputs.mjs';
 import { writePly } from '../formats/support/ply-writer.js';
 import { inriaColumns, rawSplats, type RawSplats } from '../formats/support/splats.js';
-import { onlyInLab } from '../support/extent.js';
+import { onlyInLab, someOf } from '../support/extent.js';
 
 const folder = mkdtempSync(join(tmpdir(), 'gs-parts-'));
 after(() => rmSync(folder, { recursive: true }));
@@ -58,7 +58,7 @@ const SMALL = ['--memory', '302MB'];
 
 test('cells, and parts in any order, have the bytes of a scene in one piece', () => {
   const scene = write('far.ply', farSplats(20_100, 1));
-  for (const format of ['--quantized', '--exact']) {
+  for (const format of someOf(['--quantized', '--exact'], 1)) {
     const [whole, cells] = [inFolder(`whole${format}`), inFolder(`cells${format}`)];
     assert.equal(detail(scene, '--out', whole, format).status, 0);
     const { status, text } = detail(scene, '--out', cells, format, ...SMALL);
@@ -94,13 +94,13 @@ test(
     assert.match(early.text, /of 6 cells are missing/);
     assert.match(detail(...args, '--degree', '0', '--quantized', '--join').text, /is of other files or options/);
     const time = statSync(join(out, 'unfinished', 'cell-000000.top')).mtimeMs;
-    assert.equal(detail(...args, '--part', '1/4').status, 0);
+    assert.equal(detail(...args, '--part', '1/2').status, 0);
     assert.equal(
       statSync(join(out, 'unfinished', 'cell-000000.top')).mtimeMs,
       time,
       'a finished cell is not built again',
     );
-    for (const part of ['4/4', '2/4', '3/4']) assert.equal(detail(...args, '--part', part).status, 0);
+    assert.equal(detail(...args, '--part', '2/2').status, 0);
     const joined = detail(...args, '--join');
     assert.equal(joined.status, 0, joined.text);
     assertSame(out, once);

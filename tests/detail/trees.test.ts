@@ -7,6 +7,7 @@ import { packNodes, treeSource, type NodePage, type RunError } from '@gaussian-s
 import { constants, DETAIL_NUMBERS, DETAIL_PLACES, SLOT_CHUNKS } from '@gaussian-splat/renderer/stages';
 import { shareDrawn, type DetailView } from '../support/detail-twin.js';
 import { drawUntilCalm } from '../support/draw-until-calm.js';
+import { someOf } from '../support/extent.js';
 import { pick } from '../support/lod-folder.js';
 import { anyDevice, endNodeDevice } from '../support/node-device.js';
 import { readRows } from '../support/read-rows.js';
@@ -117,7 +118,7 @@ for (const [name, kind] of KINDS)
 
 const viewFrom = (distance: number, angle: number, x = 0): Camera =>
   cameraAt([x + distance * Math.cos(angle), -0.5 * distance, distance * Math.sin(angle)], [x, 0, 0], {
-    ...{ width: 96, height: 64, fovXDegrees: 60, near: 0.01 },
+    ...{ width: 48, height: 32, fovXDegrees: 60, near: 0.01 },
   });
 
 for (const [name, kind] of KINDS)
@@ -137,15 +138,10 @@ for (const [name, kind] of KINDS)
     const renderer = new Renderer(device, OPTIONS);
     const { list } = source;
     let highest = 0;
-    for (const [distance, angle, x] of [
-      [30, 0.4, 0],
-      [6, 1, 3],
-      [3, 2, -4],
-      [2, 4, 5],
-      [40, 5, 0],
-    ]) {
+    const places = [[30, 0.4, 0], [6, 1, 3], [3, 2, -4], [2, 4, 5], [40, 5, 0]]; // prettier-ignore
+    for (const [distance, angle, x] of someOf(places, 3)) {
       const camera = viewFrom(distance, angle, x);
-      await drawUntilCalm(opened, renderer, camera, 0.5);
+      await drawUntilCalm(opened, renderer, camera, 0.25);
       const rows = await readRows(opened);
       /** Rows of the chunks of each page. */
       const rowsOf = new Map<number, Float32Array[]>();
@@ -157,7 +153,7 @@ for (const [name, kind] of KINDS)
         rowsOf.set(page, [...(rowsOf.get(page) ?? []), ...own.filter((row) => row.some((number) => number !== 0))]);
       });
       highest = Math.max(highest, opened.pagesInSlots.filter((page) => page !== undefined).length);
-      const view: DetailView = { camera, allowed: 0.5, fade: 0 };
+      const view: DetailView = { camera, allowed: 0.25, fade: 0 };
       let paths = 0;
       const visit = (page: number, row: Float32Array, above: number): void => {
         const sum = above + shareDrawn(row, 0, view);

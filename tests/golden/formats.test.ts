@@ -9,7 +9,7 @@ import { referenceViews } from '../support/cameras.js';
 import { closeness, compareWithOracle, describeCloseness, renderCloud } from '../support/compare.js';
 import { halfTurned, needsSharedData, sharedFile } from '../support/data.js';
 import { psnr } from '../support/metrics.js';
-import { isFull, onlyInLab } from '../support/extent.js';
+import { isFull, isLab, onlyInLab } from '../support/extent.js';
 import { endNodeDevice, serialDevice } from '../support/node-device.js';
 import { resized } from '../support/scenes.js';
 
@@ -44,10 +44,10 @@ const load = async (file: string, level = 0): Promise<GaussianCloud> => {
   return file.endsWith('.spz') ? halfTurned(cloud) : cloud;
 };
 
-/** Half as wide as the reference image. */
+/** Half as wide as the reference image, a third in `npm test`. */
 function viewOfAll(): Camera {
   const { camera } = referenceViews().find(({ name }) => name === 'playbot3 1')!;
-  return resized(camera, Math.round(camera.width / 2));
+  return resized(camera, Math.round(camera.width / (isLab ? 2 : 3)));
 }
 
 /** Captured scenes without a PLY. */
@@ -65,7 +65,8 @@ test('one scene through every format', { skip: needsSharedData }, async () => {
     const kept = psnr(oracle.color, ply.color, { mask: ply.contributors });
     console.log(`${describeCloseness(file, close)}, to the PLY ${kept.toFixed(2)} dB`);
     assert.ok(close.psnr >= 59, `${file}: ${close.psnr} dB to its own oracle`);
-    assert.ok(kept >= toPly, `${file}: ${kept} dB to the PLY`);
+    // Images of fewer pixels differ more.
+    assert.ok(kept >= toPly - (isLab ? 0 : 0.5), `${file}: ${kept} dB to the PLY`);
   }
 });
 
