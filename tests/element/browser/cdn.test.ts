@@ -134,7 +134,7 @@ describe('the CDN build', () => {
     }
   });
 
-  it("runs a generator there with 'wasm-unsafe-eval', and nothing more", async () => {
+  itInLab("runs a generator there with 'wasm-unsafe-eval', and nothing more", async () => {
     const report = await reportOf('/net/secure-page?generator');
     assertEqual([report.loaded, report.error], [true, undefined], 'loaded');
     assertEqual(report.violations, [], 'violations');

@@ -5,6 +5,7 @@
 import '@gaussian-splat/element';
 import { unzipSync } from 'fflate';
 import type { GaussianSplatElement } from '@gaussian-splat/element';
+import { itInLab } from '../../support/extent-in-pages.js';
 import {
   assert,
   assertEqual,
@@ -191,7 +192,7 @@ describe('a clip', () => {
     assertEqual(other.error!.reason, 'network/changed', 'reason of a clip that never opens');
   });
 
-  it('a seek into what is there takes the time of a frame, and no task of the page is long', async () => {
+  itInLab('a seek into what is there takes the time of a frame, and no task of the page is long', async () => {
     const element = await showLoaded({ src: CLIP });
     await until(() => JSON.stringify(spansOf(element)) === '[[0,1.2]]', 'all of it is there');
     await seek(element, 0.55);
@@ -226,7 +227,7 @@ describe('a clip', () => {
     await showsAlone(element, 10);
   });
 
-  it('a seek into what has not come takes half a second at 20 Mbit/s', async () => {
+  itInLab('a seek into what has not come takes half a second at 20 Mbit/s', async () => {
     // Groups of 300 kB, as those of 100,000 splats, and 30 ms until an answer begins.
     const element = await showLoaded({ src: `${CLIP}?mbps=20&slow=30&padded=300000&frames=120` });
     const took: number[] = [];

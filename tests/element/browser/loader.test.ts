@@ -47,7 +47,7 @@ describe('the scene worker', () => {
       'all loaded',
     );
     assertEqual(workers.length, 1, 'workers');
-    hurry(3);
+    hurry(12);
     await until(() => workers[0].isEnded, 'the end of an idle worker');
     hurry(0.3);
     await showLoaded();

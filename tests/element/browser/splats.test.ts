@@ -5,6 +5,7 @@ import type { GaussianCloud } from '@gaussian-splat/core';
 import { SplatGroups } from '@gaussian-splat/formats/groups';
 import { encodeUpdate, type SplatUpdate } from '@gaussian-splat/formats/updates';
 import { executeServerCommand } from '@web/test-runner-commands';
+import { itInLab, someOf } from '../../support/extent-in-pages.js';
 import { assert, assertEqual, delay, frames, nextEvent, show, until } from './support/harness.js';
 import { isBlue, isGreen, isRed, screenOf } from './support/screen.js';
 
@@ -244,7 +245,7 @@ describe('the property splats', () => {
 });
 
 describe('groups of splats', () => {
-  for (const renderer of ['webgpu', 'webgl'])
+  for (const renderer of someOf(['webgpu', 'webgl'], 1))
     it(`are picked, hidden and tinted by name: ${renderer}`, async () => {
       // Two balls, whose splats alternate in the arrays.
       const [left, right] = [ball(300, RED, -0.8), ball(300, [0.3, 0.4, 1], 0.8)];
@@ -342,7 +343,7 @@ describe('a feed of splats', () => {
     await executeServerCommand('end-training', { url, code: 1000 });
   });
 
-  it('is a WebSocket of the page, whose server may send more than is shown', async () => {
+  itInLab('is a WebSocket of the page, whose server may send more than is shown', async () => {
     const url = await executeServerCommand<string, object>('start-training', {
       ...{ count: 2_000, everyMs: 4, greenAt: 80, pushes: true },
     });

@@ -2,6 +2,7 @@
 import '@gaussian-splat/element';
 import type { GaussianSplatElement } from '@gaussian-splat/element';
 import { resetMouse, sendKeys, sendMouse } from '@web/test-runner-commands';
+import { isLab } from '../../support/extent-in-pages.js';
 import { randomSource } from '../../support/gpu.js';
 import { assert, assertEqual, delay, frames, hurry, showLoaded, until } from './support/harness.js';
 import { screenOf, sendTouch, Taps, turnWheel, type Rgb } from './support/screen.js';
@@ -61,6 +62,8 @@ afterEach(async () => {
   scrollTo(0, 0);
 });
 
+const GESTURES = isLab ? 100 : 40;
+
 describe('visitors never lose the scene', () => {
   const random = randomSource(11);
   const point = (): number[] => [Math.round(random() * WIDTH), Math.round(random() * HEIGHT)];
@@ -78,11 +81,11 @@ describe('visitors never lose the scene', () => {
     ways.forEach(([, to], id) => report('pointerup', to, id));
   };
 
-  it('by 100 gestures of fingers: it is visible, or one tap on the button away', async () => {
+  it(`by ${GESTURES} gestures of fingers: it is visible, or one tap on the button away`, async () => {
     const element = await scene({ 'touch-action': 'none' });
     const { radius } = element.getCameraOrbit();
     let away = 0;
-    for (let i = 0; i < 100; i++) {
+    for (let i = 0; i < GESTURES; i++) {
       const ways = random() < 0.3 ? [[point(), point()]] : [[point(), point()], [point(), point()]]; // prettier-ignore
       gesture(surfaceOf(element), 'touch', 0, ways);
       element.jumpCameraToGoal();
@@ -94,13 +97,13 @@ describe('visitors never lose the scene', () => {
       assert((await seenPixels(element)) > 100, 'the scene');
     }
     // In the middle of the compass there is nothing, and a pinch may end there.
-    assert(away < 10, `${away} times of 10`);
+    assert(away < GESTURES / 10, `${away} times of ${GESTURES / 10}`);
   });
 
-  it('by 100 gestures of a mouse: it is visible, or a double click away', async () => {
+  it(`by ${GESTURES} gestures of a mouse: it is visible, or a double click away`, async () => {
     const element = await scene({ zoom: 'always' });
     const { radius } = element.getCameraOrbit();
-    for (let i = 0; i < 100; i++) {
+    for (let i = 0; i < GESTURES; i++) {
       const kind = random();
       if (kind < 0.6) gesture(surfaceOf(element), 'mouse', kind < 0.3 ? 2 : 0, [[point(), point()]]);
       else
