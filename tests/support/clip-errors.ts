@@ -17,21 +17,13 @@ import { mkdirSync, readFileSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { fileURLToPath } from 'node:url';
 import { parseArgs } from 'node:util';
-import { boundsOf, type Camera } from '@gaussian-splat/core';
+import { boundsOf } from '@gaussian-splat/core';
 import { parseClip } from '@gaussian-splat/formats';
-import {
-  codeClip,
-  decibels,
-  drawOn,
-  encodingsFor,
-  meanSquare,
-  viewsAround,
-  type DrawFrame,
-} from '@gaussian-splat/optimize';
+import { codeClip, decibels, drawOn, encodingsFor, viewsAround, type DrawFrame } from '@gaussian-splat/optimize';
 import { deviceDescriptor, pickInitialVariants } from '@gaussian-splat/renderer';
 import { encodeWebp } from '../../packages/cli/src/lib/encoders.mjs';
 import { requestNodeAdapter } from '../../packages/cli/src/lib/node-gpu.mjs';
-import { cpuPainter } from '../optimize/twin/index.js';
+import { drawPlainly } from '../optimize/twin/index.js';
 import { framesOf } from './clips.js';
 import { MADE_CLIPS, remembered, type FrameOf } from './scenes/made-clips.js';
 
@@ -139,21 +131,6 @@ async function drawOnGpu(): Promise<DrawFrame> {
   const device = await adapter.requestDevice(deviceDescriptor(adapter));
   await pickInitialVariants(device, { format: 'rgba8unorm' });
   return drawOn(device);
-}
-
-/** Draws views at a quarter of their size. */
-async function drawPlainly(...[frame, views]: Parameters<DrawFrame>): ReturnType<DrawFrame> {
-  const small = views.map((view): Camera => {
-    const [width, height, fx, fy, cx, cy] = [view.width, view.height, view.fx, view.fy, view.cx, view.cy].map(
-      (value) => value / 4,
-    );
-    return { ...view, fx, fy, cx, cy, width: Math.floor(width), height: Math.floor(height) };
-  });
-  const references = await cpuPainter.draw(frame, small);
-  return {
-    compare: async (cloud) => (await cpuPainter.draw(cloud, small)).map((image, k) => meanSquare(image, references[k])),
-    destroy: () => undefined,
-  };
 }
 
 async function writeAll(clip: string, folder: string): Promise<void> {
