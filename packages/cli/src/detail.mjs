@@ -15,7 +15,7 @@ import {
   writeFileSync,
 } from 'node:fs';
 import { join, resolve } from 'node:path';
-import { deviceDescriptor, pickInitialVariants } from '@gaussian-splat/renderer';
+import { pickInitialVariants } from '@gaussian-splat/renderer';
 import { lossesIn } from '@gaussian-splat/optimize';
 import {
   codingFor,
@@ -140,9 +140,8 @@ function parsePart(text) {
 /** A device, or undefined with a message if none is available for measuring. */
 async function deviceToMeasure() {
   try {
-    const { requestNodeAdapter } = await import('./lib/node-gpu.mjs');
-    const adapter = await requestNodeAdapter({ isTrusted: true });
-    const device = await adapter.requestDevice(deviceDescriptor(adapter));
+    const { requestNodeDevice } = await import('./lib/node-gpu.mjs');
+    const { device } = await requestNodeDevice({ isTrusted: true });
     await pickInitialVariants(device, { format: 'rgba8unorm' });
     return device;
   } catch (error) {

@@ -2,13 +2,13 @@
 import { existsSync, readFileSync } from 'node:fs';
 import { basename, dirname, join, resolve } from 'node:path';
 import { framePath, parseSequence, readScene } from '@gaussian-splat/formats';
-import { deviceDescriptor, pickInitialVariants } from '@gaussian-splat/renderer';
+import { pickInitialVariants } from '@gaussian-splat/renderer';
 import { CommandError, parseSceneOptions, report, runCommand, UsageError } from './lib/command.mjs';
 import { codeClip, drawOn } from '@gaussian-splat/optimize';
 import { CREDIT_OPTIONS, CREDIT_USAGE, creditsWith } from './lib/credits.mjs';
 import { openClipStore } from './lib/clip-store.mjs';
 import { encodeWebp } from './lib/encoders.mjs';
-import { requestNodeAdapter } from './lib/node-gpu.mjs';
+import { requestNodeDevice } from './lib/node-gpu.mjs';
 import { checkOutput, obstacleTo, writeWhole } from './lib/output-file.mjs';
 import { readWhole } from './lib/input-file.mjs';
 
@@ -53,8 +53,7 @@ function parseOptions(args) {
 }
 
 async function openDevice() {
-  const adapter = await requestNodeAdapter({ isTrusted: true });
-  const device = await adapter.requestDevice(deviceDescriptor(adapter));
+  const { device } = await requestNodeDevice({ isTrusted: true });
   await pickInitialVariants(device, { format: 'rgba8unorm' });
   return device;
 }

@@ -3,12 +3,12 @@ import { dirname, join, resolve } from 'node:path';
 import { PNG } from 'pngjs';
 import { boundsOf, SPLAT_FILTERS } from '@gaussian-splat/core';
 import { readScene } from '@gaussian-splat/formats';
-import { capture, deviceDescriptor, GaussianBuffers, packGaussians, Viewpoint, World } from '@gaussian-splat/renderer';
+import { capture, GaussianBuffers, packGaussians, Viewpoint, World } from '@gaussian-splat/renderer';
 import { renderDepth, renderFisheye } from '@gaussian-splat/renderer/depth';
 import { clipMoment, isClip, openClip } from './clip-frame.mjs';
 import { CommandError, UsageError } from './command.mjs';
 import { readWhole } from './input-file.mjs';
-import { requestNodeAdapter } from './node-gpu.mjs';
+import { requestNodeDevice } from './node-gpu.mjs';
 
 /** Command-line options that control the rendering of a scene, for `parseArgs`. */
 export const DRAW_OPTIONS = {
@@ -84,8 +84,7 @@ export async function openMovingScene(name) {
  */
 export async function openSceneRenderer(cloud, options) {
   const filterOf = (of) => (options.filter === undefined ? of : SPLAT_FILTERS[options.filter]);
-  const adapter = await requestNodeAdapter();
-  const device = await adapter.requestDevice(deviceDescriptor(adapter));
+  const { adapter, device } = await requestNodeDevice();
   const validationErrors = [];
   device.addEventListener('uncapturederror', ({ error }) => validationErrors.push(error.message));
   const accumulation = chooseAccumulation(options.accumulation, device);
