@@ -29,7 +29,7 @@ import { renderOracle, renderOracleWorld, type PlacedCloud } from '../oracle/ora
 import { projectEllipse, toCamera, worldPosition } from '../oracle/projection.js';
 import { RULES } from '../oracle/rules.js';
 import { cloudOf, repeat } from '../support/clouds.js';
-import { isLab } from '../support/extent.js';
+import { isLab, onlyInLab } from '../support/extent.js';
 import { endNodeDevice, serialDevice } from '../support/node-device.js';
 import { seededRandom } from '../support/random.js';
 import { cameraAt, resized, room, thinned } from '../support/scenes.js';
@@ -109,7 +109,7 @@ test('a room: depths to a centimeter', async () => {
   assertRight('room', await measure([placed(cloud)], resized(cameras[0], width(320))));
 });
 
-test('the skull: depths to a centimeter', async () => {
+test('the skull: depths to a centimeter', { skip: onlyInLab }, async () => {
   const bytes = readFileSync(new URL('skull.spz', SCENES));
   const view = JSON.parse(readFileSync(new URL('skull-camera.json', SCENES), 'utf8')) as CalibratedView;
   const cloud = await readScene(new Uint8Array(bytes), { name: 'skull.spz' });

@@ -19,6 +19,7 @@ import {
   submits,
   until,
 } from './support/harness.js';
+import { itInLab } from '../../support/extent-in-pages.js';
 import { comesToShow, isBlue, isGreen, isRed, screenOf, type Rgb, type Screen } from './support/screen.js';
 
 const VIEW = {
@@ -112,7 +113,7 @@ it('a cut in a <splat-scene> is for that scene alone, in its frame', async () =>
   assert((await countOf(element, isGreen)) > 0, 'the element’s own scene stays');
 });
 
-it('a cut tints', async () => {
+itInLab('a cut tints', async () => {
   const element = await showLoaded(VIEW);
   await cut(element, { shape: 'sphere', scale: '100', effect: 'recolor', hue: '120deg' });
   assert((await countOf(element, isRed)) === 0 || (await countOf(element, isGreen)) > 0, 'hues are turned');
@@ -194,7 +195,7 @@ it('a function of the page changes splats; a wrong one is reported by its line, 
   assertEqual(await countOf(element, isColored), whole, 'without it all is as before');
 });
 
-it('functions of two elements that are compiled at the same time stay apart', async () => {
+itInLab('functions of two elements that are compiled at the same time stay apart', async () => {
   const elements = await Promise.all([showLoaded(VIEW), showLoaded(VIEW)]);
   const painted = (color: string): string =>
     `fn modify(splat: Splat, uniforms: Uniforms) -> Splat { var s = splat; s.color = vec3f(${color}); return s; }`;

@@ -17,7 +17,7 @@ const FAMILIES = [
 ];
 const POST_PROCESSORS = ['style', 'noise'];
 /** Runs after which memory is compared; the first ones fill the caches of the runtime. */
-const [FIRST_RUNS, RUNS] = isFull ? [500, 10_000] : isLab ? [200, 1_000] : [50, 100];
+const [FIRST_RUNS, RUNS] = isFull ? [500, 10_000] : isLab ? [200, 1_000] : [30, 60];
 /** Bytes of scripts that may remain of all runs. Of 100 runs 50 to 150 kB do, and 23 to 231 kB of 1,000: a constant, and no object for each run. */
 const MAX_HEAP = 512_000;
 
