@@ -93,18 +93,64 @@ test('a track that goes over to another splat is divided, one that turns is not'
         scale: [...scale],
       },
       { position: [3, 0, 0], color: [0.5, 0.5, 0.5], opacity: 0.9, rotation: spin(0.3 * frame), scale: [...scale] },
+      ...[6, 9, 12].map((x) => ({
+        position: [x, 0, 0] as const,
+        color: [0.5, 0.5, 0.5] as const,
+        opacity: 0.9,
+        scale: [...scale] as const,
+      })),
     ]),
   );
   const followed = followSplats(frames);
-  assert.equal(followed.count, 2);
+  assert.equal(followed.count, 5);
   const { count, of, lives } = cutTracks(followed);
-  assert.equal(count, 3);
-  assert.deepEqual([...lives.first], [0, 0, 3]);
-  assert.deepEqual([...lives.end], [3, 6, 6]);
+  assert.equal(count, 6);
+  assert.deepEqual([...lives.first], [0, 0, 0, 0, 0, 3]);
+  assert.deepEqual([...lives.end], [3, 6, 6, 6, 6, 6]);
   assert.deepEqual(
     of.map((tracks) => [...tracks]),
-    [0, 1, 2, 3, 4, 5].map((frame) => [frame < 3 ? 0 : 2, 1]),
+    [0, 1, 2, 3, 4, 5].map((frame) => [frame < 3 ? 0 : 5, 1, 2, 3, 4]),
   );
+});
+
+test('splats of frames that were trained one by one keep their tracks, though rotations and colors are noisy', () => {
+  const random = seededRandom(8);
+  const splats = Array.from({ length: 2000 }, () => ({
+    position: [random.uniform(0, 4), random.uniform(0, 4), random.uniform(0, 4)] as const,
+    color: [random.uniform(0.2, 0.8), random.uniform(0.2, 0.8), 0.5] as const,
+    ...{ rotation: random.rotation(), opacity: 0.9, scale: [0.1, 0.06, 0.02] as const },
+  }));
+  const noisy = (values: readonly number[], size: number): number[] =>
+    values.map((value) => value + size * random.normal());
+  const frames = Array.from({ length: 12 }, () =>
+    cloudOf(
+      splats.map((splat) => ({
+        ...splat,
+        color: noisy(splat.color, 0.015) as unknown as readonly [number, number, number],
+        rotation: noisy(splat.rotation, 0.03) as unknown as readonly [number, number, number, number],
+      })),
+    ),
+  );
+  const { count } = cutTracks(followSplats(frames));
+  assert.ok(count < 2020, `${count} tracks of 2,000 splats`);
+});
+
+test('rows that are absent from a frame are followed in all others, however many curves that needs', () => {
+  const [rows, frames] = [60, 40];
+  const random = seededRandom(4);
+  const changes = Float32Array.from({ length: rows * frames }, () => random.normal());
+  const source = changes.slice();
+  const spanOf = (row: number): readonly [number, number] => (row < 20 ? [row % 3, frames - 1] : [0, frames]);
+  const { curves, shares } = followedWithin(changes, frames, spanOf, minCurve(0.01 / FINER));
+  let worst = 0;
+  for (let row = 0; row < rows; row++) {
+    const [first, end] = spanOf(row);
+    for (let f = first; f < end; f++) {
+      const found = curves.reduce((sum, curve, k) => sum + curve[f] * shares[k][row], 0);
+      worst = Math.max(worst, Math.abs(found - source[frames * row + f]));
+    }
+  }
+  assert.ok(worst < 1e-3, `${worst} in a valid frame`);
 });
 
 const shownAt = (bytes: Uint8Array, frame: number): Promise<GaussianCloud> => framesOf(bytes)(frame);

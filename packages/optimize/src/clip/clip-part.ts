@@ -32,33 +32,43 @@ export interface WrittenClipPart {
   readonly bytes: Uint8Array<ArrayBuffer>;
 }
 
+/** Content of a part whose motion can be written. */
+export type TrackedContent = ClipPartContent & { readonly motion: WrittenMotion };
+
+/** The splats of a part, in the order of its scene file, and what {@link TrackedPart} knows of their motion. */
+interface FollowedSplats {
+  /** In the order in which they are given to an encoding. */
+  readonly given: GaussianCloud;
+  readonly placeOf: Int32Array;
+  readonly still: Omit<WrittenMotion, 'parts' | 'curveBits'>;
+  readonly curves: Readonly<Record<AnimatedAttributeName, Followed | undefined>>;
+}
+
+interface EncodedScene {
+  readonly bytes: Uint8Array;
+  /** The splats as a reader decodes them. */
+  readonly cloud: GaussianCloud;
+}
+
 /**
  * Some tracks of a group: their splats as an encoded scene, and the curves of their motion, which can be quantized with
  * any steps.
  */
 export class TrackedPart {
-  /** [tracks] index of each track's splat in this part, or -1. */
-  readonly placeOf: Int32Array;
-  readonly #scene: Uint8Array;
-  readonly #cloud: GaussianCloud;
-  readonly #still: Omit<WrittenMotion, 'parts' | 'curveBits'>;
-  readonly #followed: Readonly<Record<AnimatedAttributeName, Followed | undefined>>;
+  readonly #scene: EncodedScene;
+  readonly #followed: FollowedSplats;
   /** [splats] effect on images of errors of positions, and of other attributes; 1 on average. */
   readonly #importance: Readonly<Record<'position' | 'other', Float32Array>>;
 
-  private constructor(
-    scene: Uint8Array,
-    cloud: GaussianCloud,
-    placeOf: Int32Array,
-    still: Omit<WrittenMotion, 'parts' | 'curveBits'>,
-    found: Readonly<Record<AnimatedAttributeName, Followed | undefined>>,
-  ) {
+  private constructor(scene: EncodedScene, found: FollowedSplats) {
     this.#scene = scene;
-    this.#cloud = cloud;
-    this.placeOf = placeOf;
-    this.#still = still;
     this.#followed = found;
-    this.#importance = importanceOf(cloud);
+    this.#importance = importanceOf(scene.cloud);
+  }
+
+  /** [tracks] index of each track's splat in this part, or -1. */
+  get placeOf(): Int32Array {
+    return this.#followed.placeOf;
   }
 
   /**
@@ -76,12 +86,8 @@ export class TrackedPart {
     steps: MotionSteps,
   ): Promise<TrackedPart> {
     const given = splatsOf(whole, chosen);
-    const scene = new Uint8Array(
-      await encoding.write({ cloud: given, degrees: new Uint8Array(given.count).fill(given.shDegree) }),
-    );
-    const cloud = await readScene(scene, { name: 'a group of frames' });
-    if (cloud.count !== given.count) throw notWritten(given.count, cloud.count);
-    const order = orderIn(cloud, given);
+    const scene = await encoded(given, encoding);
+    const order = orderIn(scene.cloud, given);
     const source = splatsOf(given, order);
     const placeOf = new Int32Array(tracks.count).fill(-1);
     order.forEach((i, place) => (placeOf[chosen[i]] = place));
@@ -95,44 +101,59 @@ export class TrackedPart {
     const find = (name: AnimatedAttributeName): Followed | undefined => {
       const changes = changesOfTracks(tracks, { cloud: source, placeOf }, name);
       const span = (row: number): readonly [number, number] => [
-        lives.first[row % cloud.count],
-        lives.end[row % cloud.count],
+        lives.first[row % source.count],
+        lives.end[row % source.count],
       ];
       if (changes && name === 'opacity') fades = takeFades(changes, frames, source.opacities, lives);
       return changes && followedWithin(changes, frames, span, minCurve(finest[name]));
     };
-    const found = Object.fromEntries(ANIMATED_ATTRIBUTE_NAMES.map((name) => [name, find(name)]));
+    const curves = Object.fromEntries(ANIMATED_ATTRIBUTE_NAMES.map((name) => [name, find(name)]));
     const turnsHarmonics = harmonicsTurn(tracks, { cloud: source, placeOf });
-    const still = { splats: cloud.count, frames, lives: { ...lives, fades } satisfies Lives, turnsHarmonics };
-    return new TrackedPart(scene, cloud, placeOf, still, found as Record<AnimatedAttributeName, Followed | undefined>);
+    const still = { splats: source.count, frames, lives: { ...lives, fades } satisfies Lives, turnsHarmonics };
+    return new TrackedPart(scene, { given, placeOf, still, curves: curves as FollowedSplats['curves'] });
+  }
+
+  /** Returns this part with another encoding of the scene, of the same format. Curves do not depend on it. */
+  async recoded(encoding: Encoding): Promise<TrackedPart> {
+    return new TrackedPart(await encoded(this.#followed.given, encoding), this.#followed);
   }
 
   /** Returns the content that a reader decodes if motion is quantized with the given steps. */
-  contentAt(steps: MotionSteps): ClipPartContent & { readonly motion: WrittenMotion } {
+  contentAt(steps: MotionSteps): TrackedContent {
     const rounded = ANIMATED_ATTRIBUTE_NAMES.map((name) => {
-      const own = this.#followed[name];
+      const own = this.#followed.curves[name];
       const importance = this.#importance[name === 'position' ? name : 'other'];
       return own ? roundMotion(own, steps[name], importance) : UNCHANGED;
     });
     const parts = Object.fromEntries(ANIMATED_ATTRIBUTE_NAMES.map((name, k) => [name, rounded[k].part]));
     const curveBits = rounded.map((own) => own.curveBits);
-    return { cloud: this.#cloud, motion: { ...this.#still, parts: parts as WrittenMotion['parts'], curveBits } };
+    const motion = { ...this.#followed.still, parts: parts as WrittenMotion['parts'], curveBits };
+    return { cloud: this.#scene.cloud, motion };
   }
 
-  write(steps: MotionSteps): WrittenClipPart {
-    const { motion } = this.contentAt(steps);
-    const bytes = writeCodedMotion(motion, this.#cloud);
+  /** Writes the part. @param motion That of {@link contentAt}. */
+  write(motion: WrittenMotion): WrittenClipPart {
+    const { bytes: scene, cloud } = this.#scene;
+    const bytes = writeCodedMotion(motion, cloud);
     return {
-      splats: this.#cloud.count,
+      splats: cloud.count,
       planes: ANIMATED_ATTRIBUTE_NAMES.reduce(
         (sum, name) => sum + ANIMATED_ATTRIBUTES[name] * motion.parts[name].rank,
         0,
       ),
-      sceneBytes: this.#scene.length,
+      sceneBytes: scene.length,
       motionBytes: bytes.length,
-      bytes: concatenated(Uint8Array, [this.#scene, bytes]),
+      bytes: concatenated(Uint8Array, [scene, bytes]),
     };
   }
+}
+
+async function encoded(cloud: GaussianCloud, encoding: Encoding): Promise<EncodedScene> {
+  const degrees = new Uint8Array(cloud.count).fill(cloud.shDegree);
+  const bytes = new Uint8Array(await encoding.write({ cloud, degrees }));
+  const read = await readScene(bytes, { name: 'a group of frames' });
+  if (read.count !== cloud.count) throw notWritten(cloud.count, read.count);
+  return { bytes, cloud: read };
 }
 
 /**

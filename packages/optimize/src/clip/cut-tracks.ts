@@ -9,6 +9,8 @@ const MIN_GROWTH = 0.15;
 const MIN_COLOR = 0.1;
 /** Minimum ratio of a jump to the change in the previous or next pair of frames. */
 const JUMP = 4;
+/** Minimum ratio of a jump to the median change of all splats: those of frames that were trained one by one are noisy. */
+const NOISE = 5;
 
 /**
  * Divides tracks at jumps of rotation, scales or color, because the track continues with another splat there. No curve
@@ -17,6 +19,7 @@ const JUMP = 4;
 export function cutTracks(tracks: Tracks): Tracks {
   const { frames, of } = tracks;
   const changes = changesOfLooks(tracks);
+  const least = changes.map((own) => Math.max(1, NOISE * medianOf(own)));
   const first = Array.from(tracks.lives.first);
   const end = Array.from(tracks.lives.end);
   const names = Int32Array.from({ length: tracks.count }, (_, track) => track);
@@ -28,7 +31,7 @@ export function cutTracks(tracks: Tracks): Tracks {
     return own.map((track, i) => {
       const change = changes[frame][i];
       // Comparisons with missing neighbors are false.
-      if (change > 1 && (change > JUMP * before[track] || change > JUMP * after[track])) {
+      if (change > least[frame] && (change > JUMP * before[track] || change > JUMP * after[track])) {
         end[names[track]] = frame;
         names[track] = first.push(frame) - 1;
         end.push(tracks.lives.end[track]);
@@ -39,6 +42,12 @@ export function cutTracks(tracks: Tracks): Tracks {
   });
   const lives = { first: Uint16Array.from(first), end: Uint16Array.from(end) };
   return { count: first.length, frames, of: named, lives };
+}
+
+/** Returns the median of numbers that are not NaN; 0 if there are none. */
+function medianOf(values: Float32Array): number {
+  const sorted = values.filter((value) => value >= 0).sort();
+  return sorted[sorted.length >> 1] ?? 0;
 }
 
 /**

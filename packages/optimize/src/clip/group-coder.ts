@@ -57,8 +57,6 @@ export interface FoundGroup extends CodedGroup {
   readonly contents: readonly ClipPartContent[];
   readonly encoding: Encoding;
   readonly steps: MotionSteps;
-  /** Whether all frames were measured. */
-  readonly isChecked: boolean;
 }
 
 /**
@@ -67,20 +65,22 @@ export interface FoundGroup extends CodedGroup {
  */
 export async function codeGroup(coding: GroupCoding): Promise<FoundGroup> {
   const { target, maxBytes } = coding;
-  const first =
-    coding.steps ?? (await stepsFor(coding, await partsOf(coding, coding.encoding, usualSteps(coding.whole))));
-  const tried = new Map<number, FoundGroup>();
-  const isWanted = ({ parts }: FoundGroup): boolean => sizeOf(parts) <= maxBytes;
+  let parts = await partsOf(coding, coding.encoding, coding.steps ?? usualSteps(coding.whole));
+  const first = coding.steps ?? (await stepsFor(coding, parts));
+  if (!coding.steps) parts = await partsOf(coding, coding.encoding, first);
+  const tried = new Map<number, Attempt>();
+  const isTooLarge = (own: Attempt): boolean => maxBytes < Infinity && sizeOf(own.parts) > maxBytes;
   await fitSteps({
     ...{ steps: { scale: 1 }, target, tries: MAX_TRIES, nearEnough: NEAR_ENOUGH },
     measure: async ({ scale }) => {
       const encoding = scale === 1 ? coding.encoding : coding.encoding.coarser!(scale);
-      const found = tried.get(scale) ?? (await attempt(coding, encoding, scaledSteps(first, scale)));
+      const found = tried.get(scale) ?? (await attempt(coding, parts, encoding, scaledSteps(first, scale)));
       tried.set(scale, found);
       const error = worstOf(found.errors);
-      coding.onStep(`  ${sizeOf(found.parts)} bytes, ${decibels(error).toFixed(2)} dB in the worst frame`);
+      const size = error <= target ? `${sizeOf(found.parts)} bytes` : 'too coarse';
+      coding.onStep(`  ${size}, ${decibels(error).toFixed(2)} dB in the worst frame`);
       // A group that is too large must become coarser, as if its error were too small.
-      return { error: isWanted(found) ? error : (0.5 * target * maxBytes) / sizeOf(found.parts) };
+      return { error: isTooLarge(found) ? (0.5 * target * maxBytes) / sizeOf(found.parts) : error };
     },
   });
   const best = [...tried.values()].reduce((one, next) => betterOf(one, next, coding));
@@ -90,10 +90,24 @@ export async function codeGroup(coding: GroupCoding): Promise<FoundGroup> {
   return { ...best, errors: await coding.judges.errorsInAll(frames, [...coding.still, ...contents]) };
 }
 
-/** Codes a group with some steps, and measures it. */
-async function attempt(coding: GroupCoding, encoding: Encoding, steps: MotionSteps): Promise<FoundGroup> {
+/** A group with some steps. Its parts are written when they are first read: those of steps that are too coarse never are. */
+interface Attempt extends FoundGroup {
+  /** Whether all frames were measured. */
+  readonly isChecked: boolean;
+}
+
+/**
+ * Codes a group with some steps, and measures it.
+ * @param found Parts in the encoding of the last group.
+ */
+async function attempt(
+  coding: GroupCoding,
+  found: readonly TrackedPart[],
+  encoding: Encoding,
+  steps: MotionSteps,
+): Promise<Attempt> {
   const { tracks, still, judges, target } = coding;
-  const parts = await partsOf(coding, encoding, steps);
+  const parts = encoding === coding.encoding ? found : await Promise.all(found.map((part) => part.recoded(encoding)));
   const contents = parts.map((part) => part.contentAt(steps));
   const estimated = attributeErrors(
     tracks,
@@ -108,8 +122,14 @@ async function attempt(coding: GroupCoding, encoding: Encoding, steps: MotionSte
     const worst = [...errors].sort((a, b) => b.error - a.error).slice(0, REMEMBERED);
     if (worstOf(worst) > target) await judges.remember(worst.map(({ frame }) => frame));
   }
-  const written = parts.map((part) => part.write(steps));
-  return { frames: tracks.frames.length, parts: written, errors, contents, encoding, steps, isChecked };
+  let written: readonly WrittenClipPart[] | undefined;
+  return {
+    ...{ frames: tracks.frames.length, errors, contents, encoding, steps, isChecked },
+    get parts() {
+      written ??= parts.map((part, k) => part.write(contents[k].motion));
+      return written;
+    },
+  };
 }
 
 /** Returns the parts of a group with fixed quantization, unmeasured. */
@@ -119,7 +139,8 @@ export async function roundGroup(
   steps: MotionSteps,
 ): Promise<CodedGroup> {
   const parts = await partsOf(coding, encoding, steps);
-  return { frames: coding.tracks.frames.length, parts: parts.map((part) => part.write(steps)), errors: [] };
+  const written = parts.map((part) => part.write(part.contentAt(steps).motion));
+  return { frames: coding.tracks.frames.length, parts: written, errors: [] };
 }
 
 /** Returns the factor of the scales of coarse parts' splats with the smallest error against all splats of a frame. */
@@ -152,12 +173,11 @@ async function partsOf(
 }
 
 /** Returns the group that fits, has the smaller size if both reach the target, and otherwise the smaller error. */
-function betterOf(a: FoundGroup, b: FoundGroup, { target, maxBytes }: GroupCoding): FoundGroup {
-  const rank = ({ parts, errors }: FoundGroup): readonly number[] => {
-    const size = sizeOf(parts);
-    const worst = worstOf(errors);
-    if (size > maxBytes) return [2, size];
-    return worst <= target ? [0, size] : [1, worst];
+function betterOf(a: Attempt, b: Attempt, { target, maxBytes }: GroupCoding): Attempt {
+  const rank = (own: Attempt): readonly number[] => {
+    const worst = worstOf(own.errors);
+    if (maxBytes < Infinity && sizeOf(own.parts) > maxBytes) return [2, sizeOf(own.parts)];
+    return worst <= target ? [0, sizeOf(own.parts)] : [1, worst];
   };
   const [own, other] = [rank(a), rank(b)];
   return other[0] < own[0] || (other[0] === own[0] && other[1] < own[1]) ? b : a;

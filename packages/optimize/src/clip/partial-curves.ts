@@ -1,5 +1,5 @@
 import { mainCurves } from './main-curves.js';
-import { followed, minCurveStep, type Followed } from './curves.js';
+import { followed, minCurveStep, sharesOf, type Followed } from './curves.js';
 
 /** Returns the range of valid frames of a row: from `first` to `end`, excluding `end`. */
 export type Span = (row: number) => readonly [first: number, end: number];
@@ -108,10 +108,15 @@ function followedPartly(changes: Float32Array, frames: number, span: Span, min: 
     const curves = mainCurves(changes, frames, min).slice(0, MAX_CURVES);
     complete(curves, powersOf(changes, frames, curves));
   }
-  const found = followed(changes, frames, min);
-  const main = found.curves.slice(0, MAX_FITTED);
-  const shares = fitted(changes, frames, span, new RowFit(main, powersOf(changes, frames, main), min));
-  return { ...found, shares: found.shares.map((own, k) => shares[k] ?? own.fill(0)) };
+  const curves = mainCurves(changes, frames, min);
+  const main = curves.slice(0, MAX_FITTED);
+  const powers = powersOf(changes, frames, main);
+  const parts = { rows, frames, curves, passing: 0, isAged: false };
+  if (curves.length <= MAX_FITTED)
+    return { ...parts, shares: fitted(changes, frames, span, new RowFit(main, powers, min)) };
+  // The other curves have what the main ones leave of valid frames.
+  complete(main, powers);
+  return { ...parts, shares: curves.map((curve) => sharesOf(changes, curve)) };
 }
 
 /**
@@ -207,6 +212,8 @@ function powersOf(changes: Float32Array, frames: number, curves: readonly Float6
 class RowFit {
   readonly #curves: readonly Float64Array[];
   readonly #weights: readonly number[];
+  /** [frames + 1, size, size] sums over the frames before a frame of the products of two curves, b <= a. */
+  readonly #products: Float64Array;
   readonly #matrix: Float64Array;
   readonly #solution: Float64Array;
 
@@ -215,7 +222,13 @@ class RowFit {
     const known = powers.reduce((sum, power) => sum + (power === Infinity ? 0 : power), 0);
     const floor = Math.max(noise ** 2, MIN_NOISE * known);
     this.#weights = powers.map((power) => (power === Infinity ? 0 : floor / Math.max(power, 1e-30)));
-    this.#matrix = new Float64Array(curves.length ** 2);
+    const square = curves.length ** 2;
+    const frames = curves[0]?.length ?? 0;
+    this.#products = new Float64Array((frames + 1) * square);
+    for (let f = 0, at = 0; f < frames; f++)
+      for (const one of curves)
+        for (const other of curves) this.#products[square + at] = this.#products[at++] + one[f] * other[f];
+    this.#matrix = new Float64Array(square);
     this.#solution = new Float64Array(curves.length);
   }
 
@@ -230,16 +243,16 @@ class RowFit {
    */
   of(row: Float32Array, first: number, end: number, firmness = 1): Float64Array {
     const [curves, matrix, solution] = [this.#curves, this.#matrix, this.#solution];
+    const products = this.#products;
     const size = curves.length;
+    const [from, to] = [size * size * first, size * size * end];
     for (let a = 0; a < size; a++) {
+      const curve = curves[a];
       let right = 0;
-      for (let f = first; f < end; f++) right += row[f] * curves[a][f];
+      for (let f = first; f < end; f++) right += row[f] * curve[f];
       solution[a] = right;
-      for (let b = 0; b <= a; b++) {
-        let sum = a === b ? firmness * this.#weights[a] : 0;
-        for (let f = first; f < end; f++) sum += curves[a][f] * curves[b][f];
-        matrix[size * a + b] = sum;
-      }
+      for (let at = size * a; at <= (size + 1) * a; at++) matrix[at] = products[to + at] - products[from + at];
+      matrix[(size + 1) * a] += firmness * this.#weights[a];
     }
     solveInPlace(matrix, solution, size);
     return solution;
