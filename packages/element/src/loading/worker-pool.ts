@@ -43,7 +43,7 @@ const MAX_WORKERS = 8;
 const MAX_NEW_WORKERS = 8;
 /** Number of nodes of a tree that wait in one worker before another starts, and maximum number of workers for nodes. */
 const NODES_AT_ONCE = 3;
-const MAX_NODE_WORKERS = 6;
+const MAX_NODE_WORKERS = 8;
 /**
  * Maximum number of restarts of a load. Several restarts are allowed, because a load may share workers with scenes that
  * never finish.

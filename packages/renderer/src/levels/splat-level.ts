@@ -60,22 +60,31 @@ export function emptyLevel(
   };
 }
 
+/** Positions, covariance factors and opacities of some splats. */
+export type SplatShapes = Pick<LevelSource, 'positions' | 'factors' | 'opacities'>;
+
+const factor = new Float64Array(FACTOR_NUMBERS);
+
+/** Writes the shapes of the splats `kept[from]` to `kept[end - 1]` of a cloud to the beginning of `out`. */
+export function putShapes(cloud: GaussianCloud, kept: Uint32Array, from: number, end: number, out: SplatShapes): void {
+  for (let at = from, k = 0; at < end; at++, k++) {
+    const i = kept[at];
+    out.positions[3 * k] = cloud.positions[3 * i];
+    out.positions[3 * k + 1] = cloud.positions[3 * i + 1];
+    out.positions[3 * k + 2] = cloud.positions[3 * i + 2];
+    scaleRotationFactor(cloud, i, factor);
+    for (let n = 0; n < FACTOR_NUMBERS; n++) out.factors[FACTOR_NUMBERS * k + n] = factor[n];
+    out.opacities[k] = Math.min(1, Math.max(0, cloud.opacities[i]));
+  }
+}
+
 /** Returns the finest level: the splats `kept` of a cloud, in that order. */
 export function leafLevel(cloud: GaussianCloud, kept: Uint32Array): SplatLevel {
   const count = kept.length;
   const positions = new Float32Array(3 * count);
   const factors = new Float32Array(FACTOR_NUMBERS * count);
   const opacities = new Float32Array(count);
-  const factor = new Float64Array(FACTOR_NUMBERS);
-  for (let k = 0; k < count; k++) {
-    const i = kept[k];
-    positions[3 * k] = cloud.positions[3 * i];
-    positions[3 * k + 1] = cloud.positions[3 * i + 1];
-    positions[3 * k + 2] = cloud.positions[3 * i + 2];
-    scaleRotationFactor(cloud, i, factor);
-    for (let n = 0; n < FACTOR_NUMBERS; n++) factors[FACTOR_NUMBERS * k + n] = factor[n];
-    opacities[k] = Math.min(1, Math.max(0, cloud.opacities[i]));
-  }
+  putShapes(cloud, kept, 0, count, { positions, factors, opacities });
   const { sh, shDegree, antialiased, filterVariance = constants.DILATION } = cloud;
   const dilation = antialiased ? 0 : filterVariance;
   const spreads = new Float32Array(count);

@@ -78,19 +78,24 @@ export interface Axis {
 /** Returns the statistics of an axis, 0 to 2, over a sample of the splats in `kept`. */
 export function sampleAxis(positions: Float32Array, kept: Uint32Array, axis: number): Axis {
   const count = Math.min(SAMPLE, kept.length);
-  const sample = Float32Array.from({ length: count }, (_, k) => {
-    const i = kept[Math.floor((k * kept.length) / count)];
-    return positions[3 * i + axis];
-  }).sort();
-  const median = sample[count >> 1];
-  const distances = sample.map((x) => Math.abs(x - median)).sort();
+  const sample = new Float32Array(count);
+  for (let k = 0; k < count; k++) sample[k] = positions[3 * kept[Math.floor((k * kept.length) / count)] + axis];
+  sample.sort();
+  const middle = count >> 1;
+  const median = sample[middle];
   let tie = 1;
   let largestTie = 1;
   for (let k = 1; k < count; k++) {
     tie = sample[k] === sample[k - 1] ? tie + 1 : 1;
     largestTie = Math.max(largestTie, tie);
   }
-  return { median, spread: distances[count >> 1] || 1, largestTie, samples: count };
+  // Distances from the median grow on both sides of it. The nearest ones are taken, up to the median distance.
+  let [below, above, distance] = [middle - 1, middle, 0];
+  for (let k = 0; k <= middle && count > 0; k++) {
+    const isBelow = above >= count || (below >= 0 && median - sample[below] < sample[above] - median);
+    distance = isBelow ? median - sample[below--] : sample[above++] - median;
+  }
+  return { median, spread: Math.fround(distance) || 1, largestTie, samples: count };
 }
 
 /**

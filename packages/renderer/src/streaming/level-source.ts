@@ -36,7 +36,14 @@ export function packLevelPage(
 /** Returns the cloud relative to the origin of the scene, with spherical harmonics of the scene's degree. */
 export function placedIn(cloud: GaussianCloud, { origin, shDegree }: StreamedScene): GaussianCloud {
   const shift = cloud.origin.map((x, axis) => x - origin[axis]);
-  const positions = shift.every((x) => x === 0) ? cloud.positions : cloud.positions.map((x, i) => x + shift[i % 3]);
+  const positions = shift.every((x) => x === 0) ? cloud.positions : cloud.positions.slice();
+  if (positions !== cloud.positions) {
+    for (let k = 0; k < positions.length; k += 3) {
+      positions[k] += shift[0];
+      positions[k + 1] += shift[1];
+      positions[k + 2] += shift[2];
+    }
+  }
   return { ...cloud, origin, positions, sh: shOfDegree(cloud, shDegree), shDegree };
 }
 

@@ -145,44 +145,56 @@ function cut(usable: Uint32Array, parts: readonly number[]): Uint32Array<ArrayBu
   return [usable.slice(at), ...own];
 }
 
+/** Number of numbers of a box: center, three unit vectors, three half lengths, [15]. */
+const BOX_NUMBERS = 15;
+
 /** Divides splats among volumes: each belongs to the nearest one, or to the first of those that contain it. */
 function divided(
   cloud: GaussianCloud | undefined,
   usable: Uint32Array,
   volumes: readonly (readonly number[] | undefined)[],
 ): Uint32Array<ArrayBuffer>[] {
-  const boxes = volumes.map((volume) => {
-    if (!volume) return undefined;
+  const boxes = new Float64Array(BOX_NUMBERS * volumes.length);
+  const known = volumes.flatMap((volume, k) => (volume ? k : []));
+  for (const k of known) {
+    const volume = volumes[k]!;
     const axes = [3, 6, 9].map((at) => volume.slice(at, at + 3));
     const lengths = axes.map((axis) => Math.hypot(...axis));
     // An axis of length 0 has no direction, and divides nothing.
-    const units = axes.flatMap((axis, k) => axis.map((x) => (lengths[k] > 0 ? x / lengths[k] : 0)));
-    return { center: volume.slice(0, 3), units, lengths };
-  });
+    const units = axes.flatMap((axis, n) => axis.map((x) => (lengths[n] > 0 ? x / lengths[n] : 0)));
+    boxes.set([...volume.slice(0, 3), ...units, ...lengths], BOX_NUMBERS * k);
+  }
+  const positions = cloud?.positions ?? new Float32Array(0);
   const counts = new Uint32Array(volumes.length);
-  const owners = Uint32Array.from(usable, (i) => {
-    const [x, y, z] = cloud!.positions.subarray(3 * i, 3 * i + 3);
+  const owners = new Uint32Array(usable.length);
+  for (let n = 0; n < usable.length; n++) {
     let [owner, nearest] = [0, Infinity];
-    boxes.forEach((box, k) => {
-      if (!box) return;
-      const [dx, dy, dz] = [x - box.center[0], y - box.center[1], z - box.center[2]];
-      let [outside, inside] = [0, -Infinity];
-      for (let axis = 0; axis < 3; axis++) {
-        const along = dx * box.units[3 * axis] + dy * box.units[3 * axis + 1] + dz * box.units[3 * axis + 2];
-        const beyond = Math.abs(along) - box.lengths[axis];
-        outside += Math.max(0, beyond) ** 2;
-        inside = Math.max(inside, beyond);
-      }
-      const distance = outside > 0 ? Math.sqrt(outside) : inside;
-      if (distance < nearest) [owner, nearest] = [k, distance];
-    });
+    for (let k = 0; k < known.length; k++) {
+      const distance = outsideOf(boxes, BOX_NUMBERS * known[k], positions, 3 * usable[n]);
+      if (distance < nearest) [owner, nearest] = [known[k], distance];
+    }
     counts[owner]++;
-    return owner;
-  });
+    owners[n] = owner;
+  }
   const parts = Array.from(counts, (count) => new Uint32Array(count));
   counts.fill(0);
-  usable.forEach((i, k) => (parts[owners[k]][counts[owners[k]]++] = i));
+  for (let n = 0; n < usable.length; n++) parts[owners[n]][counts[owners[n]]++] = usable[n];
   return parts;
+}
+
+/** Returns the distance of a position from a box; inside of the box the negative distance from its nearest side. */
+function outsideOf(boxes: Float64Array, box: number, positions: Float32Array, at: number): number {
+  const dx = positions[at] - boxes[box];
+  const dy = positions[at + 1] - boxes[box + 1];
+  const dz = positions[at + 2] - boxes[box + 2];
+  let [outside, inside] = [0, -Infinity];
+  for (let axis = 0, unit = box + 3; axis < 3; axis++, unit += 3) {
+    const along = dx * boxes[unit] + dy * boxes[unit + 1] + dz * boxes[unit + 2];
+    const beyond = Math.abs(along) - boxes[box + 12 + axis];
+    if (beyond > 0) outside += beyond * beyond;
+    if (beyond > inside) inside = beyond;
+  }
+  return outside > 0 ? Math.sqrt(outside) : inside;
 }
 
 /** Returns center and radius of a sphere around a volume and around the boxes of chunks. */

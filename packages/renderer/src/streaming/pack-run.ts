@@ -7,7 +7,7 @@ import { detailRows, DETAIL_NUMBERS } from '../levels/chunk-detail.js';
 import { SLOT_CHUNKS, pageLayout, type PageFormat } from './manifest.js';
 import { packFiller } from '../levels/pack-level.js';
 import { packQuantizedChunk, QUANTIZED_CHUNK_WORDS, widenReach } from './quantized-geometry.js';
-import { chunksOf, leafLevel, type SplatLevel } from '../levels/splat-level.js';
+import { chunksOf, FACTOR_NUMBERS, putShapes, type SplatShapes } from '../levels/splat-level.js';
 import { CHUNK_NUMBERS } from '../pack/words.js';
 
 const { CULL_GROUP } = constants;
@@ -48,17 +48,25 @@ export function packRun(
   };
   words.sh.set(packSh(cloud, kept, shPrecision));
   words.chunks.set(boundChunks(cloud, kept));
-  if (geometry === 'quantized') quantizeRun(words, leafLevel(cloud, kept));
+  if (geometry === 'quantized') quantizeRun(words, cloud, kept);
   else words.geometry.set(packGeometry(cloud, kept));
   if (place && kept.length === 0) words.chunks.set([...place.min, 0, ...place.max, 0]);
   if (geometry !== 'quantized') packFiller(words.geometry, kept.length, CULL_GROUP * count);
   return words;
 }
 
-function quantizeRun({ geometry, chunks }: RunWords, level: SplatLevel): void {
-  for (let c = 0; CULL_GROUP * c < level.count; c++) {
-    const end = Math.min(level.count, CULL_GROUP * (c + 1));
-    packQuantizedChunk(level, geometry, QUANTIZED_CHUNK_WORDS * c, CULL_GROUP * c, end);
+/** Shapes of one chunk: memory that all calls share. */
+const shapes: SplatShapes = {
+  positions: new Float32Array(3 * CULL_GROUP),
+  factors: new Float32Array(FACTOR_NUMBERS * CULL_GROUP),
+  opacities: new Float32Array(CULL_GROUP),
+};
+
+function quantizeRun({ geometry, chunks }: RunWords, cloud: GaussianCloud, kept: Uint32Array): void {
+  for (let c = 0; CULL_GROUP * c < kept.length; c++) {
+    const end = Math.min(kept.length, CULL_GROUP * (c + 1));
+    putShapes(cloud, kept, CULL_GROUP * c, end, shapes);
+    packQuantizedChunk(shapes, geometry, QUANTIZED_CHUNK_WORDS * c, 0, end - CULL_GROUP * c);
     widenReach(chunks, CHUNK_NUMBERS * c);
   }
 }

@@ -1,5 +1,5 @@
 import { constants, layouts } from '../generated/shaders.js';
-import { FACTOR_NUMBERS, type SplatLevel } from '../levels/splat-level.js';
+import { FACTOR_NUMBERS, type SplatShapes } from '../levels/splat-level.js';
 
 /**
  * Geometry of a chunk in half the bytes of `PackedGaussian`: 16 for each splat and 32 for each chunk. The layout is
@@ -62,14 +62,25 @@ export function rowLengths(factors: Float32Array, f: number, lengths: Float64Arr
   lengths[2] = Math.hypot(factors[f + 3], factors[f + 4], factors[f + 5]);
 }
 
-/** Returns log2 of the smallest and the largest row of some splats; they differ by at most {@link MAX_OCTAVES}. */
-function octavesOf({ factors }: SplatLevel, from: number, end: number): readonly [min: number, largest: number] {
-  const lengths = new Float64Array(3);
+/** Lengths of the rows of a chunk's splats: memory that all calls share. */
+const chunkLengths = new Float64Array(3 * CULL_GROUP);
+
+/**
+ * Writes the lengths of the rows of some splats to {@link chunkLengths}. The sums of squares of float32 numbers are in
+ * the range of float64. Returns log2 of the smallest and the largest; they differ by at most {@link MAX_OCTAVES}.
+ */
+function octavesOf({ factors }: SplatShapes, from: number, end: number): readonly [min: number, largest: number] {
   let [min, largest] = [Infinity, 0];
-  for (let i = from; i < end; i++) {
-    rowLengths(factors, FACTOR_NUMBERS * i, lengths);
-    min = Math.min(min, lengths[0], lengths[1], lengths[2]);
-    largest = Math.max(largest, lengths[0], lengths[1], lengths[2]);
+  for (let f = FACTOR_NUMBERS * from, at = 0; f < FACTOR_NUMBERS * end; f += FACTOR_NUMBERS, at += 3) {
+    const x = Math.abs(factors[f]);
+    const y = Math.sqrt(factors[f + 1] * factors[f + 1] + factors[f + 2] * factors[f + 2]);
+    const [a, b, c] = [factors[f + 3], factors[f + 4], factors[f + 5]];
+    const z = Math.sqrt(a * a + b * b + c * c);
+    chunkLengths[at] = x;
+    chunkLengths[at + 1] = y;
+    chunkLengths[at + 2] = z;
+    min = Math.min(min, x, y, z);
+    largest = Math.max(largest, x, y, z);
   }
   const high = largest > 0 ? Math.log2(largest) : 0;
   return [Math.max(high - MAX_OCTAVES, Math.min(high, Math.log2(min))), high];
@@ -79,38 +90,46 @@ function octavesOf({ factors }: SplatLevel, from: number, end: number): readonly
  * Writes splats `from` to `end` of a level as one chunk, from word `at` on. The padding has opacity 0.
  * @param words Target array, which must be zero in the range of the chunk.
  */
-export function packQuantizedChunk(level: SplatLevel, words: Uint32Array, at: number, from: number, end: number): void {
+export function packQuantizedChunk(
+  level: SplatShapes,
+  words: Uint32Array,
+  at: number,
+  from: number,
+  end: number,
+): void {
   if (end - from > CULL_GROUP) throw new RangeError(`expected at most ${CULL_GROUP} splats, found ${end - from}`);
-  const floats = new Float32Array(words.buffer, words.byteOffset, words.length);
+  const head = new Float32Array(words.buffer, words.byteOffset + 4 * at, 8);
   const { positions, factors, opacities } = level;
   for (let axis = 0; axis < 3; axis++) {
     let [low, high] = [Infinity, -Infinity];
-    for (let i = from; i < end; i++) {
-      low = Math.min(low, positions[3 * i + axis]);
-      high = Math.max(high, positions[3 * i + axis]);
+    for (let k = 3 * from + axis; k < 3 * end; k += 3) {
+      low = Math.min(low, positions[k]);
+      high = Math.max(high, positions[k]);
     }
-    floats[at + axis] = low;
-    floats[at + 4 + axis] = roundedUp((high - low) / CENTER_STEPS);
+    head[axis] = low;
+    head[4 + axis] = roundedUp((high - low) / CENTER_STEPS);
   }
   const [min, largest] = octavesOf(level, from, end);
-  floats[at + 3] = min;
-  floats[at + 7] = roundedUp((largest - floats[at + 3]) / QUANTIZED_SIZES);
-  const lengths = new Float64Array(3);
-  const codes = new Int32Array(ROW_CODES);
-  const code = (k: number, value: number, max: number): number =>
-    codeOf(value, floats[at + k], floats[at + 4 + k], max);
-  for (let i = from; i < end; i++) {
-    const [x, y, z] = [0, 1, 2].map((axis) => code(axis, positions[3 * i + axis], CENTER_STEPS));
+  head[3] = min;
+  head[7] = roundedUp((largest - head[3]) / QUANTIZED_SIZES);
+  const [x, y, z, size, stepX, stepY, stepZ, octaves] = head;
+  let row = at + 4 * QUANTIZED_HEAD_ROWS;
+  for (let i = from, k = 0; i < end; i++, k += 3, row += 4) {
     const f = FACTOR_NUMBERS * i;
-    rowLengths(factors, f, lengths);
-    const size = (row: number): number => code(3, Math.log2(lengths[row]), QUANTIZED_SIZES);
     // The sign of a column does not change L Lᵀ, so the diagonal is made non-negative.
     const [first, second] = [factors[f] < 0 ? -1 : 1, factors[f + 2] < 0 ? -1 : 1];
     const t = directionIn2(first * factors[f + 1], factors[f + 2]);
     const [u, v] = directionIn3(first * factors[f + 3], second * factors[f + 4], factors[f + 5]);
-    const row = at + 4 * (QUANTIZED_HEAD_ROWS + i - from);
-    codes.set([x, y, z, size(0), size(1), size(2), t, u, v, opacityCode(opacities[i])]);
-    putRow(words, row, codes);
+    const centerX = codeOf(positions[3 * i], x, stepX, CENTER_STEPS);
+    const centerY = codeOf(positions[3 * i + 1], y, stepY, CENTER_STEPS);
+    const centerZ = codeOf(positions[3 * i + 2], z, stepZ, CENTER_STEPS);
+    const size0 = codeOf(Math.log2(chunkLengths[k]), size, octaves, QUANTIZED_SIZES);
+    const size1 = codeOf(Math.log2(chunkLengths[k + 1]), size, octaves, QUANTIZED_SIZES);
+    const size2 = codeOf(Math.log2(chunkLengths[k + 2]), size, octaves, QUANTIZED_SIZES);
+    words[row] = centerX | (centerY << 16);
+    words[row + 1] = centerZ | (u << 16) | (t << 29);
+    words[row + 2] = size0 | (size1 << 10) | (size2 << 20) | ((t >>> 3) << 30);
+    words[row + 3] = v | (opacityCode(opacities[i]) << 13) | ((t >>> 5) << 25);
   }
 }
 

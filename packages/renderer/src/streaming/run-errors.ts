@@ -11,23 +11,33 @@ const REACH = 512;
  */
 export function spacingOf(positions: Float32Array, kept: Uint32Array): number {
   const count = Math.min(SAMPLE, kept.length);
-  const distances = Float64Array.from({ length: count }, (_, s) => {
+  const ordered = new Float32Array(3 * kept.length);
+  for (let k = 0; k < kept.length; k++) {
+    ordered[3 * k] = positions[3 * kept[k]];
+    ordered[3 * k + 1] = positions[3 * kept[k] + 1];
+    ordered[3 * k + 2] = positions[3 * kept[k] + 2];
+  }
+  const distances = new Float64Array(count);
+  for (let s = 0; s < count; s++) {
     const k = Math.floor((s * kept.length) / count);
-    let nearest = Infinity;
-    for (let j = Math.max(0, k - REACH); j < Math.min(kept.length, k + REACH); j++) {
-      if (j !== k) nearest = Math.min(nearest, squaredDistance(positions, 3 * kept[k], 3 * kept[j]));
-    }
-    return Math.sqrt(nearest);
-  }).sort();
-  const median = 2 * distances[count >> 1];
+    const before = nearestTo(ordered, 3 * k, 3 * Math.max(0, k - REACH), 3 * k);
+    const after = nearestTo(ordered, 3 * k, 3 * (k + 1), 3 * Math.min(kept.length, k + REACH));
+    distances[s] = Math.sqrt(Math.min(before, after));
+  }
+  const median = 2 * distances.sort()[count >> 1];
   return Number.isFinite(median) ? median : 0;
 }
 
-function squaredDistance(positions: Float32Array, p: number, q: number): number {
-  const x = positions[p] - positions[q];
-  const y = positions[p + 1] - positions[q + 1];
-  const z = positions[p + 2] - positions[q + 2];
-  return x * x + y * y + z * z;
+/** Returns the squared distance from the point at index `at` to the nearest of the points from index `first` to `end`. */
+function nearestTo(points: Float32Array, at: number, first: number, end: number): number {
+  const [px, py, pz] = [points[at], points[at + 1], points[at + 2]];
+  let nearest = Infinity;
+  for (let k = first; k < end; k += 3) {
+    const [x, y, z] = [px - points[k], py - points[k + 1], pz - points[k + 2]];
+    const distance = x * x + y * y + z * z;
+    if (distance < nearest) nearest = distance;
+  }
+  return nearest;
 }
 
 /**
