@@ -6,7 +6,7 @@ import {
   setRuntimeLocation,
   stackInputs,
 } from '@gaussian-splat/generator';
-import { deviceDescriptor } from '@gaussian-splat/renderer';
+import { deviceDescriptor, ImageTensor } from '@gaussian-splat/renderer';
 import { sendReport } from './run/report.js';
 
 const query = new URLSearchParams(location.search);
@@ -35,6 +35,19 @@ function stateAt(run, model) {
   };
 }
 
+/** Gray images for the inputs that take one. Their size does not change from run to run, so that neither does the work. */
+function imagesOf(device, { header, contract }) {
+  const inputs = header.inputs.filter(({ name }) => contract.inputs[name].role === 'image');
+  return Object.fromEntries(
+    inputs.map(({ name, dims }) => {
+      const [height, width] = dims.slice(-2).map(Number);
+      const image = new ImageTensor(device, { width, height, dtype: 'float32' });
+      image.upload(new ImageData(new Uint8ClampedArray(4 * width * height).fill(128), width, height));
+      return [name, image];
+    }),
+  );
+}
+
 /** Milliseconds for one run of every instance, on a queue that is waited for at the end of a round only. */
 async function measure(device, url, instances) {
   const model = await openModel({ url: new URL(url, document.baseURI).href });
@@ -46,10 +59,14 @@ async function measure(device, url, instances) {
   const isOneRun = model.contract.instances !== undefined;
   const sessions = isOneRun ? [single.forInstances(instances)] : [single];
   while (!isOneRun && sessions.length < instances) sessions.push(makeSession());
+  const images = imagesOf(device, model);
   const varying = inputsOfInstances(model.header, model.contract);
   const runAll = async (run) => {
     for (const session of sessions) {
-      const states = Array.from({ length: instances / sessions.length }, (_, i) => stateAt(run + 7 * i, model));
+      const states = Array.from({ length: instances / sessions.length }, (_, i) => ({
+        ...stateAt(run + 7 * i, model),
+        images,
+      }));
       const inputs = states.map((state) => single.bind(state));
       await session.run(isOneRun ? stackInputs(inputs, varying) : inputs[0], () => undefined);
     }
@@ -69,6 +86,7 @@ async function measure(device, url, instances) {
   const { whole, submitting } = rounds.sort((one, other) => one.whole - other.whole)[ROUNDS >> 1];
   const kind = sessions[0].kind;
   await Promise.all(sessions.map((session) => session.release()));
+  for (const image of Object.values(images)) image.destroy();
   return {
     ...{ url, instances, runs: sessions.length, rows: model.contract.nMax, kind, fallbacks },
     millisecondsPerRun: whole,
