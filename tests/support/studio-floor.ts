@@ -170,15 +170,18 @@ export class StudioFloor {
 
 const distance = (a: Point, b: Point): number => Math.hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]);
 
-/** Yields the triangles of a scene's mesh, meters, y up. */
-function* trianglesOf(name: string): Generator<readonly Point[]> {
+/** Yields the triangles of a scene's mesh, meters, y up; with objects, of those alone. */
+export function* trianglesOf(name: string, objects?: (object: string) => boolean): Generator<readonly Point[]> {
   const folder = fileURLToPath(new URL(`../fixtures/studio/${name}/`, import.meta.url));
-  const { mesh } = JSON.parse(readFileSync(`${folder}truth.json`, 'utf8')) as {
+  const { mesh, objects: names } = JSON.parse(readFileSync(`${folder}truth.json`, 'utf8')) as {
     mesh: { points: number; triangles: number };
+    objects: readonly string[];
   };
   const bytes = new Uint8Array(gunzipSync(readFileSync(`${folder}mesh.bin.gz`)));
   const points = new Float32Array(bytes.buffer, bytes.byteOffset, 3 * mesh.points);
   const corners = new Uint32Array(bytes.buffer, bytes.byteOffset + points.byteLength, 3 * mesh.triangles);
+  const ids = bytes.subarray(points.byteLength + corners.byteLength);
   const pointOf = (i: number): Point => [points[3 * i], -points[3 * i + 1], -points[3 * i + 2]];
-  for (let i = 0; i < corners.length; i += 3) yield [...corners.subarray(i, i + 3)].map(pointOf);
+  for (let i = 0; i < corners.length; i += 3)
+    if (!objects || objects(names[ids[i / 3]])) yield [...corners.subarray(i, i + 3)].map(pointOf);
 }

@@ -29,8 +29,12 @@ const LAYERS = [
 ] as const;
 /** Opacity of the darkest shadow. */
 const DARKEST = 0.8;
-/** Fraction of the subject's silhouette that may lie below the ground. */
+/** Fraction of the subject's silhouette that may lie outside of its extent on each side, such as below the ground. */
 const BELOW = 0.005;
+/** Maximum ratio of the silhouette's radius to that of the images for which they are taken again, of it alone. */
+const SMALL = 0.7;
+/** Maximum number of times that they are taken again. */
+const MAX_ZOOMS = 3;
 /** Minimum opacity of a visible splat, 0..255. */
 const MIN_CODE = 1;
 
@@ -59,15 +63,44 @@ export interface ShadowMap {
 
 /** Captures the images of a subject's shadow. @returns null if the subject has no visible splats */
 export async function takeShadow(subject: Subject, take: TakeAlpha): Promise<ShadowMap | null> {
-  const { center, radius } = subject;
-  const side = extent(await take(sideCamera(subject)));
-  if (side === null) return null;
-  const at = (share: number): number => center[1] + radius * (1 - 2 * share);
-  const [top, ground] = [at(side.first), at(side.last)];
+  const found = await silhouetteOf(subject, take);
+  if (found === null) return null;
+  const { center, radius, ground, top } = found;
   const half = REACH * radius;
   const layers: Alpha[] = [];
-  for (const { height } of LAYERS) layers.push(await take(cameraAbove(subject, ground, height * (top - ground))));
+  for (const { height } of LAYERS) layers.push(await take(cameraAbove(found, ground, height * (top - ground))));
   return { middle: [center[0], ground, center[2]], half, layers };
+}
+
+/**
+ * Returns the heights of a subject's silhouette, and the sphere that its images frame. What cuts leave of a scene is
+ * often much smaller than the scene, so the sphere shrinks to what is visible.
+ */
+async function silhouetteOf(
+  subject: Subject,
+  take: TakeAlpha,
+): Promise<(Subject & { readonly ground: number; readonly top: number }) | null> {
+  for (let zooms = 0; ; zooms++) {
+    const { center, radius, frame } = subject;
+    const front = await take(sideCamera(subject));
+    const [x, y] = [extent(front, 1, SHADOW_PIXELS), extent(front, SHADOW_PIXELS, 1)];
+    if (x === null || y === null) return null;
+    const found = {
+      ...subject,
+      ground: center[1] + radius * (1 - 2 * y.last),
+      top: center[1] + radius * (1 - 2 * y.first),
+    };
+    if (zooms === MAX_ZOOMS || Math.max(x.last - x.first, y.last - y.first) > SMALL) return found;
+    const plan = await take(cameraAbove(subject, center[1] - radius, 2 * radius));
+    const z = extent(plan, SHADOW_PIXELS, 1);
+    if (z === null) return found;
+    const ends = [x, { first: 1 - y.last, last: 1 - y.first }].map(({ first, last }) => [2 * first - 1, 2 * last - 1]);
+    ends.push([REACH * (2 * z.first - 1), REACH * (2 * z.last - 1)]);
+    const small = (radius * Math.hypot(...ends.map(([from, to]) => to - from))) / 2;
+    if (small > SMALL * radius) return found;
+    const middle = center.map((value, k) => value + (radius * (ends[k][0] + ends[k][1])) / 2);
+    subject = { center: middle as unknown as Vector3, radius: small, frame };
+  }
 }
 
 /** Returns the camera in front of the subject that frames its sphere. */
@@ -103,13 +136,16 @@ function camera(
 }
 
 /**
- * Returns the first and last row of a silhouette as fractions of the image's height, ignoring small specks; null for an
- * empty image.
+ * Returns the first and last row, or column, of a silhouette as fractions of the image's side, ignoring small specks;
+ * null for an empty image.
+ * @param line Distance between rows or columns in the image, 1 or {@link SHADOW_PIXELS}
+ * @param step Distance between the pixels of one of them
  */
-function extent(alpha: Alpha): { first: number; last: number } | null {
+function extent(alpha: Alpha, line: number, step: number): { first: number; last: number } | null {
   const rows = Array.from({ length: SHADOW_PIXELS }, (_, row) => {
     let sum = 0;
-    for (let i = 0; i < SHADOW_PIXELS; i++) sum += alpha[row * SHADOW_PIXELS + i];
+    // The square ignores haze and the faint rims of splats.
+    for (let i = 0; i < SHADOW_PIXELS; i++) sum += alpha[row * line + i * step] ** 2;
     return sum;
   });
   const all = rows.reduce((sum, row) => sum + row, 0);
