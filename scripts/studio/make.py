@@ -46,6 +46,7 @@ def main() -> None:
     parser.add_argument("--reserve", type=float, default=110, help="seconds before --until that are kept for training")
     parser.add_argument("--frames", type=int, default=24, help="of a moving scene")
     parser.add_argument("--parts", type=Path, default=Path("/tmp/studio-parts"))
+    parser.add_argument("--poses", choices=["true", "found"], default="true", help="found: by COLMAP (pycolmap 3.13.0)")
     parser.add_argument("--look", action="store_true", help="only writes the held-out images")
     options = parser.parse_args()
     mi.set_variant("cuda_ad_rgb")
@@ -99,8 +100,6 @@ class Making:
 
     def run(self) -> None:
         """Images, then training, then truth."""
-        import phone
-
         if hasattr(self.scene, "animate"):
             import moving
 
@@ -110,11 +109,14 @@ class Making:
         if self.options.look:
             return None
         images, poses, points, colors = self.picture_training(views)
+        focal = self.focal
+        if self.options.poses == "found":
+            images, poses, points, colors, focal = self.as_found(images, poses)
         from train import Images, measure, train
 
         cap, antialiased = SCENES[self.options.name]
         splats = train(
-            Images(images, poses, self.focal), points, colors, cap, self.options.steps, self.left(18), antialiased
+            Images(images, poses, focal), points, colors, cap, self.options.steps, self.left(18), antialiased
         )
         figures = self.keep(
             splats, lambda s: measure(s, Images(held["pixels"], held["poses"], self.focal), antialiased)
@@ -166,6 +168,7 @@ class Making:
         import phone
 
         images, poses, points, colors = [], [], [], []
+        self.taken = []
         exposures = phone.drift(len(views), self.random)
         for k in self.random.permutation(len(views)):  # whenever time ends, all parts of the way have been seen
             (eye, target), exposure = views[k], exposures[k]
@@ -177,12 +180,33 @@ class Making:
             points.append(found)
             colors.append(color)
             images.append(image)
+            self.taken.append(int(k))
             poses.append(pose_of(eye, target))
             if time.time() > self.options.until - self.options.reserve:
                 break
             if len(images) % 50 == 0:
                 self.say(f"{len(images)} images")
         return images, poses, np.concatenate(points), np.concatenate(colors)
+
+    def as_found(self, images, poses):
+        """Images that COLMAP finds a pose for, with this pose, and its points, their colors and its focal length."""
+        import phone
+        from poses import errors, find
+
+        folder = self.options.out / "taken"
+        folder.mkdir(exist_ok=True)
+        order = np.argsort(self.taken)  # as they were taken on the way
+        names = [f"{self.taken[k]:03}.png" for k in order]
+        for name, k in zip(names, order, strict=True):
+            (folder / name).write_bytes(phone.coded(images[k], "PNG", 100))
+        true = np.stack([poses[k] for k in order])
+        result = find(folder, names, true)
+        own = errors(result["poses"], true[result["found"]])
+        self.say(
+            f"COLMAP: {len(result['found'])} of {len(images)} images, focal {result['focal'] / self.focal:.5f}, {own}"
+        )
+        chosen = [images[order[k]] for k in result["found"]]
+        return chosen, list(result["poses"]), result["points"], result["colors"], result["focal"]
 
     def found(self, where, things, image, eye, target, count: int = 700):
         """Points on surfaces, off by about a pixel, one in fifty wild; the sky's at 60 m."""
@@ -249,7 +273,12 @@ class Making:
         truth["mesh"] = {"points": len(mesh[0]), "triangles": len(mesh[1])}
         write_binary(out / "mesh.bin.gz", *mesh)
         lines = json.dumps(truth, indent=2)
-        (out / "truth.json").write_text(re.sub(r"\[[^\[\]{}]*\]", lambda list: " ".join(list[0].split()).replace("[ ", "[").replace(" ]", "]"), lines) + "\n")
+        (out / "truth.json").write_text(
+            re.sub(
+                r"\[[^\[\]{}]*\]", lambda list: " ".join(list[0].split()).replace("[ ", "[").replace(" ]", "]"), lines
+            )
+            + "\n"
+        )
         self.say("done")
 
     def view(self, name: str, pose) -> dict:
