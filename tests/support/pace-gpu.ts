@@ -45,7 +45,11 @@ export interface Frame {
  * Draws frames in motion for the given time: a frame starts with a display refresh, once the GPU has at most one frame
  * queued.
  */
-export function run(gpu: Gpu, milliseconds: number): { frames: Frame[]; quality: QualityState; targetMs: number } {
+export function run(
+  gpu: Gpu,
+  milliseconds: number,
+  levels = LEVELS,
+): { frames: Frame[]; quality: QualityState; targetMs: number } {
   const interval = 1000 / gpu.hertz;
   const targetMs = 0.8 * interval;
   const random = randomSource(gpu.seed);
@@ -56,7 +60,7 @@ export function run(gpu: Gpu, milliseconds: number): { frames: Frame[]; quality:
   for (let at = 0; at < milliseconds; at += interval) {
     while (waiting.length > 0 && waiting[0].due <= at) {
       const { due, level, spent } = waiting.shift()!;
-      quality = nextQuality(quality, { now: due, level, milliseconds: spent }, { targetMs, levels: LEVELS });
+      quality = nextQuality(quality, { now: due, level, milliseconds: spent }, { targetMs, levels });
     }
     if (gpu.moves?.(at) === false || free > at + interval) continue;
     const { level } = quality;

@@ -8,7 +8,7 @@ import { headset } from './support/headset.js';
 import { assert, assertEqual, COMPASS, frames, showLoaded, until } from './support/harness.js';
 
 const STILL = { 'interpolation-decay': '0', 'interaction-prompt': 'none' };
-const LIMIT_MS = 3_000;
+const LIMIT_MS = 30_000;
 const PLANE = 0.3;
 
 interface Session {
@@ -143,6 +143,19 @@ describe('AR', () => {
     element.exitXR!();
     await until(() => element.getAttribute('ar-status') === 'not-presenting', 'an end', LIMIT_MS);
   });
+
+  for (const name of ['product', 'walker'])
+    itInLab(`${name}: the floor of a scene that was trained from images is on the plane`, async () => {
+      const attributes = { src: `/demo/scenes/studio/${name}.spz`, 'ar-scale': 'fixed', unit: '1m' };
+      const [element, m] = await start(attributes);
+      const [x, , z] = insideOf(element).camera.bounds.center;
+      // The floors of the studio have the height 0.
+      const above = inRoom(m, [x, 0, z])[1] - PLANE;
+      console.log(`AR, ${name}: the true floor is ${(100 * above).toFixed(1)} cm above the plane`);
+      assert(Math.abs(above) < 0.05, `${above} m above the plane`);
+      element.exitXR!();
+      await until(() => element.getAttribute('ar-status') === 'not-presenting', 'an end', LIMIT_MS);
+    });
 
   itInLab('is 0.5 to 1 m large at first where no size is known', async () => {
     const [element, m] = await start({});

@@ -8,6 +8,7 @@ export {
 export { addLoss, decibelsOf } from '../../../packages/element/src/dynamic-quality/loss.js';
 export { nextQuality } from '../../../packages/element/src/dynamic-quality/next-quality.js';
 export {
+  levelsForSize,
   MIN_PSNR,
   QUALITY_LEVELS,
   type QualityLevel,
