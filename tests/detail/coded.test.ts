@@ -25,6 +25,7 @@ import {
   HarmonicRounder,
 } from '@gaussian-splat/optimize/pages';
 import { deflate } from '../../packages/cli/src/lib/encoders.mjs';
+import { someOf } from '../support/extent.js';
 import { detailFolder } from '../support/detail-folder.js';
 import { drawUntilCalm } from '../support/draw-until-calm.js';
 import { randomSource } from '../support/gpu.js';
@@ -60,7 +61,7 @@ function withHarmonics(cloud: GaussianCloud, shDegree: ShDegree): GaussianCloud 
   return { ...cloud, shDegree, sh };
 }
 
-for (const degree of [0, 1, 2, 3] as const) {
+for (const degree of someOf([3, 2, 1, 0] as const, 2)) {
   test(`degree ${degree}: rows are those of pages that are not coded, and splats are where they were`, async () => {
     const cloud = withHarmonics(pebbles(6_000), degree);
     const tree = buildDetailTree(cloud, { geometry: 'quantized' });

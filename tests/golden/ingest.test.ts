@@ -5,7 +5,7 @@ import type { Camera, GaussianCloud } from '@gaussian-splat/core';
 import { DynamicGaussians, GaussianBuffers, packGaussians } from '@gaussian-splat/renderer';
 import { mortonOrder } from '@gaussian-splat/renderer/stages';
 import { writeTensors, type TensorSpec, type WrittenTensors } from '../support/generator-tensors.js';
-import { someOf } from '../support/extent.js';
+import { isLab, someOf } from '../support/extent.js';
 import { psnr } from '../support/metrics.js';
 import { endNodeDevice, serialDevice } from '../support/node-device.js';
 import {
@@ -24,7 +24,7 @@ import { capture, Renderer } from '../support/renderer.js';
 const LIMIT_DB = 55;
 let made: Scene | undefined;
 /** Generators' tensors are written and read here in plain code, number by number: fewer splats than the whole room has. */
-const smallRoom = (): Scene => (made ??= thinned(room(), 8_000));
+const smallRoom = (): Scene => (made ??= thinned(room(), isLab ? 8_000 : 4_000));
 /**
  * Rounded to float16, covariances of needles and discs are indefinite: they have no reference image, only a bound of the difference between two repairs. The accuracy of each is tested below.
  */

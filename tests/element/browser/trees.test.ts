@@ -328,7 +328,7 @@ describe('RAD', () => {
     await close(reference);
   });
 
-  it('is coarser within little memory, without an error', async () => {
+  itInLab('is coarser within little memory, without an error', async () => {
     GaussianSplatElement.memoryBudget = LITTLE;
     const served = await rad();
     const element = await opened(served, { ...viewAt(0), detail: '0.02px' });

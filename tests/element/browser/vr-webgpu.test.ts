@@ -210,7 +210,7 @@ describe('VR by WebGPU', () => {
     await leave(element);
   });
 
-  it('keeps its scene while other loads need the memory of scenes that are out of view', async () => {
+  itInLab('keeps its scene while other loads need the memory of scenes that are out of view', async () => {
     headset();
     binding = fakeBinding('array', 1);
     element = await showVr();
@@ -294,7 +294,7 @@ describe('VR by WebGPU', () => {
       await leave(page);
     });
 
-  it('a session that WebGL draws continues without the device', async () => {
+  itInLab('a session that WebGL draws continues without the device', async () => {
     headset();
     binding = fakeBinding('array', 1, 'not granted');
     element = await showVr();
