@@ -3,12 +3,13 @@
  * `npx web-test-runner [--files tests/element/browser/lifecycle.alone.test.ts]`; for high-density.lab.test.ts with TEST_GROUP=dense. CHROMIUM names the browser;
  * GAUSSIAN_SPLAT_GPU=system takes the machine's own GPU instead of SwiftShader.
  */
-import { relative } from 'node:path';
+import { mkdirSync, writeFileSync } from 'node:fs';
+import { basename, join, relative } from 'node:path';
 import { defaultReporter } from '@web/test-runner';
 import { playwrightLauncher } from '@web/test-runner-playwright';
 import { findChromium, gpuFlags } from './scripts/lib/chromium.mjs';
 import { root } from './scripts/lib/run.mjs';
-import { DENSE } from './scripts/lib/test-files.mjs';
+import { DENSE, SHARED_PAGES } from './scripts/lib/test-files.mjs';
 import { failureLine } from './scripts/lib/slowest-reporter.mjs';
 import { pageCommands } from './tests/element/browser/support/commands.mjs';
 import { hostileServer, startOtherOrigin } from './tests/element/browser/support/server.mjs';
@@ -46,7 +47,7 @@ export default {
     slowestReporter(),
     countReporter(),
   ],
-  files: named ?? ['tests/**/browser/**/*.test.ts', `!${DENSE}`],
+  files: (isSecondVisit ? named && sharePages(named) : named) ?? ['tests/**/browser/**/*.test.ts', `!${DENSE}`],
   rootDir: '.',
   // Runs beside each other have a port each; otherwise the first one that is free.
   port: process.env.TEST_PORT ? Number(process.env.TEST_PORT) : undefined,
@@ -115,6 +116,20 @@ function countReporter() {
       console.log(`Chromium: ${passed} passed, ${failed + broken} failed, ${skipped} skipped`);
     },
   };
+}
+
+/** Replaces the files of each shared page by one that imports them. */
+function sharePages(files) {
+  const folder = 'test-output/pages';
+  mkdirSync(join(root, folder), { recursive: true });
+  const shared = SHARED_PAGES.map((page) => page.filter((file) => files.includes(file)));
+  const pages = shared.filter(({ length }) => length > 1);
+  const made = pages.map((page) => {
+    const path = `${folder}/${page.map((file) => basename(file, '.test.ts')).join('-')}.test.ts`;
+    writeFileSync(join(root, path), page.map((file) => `import '/${file}';\n`).join(''));
+    return path;
+  });
+  return [...made, ...files.filter((file) => !pages.flat().includes(file))];
 }
 
 function chromium(pixelRatio) {

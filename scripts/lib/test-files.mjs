@@ -17,6 +17,19 @@ const isAlone = (file) => /\.alone\.(lab\.)?test\.ts$/.test(file);
 
 /** Has a browser of its own, whose screen is dense. */
 export const DENSE = 'tests/element/browser/high-density.lab.test.ts';
+/**
+ * Files of Chromium that run in one page in `npm test`, which compiles the pipelines of a device once: they change nothing of the page that outlives them, and do not count what it has fetched or
+ * holds.
+ */
+export const SHARED_PAGES = [
+  ['accessibility', 'addresses', 'doors', 'embed', 'image-loss'],
+  ['labels', 'meaning', 'measure'],
+  ['mesh-files', 'meshes', 'interaction'],
+  ['depth', 'slow-reads', 'splats'],
+  ['clip', 'scenes'],
+  ['effects', 'views'],
+].map((names) => names.map((name) => `tests/element/browser/${name}.test.ts`));
+
 /** Files of Node that run in one process with the device of tests/support, and thus reuse its compiled pipelines. */
 const SHARES_DEVICE = /^tests\/(detail|golden|stages)\//;
 /** Files of these folders have a process each: they take the machine's memory or threads. Others share one: to start it takes longer than most of them. */
