@@ -45,7 +45,7 @@ function addWithImports(file, needed) {
 
 /** Scripts that a page fetches beside those of {@link scriptsForPly}, by purpose: docs/guide/performance.md has the sums. */
 const BESIDE = {
-  'the self-test of the GPU': ['search', 'timing', 'capture', 'sh'],
+  'the self-test of the GPU': ['search', 'timing', 'sh'],
   'camera controls': ['input-controller', 'box-points', 'corner-button', 'label-parts'],
 };
 
