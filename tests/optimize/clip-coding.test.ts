@@ -2,7 +2,15 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import type { Camera, GaussianCloud } from '@gaussian-splat/core';
-import { codeClip, viewsAround, type ClipStore, type CodeClipOptions, type DrawFrame } from '@gaussian-splat/optimize';
+import {
+  codeClip,
+  codeClipRange,
+  viewsAround,
+  type ClipJobs,
+  type ClipStore,
+  type CodeClipOptions,
+  type DrawFrame,
+} from '@gaussian-splat/optimize';
 import { parseClip } from '@gaussian-splat/formats';
 import { encodeWebp } from '../../packages/cli/src/lib/encoders.mjs';
 import { meanSquare } from '../../packages/optimize/src/measure.js';
@@ -108,6 +116,40 @@ test('an interrupted call continues after its last group, and returns the same c
   assert.ok(steps.includes('continues with frame 6'), steps.join('\n'));
   assert.deepEqual(progress, [12, 18]);
   assert.deepEqual(continued, whole);
+});
+
+test('groups that are coded at the same time, and end in any order, make the same clip; one that fails ends the call', async () => {
+  const given = { ...options(room, 34), framesPerGroup: 4 };
+  const whole = await codeClip(given);
+  assert.ok(whole.still > 0 && whole.groups === 5);
+  let [running, peak] = [0, 0];
+  const jobs: ClipJobs = {
+    count: 3,
+    code: async (range) => {
+      peak = Math.max(peak, ++running);
+      // The last range is ready first.
+      await new Promise((done) => setTimeout(done, 4 * (FRAMES - range.begin)));
+      const state = await codeClipRange(given, structuredClone(range));
+      running--;
+      return structuredClone(state);
+    },
+  };
+  const store = new MemoryStore();
+  assert.deepEqual(await codeClip({ ...given, jobs, store }), whole);
+  assert.equal(peak, 3);
+  // All groups are in the store.
+  assert.deepEqual(await codeClip({ ...given, store }), whole);
+  const failing = { ...jobs, code: () => Promise.reject(new Error('no memory')) };
+  await assert.rejects(codeClip({ ...given, jobs: failing }), /no memory/);
+});
+
+test('a group has more frames by default if few splats move', async () => {
+  const still = cloudOf([{ position: [0, 0, 0], scale: 0.1, opacity: 0.9, color: [0.5, 0.5, 0.5] }]);
+  const { bytes } = await clipOf(() => still, { frames: 310 });
+  assert.deepEqual(
+    parseClip(bytes, 'a.gsv').groups.map(({ frames }) => frames),
+    [300, 10],
+  );
 });
 
 /** A room whose twentieth part moves; frames have their splats in other orders, and with noise far below a pixel. */

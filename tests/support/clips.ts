@@ -21,7 +21,7 @@ export function clipOf(
     framesPerSecond = 10,
     framesPerGroup,
     name = 'a.ply',
-  }: { frames: number; framesPerSecond?: number; framesPerGroup: number; name?: string },
+  }: { frames: number; framesPerSecond?: number; framesPerGroup?: number; name?: string },
 ): Promise<CodedClip> {
   const encoding = encodingsFor(name).at(-1)!;
   return codeClip({

@@ -1,16 +1,12 @@
 /** Implementation of `gaussian-splat sequence`: converts a sequence of scene files to a clip. */
-import { existsSync, readFileSync } from 'node:fs';
-import { basename, dirname, join, resolve } from 'node:path';
-import { framePath, parseSequence, readScene } from '@gaussian-splat/formats';
-import { pickInitialVariants } from '@gaussian-splat/renderer';
+import { existsSync, readFileSync, statSync } from 'node:fs';
+import { resolve } from 'node:path';
 import { CommandError, parseSceneOptions, report, runCommand, UsageError } from './lib/command.mjs';
-import { codeClip, drawOn } from '@gaussian-splat/optimize';
+import { codeClip } from '@gaussian-splat/optimize';
 import { CREDIT_OPTIONS, CREDIT_USAGE, creditsWith } from './lib/credits.mjs';
+import { clipJobs, openFrames, usualJobs } from './lib/clip-jobs.mjs';
 import { openClipStore } from './lib/clip-store.mjs';
-import { encodeWebp } from './lib/encoders.mjs';
-import { requestNodeDevice } from './lib/node-gpu.mjs';
 import { checkOutput, obstacleTo, writeWhole } from './lib/output-file.mjs';
-import { readWhole } from './lib/input-file.mjs';
 
 const USAGE = `usage: gaussian-splat sequence MANIFEST --out CLIP.gsv [options]
 
@@ -19,8 +15,11 @@ const USAGE = `usage: gaussian-splat sequence MANIFEST --out CLIP.gsv [options]
   --min-psnr DB     PSNR of each frame to its scene file, over covered pixels of 16 views together, 30 to 60 (default 45):
                     files are as small as that allows. All frames are measured. If a frame has less, the clip is written, and the status is 1
   --max-mbps RATE   most megabits a second; the PSNR may then be below the default of --min-psnr
-  --per-file N      frames of a group, 2 to 480 (default 100): with more, the result is smaller, and its fine image comes later.
-                    Groups of large frames are shorter, so that their memory is bounded
+  --per-file N      frames of a group, 2 to 480 (default 100, up to 300 if fewer than 50,000 splats move): with more, the
+                    result is smaller, and its fine image comes later. Groups of large frames are shorter, so that their
+                    memory is bounded
+  --jobs N          groups that are encoded at the same time after the first one, 1 to 64, each in the memory of a group
+                    (default: one for five CPU cores, up to 4). The result is the same
 ${CREDIT_USAGE.replace('SCENE', 'MANIFEST, or of the scene files')}
 
 An interrupted command continues after its last group if it is started again: finished groups are in CLIP.gsv.unfinished.
@@ -28,7 +27,8 @@ An interrupted command continues after its last group if it is started again: fi
 
 function parseOptions(args) {
   const own = { out: { type: 'string' }, 'max-mbps': { type: 'string' }, ...CREDIT_OPTIONS };
-  const parsed = parseSceneOptions(args, { ...own, 'min-psnr': { type: 'string' }, 'per-file': { type: 'string' } });
+  const text = { type: 'string' };
+  const parsed = parseSceneOptions(args, { ...own, 'min-psnr': text, 'per-file': text, jobs: text });
   if (parsed === undefined) return undefined;
   const { values } = parsed;
   if (values.out === undefined) throw new UsageError('--out is missing');
@@ -38,9 +38,13 @@ function parseOptions(args) {
   const minPsnr = Number(values['min-psnr'] ?? 45);
   if (!(minPsnr >= 30 && minPsnr <= 60))
     throw new UsageError(`--min-psnr: expected 30 to 60, found "${values['min-psnr']}"`);
-  const framesPerGroup = Number(values['per-file'] ?? 100);
-  if (!(Number.isInteger(framesPerGroup) && framesPerGroup >= 2 && framesPerGroup <= 480))
-    throw new UsageError(`--per-file: expected a whole number from 2 to 480, found "${values['per-file']}"`);
+  const wholeOf = (name, min, max) => {
+    const value = values[name] === undefined ? undefined : Number(values[name]);
+    if (value === undefined || (Number.isInteger(value) && value >= min && value <= max)) return value;
+    throw new UsageError(`--${name}: expected a whole number from ${min} to ${max}, found "${values[name]}"`);
+  };
+  const framesPerGroup = wholeOf('per-file', 2, 480);
+  const jobs = wholeOf('jobs', 1, 64) ?? usualJobs();
   const { 'max-mbps': rate } = values;
   if (rate !== undefined && !(Number(rate) > 0))
     throw new UsageError(`--max-mbps: expected a rate above 0, found "${rate}"`);
@@ -49,39 +53,25 @@ function parseOptions(args) {
   const isDemanded = maxMbps === undefined || values['min-psnr'] !== undefined;
   const { attribution, license } = values;
   const credits = { attribution, license };
-  return { manifest: resolve(parsed.scene), out, minPsnr, isDemanded, maxMbps, framesPerGroup, credits };
+  return { manifest: resolve(parsed.scene), out, minPsnr, isDemanded, maxMbps, framesPerGroup, jobs, credits };
 }
 
-async function openDevice() {
-  const { device } = await requestNodeDevice({ isTrusted: true });
-  await pickInitialVariants(device, { format: 'rgba8unorm' });
-  return device;
-}
-
-async function main({ manifest, out, minPsnr, isDemanded, maxMbps, framesPerGroup, credits }) {
-  const sequence = parseSequence(await readWhole(manifest), basename(manifest));
+async function main({ manifest, out, minPsnr, isDemanded, maxMbps, framesPerGroup, jobs, credits }) {
+  const given = { manifest, minPsnr, maxMbps, framesPerGroup };
+  const { sequence, paths, options } = await openFrames(given);
   const { frameCount, framesPerSecond } = sequence;
-  const paths = Array.from({ length: frameCount }, (_, frame) => join(dirname(manifest), framePath(sequence, frame)));
-  const sizes = new Map();
-  const openFrame = async (frame) => {
-    const path = paths[frame];
-    const bytes = await readWhole(path);
-    sizes.set(path, bytes.length);
-    return readScene(bytes, { name: path, openFile: (part) => readWhole(join(dirname(path), part)) });
-  };
-  const existing = paths.filter((path) => existsSync(path));
+  const existing = [...new Set(paths)].filter((path) => existsSync(path));
   const store = openClipStore(out, { framesPerSecond, framesPerGroup, minPsnr, maxMbps }, existing);
+  const onStep = (step) => console.log(`  ${step}`);
   const clip = await codeClip({
-    ...{ frameCount, framesPerSecond, framesPerGroup, openFrame, minPsnr, maxMbps, draw: drawOn(await openDevice()) },
-    ...{ encodeWebp, store },
+    ...{ ...options, store, onStep, jobs: clipJobs(jobs, given, onStep) },
     credits: creditsWith(sequence.credits, credits),
-    onStep: (step) => console.log(`  ${step}`),
     onProgress: (frames) => console.log(`${frames} of ${frameCount} frames`),
   });
   writeWhole(out, clip.bytes);
   store.remove();
   report({ splats: clip.splats, psnr: clip.psnr });
-  const sourceBytes = [...sizes.values()].reduce((sum, bytes) => sum + bytes, 0);
+  const sourceBytes = existing.reduce((sum, path) => sum + statSync(path).size, 0);
   const seconds = frameCount / framesPerSecond;
   const megabytes = (bytes) => `${(bytes / 1e6).toFixed(2)} MB`;
   console.log(

@@ -20,6 +20,8 @@ export interface ClipState {
   readonly encoding: SogChoice | undefined;
   readonly steps: MotionSteps | undefined;
   readonly shDegree: ShDegree;
+  /** Undefined before the first group. */
+  readonly framesPerGroup: number | undefined;
   readonly grow: number;
   readonly largest: number;
   readonly splats: number;
@@ -31,11 +33,12 @@ export interface ClipState {
 const STATE = 'state.json';
 const nameOf = (group: number | string, part: number): string => `${group}-${part}.bin`;
 
-/** Writes the last group and the state. Earlier groups are written already. */
-export async function writeState(store: ClipStore, state: ClipState): Promise<void> {
-  const last = state.groups.length - 1;
-  for (const [k, { bytes }] of state.groups[last].parts.entries()) await store.write(nameOf(last, k), bytes);
-  if (last === 0) for (const [k, { bytes }] of state.still.entries()) await store.write(nameOf('still', k), bytes);
+/** Writes the last `added` groups and the state. Earlier groups are written already. */
+export async function writeState(store: ClipStore, state: ClipState, added: number): Promise<void> {
+  const first = state.groups.length - added;
+  for (const [own, { parts }] of state.groups.slice(first).entries())
+    for (const [k, { bytes }] of parts.entries()) await store.write(nameOf(first + own, k), bytes);
+  if (first === 0) for (const [k, { bytes }] of state.still.entries()) await store.write(nameOf('still', k), bytes);
   const json = JSON.stringify(state, (key, value: unknown) => (key === 'bytes' ? undefined : value));
   // Groups are complete when the state names them.
   await store.write(STATE, new TextEncoder().encode(json));

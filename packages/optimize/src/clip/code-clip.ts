@@ -22,7 +22,11 @@ export interface CodeClipOptions {
   readonly framesPerSecond: number;
   /** Credits of the clip, in place of those of its frames. */
   readonly credits?: Credits | undefined;
-  readonly framesPerGroup: number;
+  /**
+   * Maximum number of frames of a group. Default: 100, and up to 300 if few splats move, so that a group has about as many
+   * bytes.
+   */
+  readonly framesPerGroup?: number | undefined;
   /** Target PSNR of each frame against its source in dB, over covered pixels of its views together. */
   readonly minPsnr: number;
   /** Draws the frames that are measured, for example {@link drawOn} a device. Unused with `rounding`. */
@@ -32,6 +36,8 @@ export interface CodeClipOptions {
   readonly onStep?: (step: string) => void;
   /** Called with the number of coded frames after each group. */
   readonly onProgress?: (frames: number) => void;
+  /** Codes all groups after the first one, several at a time, by {@link codeClipRange}. The result is the same. */
+  readonly jobs?: ClipJobs | undefined;
   /** Memory of finished groups, so that an interrupted call continues after its last group. Default: none. */
   readonly store?: ClipStore;
   /**
@@ -44,6 +50,24 @@ export interface CodeClipOptions {
    * quantization.
    */
   readonly rounding?: { readonly encoding: Encoding; readonly steps: MotionSteps };
+}
+
+/** Processes or threads that call {@link codeClipRange}. */
+export interface ClipJobs {
+  /** Maximum number of calls at a time. */
+  readonly count: number;
+  /** Returns the state of {@link codeClipRange}, called with the options of the clip. Arguments can be cloned. */
+  readonly code: (range: ClipRange) => Promise<ClipState>;
+}
+
+/** Consecutive frames of a clip that are coded apart from others. */
+export interface ClipRange {
+  /** Index of the first frame, and of the frame after the last one. */
+  readonly begin: number;
+  readonly end: number;
+  /** State after the first group, without groups. */
+  readonly state: ClipState;
+  readonly still: GaussianCloud | undefined;
 }
 
 export interface CodedClip {
@@ -68,8 +92,12 @@ export interface CodedClip {
 }
 
 /** Maximum bytes of the frames of a group in memory. Groups of large frames are shorter. */
-const MAX_GROUP_BYTES = 640 << 20;
+const MAX_GROUP_BYTES = 896 << 20;
 const MIN_GROUP_FRAMES = 2;
+/** Default number of frames of a group, and its maximum, which a group reaches if few splats move. */
+const [USUAL_FRAMES, MAX_USUAL_FRAMES] = [100, 300];
+/** Product of the default number of frames and the number of splats that move, for numbers between these two. */
+const USUAL_WORK = 5_000_000;
 /** Frame of the first group, as a fraction of its duration, that selects the encoding of scenes. */
 const TUNED = 0.2;
 
@@ -79,56 +107,124 @@ const TUNED = 0.2;
  * frames of a group get the highest degree of spherical harmonics until then. Splats that never change are stored once.
  */
 export async function codeClip(options: CodeClipOptions): Promise<CodedClip> {
+  const { frameCount, jobs } = options;
   const coder = new ClipCoder(options);
   await coder.begin();
-  while (coder.next < options.frameCount) await coder.add();
+  while (coder.next < frameCount) await (jobs && jobs.count > 1 && coder.next > 0 ? coder.addBy(jobs) : coder.add());
   return coder.finish();
+}
+
+/**
+ * Codes some frames of a clip, for {@link ClipJobs}.
+ * @param options Those of the clip. `store` and `jobs` are not used.
+ */
+export async function codeClipRange(options: CodeClipOptions, range: ClipRange): Promise<ClipState> {
+  const coder = new ClipCoder({ ...options, frameCount: range.end, store: undefined }, range);
+  await coder.restore(range.state);
+  while (coder.next < range.end) await coder.add();
+  return coder.state;
 }
 
 class ClipCoder {
   readonly #options: CodeClipOptions;
   readonly #target: number;
   readonly #onStep: (step: string) => void;
+  /** Index of the first frame to code. */
+  readonly #first: number;
   #still: StillSplats | undefined;
   #stillParts: readonly StillPart[] = [];
   #groups: CodedGroup[] = [];
   #facts: ClipState['facts'];
   /** Highest degree of the frames until now. */
   #shDegree: ShDegree = 0;
+  /** Quantization of the first group, with which the search of others begins. */
   #encoding: Encoding | undefined;
   #steps: MotionSteps | undefined;
+  #framesPerGroup: number | undefined;
   #grow = 1;
   #largest = 0;
   #splats = 0;
   #passing = 0;
 
-  constructor(options: CodeClipOptions) {
+  constructor(options: CodeClipOptions, { begin = 0, still }: Partial<ClipRange> = {}) {
     this.#options = options;
     this.#target = meanSquareOf(options.minPsnr);
     this.#onStep = options.onStep ?? (() => undefined);
+    this.#framesPerGroup = options.framesPerGroup;
+    this.#first = begin;
+    this.#still = still && new StillSplats(still, options.minPsnr);
   }
 
   /** Index of the first frame that is not coded. */
   get next(): number {
-    return this.#groups.reduce((sum, { frames }) => sum + frames, 0);
+    return this.#groups.reduce((sum, { frames }) => sum + frames, this.#first);
+  }
+
+  get state(): ClipState {
+    return {
+      ...{ encoding: this.#encoding?.sog, steps: this.#steps, facts: this.#facts, shDegree: this.#shDegree },
+      ...{ framesPerGroup: this.#framesPerGroup, grow: this.#grow, largest: this.#largest },
+      ...{ splats: this.#splats, passing: this.#passing },
+      ...{ groups: this.#groups, still: this.#stillParts.map(({ written }) => written) },
+    };
   }
 
   /** Finds the splats that never change, and continues an interrupted call. */
   async begin(): Promise<void> {
-    const { frameCount, framesPerGroup, minPsnr, store } = this.#options;
+    const { frameCount, framesPerGroup = USUAL_FRAMES, minPsnr, store } = this.#options;
     // One group has each of its splats once in any case.
     if (frameCount > framesPerGroup)
       this.#still = await StillSplats.find((frame) => this.#open(frame), frameCount, minPsnr);
     if (this.#still) this.#onStep(`${this.#still.cloud.count} splats never change`);
     const state = store && (await readState(store));
     if (!state) return;
-    const { encoding, steps, facts, shDegree, grow, largest, splats, passing, groups, still } = state;
+    await this.restore(state);
+    this.#onStep(`continues with frame ${this.next}`);
+  }
+
+  async restore(state: ClipState): Promise<void> {
+    const { encoding, steps, facts, shDegree, framesPerGroup, grow, largest, splats, passing, groups, still } = state;
     this.#encoding = encoding && sogOf(encoding, this.#options.encodeWebp);
     [this.#steps, this.#facts, this.#shDegree, this.#grow] = [steps, facts, shDegree, grow];
     [this.#largest, this.#splats, this.#passing] = [largest, splats, passing];
+    this.#framesPerGroup = framesPerGroup;
     this.#groups = [...groups];
     this.#stillParts = await Promise.all(still.map(readStillPart));
-    this.#onStep(`continues with frame ${this.next}`);
+  }
+
+  /** Codes all other groups by jobs, and takes them in order. */
+  async addBy({ count, code }: ClipJobs): Promise<void> {
+    const { frameCount } = this.#options;
+    const length = this.#groups[0].frames;
+    const state = { ...this.state, groups: [], splats: 0, passing: 0 };
+    const begins: number[] = [];
+    for (let begin = this.next; begin < frameCount; begin += length) begins.push(begin);
+    const started: Promise<ClipState>[] = [];
+    const start = (k: number): void => {
+      if (k >= begins.length) return;
+      const [begin, end] = [begins[k], Math.min(frameCount, begins[k] + length)];
+      started[k] = code({ begin, end, state, still: this.#still?.cloud });
+      // A failure is that of the first range that fails, below.
+      started[k].then(
+        () => start(started.length),
+        () => undefined,
+      );
+    };
+    for (let k = 0; k < Math.min(count, begins.length); k++) start(k);
+    for (let k = 0; k < begins.length; k++) await this.#take(await started[k]);
+  }
+
+  /** Adds the groups of a range. */
+  async #take({ facts, shDegree, largest, splats, passing, groups }: ClipState): Promise<void> {
+    const credits = joinCredits([this.#facts?.credits, facts?.credits]);
+    this.#facts = { ...(largest > this.#largest ? facts! : this.#facts!), credits };
+    this.#largest = Math.max(this.#largest, largest);
+    this.#shDegree = Math.max(this.#shDegree, shDegree) as ShDegree;
+    this.#splats += splats;
+    this.#passing += passing;
+    this.#groups.push(...groups);
+    await this.#save(groups.length);
+    this.#options.onProgress?.(this.next);
   }
 
   /** Codes the next group. */
@@ -195,12 +291,13 @@ class ClipCoder {
 
   /** Reads the frames of a group, without splats that never change, of one degree. */
   async #openGroup(begin: number): Promise<readonly GaussianCloud[]> {
-    const { frameCount, framesPerGroup } = this.#options;
+    const { frameCount } = this.#options;
     const opened: GaussianCloud[] = [];
     let bytes = 0;
-    for (let frame = begin; frame < Math.min(frameCount, begin + framesPerGroup); frame++) {
+    for (let frame = begin; frame < Math.min(frameCount, begin + (this.#framesPerGroup ?? 1)); frame++) {
       const cloud = await this.#open(frame);
       opened.push(this.#still ? this.#still.without(cloud) : cloud);
+      this.#framesPerGroup ??= usualFrames(opened[0].count);
       const { positions, scales, rotations, opacities, sh } = opened[opened.length - 1];
       for (const own of [positions, scales, rotations, opacities, sh]) bytes += own.byteLength;
       if (bytes > MAX_GROUP_BYTES && opened.length >= MIN_GROUP_FRAMES) break;
@@ -223,13 +320,15 @@ class ClipCoder {
     const still = this.#stillParts.map(({ content }) => content);
     try {
       const { contents, encoding, steps, frames, parts, errors } = await codeGroup({
-        ...{ tracks, whole, chosen, still, judges, maxBytes, target: this.#target, seed: this.#groups.length },
+        ...{ tracks, whole, chosen, still, judges, maxBytes, target: this.#target, seed: begin },
         ...{ encoding: this.#encoding!, steps: this.#steps, onStep: this.#onStep },
       });
-      if (this.#groups.length === 0) this.#grow = await growthIn(judges, [...still.slice(0, 1), contents[0]]);
+      if (begin === 0) {
+        this.#grow = await growthIn(judges, [...still.slice(0, 1), contents[0]]);
+        [this.#encoding, this.#steps] = [encoding, steps];
+      }
       const group = { frames, parts, errors };
       this.#groups.push(group);
-      [this.#encoding, this.#steps] = [encoding, steps];
       const { frame, error } = group.errors.reduce((worst, own) => (own.error > worst.error ? own : worst));
       this.#onStep(
         `  ${sizeOf(group.parts)} bytes, ${group.parts[0].bytes.length} of them coarse; ` +
@@ -248,14 +347,10 @@ class ClipCoder {
     this.#stillParts = parts;
   }
 
-  async #save(): Promise<void> {
+  /** @param added Number of groups that were added after the last call. */
+  async #save(added = 1): Promise<void> {
     const { store } = this.#options;
-    if (!store) return;
-    await writeState(store, {
-      ...{ encoding: this.#encoding?.sog, steps: this.#steps, facts: this.#facts, shDegree: this.#shDegree },
-      ...{ grow: this.#grow, largest: this.#largest, splats: this.#splats, passing: this.#passing },
-      ...{ groups: this.#groups, still: this.#stillParts.map(({ written }) => written) },
-    });
+    if (store) await writeState(store, this.state, added);
   }
 
   /** Sets the properties of the clip. Its bounds, which determine views, are those of the group with the most splats. */
@@ -286,6 +381,10 @@ class ClipCoder {
     }
   }
 }
+
+/** Returns the default number of frames of a group with some splats that move. */
+const usualFrames = (splats: number): number =>
+  Math.max(USUAL_FRAMES, Math.min(MAX_USUAL_FRAMES, Math.floor(USUAL_WORK / splats)));
 
 /** Returns what the bounds of two clouds depend on. */
 function together(a: GaussianCloud, b: GaussianCloud | undefined): Parameters<typeof boundsOf>[0] {

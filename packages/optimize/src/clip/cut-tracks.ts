@@ -19,7 +19,7 @@ const NOISE = 5;
 export function cutTracks(tracks: Tracks): Tracks {
   const { frames, of } = tracks;
   const changes = changesOfLooks(tracks);
-  const least = changes.map((own) => Math.max(1, NOISE * medianOf(own)));
+  const min = changes.map((own) => Math.max(1, NOISE * medianOf(own)));
   const first = Array.from(tracks.lives.first);
   const end = Array.from(tracks.lives.end);
   const names = Int32Array.from({ length: tracks.count }, (_, track) => track);
@@ -31,7 +31,7 @@ export function cutTracks(tracks: Tracks): Tracks {
     return own.map((track, i) => {
       const change = changes[frame][i];
       // Comparisons with missing neighbors are false.
-      if (change > least[frame] && (change > JUMP * before[track] || change > JUMP * after[track])) {
+      if (change > min[frame] && (change > JUMP * before[track] || change > JUMP * after[track])) {
         end[names[track]] = frame;
         names[track] = first.push(frame) - 1;
         end.push(tracks.lives.end[track]);
