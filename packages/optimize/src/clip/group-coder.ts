@@ -10,7 +10,7 @@ import { decibels, mean } from '../measure.js';
 import { findSteps, fitSteps, scaledSteps, type Steps } from '../steps.js';
 import type { Encoding } from '../write/index.js';
 import { TrackedPart, type WrittenClipPart } from './clip-part.js';
-import type { MotionSteps } from './curves.js';
+import { FINER, type MotionSteps } from './curves.js';
 import { frameOf, type FrameError, type FrameJudges } from './frame-judges.js';
 import { attributeErrors, judgedFrames } from './judged-frames.js';
 import type { Tracks } from './tracks.js';
@@ -23,6 +23,7 @@ const NEAR_ENOUGH = 0.75;
 const REMEMBERED = 3;
 /** Number of frames that are measured during the search for steps. */
 const SEARCHED = 3;
+const MUCH_FINER = FINER / 4;
 const GROWTHS = [1, 1.25, 1.6, 2, 2.5, 3.2, 4];
 
 export interface GroupCoding {
@@ -67,7 +68,8 @@ export async function codeGroup(coding: GroupCoding): Promise<FoundGroup> {
   const { target, maxBytes } = coding;
   let parts = await partsOf(coding, coding.encoding, coding.steps ?? usualSteps(coding.whole));
   const first = coding.steps ?? (await stepsFor(coding, parts));
-  if (!coding.steps) parts = await partsOf(coding, coding.encoding, first);
+  if (isMuchFiner(first, coding.steps ?? usualSteps(coding.whole)))
+    parts = await partsOf(coding, coding.encoding, first);
   const tried = new Map<number, Attempt>();
   const isTooLarge = (own: Attempt): boolean => maxBytes < Infinity && sizeOf(own.parts) > maxBytes;
   await fitSteps({
@@ -155,6 +157,10 @@ export async function growthIn(judges: FrameJudges, coarse: readonly ClipPartCon
   }
   return best;
 }
+
+/** Returns whether steps are so fine that curves that were found for others may not be enough. */
+const isMuchFiner = (steps: MotionSteps, found: MotionSteps): boolean =>
+  ANIMATED_ATTRIBUTE_NAMES.some((name) => steps[name] < found[name] / MUCH_FINER);
 
 export const worstOf = (errors: readonly FrameError[]): number =>
   errors.reduce((max, { error }) => Math.max(max, error), 0);

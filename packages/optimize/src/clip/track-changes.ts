@@ -23,22 +23,20 @@ export function changesOfTracks(
 ): Float32Array | undefined {
   const { frames } = tracks;
   const { count } = splats.cloud;
-  const changes = new Float32Array(ANIMATED_ATTRIBUTES[name] * count * frames.length);
-  const readOf = name === 'rotation' ? turnsOf(splats) : numbersOf(name, splats.cloud);
+  const reader = (): Read => (name === 'rotation' ? turnsOf(splats) : numbersOf(name, splats.cloud));
+  // Attributes that never change are frequent, and this is faster than writing all differences.
+  if (!hasChanges(tracks, splats, reader())) return undefined;
+  const readOf = reader();
   const own = new Float64Array(3);
-  let hasChanged = false;
+  const changes = new Float32Array(ANIMATED_ATTRIBUTES[name] * count * frames.length);
   frames.forEach((frame, f) => {
     tracks.of[f].forEach((track, i) => {
       const place = splats.placeOf[track];
       if (place < 0) return;
       readOf(frame, i, place, own);
-      for (let k = 0; k < ANIMATED_ATTRIBUTES[name]; k++) {
-        changes[(k * count + place) * frames.length + f] = own[k];
-        if (own[k] !== 0) hasChanged = true;
-      }
+      for (let k = 0; k < ANIMATED_ATTRIBUTES[name]; k++) changes[(k * count + place) * frames.length + f] = own[k];
     });
   });
-  if (!hasChanged) return undefined;
   splats.placeOf.forEach((place, track) => {
     if (place < 0) return;
     const [first, end] = [tracks.lives.first[track], tracks.lives.end[track]];
@@ -49,6 +47,18 @@ export function changesOfTracks(
     }
   });
   return changes;
+}
+
+/** Returns whether any splat of any frame differs from the cloud. */
+function hasChanges({ frames, of }: Tracks, { placeOf }: TrackedSplats, readOf: Read): boolean {
+  const own = new Float64Array(3);
+  return frames.some((frame, f) =>
+    of[f].some((track, i) => {
+      if (placeOf[track] < 0) return false;
+      readOf(frame, i, placeOf[track], own);
+      return own[0] !== 0 || own[1] !== 0 || own[2] !== 0;
+    }),
+  );
 }
 
 /** Writes the differences of splat `i` of a frame from splat `place` of the cloud, in the units of `AnimatedAttribute`. */
