@@ -11,8 +11,10 @@ import {
   type CodeClipOptions,
   type DrawFrame,
 } from '@gaussian-splat/optimize';
-import { parseClip } from '@gaussian-splat/formats';
+import { parseClip, readScene } from '@gaussian-splat/formats';
 import { encodeWebp } from '../../packages/cli/src/lib/encoders.mjs';
+import { writePartScene } from '../../packages/optimize/src/clip/part-scene.js';
+import { sogOf } from '../../packages/optimize/src/write/tune-sog.js';
 import { meanSquare } from '../../packages/optimize/src/measure.js';
 import { clipOf, framesOf } from '../support/clips.js';
 import { cloudOf, type SplatDescription } from '../support/clouds.js';
@@ -20,6 +22,7 @@ import { seededRandom } from '../support/random.js';
 import { turningBall } from '../support/scenes/turning-ball.js';
 import { cpuPainter } from './twin/index.js';
 
+const SOG_STEPS = { place: 8, size: 0.1, turn: 6, opacity: 5, color: 0.03, harmonics: 0.02 };
 const SPLATS = 200;
 const FRAMES = 18;
 
@@ -189,6 +192,15 @@ test('splats that never change are in the file once, and in every frame', async 
       assert.ok(Math.min(...distances) < 0.01, `frame ${frame}, splat ${i}: ${Math.min(...distances)} away`);
     }
   }
+});
+
+test('scenes of parts have no codebook values beyond those that they use, and are read like those that have', async () => {
+  const cloud = turningBall({ frame: 0, turns: false });
+  const encoding = sogOf({ steps: SOG_STEPS, palette: 1024 }, encodeWebp);
+  const whole = new Uint8Array(await encoding.write({ cloud, degrees: new Uint8Array(cloud.count).fill(3) }));
+  const part = await writePartScene(cloud, encoding);
+  assert.ok(part.length < whole.length - 1500, `${part.length} of ${whole.length} bytes`);
+  assert.deepEqual(await readScene(part, { name: 'a.sog' }), await readScene(whole, { name: 'a.sog' }));
 });
 
 test('harmonics turn with their splats if those of the frames do, over more than a whole turn', async () => {

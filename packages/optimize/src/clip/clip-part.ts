@@ -19,6 +19,7 @@ import { FINER, minCurve, type Followed, type MotionSteps } from './curves.js';
 import { takeFades } from './fades.js';
 import { roundMotion, UNCHANGED } from './round-motion.js';
 import { harmonicsTurn } from './turning-harmonics.js';
+import { writePartScene } from './part-scene.js';
 import { followedWithin } from './partial-curves.js';
 import { changesOfTracks } from './track-changes.js';
 import type { Tracks } from './tracks.js';
@@ -149,8 +150,7 @@ export class TrackedPart {
 }
 
 async function encoded(cloud: GaussianCloud, encoding: Encoding): Promise<EncodedScene> {
-  const degrees = new Uint8Array(cloud.count).fill(cloud.shDegree);
-  const bytes = new Uint8Array(await encoding.write({ cloud, degrees }));
+  const bytes = await writePartScene(cloud, encoding);
   const read = await readScene(bytes, { name: 'a group of frames' });
   if (read.count !== cloud.count) throw notWritten(cloud.count, read.count);
   return { bytes, cloud: read };

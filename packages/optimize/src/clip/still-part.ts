@@ -2,6 +2,7 @@ import type { GaussianCloud } from '@gaussian-splat/core';
 import { readScene, stillMotion, type ClipPartContent } from '@gaussian-splat/formats';
 import { splatsOf } from '../reduce.js';
 import type { Encoding } from '../write/index.js';
+import { writePartScene } from './part-scene.js';
 import type { WrittenClipPart } from './clip-part.js';
 
 /** A part of the splats that never change, and its content as a reader decodes it. */
@@ -17,8 +18,7 @@ export async function writeStillPart(
   encoding: Encoding,
 ): Promise<StillPart> {
   const own = splatsOf(cloud, chosen);
-  const degrees = new Uint8Array(own.count).fill(own.shDegree);
-  const bytes = new Uint8Array(await encoding.write({ cloud: own, degrees }));
+  const bytes = await writePartScene(own, encoding);
   return readStillPart({ splats: own.count, planes: 0, sceneBytes: bytes.length, motionBytes: 0, bytes });
 }
 
