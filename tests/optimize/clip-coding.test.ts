@@ -6,7 +6,6 @@ import {
   codeClip,
   codeClipRange,
   viewsAround,
-  type ClipJobs,
   type ClipStore,
   type CodeClipOptions,
   type DrawFrame,
@@ -126,7 +125,7 @@ test('groups that are coded at the same time, and end in any order, make the sam
   const whole = await codeClip(given);
   assert.ok(whole.still > 0 && whole.groups === 5);
   let [running, peak] = [0, 0];
-  const jobs: ClipJobs = {
+  const jobs: NonNullable<CodeClipOptions['jobs']> = {
     count: 3,
     code: async (range) => {
       peak = Math.max(peak, ++running);

@@ -324,6 +324,7 @@ test('what cannot be written, or would replace what is read, is said before the 
     [/--out: expected a file \.gsv/, 'sequence', 'camera.json', '--out', 'camera.json/a'],
     [/--min-psnr: expected 30 to 60/, 'sequence', 'camera.json', '--out', 'a.gsv', '--min-psnr', '90'],
     [/--per-file/, 'sequence', 'camera.json', '--out', 'a.gsv', '--per-file', '1'],
+    [/--jobs: expected a whole number from 1 to 64/, 'sequence', 'camera.json', '--out', 'a.gsv', '--jobs', '0'],
     [/camera\.json is not a folder/, 'page', 'gltf/scene.gltf', 'camera.json/a', '--no-serve'],
     [/--images: expected with --gate/, 'optimize', 'a.ply', '--min-psnr', '40', '--images', '.', '--out', 'a.spz'],
     [/--out: .*found \.xyz/, 'optimize', 'a.ply', '--min-psnr', '40', '--out', 'a.xyz'],

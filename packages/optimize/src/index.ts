@@ -32,13 +32,6 @@ export { writeSog, type EncodeWebp, type SogOptions, type SogSteps } from './wri
 export { isLodIndex, writeStreamedSog } from './write/streamed-sog.js';
 export { filesOfZip } from './write/zip.js';
 export type { MotionSteps } from './clip/curves.js';
-export {
-  codeClip,
-  codeClipRange,
-  type ClipJobs,
-  type ClipRange,
-  type CodeClipOptions,
-  type CodedClip,
-} from './clip/code-clip.js';
-export type { ClipState, ClipStore } from './clip/clip-store.js';
+export { codeClip, codeClipRange, type CodeClipOptions, type CodedClip } from './clip/code-clip.js';
+export type { ClipStore } from './clip/clip-store.js';
 export { drawOn, type DrawFrame } from './clip/frame-judges.js';

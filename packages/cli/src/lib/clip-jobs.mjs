@@ -75,6 +75,6 @@ async function codeRange({ given, range }) {
 
 if (process.argv[1] === SCRIPT && process.send) {
   process.once('message', codeRange);
-  // Nobody needs the groups of a parent that has ended.
+  // The groups of a parent that has ended are not needed.
   process.once('disconnect', () => process.exit(1));
 }
