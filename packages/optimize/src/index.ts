@@ -31,7 +31,6 @@ export { findSteps, type FindStepsOptions, type Steps } from './steps.js';
 export { writeSog, type EncodeWebp, type SogOptions, type SogSteps } from './write/sog.js';
 export { isLodIndex, writeStreamedSog } from './write/streamed-sog.js';
 export { filesOfZip } from './write/zip.js';
-export type { MotionSteps } from './clip/curves.js';
 export { codeClip, codeClipRange, type CodeClipOptions, type CodedClip } from './clip/code-clip.js';
 export type { ClipStore } from './clip/clip-store.js';
 export { drawOn, type DrawFrame } from './clip/frame-judges.js';
