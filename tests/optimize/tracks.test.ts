@@ -55,6 +55,27 @@ test('limbs that move farther than splats are apart are followed by the order of
   assert.equal(cutTracks(followSplats(frames)).count, 20_000);
 });
 
+test('splats behind one that has disappeared keep their tracks, though their indices are those of others', () => {
+  const random = seededRandom(6);
+  const [bodies, drops] = [3000, 800];
+  const own = (i: number) => ({
+    position: [random.uniform(0, 4), random.uniform(0, 4), i < bodies ? 0 : 2] as const,
+    color: (i < bodies ? [random.uniform(0, 1), random.uniform(0, 1), 0.5] : [0.5, 0.65, 0.9]) as [
+      number,
+      number,
+      number,
+    ],
+    ...{ opacity: 0.9, scale: 0.02 * random.uniform(0.6, 1.3), rotation: random.rotation() },
+  });
+  const all = Array.from({ length: bodies + drops + 40 }, (_, i) => own(i));
+  // In each frame, ten drops at the beginning are gone, and ten are new at the end.
+  const frames = [0, 1, 2, 3].map((frame) =>
+    cloudOf(all.filter((_, i) => i < bodies || (i >= bodies + 10 * frame && i < bodies + drops + 10 * frame))),
+  );
+  const { count } = cutTracks(followSplats(frames));
+  assert.ok(Math.abs(count - (bodies + drops + 30)) < 30, `${count} tracks of ${bodies + drops + 30} splats`);
+});
+
 test('a splat that jumps in its short life does not make the motion of all others coarser', () => {
   const [rows, frames, step] = [300, 50, 0.0003];
   const random = seededRandom(3);

@@ -17,7 +17,7 @@ const RADIUS = 3;
 /** Number of rounds. Splats whose best match belongs to another splat search again in the next round. */
 const ROUNDS = 3;
 /** Minimum fraction of matching splats with equal indices, so that indices identify splats. */
-const SAME_NUMBERS = 0.9;
+const SAME_NUMBERS = 0.7;
 /** Ratio of the median {@link steadyCost} of equal indices to that of different ones, below which indices identify splats. */
 const ALIKE = 0.02;
 /** Number of splats that determine these medians. */
@@ -27,6 +27,8 @@ const MAX_JUMP = 1 / 16;
 /** Multiple of the median {@link lookCost} above which a pair is doubtful. */
 const DOUBT = 9;
 const MIN_DOUBT = 0.1;
+/** Multiple of the median {@link steadyCost} of equal indices above which a pair has other splats. */
+const NOISE = 50;
 /**
  * Number of passes over the unmatched splats. All passes except the last find only pairs of the same appearance.
  */
@@ -99,11 +101,12 @@ function putShape({ rotations, scales }: GaussianCloud, i: number, looks: Float3
 export function matchFrames(before: Features, next: Features): Int32Array {
   const grid = PlaceGrid.of(next.positions, next.count, RADIUS);
   const named = byNumber(before, next, grid.cell);
-  if (named) return named;
-  const found = new Int32Array(next.count).fill(-1);
-  let looking: Uint32Array = Uint32Array.from({ length: before.count }, (_, i) => i);
+  const found = named?.slice() ?? new Int32Array(next.count).fill(-1);
+  let looking = whichOf(matchedIn(found, before.count), (is) => is === 0);
   byPlace(before, next, { grid, looking, found, max: MAX_COST });
-  const { doubtful, limit } = doubtfulOf(before, next, found);
+  const all = doubtfulOf(before, next, found);
+  const { limit } = all;
+  const doubtful = all.doubtful.filter(({ j }) => !named || named[j] < 0);
   for (const { j } of doubtful) found[j] = -1;
   // Fast and sparse splats, such as spray, move farther than the typical distance between neighbors.
   for (let pass = 0; pass < SPARSE_PASSES; pass++) {
@@ -199,11 +202,15 @@ function byNumber(before: Features, next: Features, unit: number): Int32Array | 
     return whichOf(found, (i) => i >= 0).length >= SAME_NUMBERS * next.count ? found : undefined;
   };
   const isNamed = looksFollowNumbers(before, next);
+  // Where splats are missing or new, those behind them have other indices, and similar splats would change places.
+  const costs = Float32Array.from({ length: next.count }, (_, i) => steadyCost(before, i, next, i));
+  const limit = Math.min(MAX_COST, Math.max(MIN_DOUBT, NOISE * (costs.slice().sort()[next.count >> 1] ?? 0)));
   const reach = MAX_JUMP * extentOf(next.positions);
   const isNear = (i: number): boolean => distanceOf(before, next, i) <= reach;
-  const alike = (i: number): boolean => isNamed && steadyCost(before, i, next, i) <= MAX_COST;
+  const alike = (i: number): boolean => costs[i] <= limit;
   // Limbs move farther in a frame than most splats are apart.
-  return matched((i) => costOf(before, i, next, i, unit) <= MAX_COST || (alike(i) && isNear(i))) ?? matched(alike);
+  const isSame = (i: number): boolean => costOf(before, i, next, i, unit) <= MAX_COST || (isNamed && isNear(i));
+  return matched((i) => alike(i) && isSame(i)) ?? (isNamed ? matched(alike) : undefined);
 }
 
 const distanceOf = (a: Features, b: Features, i: number): number =>

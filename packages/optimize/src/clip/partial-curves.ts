@@ -136,7 +136,8 @@ function fitted(changes: Float32Array, frames: number, span: Span, fit: RowFit):
   for (let row = 0; row < rows; row++) {
     put(row, 1);
     const [first, end] = span(row);
-    if (end - first < LONG * frames) short.push(row);
+    // Few frames do not determine many curves.
+    if (end - first < Math.min(frames, Math.max(LONG * frames, 2 * fit.size))) short.push(row);
     else shares.forEach((own, k) => (largest[k] = Math.max(largest[k], Math.abs(own[row]))));
   }
   for (const row of short.length < rows ? short : []) {
