@@ -27,7 +27,7 @@ const MAX_JUMP = 1 / 16;
 /** Multiple of the median {@link lookCost} above which a pair is doubtful. */
 const DOUBT = 9;
 const MIN_DOUBT = 0.1;
-/** Multiple of the median {@link steadyCost} of equal indices above which a pair has other splats. */
+/** Multiple of the median {@link lookCost} of equal indices above which a pair has other splats. */
 const NOISE = 50;
 /**
  * Number of passes over the unmatched splats. All passes except the last find only pairs of the same appearance.
@@ -203,11 +203,11 @@ function byNumber(before: Features, next: Features, unit: number): Int32Array | 
   };
   const isNamed = looksFollowNumbers(before, next);
   // Where splats are missing or new, those behind them have other indices, and similar splats would change places.
-  const costs = Float32Array.from({ length: next.count }, (_, i) => steadyCost(before, i, next, i));
-  const limit = Math.min(MAX_COST, Math.max(MIN_DOUBT, NOISE * (costs.slice().sort()[next.count >> 1] ?? 0)));
+  const costs = Float32Array.from({ length: next.count }, (_, i) => lookCost(before, i, next, i));
+  const limit = Math.max(MIN_DOUBT, NOISE * (costs.slice().sort()[next.count >> 1] ?? 0));
   const reach = MAX_JUMP * extentOf(next.positions);
   const isNear = (i: number): boolean => distanceOf(before, next, i) <= reach;
-  const alike = (i: number): boolean => costs[i] <= limit;
+  const alike = (i: number): boolean => costs[i] <= limit && steadyCost(before, i, next, i) <= MAX_COST;
   // Limbs move farther in a frame than most splats are apart.
   const isSame = (i: number): boolean => costOf(before, i, next, i, unit) <= MAX_COST || (isNamed && isNear(i));
   return matched((i) => alike(i) && isSame(i)) ?? (isNamed ? matched(alike) : undefined);
