@@ -202,7 +202,7 @@ function byNumber(before: Features, next: Features, unit: number): Int32Array | 
     return whichOf(found, (i) => i >= 0).length >= SAME_NUMBERS * next.count ? found : undefined;
   };
   const isNamed = looksFollowNumbers(before, next);
-  // Where splats are missing or new, those behind them have other indices, and similar splats would change places.
+  // Splats behind missing or new ones have other indices, and similar splats would change places.
   const costs = Float32Array.from({ length: next.count }, (_, i) => lookCost(before, i, next, i));
   const limit = Math.max(MIN_DOUBT, NOISE * (costs.slice().sort()[next.count >> 1] ?? 0));
   const reach = MAX_JUMP * extentOf(next.positions);
