@@ -9,10 +9,11 @@ import { root } from './lib/run.mjs';
 
 const MODULES = [
   { source: 'packages/renderer/assembly/pack-rows.ts', name: 'ROWS_WASM' },
+  { source: 'packages/renderer/assembly/pack-nodes.ts', name: 'NODES_WASM' },
   { source: 'packages/formats/assembly/unpack-splats.ts', name: 'UNPACK_WASM' },
 ];
 /** Files that those of the modules import. */
-const SHARED = ['packages/core/assembly/exp.ts'];
+const SHARED = ['packages/core/assembly/exp.ts', 'packages/renderer/assembly/shared.ts'];
 const OPTIONS = [
   '-O3',
   '--enable',

@@ -1,16 +1,18 @@
 /** Trees of levels as pages: runs nest, every place is covered once while nodes arrive, and the finest nodes are the scene. */
 import assert from 'node:assert/strict';
 import { after, test } from 'node:test';
-import type { Camera, GaussianCloud } from '@gaussian-splat/core';
+import { shCoefficientCount, type Camera, type GaussianCloud, type ShDegree } from '@gaussian-splat/core';
 import { StreamedGaussians, type StreamedScene } from '@gaussian-splat/renderer';
-import { packNodes, treeSource, type NodePage, type RunError } from '@gaussian-splat/renderer/tools';
+import { NodePacker, packNodes, treeSource, type NodePage, type RunError } from '@gaussian-splat/renderer/tools';
 import { constants, DETAIL_NUMBERS, DETAIL_PLACES, SLOT_CHUNKS } from '@gaussian-splat/renderer/stages';
 import { shareDrawn, type DetailView } from '../support/detail-twin.js';
 import { drawUntilCalm } from '../support/draw-until-calm.js';
 import { someOf } from '../support/extent.js';
+import { withHostileSplats } from '../support/hostile.js';
 import { pick } from '../support/lod-folder.js';
 import { anyDevice, endNodeDevice } from '../support/node-device.js';
 import { readRows } from '../support/read-rows.js';
+import { seededRandom } from '../support/random.js';
 import { Renderer } from '../support/renderer.js';
 import { cameraAt } from '../support/scenes.js';
 import { pebbles } from '../support/scenes/pebbles.js';
@@ -115,6 +117,45 @@ for (const [name, kind] of KINDS)
     check(quadtree(cloud, 4, kind));
     assert.equal(leaves, cloud.count);
   });
+
+/** Needles, disks, points at one place and unusable splats. The first 300 are equal; the last has no partner in its pair. */
+function hostileNode(shDegree: ShDegree): GaussianCloud {
+  const random = seededRandom(shDegree + 1);
+  const count = 3_001;
+  const stride = 3 * shCoefficientCount(shDegree);
+  const numbers = (size: number, value: (i: number, k: number) => number): Float32Array =>
+    Float32Array.from({ length: size * count }, (_, n) => value(n < 300 * size ? 0 : Math.floor(n / size), n % size));
+  const turns = Array.from({ length: count }, () => random.rotation());
+  const base = {
+    ...{ count, shDegree, antialiased: false, droppedCount: 0, origin: [0.25, 0, 0] as const },
+    positions: numbers(3, (i) => (i === 0 ? 0 : 4 * random.normal())),
+    scales: numbers(3, (i, k) => (i === 0 ? 0.5 : i % 7 === k ? 0 : random.logUniform(1e-6, 10))),
+    rotations: numbers(4, (i, k) => 3 * turns[i][k]),
+    opacities: numbers(1, (i) => [0, 1 / 255, 0.0039, 1, random.uniform(0, 1)][i % 5]),
+    sh: numbers(stride, (i) => (i % 11 === 0 ? 0 : random.normal() * random.logUniform(1e-7, 100))),
+  };
+  return withHostileSplats(base).cloud;
+}
+
+test('WebAssembly packs, divides and sorts the splats of a node to the same words', async () => {
+  const packer = (await NodePacker.open())!;
+  const box = (x: number, z: number): number[] => [x, 0, z, 1.5, 0.5, 0, 0, 9, 0, -0.5, 0, 1.5, 10];
+  const volumes = [box(-2, -2), undefined, box(2, -2), box(-2, 2), [2, 0, 2, 0, 0, 0, 0, 9, 0, 0, 0, 1, 10]];
+  for (const shDegree of [0, 1, 2, 3] as const)
+    for (const shPrecision of ['int8', 'float16'] as const)
+      for (const node of [
+        { volumes, isAdded: false },
+        { volumes: [], isAdded: false },
+        { volumes, isAdded: true },
+        { volumes: volumes.slice(2), isAdded: false, parts: [255, 1, 2_000] },
+      ]) {
+        const content = { cloud: hostileNode(shDegree), error: Infinity, ...node };
+        const own = { ...scene, shDegree, shPrecision };
+        const [expected, found] = [undefined, packer].map((one) => packNodes([content], own, undefined, one));
+        assert.ok(expected.splats === 3_001);
+        assert.deepEqual(found, expected, `degree ${shDegree}, ${shPrecision}`);
+      }
+});
 
 const viewFrom = (distance: number, angle: number, x = 0): Camera =>
   cameraAt([x + distance * Math.cos(angle), -0.5 * distance, distance * Math.sin(angle)], [x, 0, 0], {

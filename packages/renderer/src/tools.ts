@@ -55,6 +55,7 @@ export { buildPackedLevels, packWithDetail, type PackedLevels } from './levels/p
 export { packLevelRuns } from './streaming/pack-runs.js';
 export { layoutLevels, type LevelBox, type LevelPage, type LevelScene } from './streaming/level-pages.js';
 export { levelSource, packLevelPage } from './streaming/level-source.js';
+export { NodePacker } from './streaming/node-packer.js';
 export { packNodes, type NodeContent, type NodePage, type RunError } from './streaming/pack-nodes.js';
 export { folderSource, type FetchPage } from './streaming/page-source.js';
 export { treeSource, type FetchedNode, type OpenedTree } from './streaming/tree-source.js';

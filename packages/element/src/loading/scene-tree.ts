@@ -20,6 +20,7 @@ import {
 import type { StreamedScene } from '@gaussian-splat/renderer';
 import {
   choosePrecision,
+  NodePacker,
   noiseIn,
   packNodes,
   pageLayout,
@@ -106,7 +107,7 @@ export async function openTree(
     const nodes = await readFirst(tree, files);
     const clouds = nodes.flatMap(([, { cloud }]) => cloud ?? []);
     const scene = sceneOf(clouds, tree, { sh, name, budget });
-    const first = packed(nodes, scene, files);
+    const first = await packed(nodes, scene, files);
     const children = nodes.flatMap(childrenOf);
     const { container, facts, isComplete, splats } = tree;
     const warnings = clouds.flatMap((cloud) => cloud.warnings ?? []);
@@ -130,7 +131,7 @@ export async function readNode(
     const files = filesBeside({ url, name, budget: new LoadBudget(0, all), signal, options });
     const read = await readFormat(tree, node, files);
     signal.throwIfAborted();
-    const page = packed([[node, read]], scene, files, above);
+    const page = await packed([[node, read]], scene, files, above);
     return { ...page, found: read.found, warnings: read.cloud?.warnings ?? [] };
   } catch (error) {
     signal.throwIfAborted();
@@ -170,11 +171,16 @@ const contentOf = ([node, { cloud, found, parts, isAdded, error }]: Read): NodeC
 });
 
 /** Packs nodes as a page. Throws `out-of-memory/budget` for more children than the arrived bytes allow. */
-function packed(nodes: readonly Read[], scene: StreamedScene, { budget, name }: TreeFiles, above?: RunError): NodePage {
+async function packed(
+  nodes: readonly Read[],
+  scene: StreamedScene,
+  { budget, name }: TreeFiles,
+  above?: RunError,
+): Promise<NodePage> {
   const children = nodes.reduce((sum, read) => sum + childrenOf(read).length, 0);
   // Each child has a chunk, even if no splats of the node are in its volume.
   budget.take(4 * pageLayout(scene, 1).total * children, name);
-  return packNodes(nodes.map(contentOf), scene, above);
+  return packNodes(nodes.map(contentOf), scene, above, await NodePacker.open());
 }
 
 /** Returns the properties of a scene, which follow from its coarsest splats. */

@@ -25,7 +25,7 @@ const {
 export const ROW_CODES = 10;
 /** Number of 32-bit words of a chunk. */
 export const QUANTIZED_CHUNK_WORDS = 4 * QUANTIZED_CHUNK_ROWS;
-const CENTER_STEPS = 65535;
+export const CENTER_STEPS = 65535;
 /** Twice the maximum rounding error of a center, as a fraction of the diagonal of its chunk's box. */
 export const CENTER_ROUNDING = 1 / CENTER_STEPS;
 const MAX_OPACITY = 4095;
@@ -35,10 +35,10 @@ const FIRST_VISIBLE = Math.ceil(ALPHA_MIN * QUANTIZED_OPAQUE);
  * Maximum number of octaves from the smallest to the largest row of a chunk. Anything smaller is invisible beside the
  * largest.
  */
-const MAX_OCTAVES = 24;
+export const MAX_OCTAVES = 24;
 
 /** Factor of the reach of a chunk, which allows for the rounding of sizes, and of opacities that are barely visible. */
-const FARTHER = 1.02;
+export const FARTHER = 1.02;
 const REACH = layouts.Chunk.fields.reach.offset / 4;
 
 const float = new Float32Array(1);
@@ -103,8 +103,8 @@ export function packQuantizedChunk(
   for (let axis = 0; axis < 3; axis++) {
     let [low, high] = [Infinity, -Infinity];
     for (let k = 3 * from + axis; k < 3 * end; k += 3) {
-      low = Math.min(low, positions[k]);
-      high = Math.max(high, positions[k]);
+      if (positions[k] < low) low = positions[k];
+      if (positions[k] > high) high = positions[k];
     }
     head[axis] = low;
     head[4 + axis] = roundedUp((high - low) / CENTER_STEPS);

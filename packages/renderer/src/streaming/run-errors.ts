@@ -1,7 +1,7 @@
 /** Number of splats whose nearest neighbor is searched. */
-const SAMPLE = 128;
+export const SAMPLE = 128;
 /** Number of splats before and after each of them, in the given order, among which the neighbor is searched. */
-const REACH = 512;
+export const REACH = 512;
 
 /**
  * Returns the spacing of splats on a surface, in the unit of the positions: the median side of the cell that each splat
@@ -9,7 +9,17 @@ const REACH = 512;
  * splats.
  * @param kept Indices of the splats, in Morton order.
  */
-export function spacingOf(positions: Float32Array, kept: Uint32Array): number {
+export const spacingOf = (positions: Float32Array, kept: Uint32Array): number =>
+  spacingBetween(distancesIn(positions, kept));
+
+/** Returns the spacing of splats whose nearest neighbors have these distances; 0 if there are none. */
+export function spacingBetween(distances: Float64Array): number {
+  const median = 2 * distances.sort()[distances.length >> 1];
+  return Number.isFinite(median) ? median : 0;
+}
+
+/** Returns the distances of some splats from the nearest of those near them in the order. */
+function distancesIn(positions: Float32Array, kept: Uint32Array): Float64Array {
   const count = Math.min(SAMPLE, kept.length);
   const ordered = new Float32Array(3 * kept.length);
   for (let k = 0; k < kept.length; k++) {
@@ -24,8 +34,7 @@ export function spacingOf(positions: Float32Array, kept: Uint32Array): number {
     const after = nearestTo(ordered, 3 * k, 3 * (k + 1), 3 * Math.min(kept.length, k + REACH));
     distances[s] = Math.sqrt(Math.min(before, after));
   }
-  const median = 2 * distances.sort()[count >> 1];
-  return Number.isFinite(median) ? median : 0;
+  return distances;
 }
 
 /** Returns the squared distance from the point at index `at` to the nearest of the points from index `first` to `end`. */
