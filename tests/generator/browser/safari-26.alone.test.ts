@@ -44,12 +44,17 @@ function watchMemory(): void {
 
 let device: GPUDevice;
 
-before(async () => {
+before(() => {
   removeWhatSafariLacks();
   watchMemory();
+});
+
+// A device for each family: a GPU process that ends ends the runs of one.
+beforeEach(async () => {
   device = await (await navigator.gpu.requestAdapter())!.requestDevice();
   assertEqual(device.adapterInfo as GPUAdapterInfo | undefined, undefined, 'adapterInfo of the profile');
 });
+afterEach(() => device.destroy());
 
 /** A state whose inputs differ from those of the step before. */
 function stateAt({ header, contract }: GeneratorModel, step: number, images: GeneratorState['images']): GeneratorState {
