@@ -230,6 +230,21 @@ def test_style(views: Path, tmp_path: Path, kind: str) -> None:
     assert error(run(exported, feeds)["processed"].reshape(-1, 1), expected.reshape(-1, 1)) < 1e-4
 
 
+def test_diffusion(tmp_path: Path) -> None:
+    import diffusion
+
+    diffusion.main(["train", str(tmp_path), "--vessels", "1", "--batch", "2", "--steps", "2"])
+    assert recorded(tmp_path)["steps"] == 2
+    diffusion.main(["package", str(tmp_path), str(tmp_path / "model.onnx")])
+    model = onnx.load(tmp_path / "model.onnx")
+    assert gpu_findings(model) == []
+    # Another seed is other noise, whose numbers are normal.
+    noise = [diffusion.Generator(diffusion.Denoiser()).noise(torch.tensor([number])) for number in (0, 1, 5000)]
+    for each in noise:
+        assert abs(float(each.mean())) < 0.02 and abs(float(each.std()) - 1) < 0.02
+    assert abs(float((noise[0] * noise[1]).mean())) < 0.02 and abs(float((noise[1] * noise[2]).mean())) < 0.02
+
+
 def test_the_plain_rasterizer_draws_one_gaussian_as_its_formula_says() -> None:
     import rasterizer
 

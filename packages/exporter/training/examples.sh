@@ -39,6 +39,7 @@ one feed-forward feed_forward.py "$out/feed-forward" "$data"/scenes/{skull,plant
   one denoise style.py "$out/denoise" "$work"/large-{skull,plant,playbot}.npz --kind denoise --halvings 0 --steps 8000 \
     --seconds 120
 ) &
+one vessels diffusion.py train "$out/vessels" --seconds 85 --steps 1000000 --batch 256 &
 wait
 echo "all done after $SECONDS s"
 for record in "$out"/*/record.json; do echo "$record"; python3 -c "import json,sys; print({k: v for k, v in json.load(open(sys.argv[1])).items() if k != 'options'})" "$record"; done

@@ -26,6 +26,9 @@ one statue feed-forward feed-forward "$out/feed-forward" "$to/statue/model.onnx"
   --license CC-BY-4.0 --attribution 'Trained on views of scenes by alansartlog (CC BY 4.0), Stephane Agullo (CC BY 4.0), PlayCanvas (MIT) and schwa (MIT)'
 one denoise denoise image-filter "$out/denoise" "$to/denoise/model.onnx" --name 'Denoiser' \
   --license CC-BY-4.0 --attribution 'Trained on views of scenes by alansartlog (CC BY 4.0), Stephane Agullo (CC BY 4.0) and schwa (MIT)'
+mkdir -p "$to/vessels"
+cp "$out/vessels/record.json" "$to/vessels/record.json"
+python3 "$here/diffusion.py" package "$out/vessels" "$to/vessels/model.onnx"
 python3 "$here/example_view.py" "$out/feed-forward/held-out.npz" 17 "$to/statue" --given 2
 python3 "$here/example_view.py" "$out/scaffold/held-out.npz" 2 "$to/skull"
 python3 "$here/example_view.py" "$out/hexplane/held-out.npz" 1 "$to/plant"
