@@ -69,7 +69,8 @@ for (const name of SCENES)
       console.log(
         `${name} ${view.name}: consecutive frames, 1 % nearer each: ${soft.toFixed(1)} dB PSNR by the levels alone, ${hard.toFixed(1)} dB without a fade`,
       );
-      assert.ok(soft > 50 && soft >= hard, `${soft} dB, ${hard} without a fade`);
+      // A fade begins earlier than a change at once, so it can be alone in changing a frame.
+      assert.ok(soft > 50 && soft >= Math.min(hard, 60), `${soft} dB, ${hard} without a fade`);
     }
     [faded, popping, plain, detailed].forEach((owner) => owner.destroy());
   });
