@@ -27,8 +27,8 @@ const MAX_JUMP = 1 / 16;
 /** Multiple of the median {@link lookCost} above which a pair is doubtful. */
 const DOUBT = 9;
 const MIN_DOUBT = 0.1;
-/** Multiple of the median {@link lookCost} of equal indices above which a pair has other splats. */
-const NOISE = 50;
+/** Multiple of the median {@link lookCost} of equal indices, and minimum, above which a pair has other splats. */
+const [NOISE, MIN_NOISE] = [50, 1];
 /**
  * Number of passes over the unmatched splats. All passes except the last find only pairs of the same appearance.
  */
@@ -204,7 +204,7 @@ function byNumber(before: Features, next: Features, unit: number): Int32Array | 
   const isNamed = looksFollowNumbers(before, next);
   // Splats behind missing or new ones have other indices, and similar splats would change places.
   const costs = Float32Array.from({ length: next.count }, (_, i) => lookCost(before, i, next, i));
-  const limit = Math.max(MIN_DOUBT, NOISE * (costs.slice().sort()[next.count >> 1] ?? 0));
+  const limit = Math.max(MIN_NOISE, NOISE * (costs.slice().sort()[next.count >> 1] ?? 0));
   const reach = MAX_JUMP * extentOf(next.positions);
   const isNear = (i: number): boolean => distanceOf(before, next, i) <= reach;
   const alike = (i: number): boolean => costs[i] <= limit && steadyCost(before, i, next, i) <= MAX_COST;
