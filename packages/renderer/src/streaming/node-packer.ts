@@ -27,6 +27,8 @@ const NUMBERS = [
 ];
 const PAGE = 65_536;
 const [ADDRESSES, CONSTANTS, SCRATCH, BEGIN] = [1024, 2048, 8192, 24_576];
+/** Maximum number of splats of a cloud, because the memory never shrinks. They take 80 MB at degree 3. */
+export const MAX_SPLATS = 250_000;
 /** Numbers of a box: center, three unit vectors, three half lengths. */
 export const BOX_NUMBERS = 15;
 

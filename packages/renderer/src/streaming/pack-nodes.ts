@@ -5,7 +5,7 @@ import { CHUNK_NUMBERS } from '../pack/words.js';
 import { placedIn } from './level-source.js';
 import { joinSlots, packRun, type PackedRun } from './pack-run.js';
 import type { StreamedScene } from './page-source.js';
-import { BOX_NUMBERS, type NodePacker } from './node-packer.js';
+import { BOX_NUMBERS, MAX_SPLATS, type NodePacker } from './node-packer.js';
 import { CELL_ERROR, spacingBetween, spacingOf } from './run-errors.js';
 
 /** A node of a tree of levels, with its splats. */
@@ -59,13 +59,13 @@ const MIN_SHRINK = 0.5;
  * declared error bounds it. Spheres and errors are within those of the run that the page replaces, so that screen errors
  * decrease from level to level.
  * @param above The run that the page replaces; undefined for the first page.
- * @param packer WebAssembly that packs several times as fast, to the same words, for a scene of `quantized` geometry.
+ * @param code WebAssembly that packs several times as fast, to the same words. Scenes of other geometry, and large nodes, do without.
  */
 export function packNodes(
   nodes: readonly NodeContent[],
   scene: StreamedScene,
   above?: RunError,
-  packer?: NodePacker,
+  code?: NodePacker,
 ): NodePage {
   const replaced: PackedRun[] = [];
   const drawn: PackedRun[] = [];
@@ -74,6 +74,8 @@ export function packNodes(
   for (const { cloud, volumes, parts: given, isAdded, error } of nodes) {
     const placed = cloud && placedIn(cloud, scene);
     const usable = placed ? usableIndices(placed) : new Uint32Array(0);
+    const isSmall = placed !== undefined && placed.count <= MAX_SPLATS;
+    const packer = isSmall && scene.geometry === 'quantized' ? code : undefined;
     if (placed) packer?.load(placed, scene);
     splats += usable.length;
     const places = volumes.map((volume) => volume && relative(volume, scene.origin));
