@@ -61,10 +61,10 @@ describe('the CDN build', () => {
       return element;
     };
     assert((await shown(COMPASS.replace('.splat', '.ply'))).loaded, 'a PLY file is shown');
-    // The self-test of the GPU with the code that packs its splats (`sh`), reads its frames (`capture`) and the counts that it reads, printing, and on a first visit the search for what suits the GPU. Its result is stored.
+    // The self-test of the GPU with the code that packs its splats (`sh`), the counts of frames, printing, and on a first visit the search for what suits the GPU. Its result is stored.
     await until(() => Object.keys(localStorage).some((key) => key.startsWith('gaussian-splat ')), 'a choice is kept');
     const first = parts().length;
-    const expected = /cdn\/(timing|sh|capture|frame-stats|print-controller|search)-/;
+    const expected = /cdn\/(timing|sh|frame-stats|print-controller|search)-/;
     const others = parts().filter((part) => !expected.test(part));
     assertEqual(others, [], 'further parts fetched for a PLY file');
     assert((await shown(COMPASS)).loaded, 'another is shown');
