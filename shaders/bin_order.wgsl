@@ -12,17 +12,14 @@
 // There are four classes for each doubling of the number of pairs.
 // Exponent and first two bits of the mantissa of the float32 2^31, which is more pairs than a buffer holds, and 3.
 const LONGEST = 635u;
-const SHORTEST = 127u;
 // Zero at the beginning, as WGSL says. By class: its number of bins, then the place of its first bin.
 var<workgroup> places: array<atomic<u32>, PREFIX_THREADS>;
 var<workgroup> pairs: atomic<u32>;
 var<workgroup> longest: atomic<u32>;
-// Number of bins of more than one pair, which come first.
-var<workgroup> filled: u32;
 
 fn pairs_of(bin: u32) -> u32 { return ranges[bin].y - ranges[bin].x; }
 
-// The class counted from the longest list: SHORTEST for one pair or none.
+// The class counted from the longest list: 127 for one pair or none.
 fn class_of(count: u32) -> u32 { return LONGEST - (bitcast<u32>(f32(max(count, 1u))) >> 21u); }
 
 @compute @workgroup_size(PREFIX_THREADS)
@@ -39,11 +36,10 @@ fn main(@builtin(local_invocation_index) lane: u32) {
   let upto = inclusive_sum(own, lane, PREFIX_THREADS);
   atomicStore(&places[lane], upto - own);
   if (lane == class_of(atomicLoad(&pairs) / LONG_BINS)) { bin_order[bins] = upto - own; }
-  if (lane == SHORTEST) { filled = upto - own; }
   workgroupBarrier();
   for (var bin = lane; bin < bins; bin += PREFIX_THREADS) {
     bin_order[atomicAdd(&places[class_of(pairs_of(bin))], 1u)] = bin;
   }
   if (lane == 0u) { bin_order[bins + 1u] = atomicLoad(&longest); }
-  divide_lists(lane, filled);
+  divide_lists(lane);
 }

@@ -23,30 +23,24 @@ fn splats_of(tile: u32) -> vec2u {
   return vec2u(select(count, min(count, end + end / 4u + 256u), end > 0u), count);
 }
 
-// The nth tile of the bins in their order.
-fn tile_at(nth: u32) -> u32 { return bin_order[nth / TILES_PER_BIN] * TILES_PER_BIN + nth % TILES_PER_BIN; }
-
 // A list is divided if it has at least twice the splats of a segment. Splats behind the expected end have a segment of
-// their own. Only the first `filled` bins have such lists: if splats cover a small part of the image, few.
-fn divide_lists(lane: u32, filled: u32) {
+// their own.
+fn divide_lists(lane: u32) {
   let tiles = view.bins.x * view.bins.y * TILES_PER_BIN;
-  let listed = filled * TILES_PER_BIN;
-  for (var tile = lane; tile < tiles; tile += PREFIX_THREADS) { bin_order[tile_segments_at(view, tile)] = 0u; }
-  storageBarrier();
   var sum = 0u;
-  for (var nth = lane; nth < listed; nth += PREFIX_THREADS) { sum += splats_of(tile_at(nth)).x; }
+  for (var tile = lane; tile < tiles; tile += PREFIX_THREADS) { sum += splats_of(tile).x; }
   atomicAdd(&splats, sum);
   workgroupBarrier();
-  let shared_segments = min(SHARED_SEGMENTS, SHARED_BINS / max(filled, 1u));
+  let shared_segments = min(SHARED_SEGMENTS, SHARED_BINS / (view.bins.x * view.bins.y));
   let min_splats = max(segment_splats, atomicLoad(&splats) / shared_segments + 1u);
-  for (var nth = lane; nth < listed; nth += PREFIX_THREADS) {
-    let tile = tile_at(nth);
+  for (var tile = lane; tile < tiles; tile += PREFIX_THREADS) {
     let own = splats_of(tile);
+    tile_splats[tile] = 0u;
     var count = min(own.x / min_splats, LIST_SEGMENTS);
     let size = own.x / max(count, 1u);
-    if (count < 2u) { continue; }
-    if (own.x < own.y) { count++; }
+    if (count < 2u) { count = 0u; } else if (own.x < own.y) { count++; }
     bin_order[tile_segments_at(view, tile)] = count;
+    if (count == 0u) { continue; }
     let at = divided_at(view, atomicAdd(&divided_count, 1u));
     bin_order[at] = tile;
     bin_order[at + 1u] = atomicAdd(&segment_count, count);
@@ -54,8 +48,6 @@ fn divide_lists(lane: u32, filled: u32) {
     bin_order[at + 3u] = size;
   }
   workgroupBarrier();
-  storageBarrier();
-  for (var tile = lane; tile < tiles; tile += PREFIX_THREADS) { tile_splats[tile] = 0u; }
   if (lane != 0u) { return; }
   bin_order[segment_count_at(view)] = atomicLoad(&segment_count);
   bin_order[segment_count_at(view) + 1u] = atomicLoad(&divided_count);

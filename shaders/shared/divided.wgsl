@@ -8,14 +8,13 @@
 // Capacity in segments.
 const MAX_SEGMENTS = 1024u;
 // Maximum number of segments of equal size; each divided list may have one more, of other size. Images of more tiles
-// have fewer, because their tiles keep more of a GPU busy: the number times that of bins with lists is at most
-// SHARED_BINS.
+// have fewer, because their tiles keep more of a GPU busy: the number times that of bins is at most SHARED_BINS.
 const SHARED_SEGMENTS = 640u;
 const SHARED_BINS = 23040u;
 // Maximum number of segments of equal size of one list: one workgroup sums them.
 const LIST_SEGMENTS = 64u;
 // Maximum number of tiles.
-const MAX_TILES = 256u * TILES_PER_BIN;
+const MAX_TILES = 128u * TILES_PER_BIN;
 const SEGMENT_NUMBERS = 6u;
 const END_AT = MAX_SEGMENTS * SEGMENT_NUMBERS * 256u;
 const DIVIDED_WORDS = 4u;

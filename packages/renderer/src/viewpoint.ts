@@ -300,7 +300,7 @@ export class Viewpoint {
    */
   async #read({ monitor, table }: Resources): Promise<FrameCounts | undefined> {
     const counts = await monitor.read();
-    if (counts) this.#engine.rasterizer.learn?.(counts);
+    if (counts) this.#engine.rasterizer.learn?.(counts.longest);
     if (counts && this.#overdraw?.note(counts.covered / constants.COVERED_UNIT, table.splats)) this.#onIncomplete();
     return counts;
   }

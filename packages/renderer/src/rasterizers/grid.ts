@@ -6,9 +6,8 @@ import type { TilePainter } from './tile-painter.js';
 
 const { BIN_COLUMNS, BIN_ROWS, DIGITS, MAX_TILES, SMALL_TILE, TILES_PER_BIN } = constants;
 
-/** Maximum number of bins of an image of few tiles, in general and if splats cover a small part of the image. */
-export const FEW_BINS = 128;
-export const MAX_BINS = MAX_TILES / TILES_PER_BIN;
+/** Maximum number of bins of an image of few tiles. */
+export const FEW_BINS = MAX_TILES / TILES_PER_BIN;
 
 /** The bins of an image. */
 export interface Grid {
@@ -30,22 +29,20 @@ export interface Grid {
  * Returns the bins for an image. Their tiles are small if one pass sorts the pairs by their bins.
  * @param few Kernels for images of few tiles; undefined if there are none.
  * @param hasLongLists Whether long lists of such an image are divided.
- * @param maxBins Maximum number of bins of such an image.
  */
 export function gridFor(
   { width, height }: Pick<Surface, 'width' | 'height'>,
   painter: TilePainter,
   few: FewTiles | undefined,
   hasLongLists: boolean,
-  maxBins = FEW_BINS,
   tile: number = SMALL_TILE,
 ): Grid {
   const columns = Math.ceil(width / (BIN_COLUMNS * tile));
   const rows = Math.ceil(height / (BIN_ROWS * tile));
   const count = columns * rows;
   if (count > DIGITS && tile < painter.tile)
-    return gridFor({ width, height }, painter, few, hasLongLists, maxBins, painter.tile);
-  const isFew = few !== undefined && painter.few !== undefined && tile === SMALL_TILE && count <= maxBins;
+    return gridFor({ width, height }, painter, few, hasLongLists, painter.tile);
+  const isFew = few !== undefined && painter.few !== undefined && count <= FEW_BINS;
   const isDivided = isFew && hasLongLists && !painter.hasWholeLists;
   return { tile, columns, rows, count, bits: Math.ceil(Math.log2(count)), isFew, isDivided };
 }

@@ -171,8 +171,8 @@ export interface Rasterizer {
   readonly pairPlan?: GPUBuffer;
   /** Place of the number of pairs of the longest list in the last frame; undefined for a rasterizer without lists. */
   readonly longest?: CountPlace | undefined;
-  /** Takes the numbers of pairs of an earlier frame, all and those of the longest list, by which kernels are chosen. */
-  learn?(counts: { readonly pairs: number; readonly longest: number }): void;
+  /** Takes this number of an earlier frame, by which a kernel is chosen. */
+  learn?(longest: number): void;
   /** Whether the rasterizer can write a final image of this format directly to the target. */
   finishes(format: GPUTextureFormat): boolean;
   /** Returns the required bytes of each buffer of {@link RasterizerInputs.pingPong}. */

@@ -16,7 +16,7 @@ import type {
 } from './rasterizer.js';
 import { pairBuffers, releasableBytesOf, type PairBuffers } from './pair-buffers.js';
 import { listingKernels, type ListingKernels, type PaintedTiles, type RasterizeVariant } from './tile-kernels.js';
-import { FEW_BINS, gridFor, MAX_BINS, type Grid } from './grid.js';
+import { FEW_BINS, gridFor, type Grid } from './grid.js';
 import { fewTilesOn, type FewTilesLoader } from './few-tiles-loader.js';
 import type { FewBuffers, FewTiles } from './few-tiles.js';
 import { PlainPainter, type TilePainter } from './tile-painter.js';
@@ -43,9 +43,6 @@ interface GridBindings {
 const STORABLE: readonly GPUTextureFormat[] = ['rgba8unorm', 'rgba16float', 'rgba32float'];
 /** Image format that a compute shader can write with the feature `bgra8unorm-storage`. */
 const STORABLE_WITH_FEATURE: GPUTextureFormat = 'bgra8unorm';
-
-/** A frame is narrow if its longest list has more than this part of all pairs: splats cover a small part of the image. */
-const NARROW_BINS = 12;
 
 /** Maximum number of grids with cached bindings. */
 const MAX_GRIDS = 12;
@@ -80,10 +77,9 @@ export class TilesRasterizer extends BufferOwner implements Rasterizer {
   readonly #fewLoader: FewTilesLoader | undefined;
   #few: FewTiles | undefined;
   #fewBuffers: FewBuffers | undefined;
-  /** Number of pairs in an earlier frame, and of those in the longest list. */
-  #counts = { pairs: 0, longest: 0 };
+  /** Number of pairs of the longest list in an earlier frame. */
+  #longest = 0;
   #hasLongLists = false;
-  #isNarrow = false;
   /** Bindings of the last frame. */
   #last: GridBindings | undefined;
   #inputs: RasterizerInputs | undefined;
@@ -107,8 +103,8 @@ export class TilesRasterizer extends BufferOwner implements Rasterizer {
     return this.#last && { buffer: this.#last.binOrder, offset: 4 * (this.#last.grid.count + 1) };
   }
 
-  learn(counts: { readonly pairs: number; readonly longest: number }): void {
-    this.#counts = counts;
+  learn(longest: number): void {
+    this.#longest = longest;
   }
 
   get pairPlan(): GPUBuffer | undefined {
@@ -142,11 +138,8 @@ export class TilesRasterizer extends BufferOwner implements Rasterizer {
     if (this.#few !== this.#fewLoader?.now) this.#forgetGrids();
     this.#few = this.#fewLoader?.now;
     // Lists may shrink by a quarter before they are whole again, so that frames do not alternate.
-    const { pairs, longest } = this.#counts;
     const longPairs = (this.#few?.longPairs ?? 0) * (this.#hasLongLists ? 0.75 : 1);
-    this.#hasLongLists = longest >= longPairs;
-    const narrowPairs = (pairs / NARROW_BINS) * (this.#isNarrow ? 0.75 : 1);
-    this.#isNarrow = this.#hasLongLists && longest > narrowPairs;
+    this.#hasLongLists = this.#longest >= longPairs;
     const bound = this.#boundFor(painting, this.#inputs, this.#buffers);
     this.#last = bound;
     this.#writeView(painting, bound.grid, { index: 0, count: 1 });
@@ -205,9 +198,8 @@ export class TilesRasterizer extends BufferOwner implements Rasterizer {
     inputs: RasterizerInputs,
     buffers: PairBuffers,
   ): GridBindings {
-    const maxBins = this.#isNarrow && !painter.hasWholeLists ? MAX_BINS : FEW_BINS;
-    const grid = gridFor(surface, painter, this.#few, this.#hasLongLists, maxBins);
-    if (grid.count <= maxBins) this.#fewLoader?.load();
+    const grid = gridFor(surface, painter, this.#few, this.#hasLongLists);
+    if (grid.count <= FEW_BINS) this.#fewLoader?.load();
     const key = JSON.stringify(grid);
     const known = this.#bound.get(key);
     if (known) return known;
