@@ -35,10 +35,8 @@ export async function runTests({ node, browser }, { env, built, isStatic = false
   if (isLab) await pages;
   const results = await Promise.all([
     pages,
-    inTurn(
-      () => runSharing(sharing, options),
-      () => built.then(() => runSharing(together, options)),
-    ),
+    runSharing(sharing, options),
+    built.then(() => runSharing(together, options)),
     inTurn(...(isStatic ? [() => runStatic(options)] : []), () =>
       built.then(() => runAlone(alone, isBeside ? 1 : 2, options)),
     ),
