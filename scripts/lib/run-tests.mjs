@@ -37,9 +37,7 @@ export async function runTests({ node, browser }, { env, built, isStatic = false
     pages,
     runSharing(sharing, options),
     built.then(() => runSharing(together, options)),
-    inTurn(...(isStatic ? [() => runStatic(options)] : []), () =>
-      built.then(() => runAlone(alone, isBeside ? 1 : 2, options)),
-    ),
+    inTurn(...(isStatic ? [() => runStatic(options)] : []), () => built.then(() => runAlone(alone, 2, options))),
   ]);
   return results.flat().reduce(sum, NONE);
 }
