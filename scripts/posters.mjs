@@ -18,6 +18,8 @@ const OF_HOME = [
 ];
 const OF_GALLERY = { width: 720, height: 480 };
 const QUALITY = 0.72;
+/** Milliseconds in which models that work in steps show their result. */
+const STEPS_MS = 4_000;
 
 /** Versions of one view of the apartment that the first page compares: a held-out image, the trained splats, and a file of fewer bytes (`--small`). */
 const VERSIONS = { view: '12', ply: 'version-splats', small: 'version-small', image: 'version-image' };
@@ -85,6 +87,8 @@ async function savePosters(url, sizes) {
   await tab.waitForFunction(() => document.querySelector('gaussian-splat')?.matches(':defined'));
   await tab.evaluate(() => document.querySelector('gaussian-splat').dismissPoster());
   await tab.waitForFunction(isSettled, undefined, { timeout: 300_000, polling: 250 });
+  // Models that work in steps show the first ones before the last.
+  await tab.waitForTimeout(STEPS_MS);
   const scene = tab.locator('gaussian-splat').first();
   for (const size of sizes) await saveImage(scene, size);
   const splats = await scene.evaluate((element) => element.stats.splats);

@@ -38,8 +38,8 @@ const ROUNDING = 1;
 
 for (const name of STUDIO) test(`${name}: the image against held-out images`, () => assertPictured(name, 3));
 
-/** Allowed error of picked points beside that of a single ray, in the median: single rays are nearly exact where foliage is thin, as in the garden. */
-const MAX_TO_ONE_RAY = 1.25;
+/** Allowed error of picked points beside that of a single ray, in the median, where it is not 1: the garden of the second training has 2.6 and 2.2 cm. */
+const MAX_TO_ONE_RAY: Partial<Record<StudioName, number>> = { garden: 1.25 };
 
 async function assertPictured(name: StudioName, count: number): Promise<void> {
   const scene = await studio(name);
@@ -93,7 +93,10 @@ for (const name of STUDIO)
     console.log(
       `${name}: ${errors.length} points, off by ${half} cm in the median (one ray ${one}), 90 % within ${ninetieth} cm; ${known} % state an interval, ± ${interval} cm in the median, which holds ${(100 * share).toFixed(0)} %; ${missed} found nothing`,
     );
-    assert.ok(middle(errors) <= MAX_TO_ONE_RAY * middle(before), `${name}: median ${half} cm, ${one} by one ray`);
+    assert.ok(
+      middle(errors) <= (MAX_TO_ONE_RAY[name] ?? 1) * middle(before),
+      `${name}: median ${half} cm, ${one} by one ray`,
+    );
     assert.ok(share >= 0.68, `${name}: ${share} hold`);
   });
 
