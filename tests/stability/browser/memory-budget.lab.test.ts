@@ -67,12 +67,9 @@ describe('S12: all scenes of a page together', () => {
   beforeEach(() => until(() => ledger().bytes === 0, 'an empty ledger'));
   before(async () => {
     await until(() => ledger().bytes === 0, 'an empty ledger');
-    // A machine with little memory has the details of levels, too.
-    await onMachineOf(machineFor(100_000), async () => {
-      const element = await showLoaded();
-      one = ledger().bytes;
-      element.remove();
-    });
+    const element = await showLoaded();
+    one = ledger().bytes;
+    element.remove();
     assert(one > 0, 'a scene takes memory');
   });
 
