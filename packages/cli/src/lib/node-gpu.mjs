@@ -35,8 +35,8 @@ export async function requestNodeAdapter({ isTrusted = false } = {}) {
 }
 
 /**
- * Returns an adapter of {@link requestNodeAdapter}, and its device for renderers. A software GPU gets the variants that it compiles in a fraction of the time, without a search. Images are
- * the same.
+ * Returns an adapter of {@link requestNodeAdapter}, and its device for renderers. A software GPU gets the variants that it compiles in a fraction of the time, without a search. All
+ * variants keep the same accuracy.
  */
 export async function requestNodeDevice(options) {
   const adapter = await requestNodeAdapter(options);
