@@ -28,6 +28,8 @@ const FACTORS = [10, 1_000, 30_000, 1_000_000];
 const MAX_FILE_BYTES = 8e6;
 /** The program and what its libraries take while they work, beyond the account of SECURITY.md. */
 const OWN_BYTES = 100e6;
+/** Of a machine whose processors are shared: a cost that grows with the references takes minutes, not seconds. */
+const SLOWER = 8;
 
 const folder = mkdtempSync(join(tmpdir(), 'budget-'));
 after(() => rmSync(folder, { recursive: true }));
@@ -75,7 +77,7 @@ for (const [name, multiply] of someOf(Object.entries({ ...MULTIPLIED, ...MULTIPL
       context.diagnostic(what);
       assert.doesNotMatch(result, /unnamed|undefined/, what);
       assert.ok(peak <= OWN_BYTES + 2 ** 26 + 256 * bytes, what);
-      assert.ok(cpuMs <= 1_000 + 4e-3 * bytes, what);
+      assert.ok(cpuMs <= SLOWER * (1_000 + 4e-3 * bytes), what);
     }
   });
 }

@@ -285,6 +285,7 @@ test('gaussian-splat page reads what it publishes: meshes have their tag, and wh
 });
 
 test('gaussian-splat page says in a sentence what it was asked wrongly', () => {
+  copyFileSync(fixturePath('packed.onnx'), inFolder('LOUD.ONNX'));
   const wrong: readonly [RegExp, ...string[]][] = [
     [/scene and a folder are needed/, 'gltf/scene.gltf'],
     [/There is no file .*missing\.ply/, 'gltf/scene.gltf', 'missing.ply', 'page'],
