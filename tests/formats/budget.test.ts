@@ -28,7 +28,7 @@ const FACTORS = [10, 1_000, 30_000, 1_000_000];
 const MAX_FILE_BYTES = 8e6;
 /** The program and what its libraries take while they work, beyond the account of SECURITY.md. */
 const OWN_BYTES = 100e6;
-/** Of a machine whose processors are shared: a cost that grows with the references takes minutes, not seconds. */
+/** A shared machine is slower. A cost that grows with the references takes minutes, not seconds. */
 const SLOWER = 8;
 
 const folder = mkdtempSync(join(tmpdir(), 'budget-'));
