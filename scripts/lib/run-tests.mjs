@@ -49,26 +49,40 @@ async function inTurn(...runs) {
   return counts.flat();
 }
 
-/** Every file in its own process, on half of the CPU cores. */
+/** Every file in its own process, on half of the CPU cores. A few that fail run once more, alone. */
 async function runEach({ node, browser }, env) {
   const optionsAt = (slot) => ({
     env: { ...env, NODE_ENV: 'test', TEST_PORT: String(8000 + PORT_STEP * slot) },
     isBeside: true,
   });
-  const groups = Object.entries(byGroup(browser));
+  const { sharing, together, alone } = byProcess(node);
+  const { timing, ...others } = byGroup(browser);
+  const inNode = (files) => files.map((file) => ({ file, run: (options) => runAlone([file], 1, options) }));
+  const ofGroup = ([group, files]) => files.map((file) => ({ file, run: (o) => inChromium(group, [file], o) }));
+  // Files that are alone take longest, and come first.
   const jobs = [
-    ...node.map((file) => (options) => runAlone([file], 1, options)),
-    ...groups.flatMap(([group, files]) => files.map((file) => (options) => inChromium(group, [file], options))),
+    ...inNode(alone),
+    ...ofGroup(['timing', timing]),
+    ...inNode([...sharing, ...together]),
+    ...Object.entries(others).flatMap(ofGroup),
   ];
-  let counts = NONE;
+  const results = [];
   const work = async (slot) => {
     for (let job = jobs.shift(); job !== undefined; job = jobs.shift())
-      counts = sum(counts, await job(optionsAt(slot)));
+      results.push({ job, counts: await job.run(optionsAt(slot)) });
   };
   await Promise.all(Array.from({ length: availableParallelism() >> 1 }, (_, slot) => work(slot)));
-  return counts;
+  const failed = results.filter(({ counts }) => counts.failed > 0);
+  for (const result of failed.length > MAX_UNSTEADY ? [] : failed) {
+    const counts = await result.job.run(optionsAt(0));
+    if (counts.failed > 0) continue;
+    console.log(unsteady(result.job.file));
+    result.counts = counts;
+  }
+  return results.map(({ counts }) => counts).reduce(sum, NONE);
 }
 
+const unsteady = (file) => `unsteady: ${file} failed beside the others and passed alone`;
 const NONE = { passed: 0, failed: 0, skipped: 0, failures: [] };
 
 function sum(a, b) {
@@ -129,7 +143,7 @@ async function runBrowser(groups, options) {
   for (const { group, file, count } of failed) {
     const again = await inChromium(group === 'dense' ? group : 'timing', [file], options);
     if (again.failed > 0) continue;
-    console.log(`unsteady: ${file} failed beside the others and passed alone`);
+    console.log(unsteady(file));
     const result = results.find(({ failedIn }) => failedIn.has(file));
     result.passed += count;
     result.failed -= count;
