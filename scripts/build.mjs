@@ -59,13 +59,16 @@ async function buildPackages() {
 
 /** The CDN bundle, which takes longest. */
 async function bundleElement() {
-  const bundlePart = (part) =>
+  const bundle = (script, config, part) =>
     mustSoon(process.execPath, [
-      'node_modules/rollup/dist/bin/rollup',
-      ...['--config', 'packages/element/rollup.config.mjs', '--configPart', part, '--silent'],
+      `node_modules/${script}`,
+      ...['--config', `packages/element/${config}.config.mjs`, '--environment', `PART:${part}`],
+      ...(config === 'rollup' ? ['--silent'] : []),
     ]);
-  await bundlePart('three');
-  await Promise.all([bundlePart('page'), bundlePart('worker')]);
+  const [rollup, rolldown] = ['rollup/dist/bin/rollup', 'rolldown/bin/cli.mjs'];
+  await bundle(rolldown, 'rolldown', 'three');
+  await Promise.all([bundle(rollup, 'rollup', 'page'), bundle(rollup, 'rollup', 'worker')]);
+  await bundle(rolldown, 'rolldown', 'single');
   writeLicensesOfBundle();
   console.log(`integrity of gaussian-splat.min.js: ${writeIntegrity()['gaussian-splat.min.js']}`);
 }
