@@ -183,7 +183,7 @@ function holdComments() {
   return wrong.length + measureRates('comments', comments, COMMENT_LIMITS);
 }
 
-/** Checks declared names of shaders, as the ESLint rule does those of scripts. @returns {number} of faults */
+/** Checks declared names of shaders, as the linter's rule does those of scripts. @returns {number} of faults */
 function holdShaderNames() {
   const declaration =
     /(?:\b(?:fn|struct|alias|let|const|override|var(?:<[^>]*>)?)\s+|[(,{;]\s*|^\s+)(\w+)(?=\s*[:=({])/gm;
@@ -225,7 +225,7 @@ function commentsIn(source, path) {
         .replace(/@param \w+/g, '@param')
         .trim(),
     )
-    .filter((text) => wordsOf(text) >= 3 && !/^(eslint|@ts|prettier)/.test(text));
+    .filter((text) => wordsOf(text) >= 3 && !/^(eslint|oxlint|@ts|prettier)/.test(text));
 }
 
 function filesIn(folder, ending) {

@@ -13,7 +13,7 @@ const MIN_PROCESSORS_OF_EACH = 8;
 const PORT_STEP = 10;
 const IN_ONE_PROCESS = 'tests/support/in-one-process.ts';
 const TYPES = [TSC, '--noEmit', '--project', 'tests'];
-const ESLINT = ['node_modules/eslint/bin/eslint.js', '.'];
+const LINTER = ['node_modules/oxlint/bin/oxlint', '--config', 'oxlint.config.mjs'];
 const WORDS = ['scripts/words.mjs'];
 
 /**
@@ -122,7 +122,7 @@ async function runNode(files, concurrency, options, count) {
 /** Types of the tests and the style of everything: one failure each, if any. */
 async function runStatic(options) {
   const counts = [];
-  for (const args of [TYPES, ESLINT, WORDS]) {
+  for (const args of [TYPES, LINTER, WORDS]) {
     const { status } = await runAsync(process.execPath, args, options);
     counts.push(status === 0 ? NONE : { ...NONE, failed: 1, failures: [`Failed: ${args.join(' ')}`] });
   }

@@ -4,7 +4,7 @@ import { fileURLToPath } from 'node:url';
 
 export const root = fileURLToPath(new URL('../../', import.meta.url));
 
-/** TypeScript's native compiler. ESLint, and tests that parse programs, need the API of the older compiler. */
+/** TypeScript's native compiler. Tests and scripts that parse programs need the API of the older compiler. */
 export const TSC = 'node_modules/typescript-7/bin/tsc';
 
 /** Runs a command, in the project's root by default, and returns its exit status. */

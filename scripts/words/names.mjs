@@ -1,5 +1,5 @@
 /**
- * The parts of names that the project has retired, and an ESLint rule that refuses a declaration with one of them. `lint:words` applies the same list to WGSL.
+ * The parts of names that the project has retired, and a rule of the linter that refuses a declaration with one of them. `lint:words` applies the same list to WGSL.
  */
 
 /** `[part, what to write instead]`. */
@@ -60,7 +60,6 @@ const DECLARED = {
   TSPropertySignature: keyOf,
 };
 
-/** @type {import('eslint').Rule.RuleModule} */
 export const retiredNames = {
   meta: {
     type: 'problem',

@@ -34,6 +34,7 @@ export function publicComments() {
   const program = ts.createProgram(entries, {
     ...options,
     noEmit: true,
+    noLib: true,
     composite: false,
     incremental: false,
     types: [],

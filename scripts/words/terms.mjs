@@ -69,8 +69,6 @@ export const RETIRED = [
     'begin with the noun or the verb',
   ],
 ];
-/** A heading or the label of a link may begin with What. */
-const NOT_IN_HEADINGS = RETIRED.at(-1)[0];
 
 /** Words that are right at times: upper limits of their number per 1,000 words. */
 export const RATES = {
@@ -80,15 +78,14 @@ export const RATES = {
   'of which': /\b(of|by|in|for|to|at|from|between) which\b/gi,
 };
 
+/** The last pattern is not for headings: these, and the label of a link, may begin with What. */
+const EVERYWHERE = RETIRED.map(([pattern, instead]) => [new RegExp(pattern.source, `g${pattern.flags}`), instead]);
+
 /** Retired words of a text in their order: `{ found, instead, at }`. */
 export function retiredIn(text, { isHeading = false } = {}) {
-  const hits = RETIRED.filter(([pattern]) => !(isHeading && pattern === NOT_IN_HEADINGS)).flatMap(
-    ([pattern, instead]) =>
-      [...text.matchAll(new RegExp(pattern.source, `g${pattern.flags}`))].map(({ 0: found, index: at }) => ({
-        found,
-        instead,
-        at,
-      })),
+  const patterns = isHeading ? EVERYWHERE.slice(0, -1) : EVERYWHERE;
+  const hits = patterns.flatMap(([pattern, instead]) =>
+    [...text.matchAll(pattern)].map(({ 0: found, index: at }) => ({ found, instead, at })),
   );
   return hits.sort((a, b) => a.at - b.at);
 }

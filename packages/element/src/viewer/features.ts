@@ -144,7 +144,7 @@ export class Features {
   first<K extends keyof Feature>(name: K, ...args: Parameters<Call<K>>): Result<K> | undefined {
     for (const row of this.#rows.keys()) {
       const feature = this.#loaded.get(row);
-      const result = (feature?.[name] as ((...args: unknown[]) => Result<K>) | undefined)?.apply(feature, args);
+      const result = (feature?.[name] as ((...args: unknown[]) => Result<K>) | undefined)?.call(feature, ...args);
       if (result !== undefined) return result;
     }
     return undefined;
