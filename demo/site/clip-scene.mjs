@@ -31,22 +31,24 @@ export async function writeClip(folder) {
   writeFileSync(join(folder, 'vase.gsv'), bytes);
 }
 
+const PLATE_SPLATS = Array.from({ length: PLATE }, (_, i) => plateSplat(i));
+
 /** The vase at a time, as a `GaussianCloud`. */
 function vaseAt(seconds) {
-  const splats = [];
-  for (let i = 0; i < PLATE; i++) splats.push(plateSplat(i));
-  for (let i = 0; i < SPLATS; i++) {
-    const splat = vaseSplat(i, seconds);
-    if (splat) splats.push(splat);
-  }
-  const flat = (of) => Float32Array.from(splats.flatMap(of));
+  const rising = Array.from({ length: SPLATS }, (_, i) => vaseSplat(i, seconds));
+  const splats = [...PLATE_SPLATS, ...rising.filter(Boolean)];
+  const flat = (width, of) => {
+    const values = new Float32Array(width * splats.length);
+    splats.forEach((splat, i) => values.set(of(splat), width * i));
+    return values;
+  };
   return {
     ...{ count: splats.length, origin: [0, 0, 0], shDegree: 0, antialiased: false, droppedCount: 0 },
-    positions: flat(({ position }) => position),
-    scales: flat(({ size }) => [size, 0.8 * size, 0.5 * size]),
-    rotations: flat(({ turn }) => turn),
-    opacities: flat(({ opacity }) => [opacity]),
-    sh: flat(({ color }) => color.map((value) => (value - 0.5) / SH_CONSTANT)),
+    positions: flat(3, ({ position }) => position),
+    scales: flat(3, ({ size }) => [size, 0.8 * size, 0.5 * size]),
+    rotations: flat(4, ({ turn }) => turn),
+    opacities: Float32Array.from(splats, ({ opacity }) => opacity),
+    sh: flat(3, ({ color }) => color.map((value) => (value - 0.5) / SH_CONSTANT)),
   };
 }
 

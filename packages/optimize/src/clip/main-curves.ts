@@ -61,17 +61,17 @@ function turn(
   size: number,
   { p, q, c, s }: { p: number; q: number; c: number; s: number },
 ): void {
+  for (let at = 0; at < size * size; at += size) turnPair(matrix, at + p, matrix, at + q, c, s);
+  const [one, other] = [vectors[p], vectors[q]];
   for (let k = 0; k < size; k++) {
-    const [a, b] = [matrix[size * k + p], matrix[size * k + q]];
-    matrix[size * k + p] = c * a - s * b;
-    matrix[size * k + q] = s * a + c * b;
+    turnPair(matrix, size * p + k, matrix, size * q + k, c, s);
+    turnPair(one, k, other, k, c, s);
   }
-  for (let k = 0; k < size; k++) {
-    const [a, b] = [matrix[size * p + k], matrix[size * q + k]];
-    matrix[size * p + k] = c * a - s * b;
-    matrix[size * q + k] = s * a + c * b;
-    const [x, y] = [vectors[p][k], vectors[q][k]];
-    vectors[p][k] = c * x - s * y;
-    vectors[q][k] = s * x + c * y;
-  }
+}
+
+function turnPair(as: Float64Array, i: number, bs: Float64Array, j: number, c: number, s: number): void {
+  const a = as[i];
+  const b = bs[j];
+  as[i] = c * a - s * b;
+  bs[j] = s * a + c * b;
 }
