@@ -11,7 +11,7 @@ import { writePly } from './support/ply-writer.js';
 import { inriaColumns, rawSplats } from './support/splats.js';
 import { spzBody, writeSpz } from './support/spz-writer.js';
 
-const splats = rawSplats(12, 1);
+const splats = rawSplats(5, 1);
 const columns = inriaColumns(splats);
 const compressedPly = writePly([
   {
@@ -25,7 +25,7 @@ const compressedPly = writePly([
     columns: ['position', 'rotation', 'scale', 'color'].map((name) => ({
       name: `packed_${name}`,
       type: 'uint' as const,
-      values: Array.from({ length: 12 }, (_, i) => (i * 0x9e3779b1) >>> 0),
+      values: Array.from({ length: 5 }, (_, i) => (i * 0x9e3779b1) >>> 0),
     })),
   },
 ]);
