@@ -231,7 +231,7 @@ test('a step over cells of a millimeter is bounded', async () => {
 let emptyMap: FloorMap | undefined;
 /** The room without stairs and gallery. */
 const emptyRoom = (): FloorMap =>
-  (emptyMap ??= makeFloorMap(cloudOf(ROOM.slice(0, 5)), { frame: FRAME, near: [0, 1.5, 2] }));
+  (emptyMap ??= makeFloorMap(cloudOf(ROOM.slice(0, 5)), { frame: FRAME, near: [0, 1.5, 2], voxel: 0.1 }));
 
 test('a walk map is stored in centimeters and read again', () => {
   const map = emptyRoom();
