@@ -8,7 +8,7 @@ import { fileURLToPath } from 'node:url';
 const root = fileURLToPath(new URL('../../', import.meta.url));
 const skip = existsSync(`${root}packages/react/dist`) ? false : 'not built: npm run build';
 
-const CHECKERS = { react: 'typescript/bin/tsc', vue: 'vue-tsc/bin/vue-tsc.js' };
+const CHECKERS = { react: 'typescript-7/bin/tsc', vue: 'vue-tsc/bin/vue-tsc.js' };
 
 for (const [name, checker] of Object.entries(CHECKERS)) {
   test(`the app of ${name} is well typed, and its types refuse what would not work`, { skip }, () => {
