@@ -1,6 +1,7 @@
 /** Texts for users in sources: comments of the public API, sentences of errors and of pages. */
 import { existsSync, readdirSync, readFileSync } from 'node:fs';
 import { join, relative } from 'node:path';
+import { parseSync } from 'rolldown/utils';
 import ts from 'typescript';
 import { root } from '../lib/run.mjs';
 
@@ -119,20 +120,21 @@ export function attributeComments() {
 
 /** Texts in code of two words or more: errors, warnings, and what pages and the element say. */
 export function sentencesInCode(path) {
-  const file = parse(path);
+  const source = readFileSync(path, 'utf8');
+  const { program } = parseSync(path, source);
   const found = [];
   const visit = (node) => {
+    if (node === null || typeof node !== 'object') return;
+    if (Array.isArray(node)) return node.forEach(visit);
     // Styles are no text.
-    if (ts.isTaggedTemplateExpression(node) && node.tag.getText() === 'css') return;
-    if (ts.isImportDeclaration(node)) return;
+    if (node.type === 'TaggedTemplateExpression' && node.tag.name === 'css') return;
+    if (node.type === 'ImportDeclaration') return;
     const text = textOf(node);
-    if (text !== undefined && isProse(text)) {
-      const { line } = file.getLineAndCharacterOfPosition(node.getStart());
-      found.push({ file: relative(root, path), line: line + 1, text });
-    }
-    ts.forEachChild(node, visit);
+    if (text !== undefined && isProse(text))
+      found.push({ file: relative(root, path), line: source.slice(0, node.start).split('\n').length, text });
+    for (const key in node) visit(node[key]);
   };
-  visit(file);
+  visit(program);
   return found;
 }
 
@@ -152,11 +154,9 @@ export function sentencesInPython(path) {
 const isProse = (text) =>
   /^[^{}]*$/.test(text) && /[a-z] [A-Za-z]/.test(text) && (text.match(/[A-Za-z]{2,}/g) ?? []).length >= 2;
 
-function textOf(node) {
-  if (ts.isStringLiteral(node) || ts.isNoSubstitutionTemplateLiteral(node)) return node.text;
-  if (ts.isTemplateExpression(node))
-    return [node.head.text, ...node.templateSpans.map(({ literal }) => literal.text)].join(' ` ');
-  return undefined;
+function textOf({ type, value, quasis }) {
+  if (type === 'Literal' && typeof value === 'string') return value;
+  return type === 'TemplateLiteral' ? quasis.map(({ value: { cooked } }) => cooked).join(' ` ') : undefined;
 }
 
 const parse = (path) => ts.createSourceFile(path, readFileSync(path, 'utf8'), ts.ScriptTarget.Latest, true);
