@@ -22,18 +22,17 @@ export const DENSE = 'tests/element/browser/high-density.lab.test.ts';
  * holds.
  */
 export const SHARED_PAGES = [
-  ['accessibility', 'addresses', 'doors', 'embed', 'image-loss'],
-  ['labels', 'meaning', 'measure'],
-  ['mesh-files', 'meshes', 'interaction'],
-  ['depth', 'slow-reads', 'splats'],
-  ['clip', 'scenes'],
-  ['effects', 'views'],
-].map((names) => names.map((name) => `tests/element/browser/${name}.test.ts`));
+  ['element', 'accessibility', 'addresses', 'doors', 'embed', 'image-loss', 'clip', 'scenes'],
+  ['element', 'labels', 'meaning', 'measure', 'depth', 'slow-reads', 'splats'],
+  ['element', 'mesh-files', 'meshes', 'interaction', 'effects', 'views'],
+  ['generator', 'models', 'placement', 'post-gaussians', 'video-input'],
+  ['formats', 'gunzip', 'webp'],
+].map(([folder, ...names]) => names.map((name) => `tests/${folder}/browser/${name}.test.ts`));
 
 /** Files of Node that run in one process with the device of tests/support, and thus reuse its compiled pipelines. */
 const SHARES_DEVICE = /^tests\/(detail|golden|stages)\//;
-/** Files of these folders have a process each: they take the machine's memory or threads. Others share one: to start it takes longer than most of them. */
-const ONE_EACH = /^tests\/(optimize|packages)\//;
+/** These files have a process each: they take the machine's memory or threads. Others share one: to start it takes longer than most of them. */
+const ONE_EACH = /^tests\/(optimize\/|packages\/(batch|commands|test-names|.*\.lab)\.)/;
 
 /** Folders of each package's tests. Tests of demo and documents belong to the site. */
 export const TESTS_OF = {
