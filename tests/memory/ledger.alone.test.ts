@@ -3,6 +3,7 @@ import assert from 'node:assert/strict';
 import { after, test } from 'node:test';
 import { GaussianSplatError } from '@gaussian-splat/core';
 import { DynamicGaussians, GaussianBuffers, MemoryLedger, packGaussians } from '@gaussian-splat/renderer';
+import { passesSelfTest } from '@gaussian-splat/renderer/stages';
 import { bytesPerSplat } from '@gaussian-splat/renderer/tools';
 import { smallCloud } from '../formats/support/small-cloud.js';
 import { writeTensors, type TensorSpec } from '../support/generator-tensors.js';
@@ -130,4 +131,14 @@ test('what is no number of bytes is refused by name, and the sum stays one', asy
       (error: unknown) => error instanceof GaussianSplatError && error.code === 'argument/value',
     );
   assert.equal(ledger.bytes, before);
+});
+
+test('a budget without room does not make the self-test fail', async () => {
+  const device = await serialDevice();
+  const ledger = MemoryLedger.of(device);
+  let given = 0;
+  ledger.releasable.set(() => given++, 1000);
+  ledger.budgetBytes = ledger.bytes;
+  assert.ok(await passesSelfTest(device, { threads: 'serial', rasterizer: 'quads' }));
+  assert.equal(given, 0, 'off-screen scenes are kept');
 });

@@ -12,6 +12,8 @@ import { CHUNK_NUMBERS, GEOMETRY_WORDS, shWords } from './pack/words.js';
 export interface UploadOptions {
   /** Upper limit of the GPU memory of the scene in bytes; default: no limit but the device's. */
   readonly memoryBudget?: number | undefined;
+  /** Whether the device's {@link MemoryLedger} counts the scene; default true. It does not count scenes of the self-test. */
+  readonly isCounted?: boolean;
 }
 
 /** A portion of packed Gaussians, from splat `start` on. */
@@ -72,11 +74,11 @@ export class GaussianBuffers extends SceneBuffers {
   static allocate(
     device: GPUDevice,
     packed: SceneSize,
-    { memoryBudget }: UploadOptions = {},
+    { memoryBudget, isCounted = true }: UploadOptions = {},
     budget?: DetailBudget,
   ): Promise<GaussianBuffers> {
     return withMemoryCheck(device, whatOf(packed), (memory) => {
-      memory.reserve(whatOf(packed), sceneBytes(packed), memoryBudget);
+      if (isCounted) memory.reserve(whatOf(packed), sceneBytes(packed), memoryBudget);
       return new GaussianBuffers(device, memory, packed, budget);
     });
   }

@@ -97,7 +97,7 @@ export async function timeFrames(
   clock: FrameClock,
   target: { readonly format: GPUTextureFormat; readonly usage: number } = PAGE_TARGET,
 ): Promise<number> {
-  const gaussians = await GaussianBuffers.upload(device, scene());
+  const gaussians = await GaussianBuffers.upload(device, scene(), { isCounted: false });
   const renderer = viewpointOf(device, [gaussians], variants);
   const texture = device.createTexture({ label: 'gs.probe', size: [width, height], ...target });
   const camera = probeCamera(width, height);
