@@ -6,7 +6,7 @@ const SOCKETS = '--experimental-websocket';
 /**
  * For each name: the purpose, and the command. `in` says what it needs besides the packages: headless Chromium, Dawn in
  * Node, or nothing, because the command prepares all itself. `smallest`: arguments of the shortest run, which a test
- * of the laboratory makes; {folder} is an empty folder, {shared} that of the captured scenes, {detail} one of levels of detail.
+ * of the laboratory makes; {folder} is an empty folder, {shared} that of the captured scenes, {detail} one of levels of detail. `installs`: it installs packages of npm.
  * Rows without it need an engine, packages of Python, or a GPU.
  */
 export const COMMANDS = {
@@ -109,6 +109,7 @@ export const COMMANDS = {
     what: 'paints and layout shift of the site, on a simulated phone',
     in: 'chromium',
     command: ['scripts/lighthouse.mjs'],
+    installs: true,
     smallest: ['--only', '^/docs/guide/start/$', '--runs', '1'],
   },
   lives: {
@@ -153,7 +154,7 @@ export const COMMANDS = {
     what: 'scenes with known geometry, made from nothing on an NVIDIA GPU',
     command: ['scripts/studio/run-studio.mjs'],
   },
-  tools: { what: 'files of public tools, both ways', command: ['scripts/tools.mjs'], smallest: [] },
+  tools: { what: 'files of public tools, both ways', command: ['scripts/tools.mjs'], installs: true, smallest: [] },
   webgl: {
     what: 'WebGL 2 against the oracle',
     command: [SOCKETS, QUIET, ...TSX, 'scripts/webgl.mjs'],

@@ -20,9 +20,14 @@ function node(...args: string[]): string {
   return stdout;
 }
 
-for (const [name, { smallest }] of Object.entries(COMMANDS)) {
+const ping = spawnSync('npm', ['ping', '--fetch-retries=0'], { encoding: 'utf8', shell: process.platform === 'win32' });
+/** Why nothing can be installed; undefined where it can. */
+const offline = ping.status === 0 ? undefined : `no npm registry: ${/npm error code (\w+)/.exec(ping.stderr)?.[1]}`;
+
+for (const [name, { smallest, installs }] of Object.entries(COMMANDS)) {
   const needsData = smallest?.some((word) => word.includes('{shared}')) && !existsSync(shared);
-  const skip = smallest ? needsData && `no ${shared}` : 'needs another engine, packages of Python, or a GPU';
+  const reason = needsData ? `no ${shared}` : installs && offline;
+  const skip = smallest ? reason : 'needs another engine, packages of Python, or a GPU';
   test(`npm run lab -- ${name}`, { skip }, () => {
     if (smallest?.includes('{detail}'))
       node('packages/cli/bin/gaussian-splat.mjs', 'detail', 'demo/scenes/skull.spz', '--quantized', '--out', detail);
