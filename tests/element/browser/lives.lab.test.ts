@@ -19,7 +19,7 @@ import {
 } from './support/harness.js';
 import { isGreen, isRed, screenOf } from './support/screen.js';
 
-/** What the page holds after a collection of garbage: bytes of scripts, nodes, and listeners of events. */
+/** Bytes of scripts, nodes and event listeners of the page after a collection of garbage. */
 async function held(): Promise<{ heap: number; nodes: number; listeners: number }> {
   const heap = await executeServerCommand<number, undefined>('heap-size');
   const metrics = await executeServerCommand<Record<string, number>, undefined>('thread-metrics');
