@@ -8,6 +8,7 @@ import type { FrameSettings } from '../frame-target.js';
 import { Viewpoint } from '../viewpoint.js';
 import { World } from '../world.js';
 import { drawReference, ROW_STEP } from './reference.js';
+import type { PackedGaussians } from '../pack/pack.js';
 import { packRepeatedSpheres, packSpheres, probeCamera, sphereCloud } from './spheres.js';
 import { sumsAndSorts } from './stages-alone.js';
 
@@ -32,10 +33,10 @@ const DEEP = { left: 126, right: 150, top: 60, bottom: 76 } as const;
 const SMALL = 4_500;
 /** Size of the image in pixels: several bins of tiles in each direction, the last of them partly outside. */
 const [WIDTH, HEIGHT] = [276, 136];
-/** Number of elements of a row of pixels, and bytes of a row in a buffer: a multiple of 256. */
+/** Number of elements of a row of pixels, and bytes of the rows that are read: every {@link ROW_STEP}th. */
 const ROW = 4 * WIDTH;
-const ROW_BYTES = 4_608;
-const IMAGE_BYTES = ROW_BYTES * HEIGHT;
+const ROW_BYTES = 4 * ROW;
+const IMAGE_BYTES = ROW_BYTES * Math.ceil(HEIGHT / ROW_STEP);
 /** Bytes of the counts of a frame: see `Viewpoint.copyCounts`. */
 const COUNT_BYTES = 16;
 /** Bits of the tested sort keys: 16 as in motion, and 32 (exact depths) as at rest. */
@@ -51,12 +52,19 @@ const MAP_READ = 1;
 
 /** Expected image, which is computed once for all variants and devices; undefined before the first test. */
 let reference: Promise<Float32Array> | undefined;
+/** The scenes of the test, packed before the first one. */
+let packed: readonly PackedGaussians[] | undefined;
 
 /** Returns the two scenes of the test. */
 const testScenes = (): [large: GaussianCloud, small: GaussianCloud] => [
   joined(sphereCloud(LARGE, 0.8), faintCloud()),
   sphereCloud(SMALL, 0.08, 2.4, SHAPES),
 ];
+
+const packedScenes = (): readonly PackedGaussians[] => {
+  const [large, small] = testScenes();
+  return [packSpheres(large, 'float16'), packRepeatedSpheres(small, SHAPES)];
+};
 
 /** Starts to compute the expected image, which requires no device. */
 export const expectedImage = (): Promise<Float32Array> =>
@@ -69,7 +77,6 @@ export const passesSelfTest = async (device: GPUDevice, options: FrameSettings):
 /** Resolves to the name of the first stage or frame that is wrong with these options; undefined if none is. */
 export async function faultOf(device: GPUDevice, options: FrameSettings): Promise<string | undefined> {
   const threads = options.threads === 'serial' ? 'serial' : 'parallel';
-  const [large, small] = testScenes();
   const camera = shearedCamera(WIDTH, HEIGHT);
   // The CPU computes the image while the GPU sums and sorts.
   const [isSorted, expected] = await Promise.all([
@@ -80,8 +87,8 @@ export async function faultOf(device: GPUDevice, options: FrameSettings): Promis
   // Each step is a task of its own, because a page that starts has frames to show meanwhile.
   await turn();
   const scenes: GaussianBuffers[] = [];
-  for (const packed of [packSpheres(large, 'float16'), packRepeatedSpheres(small, SHAPES)])
-    scenes.push(await GaussianBuffers.upload(device, packed, { isCounted: false }));
+  for (const scene of (packed ??= packedScenes()))
+    scenes.push(await GaussianBuffers.upload(device, scene, { isCounted: false }));
   const renderer = viewpointOf(device, scenes, options);
   try {
     const images = await drawAll(device, renderer, camera, options);
@@ -117,8 +124,8 @@ async function drawAll(
       KEY_BITS.forEach((depthKeyBits, nth) => {
         renderer.draw(camera, { target: texture }, { ...options, depthKeyBits });
         const encoder = device.createCommandEncoder({ label: 'gs.probe' });
-        const target = { buffer: staging, offset: nth * step, bytesPerRow: ROW_BYTES };
-        encoder.copyTextureToBuffer({ texture }, target, [WIDTH, HEIGHT]);
+        for (let y = 0, offset = nth * step; y < HEIGHT; y += ROW_STEP, offset += ROW_BYTES)
+          encoder.copyTextureToBuffer({ texture, origin: [0, y] }, { buffer: staging, offset }, [WIDTH, 1]);
         renderer.copyCounts(encoder, staging, nth * step + IMAGE_BYTES);
         device.queue.submit([encoder.finish()]);
       });
@@ -149,22 +156,19 @@ function isNear(pixels: Float32Array, expected: Float32Array): boolean {
 
 /**
  * Returns the mean squared errors of the covered pixels of the computed rows, and of the {@link DEEP} ones. Infinity if
- * a pixel is not within {@link TOLERANCE}. Rows of `pixels` have
- * {@link ROW_BYTES}.
+ * a pixel is not within {@link TOLERANCE}.
  */
 function errorsOf(pixels: Float32Array, expected: Float32Array): readonly [all: number, deep: number] {
   let [sum, covered] = [0, 0];
   let [deepSum, deepCount] = [0, 0];
   for (let row = 0, begin = 0; begin < expected.length; row += ROW_STEP, begin += ROW) {
-    const drawn = (row * ROW_BYTES) / 4;
     const isDeepRow = row >= DEEP.top && row < DEEP.bottom;
     for (let k = 0; k < ROW; k += 4) {
-      const i = drawn + k;
       const at = begin + k;
-      const red = pixels[i] - expected[at];
-      const green = pixels[i + 1] - expected[at + 1];
-      const blue = pixels[i + 2] - expected[at + 2];
-      const alpha = pixels[i + 3] - expected[at + 3];
+      const red = pixels[at] - expected[at];
+      const green = pixels[at + 1] - expected[at + 1];
+      const blue = pixels[at + 2] - expected[at + 2];
+      const alpha = pixels[at + 3] - expected[at + 3];
       // NaN fails the comparison, too.
       const worst = Math.max(Math.abs(red), Math.abs(green), Math.abs(blue), Math.abs(alpha));
       if (!(worst <= TOLERANCE)) return [Infinity, Infinity];
