@@ -27,6 +27,12 @@ const MAX_MOTION_SHARE = 2;
 
 const NOTHING: Capacity = { visible: 0, pairs: 0 };
 
+/** Returns a capacity that suffices for both. */
+export const larger = (a: Capacity, b: Capacity): Capacity => ({
+  visible: Math.max(a.visible, b.visible),
+  pairs: Math.max(a.pairs, b.pairs),
+});
+
 /** Size and kind of a sampled frame. */
 export interface SampledFrame {
   /** Number of drawn pixels. */

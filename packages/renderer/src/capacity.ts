@@ -40,7 +40,7 @@ const PAIRS_PER_SPLAT = 1.5;
  * Pairs of splat and bin for each splat of a budget. A fifth of the splats is never visible, and the splats of a frame
  * that uses the whole budget are small. Scenes of 10 and 16 million splats needed 0.93.
  */
-const PAIRS_PER_BUDGETED = 1.1;
+export const PAIRS_PER_BUDGETED = 1.1;
 
 /**
  * Bytes of six u32 counts: visible splats, splats beyond the capacity, pairs, pairs beyond the capacity, coverage, and
@@ -268,4 +268,4 @@ const grow = (used: number, room: number, max: number): number =>
 const shrink = (used: number, room: number, min: number): number =>
   used < SLACK * room ? Math.max(min, Math.ceil(used * HEADROOM)) : room;
 
-const bytesOf = ({ visible, pairs }: Capacity): number => BYTES_PER_VISIBLE * visible + BYTES_PER_PAIR * pairs;
+export const bytesOf = ({ visible, pairs }: Capacity): number => BYTES_PER_VISIBLE * visible + BYTES_PER_PAIR * pairs;

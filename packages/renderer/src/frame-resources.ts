@@ -1,5 +1,5 @@
 import { FrameBindings, type Stages } from './bindings.js';
-import { CapacityHistory, type Capacity } from './capacity-history.js';
+import { CapacityHistory, larger, type Capacity } from './capacity-history.js';
 import { CapacityMonitor, CountBuffers, initialCapacity, MIN_CAPACITY } from './capacity.js';
 import { BlockTable } from './block-table.js';
 import type { Rasterizer } from './rasterizers/rasterizer.js';
@@ -78,15 +78,16 @@ export class FrameResources {
    * @param splatBudget Maximum number of splats in the frame; 0 for no limit.
    */
   fit(world: World, splatBudget: number): Resources {
-    this.#roomFor(splatBudget);
+    const isLarger = this.#admit(splatBudget);
     const current = this.#current;
-    if (current?.table.isCurrent) {
+    if (current) {
+      const [{ table, scratch }, isLaid] = [current, current.table.isCurrent];
+      if (!isLaid) this.#layoutAgain(table);
+      if (isLarger) this.#capacity = larger(this.#capacity!, this.#firstFor(table));
       const { visible, pairs } = this.#capacity!;
-      // False if the monitor has requested another capacity.
-      const isBound = current.scratch.capacity === visible && this.#boundPairs === pairs;
-      return isBound ? current : this.#rebind(current.table);
+      const isBound = isLaid && !isLarger && scratch.capacity === visible && this.#boundPairs === pairs;
+      return isBound ? current : this.#rebind(table);
     }
-    if (current) return this.#layoutAgain(current);
     const table = new BlockTable(this.#device, world);
     this.#capacity = this.#firstFor(table);
     this.#memory = new CapacityHistory();
@@ -97,7 +98,7 @@ export class FrameResources {
    * Adapts the resources to another set of scenes. A capacity changes only if it is too small for these scenes, or if
    * they need less than {@link MIN_USED} of it.
    */
-  #layoutAgain({ table }: Resources): Resources {
+  #layoutAgain(table: BlockTable): void {
     const before = table.splats;
     table.lay();
     const [now, max, first] = [this.#capacity!, this.#maxFor(table), this.#firstFor(table)];
@@ -113,7 +114,6 @@ export class FrameResources {
       pairs: isEnough(now.pairs, pairs) ? now.pairs : pairs,
     };
     this.#memory = new CapacityHistory();
-    return this.#rebind(table);
   }
 
   /** Returns the capacity in visible splats after `coming` more splats may become visible. Unused capacity counts. */
@@ -134,11 +134,11 @@ export class FrameResources {
     this.#counts = this.#current = this.#boundPlan = undefined;
   }
 
-  /** Releases the resources if a splat budget is larger than all earlier ones, because it requires another capacity. */
-  #roomFor(splatBudget: number): void {
-    const max = splatBudget > 0 ? splatBudget : Infinity;
-    if (this.#maxSplats !== undefined && max > this.#maxSplats) this.release();
-    this.#maxSplats = Math.max(this.#maxSplats ?? 0, max);
+  /** Records a splat budget. @returns Whether it is larger than all earlier ones, so that it requires another capacity. */
+  #admit(splatBudget: number): boolean {
+    const before = this.#maxSplats ?? 0;
+    this.#maxSplats = Math.max(before, splatBudget || Infinity);
+    return this.#maxSplats > before;
   }
 
   #maxFor(table: BlockTable): Capacity {

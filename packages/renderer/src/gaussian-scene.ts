@@ -21,7 +21,9 @@ export interface GaussianBlock {
 }
 
 /** Inputs of {@link PageRequests}: a view, and the content of a page in the pool. */
-export type FeedbackInputs = Readonly<Record<'view' | 'chunks' | 'details' | 'chunk_shares', Resource>>;
+export type FeedbackInputs = Readonly<Record<'view' | 'chunks' | 'details', Resource>> & {
+  readonly chunk_shares: GPUBuffer;
+};
 
 /** Settings that influence which pages a view requests. */
 export type FeedbackSettings = Pick<RenderSettings, 'detail' | 'detailFade' | 'splatBudget'>;

@@ -3,9 +3,10 @@ import type { WorkTime } from '@gaussian-splat/renderer/tools';
 import { targetMsOf, type FrameScheduler } from '../gpu/frame-scheduler.js';
 import { canFade, Fade, FADE_MS } from './fade.js';
 import { levelsForSize, QUALITY_LEVELS, type QualityLevel, type Losses } from './quality-levels.js';
-import { nextQuality, limited, resized } from './next-quality.js';
+import { MEMORY, nextQuality, limited, resized, usualOf } from './next-quality.js';
 import { lossesOf } from './image-loss.js';
 import { quantile } from './display-interval.js';
+import { SplatBudgets, type BudgetedScene } from './splat-budgets.js';
 import { INITIAL_QUALITY, waitForRest, type QualityState, type QualityReason } from './start.js';
 
 /** Settings of all quality levels of frames in motion, for which pipelines are prepared. */
@@ -84,6 +85,8 @@ export interface DynamicQualityOptions {
   readonly mayFade: () => boolean;
   /** Called for each timed frame of a motion. `isWhole`: whether frames in motion are drawn at full quality. */
   readonly onFrameTimed: (isWhole: boolean) => void;
+  /** Returns the scenes that are drawn. The splat budgets of streamed ones follow the time of frames. Default: none. */
+  readonly scenes?: () => readonly BudgetedScene[];
   /** Levels from which the controller chooses; default: {@link QUALITY_LEVELS}. */
   readonly levels?: readonly QualityLevel[];
 }
@@ -94,6 +97,7 @@ export interface DynamicQualityOptions {
  */
 export class DynamicQualityController {
   readonly #options: DynamicQualityOptions;
+  readonly #budgets: SplatBudgets;
   #state: QualityState = INITIAL_QUALITY;
   readonly #all: readonly QualityLevel[];
   /** Levels that suit the number of pixels and the measured errors. */
@@ -117,6 +121,7 @@ export class DynamicQualityController {
 
   constructor(options: DynamicQualityOptions) {
     this.#options = options;
+    this.#budgets = new SplatBudgets(options.scenes ?? (() => []));
     this.#levels = this.#all = options.levels ?? QUALITY_LEVELS;
     this.#drawn = this.#all[0];
   }
@@ -245,9 +250,27 @@ export class DynamicQualityController {
     const milliseconds = upperBound > targetMs ? lowerBound : upperBound;
     this.#lastMs = milliseconds;
     if (level === 0) this.#wholeMs = milliseconds;
-    this.#state = nextQuality(this.#state, { now: doneAt, level, milliseconds }, { targetMs, levels: this.#levels });
+    const next = nextQuality(this.#state, { now: doneAt, level, milliseconds }, { targetMs, levels: this.#levels });
+    this.#state = this.#spend(next, doneAt) ?? next;
     const isWhole = this.#state.level === 0;
     if (isWhole || level > 0) this.#options.onFrameTimed(isWhole);
+  }
+
+  /**
+   * Lets splat budgets follow the times of full-quality frames. They grow with the headroom, and fall before the quality
+   * does. @returns The state that replaces `next`, without times of frames with other budgets; undefined if no budget has
+   * changed.
+   */
+  #spend(next: QualityState, now: number): QualityState | undefined {
+    const { level } = this.#state;
+    const { recent } = next.level > 0 ? this.#state : next;
+    if (level > 0 || recent.length === 0) return undefined;
+    const time = { now, milliseconds: usualOf(recent), targetMs: this.targetMs };
+    const isChanged =
+      next.level > 0 ? this.#budgets.shrink(time) : recent.length === MEMORY && this.#budgets.grow(time);
+    if (!isChanged) return undefined;
+    this.#options.requestFrame();
+    return { ...this.#state, recent: [], smoothedMs: 0 };
   }
 
   /** Discards all measurements. Call when the scene or the backend has changed. */
@@ -261,9 +284,10 @@ export class DynamicQualityController {
     this.#losses = this.#measuring = undefined;
   }
 
-  /** Ends the fade, and cancels the image at rest. Call when no frame follows. */
+  /** Ends the fade, cancels the image at rest, and resets splat budgets. Call when no frame follows. */
   stop(): void {
     this.#cancelRest();
+    this.#budgets.reset();
     this.#fade.end();
   }
 

@@ -22,7 +22,7 @@ export interface QualityTargets {
 }
 
 /** Number of recent frames that are considered. A single slow frame does not change their typical time. */
-const MEMORY = 9;
+export const MEMORY = 9;
 const ENOUGH = 5;
 /** Minimum frame time, ms; shorter times are indistinguishable from 0. */
 const NOTHING_MS = 0.01;
@@ -32,7 +32,7 @@ const MIN_FRAMES = 3;
  * Fractions of the target: a level is chosen if it is predicted to take at most the first, and kept while frames take
  * at most the second.
  */
-const AIM = 0.85;
+export const AIM = 0.85;
 const LATE = 1.05;
 /**
  * Levels whose time is within this factor of the fastest level count as equally fast; the most accurate of them is
@@ -58,8 +58,8 @@ const LONGEST_STEP_MS = 100;
 const REST_MS = 250;
 const WAKING_MS = 400;
 /** Factor by which the hold grows if the last upward step had to be undone, and the maximum of the hold, ms. */
-const LONGER = 3;
-const LONGEST_HOLD_MS = 60_000;
+export const LONGER = 3;
+export const LONGEST_HOLD_MS = 60_000;
 /** Factor of the target above which frame times end a hold early. */
 const FAR_TOO_LATE = 1.25;
 /** Time without a change of level after which an unmeasured level is tried, if it may be fast enough, ms. */
@@ -99,7 +99,7 @@ function observe(
  * Returns the typical time of a frame, ms: the mean of the middle half. The times of two queued frames may arrive
  * together, so a median would alternate.
  */
-function usualOf(recent: readonly number[]): number {
+export function usualOf(recent: readonly number[]): number {
   const cut = recent.length >> 2;
   const middle = [...recent].sort((x, y) => x - y).slice(cut, recent.length - cut);
   return middle.reduce((sum, time) => sum + time, 0) / middle.length;

@@ -24,7 +24,10 @@ export interface Rendering {
 }
 
 /** Allowed error in pixels, and maximum number of splats, for scenes with levels of detail. */
-export type LodSettings = Pick<FrameSettings, 'detail' | 'splatBudget'>;
+export interface LodSettings extends Pick<FrameSettings, 'detail' | 'splatBudget'> {
+  /** Smallest and largest `splatBudget`, within which it follows the time of frames. Absent for a fixed one. */
+  readonly splatRange?: readonly [number, number];
+}
 
 /** Counts of the splats of a frame, which are read back from the GPU. */
 export interface ReadCounts {

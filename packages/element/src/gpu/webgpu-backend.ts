@@ -33,7 +33,7 @@ export class WebGpuBackend implements Backend {
   #filter: FrameFilter | undefined;
   #isDestroyed = false;
   #isPrepared = false;
-  /** Size of the last frame, as text. It is empty if the next frame may need other buffers even at the same size. */
+  /** Size and splat budget of the last frame, as text. Empty if the next frame may need other buffers at the same size. */
   #drawnSize = '';
   #layout = 0;
 
@@ -133,14 +133,18 @@ export class WebGpuBackend implements Backend {
 
   render(request: CanvasFrame, content: string, onTime?: (time: WorkTime) => void): void {
     const frame = frameOf(request);
-    const size = sizeOf(frame);
+    const size = this.#sizeOf(frame);
     const { layout } = this.#contents.sources.world;
     if (layout === this.#layout && size === this.#drawnSize) return this.#renderOnce(frame, content, onTime);
     this.#drawnSize = size;
     void this.#withRefusal(() => this.#renderOnce(frame, content, onTime)).then(async (error) => {
-      const reason = error && (await why(({ outOfMemory }) => outOfMemory(`frame of ${size} pixels`, error)));
+      const reason = error && (await why(({ outOfMemory }) => outOfMemory(`frame of ${size} splats`, error)));
       if (reason && !this.#isDestroyed) this.#events.onError(reason);
     });
+  }
+
+  #sizeOf({ camera: { width, height } }: Frame): string {
+    return `${width} x ${height} pixels, ${this.#contents.sources.levels.splatBudget}`;
   }
 
   #renderOnce(frame: Frame, content: string, onTime: ((time: WorkTime) => void) | undefined): void {
@@ -172,7 +176,7 @@ export class WebGpuBackend implements Backend {
    */
   async renderFirst(request: CanvasFrame, content: string): Promise<void> {
     const frame = frameOf(request);
-    this.#drawnSize = sizeOf(frame);
+    this.#drawnSize = this.#sizeOf(frame);
     const error = await this.#withRefusal(() => this.#draw(frame, content));
     if (error) throw await why(({ outOfMemory }) => outOfMemory('first frame', error));
     await this.finished();
@@ -226,8 +230,6 @@ export class WebGpuBackend implements Backend {
     this.viewpoint.destroy();
   }
 }
-
-const sizeOf = ({ camera: { width, height } }: Frame): string => `${width} x ${height}`;
 
 let format: GPUTextureFormat | undefined;
 /** Returns the preferred format of canvases, which is the same for all of a browser and is read once. */

@@ -89,6 +89,7 @@ export class ViewController implements FrameClient {
         requestFrame: () => this.requestFrame(),
         mayFade: () => !this.#backend?.filter,
         onFrameTimed: (isWhole) => host.sources.reportMotionFrame(isWhole),
+        scenes: () => host.sources.shown,
       }));
   }
 

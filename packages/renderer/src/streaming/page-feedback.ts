@@ -35,9 +35,10 @@ export interface PageFeedbackOptions {
   readonly version: () => number;
   /**
    * Called after each read-back with the screen errors in pixels of all missing pages, each the larger of the view and
-   * the predicted view. The second argument is the largest error of the view in pixels.
+   * the predicted view. The second argument is the largest error of the view in pixels, the third the error threshold
+   * that its splat budget requires, or 0.
    */
-  readonly onFeedback: (requests: Float32Array, lacking: number) => void;
+  readonly onFeedback: (requests: Float32Array, lacking: number, budgetError: number) => void;
   /** Called when the last view lacks a feedback pass and needs another frame. */
   readonly onStale: () => void;
 }
@@ -51,7 +52,10 @@ export class PageFeedback implements PageRequests {
    * pass.
    */
   readonly #requests: GPUBuffer;
+  /** [P + 1] copy of the requests, followed by the error threshold. */
   readonly #staging: GPUBuffer;
+  /** Its last word is the error threshold of the splat budget. */
+  #shares: GPUBuffer | undefined;
   readonly #ahead: GPUBuffer;
   readonly #device: GPUDevice;
   readonly #options: PageFeedbackOptions;
@@ -69,7 +73,7 @@ export class PageFeedback implements PageRequests {
   #passedOver = 0;
   #timer: ReturnType<typeof setTimeout> | undefined;
   #isReading = false;
-  /** Number of bytes of the read-back. */
+  /** Number of bytes of the requests in the read-back. */
   #bytes = 0;
   /** Matrix of the last camera. */
   #worldToCamera: Camera['worldToCamera'] = [];
@@ -81,7 +85,7 @@ export class PageFeedback implements PageRequests {
     const { storage, uniform, copySource, copyDestination, mapRead } = BUFFER_USAGE;
     const bytes = 4 * options.pages;
     this.#requests = memory.buffer('gs.requests', bytes, storage | copySource | copyDestination);
-    this.#staging = memory.buffer('gs.requests.staging', bytes, mapRead | copyDestination);
+    this.#staging = memory.buffer('gs.requests.staging', bytes + 4, mapRead | copyDestination);
     this.#ahead = memory.buffer('gs.requests.ahead', 4 * AHEAD_NUMBERS, uniform | copyDestination);
   }
 
@@ -146,6 +150,7 @@ export class PageFeedback implements PageRequests {
   bind(page: FeedbackInputs): GPUBindGroup {
     // New bindings mean another image size or another set of scenes, so all passes are invalid.
     this.#views.clear();
+    this.#shares = page.chunk_shares;
     return this.#stage.bind({ ...page, ahead: this.#ahead, requests: this.#requests });
   }
 
@@ -156,17 +161,20 @@ export class PageFeedback implements PageRequests {
   copy(encoder: GPUCommandEncoder): void {
     this.#bytes = 4 * this.#options.count();
     encoder.copyBufferToBuffer(this.#requests, 0, this.#staging, 0, this.#bytes);
+    const shares = this.#shares!;
+    encoder.copyBufferToBuffer(shares, shares.size - 4, this.#staging, this.#bytes, 4);
     this.#isReading = true;
   }
 
   read(): void {
     const bytes = this.#bytes;
-    this.#staging.mapAsync(0x1, 0, bytes).then(
+    this.#staging.mapAsync(0x1, 0, bytes + 4).then(
       () => {
-        const requests = this.#views.end(new Float32Array(this.#staging.getMappedRange(0, bytes).slice(0)));
+        const read = new Float32Array(this.#staging.getMappedRange(0, bytes + 4).slice(0));
+        const requests = this.#views.end(read.subarray(0, bytes / 4));
         this.#staging.unmap();
         this.#isReading = false;
-        this.#options.onFeedback(requests, requests[0]);
+        this.#options.onFeedback(requests, requests[0], read[bytes / 4]);
       },
       // Fails if the device is lost or the scene was destroyed meanwhile.
       () => undefined,

@@ -16,6 +16,11 @@ export interface StreamProgress {
    */
   readonly error: number;
   /**
+   * Error threshold in pixels that keeps the view within the splat budget, as in `FrameStats`; 0 if all splats fit, and
+   * in WebGL.
+   */
+  readonly budgetError: number;
+  /**
    * Why pages that the view needs are missing: they are coming (`transit`), no slots are left for them (`memory`), or
    * they could not be loaded (`failure`). null if none is missing.
    */

@@ -114,6 +114,7 @@ export class StreamedGaussians extends SceneBuffers {
   /** Whether {@link update} was called in the current task. */
   #isUpdated = false;
   #lacking = 0;
+  #budgetError = 0;
   #uploaded = { blocks: 0, bytes: 0, milliseconds: 0 };
   #version = 1;
 
@@ -134,7 +135,7 @@ export class StreamedGaussians extends SceneBuffers {
       count: () => list.count,
       aheadMs: () => aheadMs(this.#traffic.arrivalMs),
       version: () => this.#version,
-      onFeedback: (requests, lacking) => this.#take(requests, lacking),
+      onFeedback: (requests, lacking, budgetError) => this.#take(requests, lacking, budgetError),
       onStale: () => this.#options.onChange?.(),
     });
     this.blocks = this.#pool.pages;
@@ -213,6 +214,7 @@ export class StreamedGaussians extends SceneBuffers {
       splats: chunks * constants.CULL_GROUP,
       bytes: slotsInUse * this.#slotBytes,
       error: this.#lacking,
+      budgetError: this.#budgetError,
       lacksSlots,
     });
   }
@@ -329,9 +331,10 @@ export class StreamedGaussians extends SceneBuffers {
     this.#pool.flush();
   }
 
-  #take(requests: Float32Array, lacking: number): void {
+  #take(requests: Float32Array, lacking: number, budgetError: number): void {
     if (this.#isDestroyed) return;
     this.#lacking = lacking;
+    this.#budgetError = budgetError;
     this.#residency.note(requests);
     this.#traffic.follow();
   }

@@ -126,6 +126,7 @@ export class GlStream {
     return progressOf({
       ...{ resident: slots.count, total: this.#source.list.count, coming: this.#traffic.underWay },
       ...{ splats: chunks * CULL_GROUP, bytes: slotsInUse * slotBytes, error: this.#lacking, lacksSlots },
+      budgetError: 0,
     });
   }
 

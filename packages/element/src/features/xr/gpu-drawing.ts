@@ -133,7 +133,12 @@ export class GpuDrawing implements XrDrawing {
     const key = JSON.stringify([settings, resolutionScale]);
     if (this.#settings && key === this.#settingsKey) return this.#settings;
     this.#settingsKey = key;
-    const budget = settings.splatBudget || Infinity;
+    // The times of the page's frames say nothing about two eyes at another rate.
+    const own = Math.max(
+      0,
+      ...this.#core.sources.shown.map(({ detail: { splatRange, splatBudget = 0 } }) => splatRange?.[0] ?? splatBudget),
+    );
+    const budget = own || Infinity;
     const max = isHandheld() ? Math.min(budget, HANDHELD_SPLATS) : budget;
     const splatBudget = Number.isFinite(max) ? max : 0;
     return (this.#settings = { ...settings, resolutionScale, splatBudget });

@@ -104,7 +104,7 @@ export class DetailController {
     if (choice === this.#choice) return;
     this.#choice = choice;
     const pixels = choice === 'auto' ? this.#own.detail : choice === 'off' ? 0 : choice;
-    scene.setDetail({ ...this.#own, detail: pixels });
+    scene.setDetail({ ...scene.detail, detail: pixels });
     this.#host.splatsChanged();
   }
 

@@ -1,6 +1,7 @@
 /** Opens streamed scenes on the GPU. */
 import type { Credits, TrainedOrder } from '@gaussian-splat/core';
 import { MemoryLedger, pickInitialVariants, StreamedGaussians, type PoolOptions } from '@gaussian-splat/renderer';
+import { maxSplatBudget } from '@gaussian-splat/renderer/tools';
 import type { SceneRequest } from '../../loading/protocol.js';
 import type { SceneBounds } from '../../viewer/camera/settings.js';
 import { LoadedGaussians, type OwnedGaussians } from '../../gpu/loaded-gaussians.js';
@@ -68,9 +69,12 @@ async function openStreamed(
   const { source, credits } = opened;
   const gaussians = await StreamedGaussians.openSource(device, source, pool);
   const { bounds, order } = gaussians;
-  const splatBudget = Math.min(caps.splats, request.limits?.maxSplats ?? Infinity);
-  if (!signal.aborted)
-    return { ...{ gaussians, bounds, order, warnings, credits }, detail: { detail: DETAIL, splatBudget } };
+  const { maxSplats = Infinity } = request.limits ?? {};
+  const splatBudget = Math.min(caps.splats, maxSplats);
+  // More splats than the pool holds are never drawn.
+  const max = Math.max(splatBudget, Math.min(maxSplats, gaussians.count, maxSplatBudget(device)));
+  const detail = { detail: DETAIL, splatBudget, splatRange: [splatBudget, max] as const };
+  if (!signal.aborted) return { ...{ gaussians, bounds, order, warnings, credits }, detail };
   gaussians.destroy();
   throw signal.reason;
 }

@@ -1,0 +1,112 @@
+/** Splat budgets of streamed scenes, which follow the headroom of frames. */
+import type { MemoryLedger, StreamProgress } from '@gaussian-splat/renderer';
+import { budgetBytes, type Reservation } from '@gaussian-splat/renderer/tools';
+import type { LodSettings } from '../gpu/backend.js';
+import { AIM, LONGER, LONGEST_HOLD_MS } from './next-quality.js';
+import { HOLD_MS } from './start.js';
+
+/** Maximum and minimum factor of one step upward. Each enlarges the buffers of frames, which are allocated again. */
+const [MAX_STEP, MIN_STEP] = [1.5, 1.05];
+/** Fraction of the rest of the memory budget that the buffers for larger budgets may take, because scenes may follow. */
+const SHARE_OF_REST = 0.5;
+
+/** The streamed scene whose budget changes. */
+export interface BudgetedScene {
+  readonly place: { readonly memory: MemoryLedger };
+  readonly gaussians: { readonly progress?: Pick<StreamProgress, 'budgetError'> };
+  readonly detail: LodSettings;
+  setDetail(detail: LodSettings): void;
+}
+
+/** Typical time of a frame at full quality, and the target, ms; and the time of the measurement, ms. */
+export interface FrameTime {
+  readonly now: number;
+  readonly milliseconds: number;
+  readonly targetMs: number;
+}
+
+/**
+ * Changes the splat budgets of scenes with a `splatRange`: upward while a budget limits the view and the larger one is
+ * predicted to be fast enough, downward before frames lose quality. The time of a frame is assumed to be proportional to
+ * its splats, at most.
+ */
+export class SplatBudgets {
+  readonly #scenes: () => readonly BudgetedScene[];
+  /** Scenes with a changed budget. */
+  readonly #changed = new Set<BudgetedScene>();
+  #reservation: Reservation | undefined;
+  #heldUntil = -Infinity;
+  #grewAt = -Infinity;
+  #hold = HOLD_MS;
+
+  constructor(scenes: () => readonly BudgetedScene[]) {
+    this.#scenes = scenes;
+  }
+
+  /** Enlarges the budgets if the time allows it. @returns Whether a budget has changed. */
+  grow({ now, milliseconds, targetMs }: FrameTime): boolean {
+    const factor = Math.min(MAX_STEP, (AIM * targetMs) / milliseconds);
+    if (now < this.#heldUntil || factor < MIN_STEP) return false;
+    const isLimited = ({ gaussians: { progress }, detail: { detail = 0 } }: BudgetedScene): boolean =>
+      (progress?.budgetError ?? 0) > detail;
+    const limited = this.#scenes().filter(isLimited);
+    if (limited.length === 0 || !this.#reserve(limited, factor)) return false;
+    this.#grewAt = now;
+    return this.#scale(limited, factor);
+  }
+
+  /** Reduces enlarged budgets to what the time allows. @returns Whether a budget has changed. */
+  shrink({ now, milliseconds, targetMs }: FrameTime): boolean {
+    if (!this.#scale([...this.#changed], Math.min(1, (AIM * targetMs) / milliseconds))) return false;
+    // A step that must be undone at once is not repeated soon.
+    const isOscillation = now - this.#grewAt < HOLD_MS;
+    this.#hold = isOscillation ? Math.min(LONGEST_HOLD_MS, LONGER * this.#hold) : HOLD_MS;
+    this.#heldUntil = now + this.#hold;
+    return true;
+  }
+
+  /** Sets all budgets to those that the scenes were loaded with, and releases the reserved memory. */
+  reset(): void {
+    for (const scene of this.#changed) setBudget(scene, scene.detail.splatRange![0]);
+    this.#changed.clear();
+    this.#reservation?.release();
+    this.#reservation = undefined;
+    this.#heldUntil = this.#grewAt = -Infinity;
+    this.#hold = HOLD_MS;
+  }
+
+  #scale(scenes: readonly BudgetedScene[], factor: number): boolean {
+    const isChanged = scenes.map((scene) => {
+      this.#changed.add(scene);
+      return setBudget(scene, scaled(scene, factor));
+    });
+    return isChanged.includes(true);
+  }
+
+  /** Reserves the memory of the larger budgets. @returns False if the memory budget of the page leaves too little. */
+  #reserve(scenes: readonly BudgetedScene[], factor: number): boolean {
+    // The scenes of a page share the buffers of a frame, which have room for the largest budget.
+    const max = (of: (scene: BudgetedScene) => number): number => Math.max(...scenes.map(of));
+    const bytes =
+      budgetBytes(max((scene) => scaled(scene, factor))) - budgetBytes(max(({ detail }) => detail.splatRange![0]));
+    const { memory } = scenes[0].place;
+    const held = this.#reservation?.bytes ?? 0;
+    // Buffers never become smaller.
+    if (bytes <= held) return true;
+    if (bytes > SHARE_OF_REST * (memory.budgetBytes - memory.bytes + held)) return false;
+    this.#reservation?.release();
+    this.#reservation = memory.reserve('frames of larger splat budgets', bytes);
+    return true;
+  }
+}
+
+function scaled({ detail: { splatBudget = 0, splatRange } }: BudgetedScene, factor: number): number {
+  const [min, max] = splatRange ?? [splatBudget, splatBudget];
+  return Math.min(max, Math.max(min, Math.floor(factor * splatBudget)));
+}
+
+function setBudget(scene: BudgetedScene, splatBudget: number): boolean {
+  if (splatBudget === scene.detail.splatBudget) return false;
+  scene.setDetail({ ...scene.detail, splatBudget });
+  return true;
+}
