@@ -57,6 +57,7 @@ export { layoutLevels, type LevelBox, type LevelPage, type LevelScene } from './
 export { levelSource, packLevelPage } from './streaming/level-source.js';
 export { NodePacker } from './streaming/node-packer.js';
 export { packNodes, type NodeContent, type NodePage, type RunError } from './streaming/pack-nodes.js';
+export { MAX_UNPACKED, PageUnpacker, UNPACKED_AT_ONCE } from './streaming/page-unpacker.js';
 export { folderSource, type FetchPage } from './streaming/page-source.js';
 export { treeSource, type FetchedNode, type OpenedTree } from './streaming/tree-source.js';
 export { readPacked } from './pack/packed-scene.js';

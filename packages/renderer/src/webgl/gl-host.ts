@@ -348,7 +348,7 @@ export class HostedSplats {
       const levels = hasLevels ? levelChoice(cameras[k], facts.origin, detail) : undefined;
       return { ...orderView(cameras[k], facts.origin), first, levels };
     });
-    if (!stream?.hasNews && this.#sorted?.every((old, k) => isSameView(view[k], old))) return true;
+    if (!stream?.hasNews && this.#sorted?.every((old, k) => isSameView(view[k], old))) return !stream?.isBehind;
     if (!(this.#sorter instanceof SplatOrder)) {
       const order = this.#order;
       this.#order = NO_ORDER;

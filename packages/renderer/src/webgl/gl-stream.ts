@@ -9,6 +9,8 @@ import { ARRIVED } from '../streaming/page-rows.js';
 import { childrenIn, NONE } from '../streaming/page-list.js';
 import type { PageSource } from '../streaming/page-source.js';
 import { PageStreamer } from '../streaming/page-streamer.js';
+import { PageUnpacker, UNPACKED_AT_ONCE, type UnpackedPage } from '../streaming/page-unpacker.js';
+import { turn } from '../gpu/page-thread.js';
 import { progressOf, type StreamProgress } from '../streaming/progress.js';
 import { Residency } from '../streaming/residency.js';
 import { chunkLayout, startOf, type SlotWords } from '../streaming/slot-words.js';
@@ -21,8 +23,6 @@ import type { SplatUpdate } from './splat-order.js';
 const { CULL_GROUP, NEARBY, NEARBY_SIZE, SOON, UNSEEN } = constants;
 const SLOT_SPLATS = SLOT_CHUNKS * CULL_GROUP;
 const DEFAULT_SPLATS = 1_000_000;
-/** Maximum number of slots of the pages that become visible with one order, unless a page has more. */
-const SLOTS_AT_ONCE = 16;
 /** Milliseconds between two requests for pages while the camera moves. */
 const REQUEST_MS = 50;
 const IN_PLACE: Vector3 = [0, 0, 0];
@@ -39,11 +39,15 @@ export interface GlStreamOptions {
   readonly onError?: (error: unknown) => void;
 }
 
-/** Splats of a slot that wait for the order that contains them. */
-interface Write {
-  readonly first: number;
-  readonly geometry: Uint32Array;
+/** Splats of a slot in the layout of the textures. */
+interface SlotSplats {
+  readonly geometry: Uint32Array<ArrayBuffer>;
   readonly sh: Uint32Array;
+}
+
+/** Splats of a slot that wait for the order that contains them. */
+interface Write extends SlotSplats {
+  readonly first: number;
 }
 
 /**
@@ -55,6 +59,7 @@ export class GlStream {
   readonly #source: PageSource;
   readonly #residency: Residency;
   readonly #traffic: PageStreamer<readonly SlotWords[]>;
+  readonly #unpacker: PageUnpacker<SlotSplats>;
   readonly #rows: TranslatedRows;
   /** [C, 12] levels of all chunks, as the sorter has them. */
   readonly #details: Float32Array<ArrayBuffer>;
@@ -82,6 +87,7 @@ export class GlStream {
       onArrival: () => onChange?.(),
       onError: (reason) => onError?.(reason),
     });
+    this.#unpacker = new PageUnpacker(() => this.#traffic.next(), this.#unpack);
     this.#rows = new TranslatedRows(list, this.#residency, scene);
     this.#details = new Float32Array(DETAIL_NUMBERS * SLOT_CHUNKS * slots);
   }
@@ -100,7 +106,13 @@ export class GlStream {
       stream.#residency.begin(0);
       const words = await source.fetch(0, signal);
       signal.throwIfAborted();
-      stream.#settle(0, words);
+      const parts: SlotSplats[] = [];
+      for (const [k, slot] of words.entries()) {
+        if (k > 0 && k % UNPACKED_AT_ONCE === 0) await turn();
+        parts.push(stream.#unpack(slot, 0));
+      }
+      signal.throwIfAborted();
+      stream.#settle({ page: 0, words, parts });
       return stream;
     } catch (reason) {
       stream.destroy();
@@ -113,9 +125,14 @@ export class GlStream {
     return this.gaussians.facts.count;
   }
 
-  /** Whether pages have arrived that the next order can contain. */
+  /** Whether there are pages that the next order can contain. */
   get hasNews(): boolean {
-    return this.#writes.length > 0 || this.#traffic.waiting > 0;
+    return this.#writes.length > 0 || this.#unpacker.hasReady;
+  }
+
+  /** Whether pages have arrived that no order contains yet. */
+  get isBehind(): boolean {
+    return this.hasNews || this.#unpacker.count + this.#traffic.waiting > 0;
   }
 
   /** The pages on the GPU, from the last request for pages, and what limits them. */
@@ -124,14 +141,22 @@ export class GlStream {
     const { facts } = this.gaussians;
     const slotBytes = 4 * (chunkLayout({ ...facts, geometry: undefined }).total * SLOT_CHUNKS);
     return progressOf({
-      ...{ resident: slots.count, total: this.#source.list.count, coming: this.#traffic.underWay },
+      ...{
+        resident: slots.count,
+        total: this.#source.list.count,
+        coming: this.#traffic.underWay + this.#unpacker.count,
+      },
       ...{ splats: chunks * CULL_GROUP, bytes: slotsInUse * slotBytes, error: this.#lacking, lacksSlots },
       budgetError: 0,
     });
   }
 
-  /** Requests the pages that a view needs, now or soon. @param allowed Maximum error, pixels. */
+  /**
+   * Requests the pages that a view needs, now or soon, and unpacks some that have arrived. Call this once in a frame.
+   * @param allowed Maximum error, pixels.
+   */
   follow(camera: Camera, allowed: number): void {
+    this.#unpacker.step();
     const now = performance.now();
     this.#motion.observe(camera, now);
     if (now - this.#requestedAt < REQUEST_MS) return;
@@ -141,14 +166,9 @@ export class GlStream {
     this.#traffic.follow();
   }
 
-  /** Adds pages that have arrived, and returns what has changed for the sorter. Call {@link write} with its order. */
+  /** Adds the unpacked pages, and returns what has changed for the sorter. Call {@link write} with its order. */
   take(): SplatUpdate {
-    for (let slots = 0; slots < SLOTS_AT_ONCE;) {
-      const next = this.#traffic.next();
-      if (next === undefined) break;
-      slots += next.words.length;
-      if (!this.#settle(next.page, next.words)) this.#traffic.refused();
-    }
+    for (const page of this.#unpacker.take()) if (!this.#settle(page)) this.#traffic.refused();
     this.#traffic.sendForMore();
     const details: SplatUpdate['details'][number][] = [];
     this.#rows.flush(this.#residency.slots.pageIn.length, (slot, rows) => {
@@ -174,26 +194,31 @@ export class GlStream {
   }
 
   /** Makes a page resident. @returns False if there are no slots for it. */
-  #settle(page: number, parts: readonly SlotWords[]): boolean {
+  #settle({ page, words, parts }: UnpackedPage<SlotSplats>): boolean {
     const place = this.#residency.settle(page);
     if (place === undefined) return false;
-    const by = this.#source.translate?.(page) ?? IN_PLACE;
+    const by = this.#translation(page);
     for (const evicted of place.left) this.#rows.leave(evicted.page, evicted.slots);
-    this.#rows.load(page, parts, by);
+    this.#rows.load(page, words, by);
     this.#rows.setArrived(page, ARRIVED);
+    parts.forEach((part, k) => this.#writes.push({ ...part, first: SLOT_SPLATS * place.slots[k] }));
+    return true;
+  }
+
+  readonly #unpack = (words: SlotWords, page: number): SlotSplats => {
     const { scene } = this.#source;
     const layout = chunkLayout(scene);
-    parts.forEach((words, k) => {
-      const geometry = new Uint32Array(GEOMETRY_WORDS * SLOT_SPLATS);
-      const own = exactGeometry(words, scene, layout, by);
-      geometry.set(own);
-      // A part of a slot without splats is not listed.
-      new Float32Array(geometry.buffer).fill(NaN, own.length);
-      const at = startOf(words, 'sh', layout);
-      const sh = words.words.subarray(at, at + layout.sh * words.chunks);
-      this.#writes.push({ first: SLOT_SPLATS * place.slots[k], geometry, sh });
-    });
-    return true;
+    const geometry = new Uint32Array(GEOMETRY_WORDS * SLOT_SPLATS);
+    const own = exactGeometry(words, scene, layout, this.#translation(page));
+    geometry.set(own);
+    // A part of a slot without splats is not listed.
+    new Float32Array(geometry.buffer).fill(NaN, own.length);
+    const at = startOf(words, 'sh', layout);
+    return { geometry, sh: words.words.subarray(at, at + layout.sh * words.chunks) };
+  };
+
+  #translation(page: number): Vector3 {
+    return this.#source.translate?.(page) ?? IN_PLACE;
   }
 
   /** Returns the errors in pixels of all missing pages, and at index 0 that of the first view, as page_feedback.wgsl does. */
