@@ -1,5 +1,6 @@
 /** A scene that changes: a still ground, a body that swings, and drops that rise, fall and are gone. No frame says which of its splats were in the one before. */
 import type { GaussianCloud, Vector3 } from '@gaussian-splat/core';
+import { splatsOf } from '../../../packages/optimize/src/reduce.js';
 import { cloudOf, type SplatDescription } from '../clouds.js';
 import { seededRandom } from '../random.js';
 
@@ -53,31 +54,41 @@ export function fountain({ splats, frames, framesPerSecond, seed = 5 }: Fountain
     return { birth: random.uniform(-life, seconds), life: random.uniform(0.8, 1.2) * life, velocity, splat };
   });
   const shuffle = seededRandom(seed + 1);
+  const whole = cloudOf([...ground, ...body, ...drops.map(({ splat }) => splat)]);
+  const still = ground.length;
+  const lasting = still + body.length;
   return (frame) => {
     const time = frame / framesPerSecond;
-    const all = [
-      ...ground,
-      ...body.map((splat) => swung(splat, time)),
-      ...drops.flatMap((drop) => fallen(drop, time) ?? []),
-    ];
-    for (let i = all.length - 1; i > 0; i--) {
+    const isShown = (i: number): boolean => i < lasting || isAlive(drops[i - lasting], time);
+    const order = Uint32Array.from(Array.from({ length: whole.count }, (_, i) => i).filter(isShown));
+    for (let i = order.length - 1; i > 0; i--) {
       const k = Math.floor(shuffle.uniform(0, i + 1));
-      [all[i], all[k]] = [all[k], all[i]];
+      [order[i], order[k]] = [order[k], order[i]];
     }
-    return cloudOf(all);
+    // Only positions and opacities change: long clips are made in seconds.
+    const cloud = splatsOf(whole, order);
+    order.forEach((i, place) => {
+      if (i < still) return;
+      const { position, opacity } = i < lasting ? swung(body[i - still], time) : fallen(drops[i - lasting], time);
+      for (let axis = 0; axis < 3; axis++) cloud.positions[3 * place + axis] = position[axis];
+      cloud.opacities[place] = opacity;
+    });
+    return cloud;
   };
 }
 
-function swung(splat: SplatDescription, time: number): SplatDescription {
-  const [x, y, z] = splat.position;
+type Shown = Pick<SplatDescription, 'position' | 'opacity'>;
+
+function swung({ position: [x, y, z], opacity }: SplatDescription, time: number): Shown {
   const bend = 0.35 * Math.sin(2 * time) * -y;
-  return { ...splat, position: [x + bend * 0.6, y, z + 0.15 * Math.cos(3 * time) * y] };
+  return { position: [x + bend * 0.6, y, z + 0.15 * Math.cos(3 * time) * y], opacity };
 }
 
-function fallen({ birth, life, velocity, splat }: Drop, time: number): SplatDescription | undefined {
+const isAlive = ({ birth, life }: Drop, time: number): boolean => time >= birth && time - birth < life;
+
+function fallen({ birth, life, velocity, splat }: Drop, time: number): Shown {
   const age = time - birth;
-  if (age < 0 || age >= life) return undefined;
   const [x, y, z] = splat.position.map((value, k) => value + velocity[k] * age);
   const fade = Math.min(1, 8 * (age / life), 8 * (1 - age / life));
-  return { ...splat, position: [x, y + 0.5 * GRAVITY * age * age, z], opacity: splat.opacity * fade };
+  return { position: [x, y + 0.5 * GRAVITY * age * age, z], opacity: splat.opacity * fade };
 }
