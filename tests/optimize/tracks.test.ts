@@ -102,6 +102,23 @@ test('a splat that jumps in its short life does not make the motion of all other
   assert.equal(part.step, Math.fround(step));
 });
 
+test('a change that all splats have in common is exact with any step, also for splats of little effect', () => {
+  const [rows, frames] = [300, 12];
+  const at = (f: number): number => 0.2 * Math.sin(0.5 * f);
+  const changes = Float32Array.from({ length: rows * frames }, (_, k) => at(k % frames));
+  const found = followedWithin(changes, frames, () => [0, frames], minCurve(0.01));
+  const importance = Float32Array.from({ length: rows }, (_, i) => (i % 3 ? 1.4 : 0.01));
+  for (const step of [0.01, 0.11, 0.5, 3]) {
+    const { part } = roundMotion(found, step, importance);
+    for (let k = 0; k < changes.length; k++) {
+      const [row, f] = [Math.floor(k / frames), k % frames];
+      let change = 0;
+      for (let n = 0; n < part.rank; n++) change += part.step * part.curves[part.rank * f + n] * part.codes[n][row];
+      assert.ok(Math.abs(change - at(f)) < 2e-3, `step ${step}, splat ${row}, frame ${f}: ${change}, not ${at(f)}`);
+    }
+  }
+});
+
 test('a track that goes over to another splat is divided, one that turns is not', () => {
   const spin = (angle: number): readonly [number, number, number, number] => [
     Math.cos(angle / 2),

@@ -13,6 +13,10 @@ const MAX_DROPPED = 0.02;
 const REGION = 64;
 /** Weight of the error of a region relative to that of all rows. */
 const REGION_SHARE = 0.25;
+/** Maximum energy of the differences from the mean weight of all splats, relative to that of all weights. */
+const COMMON_REST = 0.1;
+/** Factor of the precision of curves that all splats follow, in which errors of splats do not compensate each other. */
+const COMMON_FINER = 64;
 const MAX_CODE = 32_767;
 const ROUNDS = 30;
 
@@ -40,7 +44,10 @@ export function roundMotion(found: Followed, step: number, importance: Float32Ar
   const staying = curves.length - passing;
   const gains = [...evenGains(curves.slice(0, staying)), ...evenGains(curves.slice(staying))];
   const isNeeded = neededCurves(found, step);
-  const ownSteps = gains.map((gain) => step * gain);
+  const means = shares.map((own, k) => (k < staying ? commonWeights(own, splats) : [0]));
+  // A weight that all splats have hardly takes bytes, so that it is never rounded to 0.
+  const isCommon = means.map((own) => own.some((mean) => mean !== 0));
+  const ownSteps = gains.map((gain, k) => Math.min(step * gain, Math.max(...means[k].map(Math.abs)) || Infinity));
   const overflow = shares.reduce(
     (max, own, k) => own.reduce((largest, value) => Math.max(largest, Math.abs(value) / ownSteps[k]), max),
     0,
@@ -50,14 +57,17 @@ export function roundMotion(found: Followed, step: number, importance: Float32Ar
     Math.min(MAX_SHRINKING, SHRINKING / Math.max(weight, 1e-9)),
   );
   const codes = shares.map((own, k) => {
-    if (!isNeeded[k]) return undefined;
+    if (!isNeeded[k] && !isCommon[k]) return undefined;
     const rounded = new Int16Array(rows);
+    const unit = factor * ownSteps[k];
+    const middles = means[k].map((mean) => Math.round(mean / unit));
     let hasCode = false;
     for (let row = 0; row < rows; row++) {
-      const size = Math.floor(Math.abs(own[row]) / (factor * ownSteps[k]) + 0.5 - shrinking[row % splats]);
-      if (size <= 0) continue;
-      rounded[row] = own[row] < 0 ? -size : size;
-      hasCode = true;
+      const middle = isCommon[k] ? middles[Math.floor(row / splats)] : 0;
+      const apart = own[row] / unit - middle;
+      const size = Math.floor(Math.abs(apart) + 0.5 - shrinking[row % splats]);
+      rounded[row] = size > 0 ? middle + (apart < 0 ? -size : size) : middle;
+      hasCode ||= rounded[row] !== 0;
     }
     return hasCode ? rounded : undefined;
   });
@@ -67,11 +77,10 @@ export function roundMotion(found: Followed, step: number, importance: Float32Ar
   const written = new Float32Array(frames * rank);
   const ownStep = Math.fround(factor * step);
   const curveBits = kept.map(({ own, k }, at) => {
-    const scaled = curves[k].map((value) => gains[k] * value);
-    const bits = curveBitsFor(
-      scaled,
-      own.reduce((max, code) => Math.max(max, Math.abs(code)), 0),
-    );
+    const gain = (ownSteps[k] / step) * fittingGain(shares[k], own, factor * ownSteps[k], importance);
+    const scaled = curves[k].map((value) => gain * value);
+    const largest = own.reduce((max, code) => Math.max(max, Math.abs(code)), 0);
+    const bits = curveBitsFor(scaled, isCommon[k] ? (COMMON_FINER * largest * step) / ownSteps[k] : largest);
     scaled.forEach((value, f) => (written[rank * f + at] = roundedCurveValue(value, bits)));
     return bits;
   });
@@ -80,6 +89,36 @@ export function roundMotion(found: Followed, step: number, importance: Float32Ar
   ).flat();
   const aged = isAged ? kept.filter(({ k }) => k >= staying).length : 0;
   return { part: { rank, aged, step: ownStep, curves: written, codes: planes }, curveBits };
+}
+
+/** Returns the mean weight of each number of an attribute if nearly all splats have it; otherwise 0. */
+function commonWeights(shares: Float32Array, splats: number): readonly number[] {
+  const numbers = Array.from({ length: shares.length / splats }, (_, n) =>
+    shares.subarray(splats * n, splats * (n + 1)),
+  );
+  const means = numbers.map((own) => own.reduce((sum, value) => sum + value, 0) / splats);
+  let [rest, all] = [0, 0];
+  numbers.forEach((own, n) => {
+    for (const value of own) {
+      rest += (value - means[n]) ** 2;
+      all += value * value;
+    }
+  });
+  return rest < COMMON_REST * all ? means : [0];
+}
+
+/**
+ * Returns the factor of a curve with which its rounded weights have the smallest error, by least squares. Without it, weights
+ * that are nearly equal would all be rounded in the same direction, and those that shrink would all be too small.
+ */
+function fittingGain(shares: Float32Array, codes: Int16Array, step: number, importance: Float32Array): number {
+  let [products, squares] = [0, 0];
+  for (let row = 0; row < codes.length; row++) {
+    const weighted = importance[row % importance.length] * codes[row];
+    products += weighted * shares[row];
+    squares += weighted * codes[row];
+  }
+  return squares > 0 ? products / (squares * step) : 1;
 }
 
 /**

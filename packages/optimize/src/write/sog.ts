@@ -22,7 +22,7 @@ export type EncodeWebp = (
 
 /**
  * Quantization steps: SOG stores bytes, and images with fewer values are smaller. Units: `place` 1/65,535 of the scene's
- * logarithmic box, `size` octaves, `turn` and `opacity` 1/255 of their range, `color` and `harmonics` coefficients. The
+ * logarithmic box, rounded to a power of two, `size` octaves, `turn` and `opacity` 1/255 of their range, `color` and `harmonics` coefficients. The
  * step `harmonics` applies to the most visible splats; less visible ones have larger steps.
  */
 export type SogSteps = Steps<'place' | 'size' | 'turn' | 'opacity' | 'color' | 'harmonics'>;
@@ -162,8 +162,8 @@ function putMeans(
 ): { mins: number[]; maxs: number[] } {
   const codes = new Uint16Array(3 * order.length);
   const [mins, maxs]: [number[], number[]] = [[], []];
-  // The step is an integer number of codes, so that the low bytes of positions have few values.
-  const whole = Math.max(1, Math.round(step));
+  // A power of two, so that low bytes have few values. Multiples of 3, for example, have all 256 of them.
+  const whole = 2 ** Math.max(0, Math.round(Math.log2(step)));
   for (let axis = 0; axis < 3; axis++) {
     const values = Float64Array.from(order, (i) => logPlace(positions[3 * i + axis] + origin[axis]));
     const low = values.reduce((min, value) => Math.min(min, value), Infinity);

@@ -7,7 +7,7 @@ import { writeSog, type EncodeWebp, type SogOptions, type SogSteps } from './sog
 import { writeStreamedSog } from './streamed-sog.js';
 import { writeZip } from './zip.js';
 
-const USUAL: SogSteps = { place: 4, size: 1 / 12, turn: 4, opacity: 4, color: 1 / 32, harmonics: 1 / 64 };
+const USUAL: Omit<SogSteps, 'place'> = { size: 1 / 12, turn: 4, opacity: 4, color: 1 / 32, harmonics: 1 / 64 };
 /** Settings of a SOG file that measurements select. */
 export interface SogChoice {
   readonly steps: SogSteps;
@@ -15,12 +15,16 @@ export interface SogChoice {
 }
 
 /** Number of values of a splat that each step quantizes. Harmonics depend on the palette; about half of them are 0. */
-const NUMBERS: Omit<SogSteps, 'harmonics'> = { place: 3, size: 3, turn: 3, opacity: 1, color: 3 };
+const NUMBERS: Omit<SogSteps, 'harmonics' | 'place'> = { size: 3, turn: 3, opacity: 1, color: 3 };
+const PLACE_NUMBERS = 3;
+const MAX_PLACE = 256;
 /** Finest steps that files support, in the units of {@link SogSteps}. */
 const FINEST: SogSteps = { place: 1, size: 1e-3, turn: 1, opacity: 1, color: 1e-3, harmonics: 1e-3 };
 const PALETTES = [1024, 4096, 8192, 16_384, 32_768, 65_536];
 /** Maximum fraction of the allowed error that the palette may cause, unless it is the largest palette. */
 const PALETTE_SHARE = 0.4;
+/** Minimum fraction of the allowed error that is left to steps other than `place`. */
+const MIN_REST = 0.2;
 /** The search for steps ends when the error reaches this fraction of the allowed error. */
 const NEAR_ENOUGH = 0.9;
 /** Effort of {@link EncodeWebp} for temporary files that are only measured. */
@@ -84,23 +88,43 @@ async function tuned(
   const errorOf = async (steps: SogSteps, palette: number): Promise<number> =>
     measure(await writeSog(cloud, { steps, palette, encodeWebp, effort: QUICK, seen, palettes }));
   let palette = PALETTES[0];
-  let rest = target;
   if (cloud.shDegree > 0) {
-    for (palette of PALETTES) {
-      const error = await errorOf(FINEST, palette);
-      rest = target - error;
-      if (error <= PALETTE_SHARE * target) break;
-    }
+    for (palette of PALETTES) if ((await errorOf(FINEST, palette)) <= PALETTE_SHARE * target) break;
   }
-  const min = (1 - PALETTE_SHARE) * target * 0.25;
-  const share = cloud.shDegree > 0 ? Math.max(min, rest) : target;
   const ofPalette = 1.5 * (shCoefficientCount(cloud.shDegree) - 1) * Math.min(1, palette / cloud.count);
   const numbers = ofPalette > 0 ? { ...NUMBERS, harmonics: ofPalette } : NUMBERS;
+  const others = Object.values(numbers).reduce((sum, count) => sum + count, 0);
+  const { place, error } = await placeStep((own) => errorOf({ ...FINEST, place: own }, palette), target, others);
+  // If no step of positions is fine enough, finer ones of other attributes help little.
+  const rest = Math.max(target - error, MIN_REST * Math.max(target, error));
   const { steps } = await findSteps({
-    ...{ usual: USUAL, numbers, share, target, nearEnough: NEAR_ENOUGH },
-    measure: (tried) => errorOf(tried, palette),
+    ...{ usual: USUAL, numbers, share: rest, target: Math.max(target, error + rest), nearEnough: NEAR_ENOUGH },
+    measure: (tried: Omit<SogSteps, 'place'>) => errorOf({ ...tried, place }, palette),
   });
-  return { steps, palette, encodeWebp, seen };
+  return { steps: { ...steps, place }, palette, encodeWebp, seen };
+}
+
+/**
+ * Returns the step of positions, a power of two, with which all steps together take the fewest bits, and its error. It is
+ * measured with the finest other steps: it grows irregularly, because splats of nearly equal depth exchange their order.
+ * @param measure Returns the error with a step of positions.
+ * @param target Allowed error of all steps.
+ * @param others Number of other values of a splat. Their error is proportional to the square of their steps.
+ */
+async function placeStep(
+  measure: (place: number) => Promise<number>,
+  target: number,
+  others: number,
+): Promise<{ readonly place: number; readonly error: number }> {
+  let best = { place: 1, error: await measure(1) };
+  const bitsOf = ({ place, error }: typeof best): number =>
+    -PLACE_NUMBERS * Math.log2(place) - (others / 2) * Math.log2(Math.max(target - error, 1e-9 * target));
+  for (let place = 2; place <= MAX_PLACE; place *= 2) {
+    const next = { place, error: await measure(place) };
+    if (bitsOf(next) < bitsOf(best)) best = next;
+    if (next.error > (1 - MIN_REST) * target) break;
+  }
+  return best;
 }
 
 /** Returns the visibility of the splats with the indices `kept`. */
