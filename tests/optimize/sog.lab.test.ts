@@ -65,6 +65,15 @@ test('coarser steps and smaller palettes make smaller files, and a flag for anti
   assert.equal((await read(rough)).antialiased, true);
 });
 
+test('positions have steps of powers of two, with which their low bytes have fewer values', async () => {
+  const cloud = ofKinds(3_000, 0, 400);
+  const write = (place: number): Promise<Uint8Array> =>
+    writeSog(cloud, { steps: { ...FINEST, place }, palette: 64, encodeWebp, effort: 0.3 });
+  const [two, three, four] = [await write(2), await write(3), await write(4)];
+  assert.deepEqual(three, four);
+  assert.ok(four.length < two.length - 400, `${four.length} after ${two.length}`);
+});
+
 test('where it is known how splats are seen, what they show from there is nearer with the same palette', async () => {
   const cloud = ofKinds(2_000, 2, 500);
   const random = randomSource(5);
