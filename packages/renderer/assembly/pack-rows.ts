@@ -163,7 +163,7 @@ export function pack(
     const blue = at(row, 13);
     const sum = <f64>red + <f64>green + <f64>blue;
     if (!(abs<f64>(sum) < Infinity)) continue;
-    // Harmonics, planar: three channels of 16, the last of which is zero.
+    // Harmonics, planar: three channels of 16. The last one is zero.
     let noise: f64 = 0;
     const sh = to + 32;
     if (degree > 0) {
