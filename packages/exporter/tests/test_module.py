@@ -73,6 +73,8 @@ def test_a_module_in_one_call(tmp_path: Path, capsys: pytest.CaptureFixture[str]
     assert contract["inputs"]["t"] == {"role": "time", "unit": "seconds"} and contract["duration"] == 6.2832
     assert contract["bounds"]["max"][1] > 1.2
     assert check_outputs(model)["positions"].shape == (COUNT, 3)
+    # PyTorch notes the file and the lines of the code in every node.
+    assert b".py" not in (tmp_path / "ball.onnx").read_bytes()
 
 
 class Arm(torch.nn.Module):  # type: ignore[misc]

@@ -26,6 +26,7 @@ def finish_graph(
     """Changes the model in place."""
     model.ir_version = min(model.ir_version, RULES["newestIr"], 10)
     graph = model.graph
+    _forget_source(graph)
     _narrow(graph)
     for value, wanted in zip(graph.output, layout.outputs, strict=True):
         if value.name != wanted:
@@ -37,6 +38,16 @@ def finish_graph(
     _turn_vectors(model)
     _write_by_kernels(model, inputs)
     onnx.checker.check_model(model)
+
+
+def _forget_source(graph: onnx.GraphProto) -> None:
+    """Removes what PyTorch notes of the code: its author's paths and lines, a kilobyte for each node."""
+    for part in (graph, *graph.node, *graph.initializer, *graph.input, *graph.value_info, *graph.output):
+        part.ClearField("metadata_props")
+        part.ClearField("doc_string")
+    for attribute in (attribute for node in graph.node for attribute in node.attribute):
+        if attribute.HasField("g"):
+            _forget_source(attribute.g)
 
 
 def _narrow(graph: onnx.GraphProto) -> None:
