@@ -1,4 +1,4 @@
-/** A scene of the gallery: its cost here, its code, the images of its network, and the webcam as one of them. */
+/** A scene of the gallery: its cost here, its code, the images and seeds of its network, and the webcam. */
 import { copy } from '../site/copy.js';
 import { fillCostCard } from '../site/cost-card.js';
 
@@ -20,6 +20,14 @@ async function giveInputs(address) {
   scene.inputValues = { ...Object.fromEntries(addresses), ...controls };
 }
 if (scene.dataset.inputs) giveInputs(scene.dataset.inputs).catch((error) => console.error(error));
+
+/** A generator of noise begins again with another seed. */
+find('seeds')?.addEventListener('click', () => {
+  scene.setAttribute('control-seed', Number(scene.getAttribute('control-seed')) + 1);
+  scene.currentTime = 0;
+  scene.dismissPoster();
+  scene.play();
+});
 
 /** Frames of the webcam go to the model on this device, and nowhere else. */
 find('webcam')?.addEventListener('click', async ({ target }) => {

@@ -123,6 +123,16 @@ const SCENES = [
       'A feed-forward network predicts a Gaussian for each pixel of two images. It was not trained on this statue.',
     credit: TRAINED,
   },
+  {
+    ...{ id: 'vessel', kind: 'generator', title: 'Noise becomes a vessel', src: model('vessels') },
+    alt: 'A vessel that appears from noise',
+    view: ['20deg 68deg 5m', '0m 0m 0m', '30deg'],
+    attributes: { autoplay: '', loop: '', 'control-seed': '5', ...clicked },
+    hasSeeds: true,
+    words:
+      'A diffusion model removes the noise of 3,072 Gaussians in steps. It is small, 0.9 million weights, and makes vessels only: it learned from 30,000 of our own formula. Each seed is another.',
+    credit: TRAINED,
+  },
 ];
 
 const POSTERS = 'demo/scenes/posters';
