@@ -409,6 +409,11 @@ def test_parts_of_avatars_are_refused_by_name(tmp_path: Path, neighbor: str, fam
     with pytest.raises(ExportError, match=rf"{neighbor}.*a checkpoint of {family}"):
         read_cloud(tmp_path / "offset.ply")
     assert np.array_equal(read_cloud(tmp_path / "offset.ply", [neighbor]).positions, same.positions)
+    # The folder, which has no point_cloud.ply, gets the same name; one without any of these files is not a training.
+    with pytest.raises(ExportError, match=rf"{neighbor}.*a checkpoint of {family}"):
+        read_cloud(tmp_path)
+    with pytest.raises(ExportError, match=rf"expected a training.*beside it lie .*{neighbor}"):
+        read_cloud(tmp_path, [neighbor])
 
 
 def test_what_gsplat_saves_besides_is_refused_by_name(tmp_path: Path) -> None:

@@ -43,9 +43,9 @@ def read_cloud(path: Path, ignored: Sequence[str] = ()) -> Cloud:
     change nothing; "2d" declares that a gsplat checkpoint without a rank in its name has 3D Gaussians.
     """
     path = newest_in(existing(path, "a PLY file, a checkpoint, or the folder of a training"))
-    with path.open("rb") as file:
-        is_archive = file.read(2) == b"PK"
     refuse_neighbors(path, ignored)
+    with existing(path, "a training with a point cloud or a checkpoint").open("rb") as file:
+        is_archive = file.read(2) == b"PK"
     kernel = refused_settings(path, ignored)
     if is_archive:
         if kernel is not None:
