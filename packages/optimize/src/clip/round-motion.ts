@@ -6,7 +6,7 @@ import type { Followed } from './curves.js';
  * Penalty of a level of a code for a splat of average importance, in levels. Zeros and small codes need few bits. Codes
  * of unimportant splats shrink further, by up to the second number.
  */
-const [SHRINKING, MAX_SHRINKING] = [0.1, 1.5];
+const [SHRINKING, MAX_SHRINKING] = [0.05, 1.5];
 /** Maximum error of the curves that are not written, in any frame, as a fraction of the squared step. */
 const MAX_DROPPED = 0.02;
 /** Number of neighboring rows whose mean error counts, because an error may be concentrated in a region. */
