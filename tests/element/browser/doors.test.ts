@@ -6,6 +6,7 @@ import { encodeFloorMap } from '@gaussian-splat/formats/floor';
 import { sendKeys } from '@web/test-runner-commands';
 import { itInLab } from '../../support/extent-in-pages.js';
 import { headset } from './support/headset.js';
+import { insideOf } from './support/inside.js';
 import { assert, assertEqual, atRest, delay, frames, nextEvent, show, until } from './support/harness.js';
 
 /** Rooms of 4 by 4 m in a row: each door leads to the next one or back. One arrives at z = 0.9. */
@@ -46,10 +47,11 @@ function doorOf(from: string, to: string, z: number, heading: string): HTMLEleme
   return door;
 }
 
-/** @param sceneAfter Milliseconds until the element gets its scene. */
+/** @param sceneAfter Milliseconds until the element gets its scene. @param onShown Called before the element has doors. */
 async function showTour(
   attributes: Readonly<Record<string, string>> = {},
   sceneAfter = 0,
+  onShown: (element: GaussianSplatElement) => void = () => undefined,
 ): Promise<GaussianSplatElement> {
   await putRooms();
   const scene = `${folder}/a.splat`;
@@ -66,6 +68,7 @@ async function showTour(
     },
     'width: 200px; height: 160px',
   );
+  onShown(element);
   for (const [i, name] of NAMES.entries()) {
     if (i + 1 < NAMES.length) element.append(doorOf(name, NAMES[i + 1], -1.9, '0deg'));
     if (i > 0) element.append(doorOf(name, NAMES[i - 1], 1.9, '180deg'));
@@ -153,6 +156,33 @@ describe('doors', () => {
     // Back, one comes in at the other end and looks the other way.
     await pass(element, 'a');
     assertEqual(element.getCameraTarget().z.toFixed(3), '0.100', 'the view from the door back');
+  });
+
+  it('doors of other rooms are not seen while the code for doors is on its way', async () => {
+    let arrive!: () => void;
+    const arrived = new Promise<void>((resolve) => (arrive = resolve));
+    // `ready` waits for all code.
+    const element = await new Promise<GaussianSplatElement>((resolve) => {
+      void showTour({}, 0, (shown) => {
+        const { announcer } = insideOf(shown);
+        const get = announcer.get.bind(announcer);
+        // The code for doors waits for it.
+        announcer.get = () => arrived.then(get);
+        resolve(shown);
+      });
+    });
+    await nextEvent(element, 'load');
+    const seen = (): string[] =>
+      [...element.querySelectorAll<HTMLElement>('[data-door]')]
+        .filter((door) => door.checkVisibility({ visibilityProperty: true }))
+        .map(({ slot }) => slot);
+    await until(() => element.shadowRoot!.querySelectorAll('.hotspot').length === 4, 'the boxes of all labels');
+    await atRest(element);
+    await frames(3);
+    assertEqual(seen(), [], 'doors before');
+    arrive();
+    await until(() => seen().length > 0, 'a door');
+    assertEqual(seen(), ['hotspot-a-b'], 'doors');
   });
 
   it('the keyboard goes through doors, and the room is announced', async () => {

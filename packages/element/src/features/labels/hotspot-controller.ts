@@ -69,6 +69,8 @@ interface Hotspot extends Located {
   readonly elements: readonly HTMLElement[];
   isOccluded: boolean;
   isVisible: boolean;
+  /** Whether it is a door. Doors are shown when the code for doors is loaded, which hides those of other rooms. */
+  readonly isDoor: boolean;
   /** Whether one of the hotspot's elements contains an open panel. */
   hasPanel: boolean;
 }
@@ -205,7 +207,8 @@ export class HotspotController implements ReactiveController, Feature {
     const normal = read('data-normal', dataset.normal);
     const fresh = { x: 0, y: 0, depth: 0, facesCamera: true, isOccluded: false, isVisible: false };
     const hasPanel = elements.some((element) => element.querySelector(labelParts.panel) !== null);
-    return { ...fresh, ...before, elements, position, normal, hasPanel };
+    const isDoor = elements.some((element) => element.dataset.door !== undefined);
+    return { ...fresh, ...before, elements, position, normal, isDoor, hasPanel };
   }
 
   /**
@@ -218,12 +221,13 @@ export class HotspotController implements ReactiveController, Feature {
     const { clientWidth: width, clientHeight: height } = this.#viewer.element;
     const minMove = VISIBLE_MOVE / windowOf(this.#viewer.element).devicePixelRatio || 0;
     const view = this.#camera && new LabelView(this.#camera, this.#viewer.camera.viewerFrame, width, height);
+    const hasDoors = this.#viewer.features.get('doors').value !== undefined;
     let i = 0;
     for (const hotspot of this.#hotspots.values()) {
       const element = boxes[i++] as HTMLElement | undefined;
       if (element === undefined) continue;
       hotspot.depth = 0;
-      view?.locate(hotspot);
+      if (hasDoors || !hotspot.isDoor) view?.locate(hotspot);
       const { x, y, depth, facesCamera, isOccluded, hasPanel } = hotspot;
       const isOpen = depth > 0 && facesCamera && !isOccluded;
       const box = this.#boxOf(element);
