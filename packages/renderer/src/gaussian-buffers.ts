@@ -83,10 +83,7 @@ export class GaussianBuffers extends SceneBuffers {
     });
   }
 
-  /**
-   * Copies a portion of the scene to the GPU. The call waits for the GPU between steps, because a browser blocks the
-   * thread if more bytes are in transit than its transfer buffer can hold.
-   */
+  /** Copies a portion to the GPU, with waits: browsers block the thread if more is in transit than a buffer can hold. */
   async write(portion: PackedPortion): Promise<void> {
     for (const { buffer, offset, words } of this.#contentsOf(portion))
       for (let first = 0; first < words.length;) {
