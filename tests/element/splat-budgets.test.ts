@@ -19,6 +19,8 @@ interface Flight {
   readonly perMillion: (now: number) => number;
   /** Number of splats that the view needs within a pixel. */
   readonly needed?: (now: number) => number;
+  /** Error of missing pages, px. */
+  readonly missing?: (now: number) => number;
   readonly range?: readonly [number, number];
   readonly ledger?: MemoryLedger;
   /** Relative spread of times. */
@@ -42,6 +44,9 @@ function fly(flight: Flight, milliseconds: number): { readonly frames: Frame[]; 
     place: { memory: flight.ledger ?? new MemoryLedger() },
     gaussians: {
       progress: {
+        get error() {
+          return flight.missing?.(now) ?? 0;
+        },
         get budgetError() {
           return budgetError;
         },
@@ -120,6 +125,12 @@ test('a budget that limits no view stays, as does a named one, and that of a pag
     frames.every(({ at, splatBudget }) => at < 2_050 || splatBudget === BASE),
     'the quality became fixed',
   );
+});
+
+test('a budget stays while missing pages have the larger error, and grows once they have arrived', () => {
+  const { frames } = fly({ perMillion: () => 0.5, missing: (now) => (now < 2_000 ? 9 : 0) }, 4_000);
+  assert.ok(frames.every(({ at, splatBudget }) => at > 2_000 || splatBudget === BASE));
+  assert.ok(frames.at(-1)!.splatBudget > 2 * BASE);
 });
 
 test('frames become slower: the budget falls to what is in time, and the quality stays', () => {

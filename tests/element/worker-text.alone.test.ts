@@ -14,7 +14,7 @@ type Run = (exports: object, require: (name: string) => object, load: (name: str
 
 const chunks = async (): Promise<Chunks> => ((await import(`${folder}worker-code.js`)) as { CHUNKS: Chunks }).CHUNKS;
 const namesIn = (text: string, call: string): string[] =>
-  [...text.matchAll(new RegExp(`\\b${call}\\(["']([^"']+)["']\\)`, 'g'))].map(([, name]) => name);
+  [...text.matchAll(new RegExp(`\\b${call}\\(["'\`]([^"'\`]+)["'\`]\\)`, 'g'))].map(([, name]) => name);
 
 test('each chunk names what it needs and what it loads later, and nothing else', { skip }, async () => {
   const all = await chunks();

@@ -75,7 +75,7 @@ export { previewOf } from './pack/row-preview.js';
 export { readBack, readBackWith, type ReadPart } from './gpu/read-back.js';
 export { sortByKey } from './pack/radix-sort.js';
 export { RankedHeap } from './ranked-heap.js';
-export { budgetBytes, maxSplatBudget } from './splat-budget.js';
+export { budgetBytes, maxSplatBudget } from './frame-resources.js';
 export { untilItHasRoom } from './until-it-has-room.js';
 export { faultsOf } from './variants.js';
 export { packAnimation, type Motions, type PackedAnimation } from './pack/pack-animated.js';

@@ -13,7 +13,7 @@ const SHARE_OF_REST = 0.5;
 /** The streamed scene whose budget changes. */
 export interface BudgetedScene {
   readonly place: { readonly memory: MemoryLedger };
-  readonly gaussians: { readonly progress?: Pick<StreamProgress, 'budgetError'> };
+  readonly gaussians: { readonly progress?: Pick<StreamProgress, 'error' | 'budgetError'> };
   readonly detail: LodSettings;
   setDetail(detail: LodSettings): void;
 }
@@ -26,9 +26,9 @@ export interface FrameTime {
 }
 
 /**
- * Changes the splat budgets of scenes with a `splatRange`: upward while a budget limits the view and the larger one is
- * predicted to be fast enough, downward before frames lose quality. The time of a frame is assumed to be proportional to
- * its splats, at most.
+ * Changes the splat budgets of scenes with a `splatRange`: upward while a budget limits the view more than missing pages
+ * do and the larger one is predicted to be fast enough, downward before frames lose quality. The time of a frame is
+ * assumed to be proportional to its splats, at most.
  */
 export class SplatBudgets {
   readonly #scenes: () => readonly BudgetedScene[];
@@ -47,8 +47,9 @@ export class SplatBudgets {
   grow({ now, milliseconds, targetMs }: FrameTime): boolean {
     const factor = Math.min(MAX_STEP, (AIM * targetMs) / milliseconds);
     if (now < this.#heldUntil || factor < MIN_STEP) return false;
+    // While missing pages have the larger error, more splats would be more pages.
     const isLimited = ({ gaussians: { progress }, detail: { detail = 0 } }: BudgetedScene): boolean =>
-      (progress?.budgetError ?? 0) > detail;
+      (progress?.budgetError ?? 0) > Math.max(detail, progress?.error ?? 0);
     const limited = this.#scenes().filter(isLimited);
     if (limited.length === 0 || !this.#reserve(limited, factor)) return false;
     this.#grewAt = now;
