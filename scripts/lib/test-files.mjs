@@ -32,7 +32,7 @@ export const SHARED_PAGES = [
 /** Files of Node that run in one process with the device of tests/support, and thus reuse its compiled pipelines. */
 const SHARES_DEVICE = /^tests\/(detail|golden|stages)\//;
 /** These files have a process each: they take the machine's memory or threads. Others share one: to start it takes longer than most of them. */
-const ONE_EACH = /^tests\/(optimize\/|packages\/(batch|commands|test-names|.*\.lab)\.)/;
+const ONE_EACH = /^tests\/(optimize\/|packages\/(batch|commands|test-names|.*\.lab)\.|detail\/(command|parts)\.)/;
 
 /** Folders of each package's tests. Tests of demo and documents belong to the site. */
 export const TESTS_OF = {
