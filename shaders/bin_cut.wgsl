@@ -1,4 +1,4 @@
-// Divides the list of a tile into segments of as many splats each, to the nearest 256 pairs of the bin. The last segment
+// Divides the list of a tile into segments of the same cost, to the nearest 256 pairs of the bin. The last segment
 // has the rest. One workgroup for each divided list.
 #import shared/divided
 #import shared/prefix
@@ -12,7 +12,11 @@
 const GROUP_PAIRS = 32u * PAIR_WORDS;
 var<workgroup> divided: vec4u;
 
-fn splats_of(group: u32, tile: u32) -> u32 { return group_splats[group * TILES_PER_BIN + tile % TILES_PER_BIN]; }
+// @param words The first word of the bin and the one after its last.
+fn cost_of(group: u32, tile: u32, words: vec2u) -> u32 {
+  let own = min((group + 1u) * PAIR_WORDS, words.y) - max(group * PAIR_WORDS, words.x);
+  return group_splats[group * TILES_PER_BIN + tile % TILES_PER_BIN] + own;
+}
 
 @compute @workgroup_size(PREFIX_THREADS)
 fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_index) lane: u32) {
@@ -30,31 +34,31 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
   let range = ranges[tile / TILES_PER_BIN];
   let first_group = range.x / GROUP_PAIRS;
   let end_group = (range.y + GROUP_PAIRS - 1u) / GROUP_PAIRS;
-  let end_word = (range.y + 31u) / 32u;
+  let words = vec2u(range.x / 32u, (range.y + 31u) / 32u);
   let groups = (end_group - first_group + PREFIX_THREADS - 1u) / PREFIX_THREADS;
   let begin = min(first_group + lane * groups, end_group);
   let end = min(begin + groups, end_group);
-  // A segment that the splats do not reach begins and ends behind them.
+  // A segment that the costs do not reach begins and ends behind them.
   for (var nth = lane; nth < count; nth += PREFIX_THREADS) {
     let at = segment_at(view, first_segment + nth);
     bin_order[at] = tile;
     bin_order[at + 1u] = nth | (count << 16u);
-    bin_order[at + 2u] = select(end_word, range.x / 32u, nth == 0u);
-    bin_order[at + 3u] = end_word;
+    bin_order[at + 2u] = select(words.y, words.x, nth == 0u);
+    bin_order[at + 3u] = words.y;
     bin_order[at + 4u] = nth * size;
   }
   var own = 0u;
-  for (var group = begin; group < end; group++) { own += splats_of(group, tile); }
+  for (var group = begin; group < end; group++) { own += cost_of(group, tile, words); }
   // Its barriers come before the words that follow.
   var sum = inclusive_sum(own, lane, PREFIX_THREADS) - own;
   storageBarrier();
   // The next end of a segment at or behind the sum.
   var nth = max((sum + size - 1u) / size, 1u);
   for (var group = begin; group < end; group++) {
-    sum += splats_of(group, tile);
+    sum += cost_of(group, tile, words);
     while (nth < count && nth * size < sum) {
       let at = segment_at(view, first_segment + nth);
-      let word = min((group + 1u) * PAIR_WORDS, end_word);
+      let word = min((group + 1u) * PAIR_WORDS, words.y);
       bin_order[at + 2u] = word;
       bin_order[at + 3u - SEGMENT_WORDS] = word;
       nth++;

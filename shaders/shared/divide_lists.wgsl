@@ -7,39 +7,40 @@
 // See shared/segments.
 @group(0) @binding(4) var<storage, read> segments: array<f32>;
 
-// Minimum number of splats of a segment.
+// Minimum cost of a segment.
 override segment_splats: u32 = 512u;
 
-var<workgroup> splats: atomic<u32>;
+var<workgroup> costs: atomic<u32>;
 var<workgroup> segment_count: atomic<u32>;
 var<workgroup> divided_count: atomic<u32>;
 
-// The splats of a tile that are expected to be rasterized, and all of them. A tile that was finished in the last frame
-// will be after about as many splats.
-fn splats_of(tile: u32) -> vec2u {
-  if (!is_seen(view, corner_of(view, tile / TILES_PER_BIN, tile % TILES_PER_BIN))) { return vec2u(0u); }
-  let count = tile_splats[tile];
+// The cost of the splats of a tile that are expected to be rasterized, and of all. A tile that was finished in the last
+// frame will be after about as many.
+fn cost_of(tile: u32) -> vec2u {
+  if (tile_splats[tile] == 0u || !is_seen(view, corner_of(view, tile / TILES_PER_BIN, tile % TILES_PER_BIN))) { return vec2u(0u); }
+  let range = ranges[tile / TILES_PER_BIN];
+  let cost = tile_splats[tile] + (range.y + 31u) / 32u - range.x / 32u;
   let end = u32(segments[END_AT + tile]);
-  return vec2u(select(count, min(count, end + end / 4u + 256u), end > 0u), count);
+  return vec2u(select(cost, min(cost, end + end / 4u + 256u), end > 0u), cost);
 }
 
-// A list is divided if it has at least twice the splats of a segment. Splats behind the expected end have a segment of
+// A list is divided if it has at least twice the cost of a segment. Splats behind the expected end have a segment of
 // their own.
 fn divide_lists(lane: u32) {
   let tiles = view.bins.x * view.bins.y * TILES_PER_BIN;
   var sum = 0u;
-  for (var tile = lane; tile < tiles; tile += PREFIX_THREADS) { sum += splats_of(tile).x; }
-  atomicAdd(&splats, sum);
+  for (var tile = lane; tile < tiles; tile += PREFIX_THREADS) { sum += cost_of(tile).x; }
+  atomicAdd(&costs, sum);
   workgroupBarrier();
   let shared_segments = min(SHARED_SEGMENTS, SHARED_BINS / (view.bins.x * view.bins.y));
-  let min_splats = max(segment_splats, atomicLoad(&splats) / shared_segments + 1u);
+  let min_cost = max(segment_splats, atomicLoad(&costs) / shared_segments + 1u);
   for (var tile = lane; tile < tiles; tile += PREFIX_THREADS) {
-    let own = splats_of(tile);
-    tile_splats[tile] = 0u;
-    var count = min(own.x / min_splats, LIST_SEGMENTS);
+    let own = cost_of(tile);
+    var count = min(own.x / min_cost, LIST_SEGMENTS);
     let size = own.x / max(count, 1u);
     if (count < 2u) { count = 0u; } else if (own.x < own.y) { count++; }
-    bin_order[tile_segments_at(view, tile)] = count;
+    bin_order[tile_segments_at(view, tile)] = select(count, EMPTY_LIST, tile_splats[tile] == 0u);
+    tile_splats[tile] = 0u;
     if (count == 0u) { continue; }
     let at = divided_at(view, atomicAdd(&divided_count, 1u));
     bin_order[at] = tile;

@@ -1,8 +1,9 @@
 // Long lists of small tiles, divided into segments. They lie in the buffer `bin_order` behind the bins, the number
 // of long bins and the pairs of the longest: the numbers of segments and of divided lists; for each tile the number of its segments, 0 if its list is
-// not divided; for each divided list its tile, first segment, number of segments, and splats of a segment; for each
-// segment its tile, its number among those of the tile with their number, its first word of bits, the one after its last,
-// and the number of splats in front of it.
+// not divided, or EMPTY_LIST; for each divided list its tile, first segment, number of segments, and the cost of a segment;
+// for each segment its tile, its number among those of the tile with their number, its first word of bits, the one after
+// its last, and the cost in front of it. The cost of a list is the number of its splats and of the words of bits that are
+// searched for them: to search 256 words takes as long as to rasterize 256 splats.
 #import shared/bins
 
 // Capacity in segments.
@@ -15,6 +16,8 @@ const SHARED_BINS = 23040u;
 const LIST_SEGMENTS = 64u;
 // Maximum number of tiles.
 const MAX_TILES = 128u * TILES_PER_BIN;
+// In place of a number of segments: a tile that no splat touches.
+const EMPTY_LIST = 0xffffffffu;
 const SEGMENT_NUMBERS = 6u;
 const END_AT = MAX_SEGMENTS * SEGMENT_NUMBERS * 256u;
 const DIVIDED_WORDS = 4u;

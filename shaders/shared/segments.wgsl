@@ -13,7 +13,7 @@ override stage: u32 = 0u;
 const UNDIVIDED = 3u;
 
 // For each segment and thread: light behind it, red, green, blue, the transmittance that it takes, and the depth that
-// halves it. Followed by the number of splats after which each tile was finished in the last frame.
+// halves it. Followed by the cost of each tile until it was finished in the last frame.
 @group(0) @binding(14) var<storage, read_write> segments: array<f32>;
 
 // The words from `begin` to `end` of the list of a tile.
@@ -59,7 +59,7 @@ fn dim_batch(pixels: ptr<function, Pixels>, own_block: u32, place: vec2f, min_po
 }
 
 // Rasterizes the splats of a list until all pixels are finished. If `only_light`, only their light is changed. Returns
-// the number of splats.
+// the cost of what was searched and rasterized: see shared/divided.
 fn paint_list(pixels: ptr<function, Pixels>, first: ListPlace, corner: vec2u, lane: u32, only_light: bool) -> u32 {
   let own_block = lane / (block_side * block_side);
   let place = vec2f(pixel_of(lane)) + 0.5;
@@ -67,14 +67,29 @@ fn paint_list(pixels: ptr<function, Pixels>, first: ListPlace, corner: vec2u, la
   var list = first;
   var painted = 0u;
   if (lane == 0u) { paints[NO_SPLAT].y = bitcast<u32>(NO_POWER); }
+  // If lists are long, the next batch is fetched before this one is rasterized, as in shared/whole_lists.
+  let is_ahead = stage != UNDIVIDED;
+  var slot = 0u;
+  var found_ahead = 0u;
+  var splat_ahead = ProjectedSplat();
+  if (is_ahead) {
+    found_ahead = find_batch(&list, BATCH, lane, &slot);
+    splat_ahead = splats[slot];
+  }
   loop {
     if (lane < BLOCKS * BATCH_WORDS) { atomicStore(&block_hits[lane], 0u); }
     if (lane == 0u) { atomicStore(&unfinished, 0u); }
     aux_clear(lane);
     workgroupBarrier();
-    let count = load_batch(&list, BATCH, vec2f(corner), lane);
+    var count = found_ahead;
+    if (!is_ahead) { count = load_batch(&list, BATCH, vec2f(corner), lane); }
     if (count == 0u) { break; }
+    if (is_ahead && lane < count) { load_splat(lane, slot, splat_ahead, vec2f(corner)); }
     workgroupBarrier();
+    if (is_ahead) {
+      found_ahead = find_batch(&list, BATCH, lane, &slot);
+      splat_ahead = splats[slot];
+    }
 
     if (only_light) { dim_batch(pixels, own_block, place, min_power); }
     else { paint_batch(pixels, own_block, place, min_power); }
@@ -86,7 +101,7 @@ fn paint_list(pixels: ptr<function, Pixels>, first: ListPlace, corner: vec2u, la
     if (lane == 0u) { is_open = atomicLoad(&unfinished); }
     if (workgroupUniformLoad(&is_open) == 0u) { break; }
   }
-  return painted;
+  return painted + min(list.next_word, (first.range.y + 31u) / 32u) - first.first_word;
 }
 
 fn number_at(segment: u32, number: u32, lane: u32) -> u32 {
@@ -102,9 +117,9 @@ fn are_all_finished(pixels: Pixels, lane: u32) -> bool {
   return workgroupUniformLoad(&is_open) == 0u;
 }
 
-// Keeps the number of splats after which a tile is finished.
-fn keep_end(tile: u32, splats: u32, lane: u32) {
-  if (lane == 0u) { segments[END_AT + tile] = f32(max(splats, 1u)); }
+// Keeps the cost of a tile until it is finished; zero, if it has no splats.
+fn keep_end(tile: u32, cost: u32, lane: u32) {
+  if (lane == 0u) { segments[END_AT + tile] = f32(cost); }
 }
 
 fn sum_segments(first: u32, count: u32, position: vec2u, lane: u32) {
@@ -171,10 +186,14 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
     let tile = bin * TILES_PER_BIN + tile_in_bin;
     let corner = corner_of(view, bin, tile_in_bin);
     if (!is_seen(view, corner)) { return; }
-    if (stage == 0u && bin_order[tile_segments_at(view, tile)] > 0u) { return; }
+    var list = begin_list(bin, tile_in_bin, 0u);
+    if (stage == 0u) {
+      let count = bin_order[tile_segments_at(view, tile)];
+      if (count == EMPTY_LIST) { list = ListPlace(); } else if (count > 0u) { return; }
+    }
     let position = corner + pixel_of(lane);
     var pixels = start_pixels(position);
-    let painted = paint_list(&pixels, begin_list(bin, tile_in_bin, 0u), corner, lane, false);
+    let painted = paint_list(&pixels, list, corner, lane, false);
     finish_pixels(&pixels, position);
     if (stage == 0u) { keep_end(tile, painted, lane); }
     return;

@@ -18,6 +18,10 @@ after(endNodeDevice);
 const MAX_DIFFERENCE = 0.13 / 255;
 /** Minimum number of splats of a segment, so that a small scene has many of them. */
 const SEGMENT_SPLATS = 64;
+/** Number of tiles of a bin. */
+const TILES = 32;
+/** In place of a number of segments: EMPTY_LIST of shaders/shared/divided.wgsl. */
+const EMPTY_LIST = 0xffffffff;
 const SIZE = { width: 96, height: 64 };
 const USAGE = { textureBinding: 4, copySource: 1, copyDestination: 2, storageBinding: 8 };
 
@@ -106,8 +110,8 @@ const WAYS: Readonly<
   },
 };
 
-/** A device whose buffer of divided lists can be read. */
-function readable(device: GPUDevice): { device: GPUDevice; segmentsIn: () => Promise<number> } {
+/** A device whose buffer of divided lists can be read: the number of segments, and that of each tile of the one bin. */
+function readable(device: GPUDevice): { device: GPUDevice; segmentsIn: () => Promise<number[]> } {
   let order: GPUBuffer | undefined;
   const createBuffer = (descriptor: GPUBufferDescriptor): GPUBuffer => {
     const isOrder = descriptor.label === 'gs.bin.order';
@@ -115,10 +119,11 @@ function readable(device: GPUDevice): { device: GPUDevice; segmentsIn: () => Pro
     if (isOrder) order = buffer;
     return buffer;
   };
-  const segmentsIn = async (): Promise<number> => {
-    // One bin, the number of long bins, the pairs of the longest, the number of segments.
-    const [words] = await readBack(device, [{ buffer: order!, byteOffset: 12, byteLength: 4 }]);
-    return new Uint32Array(words)[0];
+  const segmentsIn = async (): Promise<number[]> => {
+    // One bin, the number of long bins, the pairs of the longest, the numbers of segments and of divided lists, the tiles.
+    const [words] = await readBack(device, [{ buffer: order!, byteOffset: 12, byteLength: 4 * (2 + TILES) }]);
+    const [all, , ...tiles] = new Uint32Array(words);
+    return [all, ...tiles];
   };
   const other = new Proxy(device, {
     get(target, name) {
@@ -148,7 +153,7 @@ for (const [way, make] of Object.entries(WAYS)) {
     const counts: number[] = [];
     for (const frame of ['first', 'second']) {
       const divided = await draw();
-      if (way !== 'a layer of color') counts.push(await segmentsIn());
+      if (way !== 'a layer of color') counts.push((await segmentsIn())[0]);
       const worst = largest(whole.image, divided.image);
       const different = whole.more.filter(
         (value, i) => Math.abs(value - divided.more[i]) > 1e-4 * Math.abs(value) + 1e-6,
@@ -165,6 +170,35 @@ for (const [way, make] of Object.entries(WAYS)) {
     gaussians.destroy();
   });
 }
+
+test('a tile of few splats is divided where its bin has many pairs; one without splats searches for none', async () => {
+  const { device, segmentsIn } = readable(await nodeDevice());
+  const few = fewTilesOn(device);
+  few.load = () => undefined;
+  few.now = undefined;
+  const random = seededRandom(33);
+  const at = (x: number) => ({
+    position: [x + random.uniform(-0.05, 0.05), random.uniform(-0.05, 0.05), random.uniform(-0.5, 0.5)] as const,
+    scale: [0.01, 0.01, 0.01] as const,
+    opacity: 0.02,
+    color: [random.uniform(0, 1), random.uniform(0, 1), random.uniform(0, 1)] as const,
+  });
+  // The first column of tiles has thousands of splats, the fifth twenty, and the others none.
+  const cloud = cloudOf([...repeat(8_000, () => at(-0.8)), ...repeat(20, () => at(0.48))]);
+  const gaussians = await GaussianBuffers.upload(device, packGaussians(cloud));
+  const renderer = new Renderer(device, { rasterizer: 'tiles', threads: 'parallel' });
+  const whole = await readFrame(device, renderer, { gaussians, camera });
+  few.now = new FewTiles(device, SEGMENT_SPLATS);
+  const divided = await readFrame(device, renderer, { gaussians, camera });
+  const [, ...tiles] = await segmentsIn();
+  const row = tiles.slice(8, 14);
+  console.log(`a row of tiles: ${row.join(', ')} segments`);
+  assert.ok(row[0] > 16 && row[4] >= 4 && row[4] < 16, `${row[0]} and ${row[4]} segments`);
+  assert.deepEqual([row[2], row[5]], [EMPTY_LIST, EMPTY_LIST]);
+  assert.ok(largest(whole, divided) <= MAX_DIFFERENCE, `a pixel differs by ${largest(whole, divided)}`);
+  renderer.destroy();
+  gaussians.destroy();
+});
 
 function largest(a: Float32Array, b: Float32Array): number {
   let worst = 0;

@@ -171,7 +171,7 @@ export interface Rasterizer {
   readonly pairPlan?: GPUBuffer;
   /** Place of the number of pairs of the longest list in the last frame; undefined for a rasterizer without lists. */
   readonly longest?: CountPlace | undefined;
-  /** Takes this number of an earlier frame, by which a kernel is chosen. */
+  /** Takes this number of an earlier frame, to choose a kernel. */
   learn?(longest: number): void;
   /** Whether the rasterizer can write a final image of this format directly to the target. */
   finishes(format: GPUTextureFormat): boolean;
