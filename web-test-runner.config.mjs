@@ -109,8 +109,9 @@ function countReporter() {
       for (const { testFile, testResults, errors } of sessions.filter((session) => !session.passed)) {
         const tests = failedIn(testResults);
         const found = tests.length > 0 ? tests : [{ name: 'the file', error: errors[0] }];
+        // Tests that a failed hook has ended before they began have no message.
         for (const { name, error } of found)
-          process.stdout.write(failureLine(relative(root, testFile), name, error?.message));
+          process.stdout.write(failureLine(relative(root, testFile), name, (error ?? errors[0])?.message));
         console.log(`Failed: ${Math.max(1, countOf(testResults).failed)} of ${testFile}`);
       }
       console.log(`Chromium: ${passed} passed, ${failed + broken} failed, ${skipped} skipped`);

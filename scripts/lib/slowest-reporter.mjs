@@ -10,7 +10,7 @@ const SHORT_MS = 1_000;
 
 /** A test that failed, in one line: what `npm test` repeats at its end. */
 export function failureLine(file, name, message = '') {
-  return `Failed test: ${file}: ${name}: ${String(message).split('\n')[0].slice(0, 300)}\n`;
+  return `Failed test: ${file}: ${name}: ${String(message).replace(/\s+/g, ' ').slice(0, 300)}\n`;
 }
 
 export default async function* slowest(source) {

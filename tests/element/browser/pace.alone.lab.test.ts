@@ -35,6 +35,17 @@ function countWork(): () => void {
   };
 }
 
+const { animate } = Element.prototype;
+
+/** Pauses what scripts animate, until `animate` is given back: a busy machine may look at the page less often than a fade lasts. */
+function holdAnimations(): void {
+  Element.prototype.animate = function (...how) {
+    const animation = animate.apply(this, how);
+    animation.pause();
+    return animation;
+  };
+}
+
 /** Waits until the submitted work is done. */
 const gpuIdle = (): Promise<undefined> => devices[devices.length - 1].queue.onSubmittedWorkDone();
 
@@ -75,6 +86,7 @@ describe('dynamic quality', () => {
     restore = countWork();
   });
   after(() => restore());
+  afterEach(() => void Object.assign(Element.prototype, { animate }));
 
   it('moves with less work than at full quality, settles on the accurate frame, byte for byte, and reports its settings', async () => {
     const auto = await showLoaded(PACED, SIZE);
@@ -113,6 +125,7 @@ describe('dynamic quality', () => {
   it('a frame of fewer pixels fades into the accurate frame, and nothing of it stays', async () => {
     const element = await showLoaded({ ...PACED, 'interpolation-decay': '0' }, SIZE);
     await findQuality(element);
+    holdAnimations();
     const overlay = (): HTMLCanvasElement | null => element.shadowRoot!.querySelector('canvas[aria-hidden]');
     const isSmaller = (): boolean => /at 0/.test(element.stats!.dynamicQuality.drawn);
     for (let i = 0; i < 20 && !isSmaller(); i++) await turnFor(element, 300);
@@ -123,20 +136,28 @@ describe('dynamic quality', () => {
     assertEqual([width, height], [canvas.width, canvas.height], 'its pixels');
     const bounds = [canvas, overlay()!].map((each) => JSON.stringify(each.getBoundingClientRect()));
     assertEqual(bounds[0], bounds[1], 'where it lies');
-    await until(() => overlay()!.getAnimations().length > 0, 'it fades');
+    const isFading = (): boolean => (overlay()?.getAnimations().length ?? 0) > 0;
+    await until(isFading, 'it fades');
+    const fade = [canvas, overlay()!].flatMap((each) => each.getAnimations());
+    for (const animation of fade) animation.currentTime = 40;
     assertEqual(element.stats!.dynamicQuality.drawn, 'whole', 'beneath it');
-    const sum = [canvas, overlay()!].reduce((weights, each) => weights + Number(getComputedStyle(each).opacity), 0);
-    assert(Math.abs(sum - 1) < 0.01, `weights of ${sum}`);
+    const weights = [canvas, overlay()!].map((each) => Number(getComputedStyle(each).opacity));
+    assert(
+      weights.every((weight) => weight > 0.3) && Math.abs(weights[0] + weights[1] - 1) < 0.01,
+      `weights ${weights}`,
+    );
+    for (const animation of fade) animation.play();
     await until(() => overlay() === null, 'it is gone');
     assertEqual(getComputedStyle(canvas).opacity, '1', 'the canvas is opaque again');
     assertEqual(canvas.parentElement!.style.isolation, '', 'and not isolated');
     // A motion that begins meanwhile ends the fade at once.
     for (let i = 0; i < 20 && !isSmaller(); i++) await turnFor(element, 300);
-    await until(() => overlay() !== null, 'it fades once more');
-    // Two frames at least: the first of the motion ends the fade.
+    await until(isFading, 'it fades once more');
+    const covering = overlay()!;
+    // Two frames at least: the first of the motion ends the fade. After a pause of a busy machine there may be another.
     await turnFor(element, 100);
     await frames(2);
-    assert(overlay() === null, 'nothing lies over what moves');
+    assert(!covering.isConnected, 'nothing lies over what moves');
   });
 
   it('a small subject is not drawn with levels that would lose nearly all of it', async () => {
