@@ -84,7 +84,8 @@ async function open(path: string, prepare?: (tab: Page) => Promise<unknown>): Pr
   const faults: string[] = [];
   tab.on('pageerror', ({ message }) => faults.push(message));
   tab.on('console', (message) => {
-    const isFault = ['error', 'warning'].includes(message.type()) && !/favicon|404/.test(message.text());
+    const isFault =
+      ['error', 'warning'].includes(message.type()) && !/favicon|404|none has started within 2 s/.test(message.text());
     if (isFault) faults.push(`${message.text()} (${message.location().url})`);
   });
   await prepare?.(tab);
