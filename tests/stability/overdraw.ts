@@ -8,7 +8,7 @@
  * with quads, which take hours for more on a CPU; times of submissions are recorded and not limited, since a CPU cannot keep 250 ms.
  *
  * Passes: no loss of the device; the image is right, and the same to the byte however it is divided into submissions; tiles are divided automatically, the more the more
- * pairs of splat and bin there may be, quads if the setting `submissions` asks for it.
+ * pairs of splat and bin there may be, quads if the setting `submissions` asks for it; each submission of quads then has its fraction of the fragments.
  */
 import { test } from 'node:test';
 import assert from 'node:assert/strict';
@@ -92,8 +92,8 @@ function timeSubmissions(device: GPUDevice): { readonly times: Promise<number>[]
   return { times, stop: () => void Reflect.deleteProperty(queue, 'submit') };
 }
 
-/** Submissions of a frame of quads that are counted, and the largest share of one in their fragments. */
-const [SLICES, LARGEST_SHARE] = [64, 0.03];
+/** Submissions of a frame of quads that are counted, and the maximum fraction of all fragments that one of them draws. */
+const [SLICES, MAX_FRACTION] = [64, 0.03];
 
 /** A new device whose quads add 1 to red for each fragment, and draw only in the passes of a frame that `draws` names. */
 async function countingDevice(draws: { nth: number; of: number }): Promise<GPUDevice> {
@@ -168,8 +168,8 @@ test('quads, divided into many submissions, have few fragments in each, and all 
     whole,
     'each fragment is drawn once',
   );
-  holds('S9', `largest of ${SLICES} submissions, share of the fragments`, Math.max(...slices) / whole, {
-    atMost: LARGEST_SHARE,
+  holds('S9', `largest of ${SLICES} submissions, fraction of the fragments`, Math.max(...slices) / whole, {
+    atMost: MAX_FRACTION,
     unit: '',
   });
   gaussians.destroy();

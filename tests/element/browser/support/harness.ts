@@ -177,7 +177,7 @@ export async function claimComing(pattern: RegExp): Promise<void> {
 }
 
 /**
- * What is said of many SPZ files, which name no axes, and of a busy machine, whose worker is late: see meaning.test.ts and loads-apart.alone.lab.test.ts.
+ * Warnings of many SPZ files, which name no axes, and of a busy machine, whose worker is late: see meaning.test.ts and loads-apart.alone.lab.test.ts.
  */
 const EXPECTED = /does not name its axes|no worker could be started \(none has started within 2 s\)/;
 
