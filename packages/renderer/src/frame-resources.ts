@@ -1,13 +1,6 @@
 import { FrameBindings, type Stages } from './bindings.js';
 import { CapacityHistory, larger, type Capacity } from './capacity-history.js';
-import {
-  bytesOf,
-  CapacityMonitor,
-  CountBuffers,
-  initialCapacity,
-  MIN_CAPACITY,
-  PAIRS_PER_BUDGETED,
-} from './capacity.js';
+import { CapacityMonitor, CountBuffers, initialCapacity, MIN_CAPACITY } from './capacity.js';
 import { BlockTable } from './block-table.js';
 import type { Rasterizer } from './rasterizers/rasterizer.js';
 import { maxPairs } from './rasterizers/pair-buffers.js';
@@ -212,10 +205,3 @@ export class FrameResources {
     });
   }
 }
-
-/** Returns the bytes of GPU memory that frames reserve for a splat budget of streamed scenes, at most. */
-export const budgetBytes = (splats: number): number => bytesOf({ visible: splats, pairs: PAIRS_PER_BUDGETED * splats });
-
-/** Returns the maximum splat budget that the buffers of a device allow. */
-export const maxSplatBudget = (device: GPUDevice): number =>
-  Math.floor(Math.min(maxVisible(device), maxPairs(device) / PAIRS_PER_BUDGETED));
