@@ -1,5 +1,5 @@
 /**
- * `npm run lab -- posters [--only REGEX] [--small FILE.sog] [--out FOLDER]`: the posters of the gallery and of the first page, as the built site draws the first frames of its scenes, and the
+ * `npm run lab -- posters [--only REGEX] [--small FILE.sog] [--out FOLDER]`: the posters of the gallery and of the first page, as the built site draws the first whole frames of its scenes, and the
  * number of splats of each. `tests/site/posters.alone.lab.test.ts` compares them again.
  */
 import { copyFileSync, mkdirSync, readFileSync, statSync, writeFileSync } from 'node:fs';
@@ -107,7 +107,8 @@ async function saveImage(scene, { id, ...size }) {
 }
 
 function isSettled() {
-  const { loaded, revealed, error } = document.querySelector('gaussian-splat');
+  const { loaded, revealed, error, stats } = document.querySelector('gaussian-splat');
   if (error) throw new Error(error.message);
-  return loaded && revealed;
+  const isWhole = ({ coming, limit }) => coming === 0 && limit !== 'transit';
+  return loaded && revealed && stats.streamed.every(isWhole);
 }

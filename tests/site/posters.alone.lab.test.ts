@@ -1,4 +1,4 @@
-/** The posters of the first page and of the gallery are what their scenes show first, pixel by pixel, in windows of all shapes. */
+/** The posters of the first page and of the gallery are what their scenes show first, streamed ones as soon as they are whole, pixel by pixel, in windows of all shapes. */
 import assert from 'node:assert/strict';
 import { after, before, describe, it } from 'node:test';
 import type { Page } from 'playwright-core';
@@ -9,6 +9,7 @@ import { isBuilt, openSite, withScenesToCome, type OpenSite } from './support.js
 interface Splat extends HTMLElement {
   readonly loaded: boolean;
   readonly revealed: boolean;
+  readonly stats: { readonly streamed: readonly { coming: number; limit: string | null }[] };
   dismissPoster(): void;
 }
 
@@ -62,7 +63,7 @@ describe('posters', { skip: isBuilt ? false : 'no site: npm run build', timeout:
     });
     const element = tab.locator('gaussian-splat').first();
     const isShown = isScene
-      ? () => element.evaluate((splat: Splat) => splat.loaded && splat.revealed)
+      ? () => element.evaluate(isWhole)
       : () => element.evaluate((splat) => splat.matches(':defined'));
     if (isScene) await element.evaluate((splat: Splat) => splat.dismissPoster?.());
     for (let tries = 0; !(await isShown()); tries++) {
@@ -76,6 +77,10 @@ describe('posters', { skip: isBuilt ? false : 'no site: npm run build', timeout:
     return image;
   }
 });
+
+/** Whether an element shows all of its scene: no page of a streamed one is on its way. */
+const isWhole = ({ loaded, revealed, stats }: Splat): boolean =>
+  loaded && revealed && stats.streamed.every(({ coming, limit }) => coming === 0 && limit !== 'transit');
 
 /** Mean absolute difference of two images of one size, of 255. */
 function differenceOf(a: PNG, b: PNG): number {
