@@ -3,7 +3,7 @@ import { availableParallelism } from 'node:os';
 import { relative } from 'node:path';
 import { runAsync } from './processes.mjs';
 import { root, TSC } from './run.mjs';
-import { byGroup, byProcess } from './test-files.mjs';
+import { byGroup, byProcess, isLaboratory } from './test-files.mjs';
 
 /** Files that are given a second chance alone, at most: more than that is no matter of a busy machine. */
 const MAX_UNSTEADY = 3;
@@ -57,13 +57,14 @@ async function runEach({ node, browser }, env) {
   });
   const { sharing, together, alone } = byProcess(node);
   const { timing, ...others } = byGroup(browser);
+  const longestFirst = (files) => [...files].sort((a, b) => isLaboratory(b) - isLaboratory(a));
   const inNode = (files) => files.map((file) => ({ file, run: (options) => runAlone([file], 1, options) }));
   const ofGroup = ([group, files]) => files.map((file) => ({ file, run: (o) => inChromium(group, [file], o) }));
-  // Files that are alone take longest, and come first.
+  // Files that are alone take longest, above all those of the laboratory, and come first.
   const jobs = [
-    ...inNode(alone),
+    ...inNode(longestFirst(alone)),
     ...ofGroup(['timing', timing]),
-    ...inNode([...sharing, ...together]),
+    ...inNode(longestFirst([...sharing, ...together])),
     ...Object.entries(others).flatMap(ofGroup),
   ];
   const results = [];
