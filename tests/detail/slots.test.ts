@@ -3,7 +3,7 @@ import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { setImmediate as turn } from 'node:timers/promises';
 import {
-  MAX_IN_FLIGHT,
+  MAX_TRANSIT_BYTES,
   NONE,
   SLOT_CHUNKS,
   PageStreamer,
@@ -164,23 +164,33 @@ test('views at rest come to rest in a pool that is too small, and nothing that h
   }
 });
 
-test('what is under way is bounded in slots, not in pages', async () => {
+test('pages in transit are bounded in bytes: of their words, twice while they are fetched, and of their true size once it is known', async () => {
+  const slotBytes = 500_000;
   const list = boxList(Array.from({ length: 200 }, (_, k) => [1, k % 3 === 0 ? 60 : 8]));
+  // Some pages turn out to be larger than expected when they arrive.
+  const sizes = list.slots.slice();
+  for (let page = 3; page < list.count; page += 7) list.slots[page] = 1;
   const residency = opened(list, 2000);
-  const open: (() => void)[] = [];
-  const sent: number[] = [];
+  const fetching = new Map<number, () => void>();
+  const waiting = new Set<number>();
   const traffic = new PageStreamer(residency, {
-    fetch: (page) => {
-      sent.push(page);
-      const words = new Uint32Array(1);
-      return new Promise((resolve) => open.push(() => resolve(words)));
-    },
+    slotBytes,
+    fetch: (page) =>
+      new Promise((resolve) =>
+        fetching.set(page, () => {
+          list.slots[page] = sizes[page];
+          resolve(new Uint32Array(1));
+        }),
+      ),
     onArrival: () => undefined,
     onError: (error) => assert.fail(String(error)),
   });
-  const largest = Math.max(...list.slots.subarray(1));
-  const waiting = new Set<number>();
+  const bytesOf = (pages: Iterable<number>): number =>
+    [...pages].reduce((sum, page) => sum + slotBytes * list.slots[page], 0);
+  const largest = 2 * slotBytes * Math.max(...sizes.subarray(1));
+  let [most, seen] = [0, 0];
   for (let round = 0; round < 600 && residency.slots.count < list.count; round++) {
+    const before = fetching.size;
     residency.note(
       requestsOf(
         list,
@@ -189,16 +199,25 @@ test('what is under way is bounded in slots, not in pages', async () => {
       ),
     );
     traffic.follow();
-    for (const page of sent.splice(0)) waiting.add(page);
-    const slots = [...waiting].reduce((sum, page) => sum + list.slots[page], 0);
-    assert.ok(slots < MAX_IN_FLIGHT + largest, `${slots} slots under way`);
-    for (const arrive of open.splice(0)) arrive();
-    await turn();
+    const bytes = 2 * bytesOf(fetching.keys()) + bytesOf(waiting);
+    assert.equal(traffic.bytes, bytes);
+    if (fetching.size > before) assert.ok(bytes < MAX_TRANSIT_BYTES + largest, `${bytes} bytes`);
+    [most, seen] = [Math.max(most, bytes), Math.max(seen, fetching.size + waiting.size)];
+    // Pages arrive faster than they are uploaded.
+    for (const [page, arrive] of [...fetching].slice(0, 3)) {
+      arrive();
+      fetching.delete(page);
+      waiting.add(page);
+      await turn();
+    }
     const next = traffic.next();
     if (next !== undefined && residency.settle(next.page)) waiting.delete(next.page);
   }
+  console.log(`up to ${seen} pages and ${most / 1e6} MB in transit`);
+  assert.ok(most >= MAX_TRANSIT_BYTES, 'the limit is used');
   assert.equal(residency.slots.count, list.count);
   assert.equal(traffic.underWay, 0);
+  assert.equal(traffic.bytes, 0);
   assert.equal(list.chunks[1], 60);
   assert.equal(list.slots[1], 60 / SLOT_CHUNKS);
 });

@@ -7,7 +7,7 @@ import {
   DETAIL_NUMBERS,
   DetailTable,
   MAX_FETCHES,
-  MAX_IN_FLIGHT,
+  MAX_TRANSIT_BYTES,
   NONE,
   SLOT_CHUNKS,
   PageStreamer,
@@ -16,6 +16,9 @@ import {
 } from '@gaussian-splat/renderer/stages';
 import { randomSource } from '../support/gpu.js';
 import { pageTree, requestsOf } from '../support/page-tree.js';
+
+/** Bytes of a page of one slot, the largest that there are. */
+const SLOT_BYTES = 131_072;
 
 interface Fetch {
   readonly page: number;
@@ -67,6 +70,7 @@ function pool(pages: number, slots: number, below = 16, now?: () => number): Poo
   const [server, errors] = [new Server(), [] as unknown[]];
   let arrivals = 0;
   const traffic = new PageStreamer(residency, {
+    slotBytes: SLOT_BYTES,
     fetch: server.fetch,
     onArrival: () => {
       arrivals++;
@@ -102,7 +106,7 @@ test('a thousand pages that arrive as fast as they are sent for: few are under w
     assert.ok(frame < 1000, `${all.residency.slots.count} of 1200 pages after 1000 frames`);
     if (frame % 6 === 0) all.look((page) => shares[page]);
     for (let answers = 0; answers < 3; answers++) await all.server.answer();
-    assert.ok(all.traffic.underWay <= MAX_IN_FLIGHT && all.server.max <= MAX_FETCHES);
+    assert.ok(all.traffic.bytes < MAX_TRANSIT_BYTES + 2 * SLOT_BYTES && all.server.max <= MAX_FETCHES);
     const needs = place(all, 5).map((page) => all.residency.need(page));
     assert.deepEqual(
       needs,
@@ -253,7 +257,7 @@ test('in a small pool, with any order of arrivals, the ancestors of a page are r
       for (const page of residents.filter((page) => page !== 0)) {
         assert.ok(all.residency.isResident(all.list.parent[page]), `page ${page} hangs in the air`);
       }
-      assert.ok(all.traffic.underWay <= MAX_IN_FLIGHT);
+      assert.ok(all.traffic.bytes < MAX_TRANSIT_BYTES + 2 * SLOT_BYTES);
       assert.ok(frame < 599, `view ${view} never comes to rest`);
     }
   }

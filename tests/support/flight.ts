@@ -118,6 +118,7 @@ export async function fly(pages: FlightPages, options: FlightOptions): Promise<F
   residency.begin(0);
   residency.settle(0);
   const traffic = new PageStreamer(residency, {
+    slotBytes: options.bytes,
     fetch: async (page, signal) => {
       const name = nameOf(page);
       await files.read(name, () => server.fetch(parseInt(name)), signal);

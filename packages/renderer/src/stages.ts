@@ -31,7 +31,7 @@ export { pageLayout, SLOT_CHUNKS } from './streaming/manifest.js';
 export { packQuantizedChunk, QUANTIZED_CHUNK_WORDS } from './streaming/quantized-geometry.js';
 export { QUANTIZED } from './streaming/quantized-reading.js';
 export { PagePool, poolBytes, poolSize } from './streaming/page-pool.js';
-export { MAX_FETCHES, MAX_IN_FLIGHT, PageStreamer } from './streaming/page-streamer.js';
+export { MAX_FETCHES, MAX_TRANSIT_BYTES, PageStreamer } from './streaming/page-streamer.js';
 export { folderSource } from './streaming/page-source.js';
 export { Residency } from './streaming/residency.js';
 export { MAX_UPLOAD_BYTES, UPLOAD_SHARE, UploadBudget } from './streaming/upload-budget.js';

@@ -5,10 +5,10 @@ import type { Residency } from './residency.js';
 /** Maximum number of concurrent fetches; a file contains up to five pages. */
 export const MAX_FETCHES = 64;
 /**
- * Maximum number of slots of the pages that are in transit or wait for their upload. These pages take up to 31 MB of
- * CPU memory, plus one page of any size. They take more if their files contain other pages, too.
+ * Maximum bytes of CPU memory of the pages in transit, beside one page of any size: the words of arrived pages, and twice
+ * the words of pages that are being fetched, for their files.
  */
-export const MAX_IN_FLIGHT = 240;
+export const MAX_TRANSIT_BYTES = 32e6;
 /** Weight of the previous mean arrival time in an update. */
 const MEMORY = 0.95;
 /** Milliseconds before a failed page is requested again; doubled after each further failure. */
@@ -26,6 +26,8 @@ export interface FetchedPage<Words> {
 
 /** Options of a {@link PageStreamer}. */
 export interface TrafficOptions<Words> {
+  /** Bytes of a slot. */
+  readonly slotBytes: number;
   /** Fetches a page; rejects if the page is unavailable. */
   readonly fetch: (page: number, signal: AbortSignal) => Promise<Words>;
   /** Called when a page has arrived and waits for its upload. */
@@ -50,11 +52,11 @@ export class PageStreamer<Words> {
   readonly #failures: BackOff<number>;
   #retry: ReturnType<typeof setTimeout> | undefined;
   #recheckTimer: ReturnType<typeof setTimeout> | undefined;
-  /** Time of the request of each page in transit, and the number of slots that it was assumed to need. */
-  readonly #sent = new Map<number, { readonly at: number; readonly slots: number }>();
+  /** Time of the request of each page in transit, and its bytes of CPU memory. */
+  readonly #sent = new Map<number, { readonly at: number; bytes: number }>();
   readonly #now: () => number;
   #arrivalMs = 0;
-  #slotsUnderWay = 0;
+  #bytes = 0;
   #abandoned = 0;
   #isClosed = false;
 
@@ -68,6 +70,11 @@ export class PageStreamer<Words> {
   /** Number of pages that are being fetched or wait for their upload. */
   get underWay(): number {
     return this.#fetching.size + this.#waiting.size;
+  }
+
+  /** Bytes of CPU memory of these pages; those of a fetch are expected. */
+  get bytes(): number {
+    return this.#bytes;
   }
 
   /** Number of pages that wait for their upload. */
@@ -101,7 +108,7 @@ export class PageStreamer<Words> {
 
   /** Fetches the most needed missing pages, up to the limits. */
   sendForMore(): void {
-    while (!this.#isClosed && this.#fetching.size < MAX_FETCHES && this.#slotsUnderWay < MAX_IN_FLIGHT) {
+    while (!this.#isClosed && this.#fetching.size < MAX_FETCHES && this.#bytes < MAX_TRANSIT_BYTES) {
       const page = this.#residency.nextMissing();
       if (page === NONE) return;
       if (!this.#failures.isPaused(page) && this.#residency.begin(page)) void this.#bring(page);
@@ -167,10 +174,14 @@ export class PageStreamer<Words> {
 
   /** Ends the transit of a page. @returns The time of its request. */
   #takeSent(page: number): number {
-    const { at, slots } = this.#sent.get(page)!;
+    const { at, bytes } = this.#sent.get(page)!;
     this.#sent.delete(page);
-    this.#slotsUnderWay -= slots;
+    this.#bytes -= bytes;
     return at;
+  }
+
+  #wordBytes(page: number): number {
+    return this.#options.slotBytes * this.#residency.slotsFor(page);
   }
 
   #noteArrival(page: number): void {
@@ -190,14 +201,18 @@ export class PageStreamer<Words> {
   async #bring(page: number): Promise<void> {
     const controller = new AbortController();
     this.#fetching.set(page, controller);
-    this.#sent.set(page, { at: this.#now(), slots: this.#residency.slotsFor(page) });
-    this.#slotsUnderWay += this.#residency.slotsFor(page);
+    const sent = { at: this.#now(), bytes: 2 * this.#wordBytes(page) };
+    this.#sent.set(page, sent);
+    this.#bytes += sent.bytes;
     // A canceled page may have been requested again meanwhile, which is a separate fetch.
     const isOver = (): boolean => this.#fetching.get(page) !== controller;
     try {
       const words = await this.#options.fetch(page, controller.signal);
       if (isOver()) return;
       this.#waiting.set(page, words);
+      // The file is no longer needed, and the number of slots may have been a guess.
+      this.#bytes += this.#wordBytes(page) - sent.bytes;
+      sent.bytes = this.#wordBytes(page);
       this.#order = undefined;
       this.#failures.succeed(page);
     } catch (error) {

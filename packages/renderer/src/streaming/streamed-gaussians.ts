@@ -140,7 +140,9 @@ export class StreamedGaussians extends SceneBuffers {
     });
     this.blocks = this.#pool.pages;
     this.#residency = new Residency(list, slots, source.isCached);
+    this.#slotBytes = slotBytes(scene);
     this.#traffic = new PageStreamer(this.#residency, {
+      slotBytes: this.#slotBytes,
       fetch: async (page, signal) => {
         const words = await source.fetch(page, signal);
         signal.throwIfAborted();
@@ -150,7 +152,6 @@ export class StreamedGaussians extends SceneBuffers {
       onError: (error) => this.#options.onError?.(error),
     });
     this.#rows = new TranslatedRows(list, this.#residency, scene);
-    this.#slotBytes = slotBytes(scene);
     this.#arrivals = new PageFadeIn(list, options.arrivalMs ?? ARRIVAL_MS, (page, arrived) =>
       this.#rows.setArrived(page, arrived),
     );

@@ -83,6 +83,7 @@ export class GlStream {
     this.gaussians = run(() => new GlGaussians(gl, { ...scene, count: SLOT_SPLATS * slots, droppedCount: 0 }));
     this.#residency = new Residency(list, slots, source.isCached);
     this.#traffic = new PageStreamer(this.#residency, {
+      slotBytes: 4 * SLOT_CHUNKS * chunkLayout(scene).total,
       fetch: source.fetch,
       onArrival: () => onChange?.(),
       onError: (reason) => onError?.(reason),
