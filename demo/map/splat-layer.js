@@ -53,7 +53,7 @@ export class SplatLayer {
    * @param lngLat place of the scene; by default that of its file, if that has earth-centered coordinates (3D Tiles)
    * @param metersPerUnit length of a unit of the scene's file
    * @param maxSplats of a streamed scene on the GPU; default: one million
-   * @param detail maximum error of a streamed scene, pixels
+   * @param detail maximum error of a streamed scene, pixels; up to four times as much while frames are late
    * @param worker that sorts the splats, in place of the main thread: see `GlHostOptions`
    */
   constructor({ id, src, lngLat, altitude = 0, metersPerUnit = 1, maxSplats, detail = 1, worker }) {
@@ -71,7 +71,10 @@ export class SplatLayer {
 
   onAdd(map, gl) {
     this.map = map;
-    this.host = new GlHost(gl);
+    // Layers of the style decide the range of depth; reading it in each frame would wait for the GPU process.
+    map.on('styledata', (this.forget = () => (this.depthRange = undefined)));
+    // MapLibre sets its own state after a custom layer.
+    this.host = new GlHost(gl, { restores: false });
     this.loaded = this.load().catch((error) => map.fire('error', { error }));
   }
 
@@ -94,7 +97,7 @@ export class SplatLayer {
 
   async stream() {
     const { maxSplats, worker, host, map } = this;
-    const { source } = await openPages(this.src);
+    const { source } = await openPages(this.src, { isExact: true });
     this.placement ??= placementOnEarth(source.scene.origin);
     const onError = (error) => map.fire('error', { error });
     const local = { ...source, scene: { ...source.scene, origin: [0, 0, 0] } };
@@ -108,10 +111,19 @@ export class SplatLayer {
     const { drawingBufferWidth: width, drawingBufferHeight: height } = gl;
     const camera = cameraFromClip(matrix, { width, height, clipDepth: '-1..1' });
     const framebuffer = gl.getParameter(gl.FRAMEBUFFER_BINDING);
-    if (!this.splats.draw(camera, { framebuffer }, { detail: this.detail })) this.map.triggerRepaint();
+    this.depthRange ??= [...gl.getParameter(gl.DEPTH_RANGE)];
+    if (
+      !this.splats.draw(
+        camera,
+        { framebuffer, depthRange: this.depthRange },
+        { detail: this.detail, frameMs: 1000 / 60 },
+      )
+    )
+      this.map.triggerRepaint();
   }
 
   onRemove() {
+    this.map.off('styledata', this.forget);
     this.splats?.destroy();
     this.host.destroy();
     this.splats = this.host = undefined;

@@ -12,6 +12,11 @@ export interface PagesRequest {
   /** Mode of fetch for cookies. Default: `same-origin`. */
   readonly credentials?: RequestCredentials;
   readonly limits?: SceneLimits;
+  /**
+   * Whether workers pack 3D Tiles, LCC and RAD in float32, as WebGL draws them, so that no page is unpacked on the main
+   * thread. Their pages take more memory. Default: false.
+   */
+  readonly isExact?: boolean;
   /** Called with warnings about content that is not drawn. */
   readonly onWarning?: (error: unknown) => void;
 }
@@ -24,10 +29,10 @@ let loader: SceneLoader | undefined;
  * `signal`.
  */
 export async function openPages(src: string | URL, options: PagesRequest = {}): Promise<OpenedPages> {
-  const { signal = new AbortController().signal, credentials = 'same-origin', limits, onWarning } = options;
+  const { signal = new AbortController().signal, credentials = 'same-origin', limits, isExact, onWarning } = options;
   loader ??= new SceneLoader();
   const { href: url } = new URL(src, document.baseURI);
-  const request = { url, credentials, limits, sh: 'auto' } as const;
+  const request = { url, credentials, limits, isExact, sh: 'auto' } as const;
   const opened = await open(request, { loader, signal, onProgress: () => undefined, onError: onWarning });
   if (opened) return opened;
   throw new GaussianSplatError('decode/unsupported', {

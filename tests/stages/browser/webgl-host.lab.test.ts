@@ -32,6 +32,23 @@ const cameraOf = ({ worldToCamera: m }: Camera, origin: readonly number[]): Floa
     i % 4 === 3 && i < 12 ? value + [0, 1, 2].reduce((sum, k) => sum + m[i - 3 + k] * origin[k], 0) : value,
   );
 
+/** Parameters of a context that a call reads, except for constants. */
+function queriesOf(gl: WebGL2RenderingContext, call: () => void): string[] {
+  const names: string[] = [];
+  const nameOf = (value: unknown): string =>
+    Object.keys(WebGL2RenderingContext).find(
+      (name) => (WebGL2RenderingContext as unknown as Record<string, unknown>)[name] === value,
+    ) ?? String(value);
+  const read = ['getParameter', 'getIndexedParameter', 'isEnabled', 'getError', 'getFramebufferAttachmentParameter'];
+  for (const name of read) {
+    const own = (gl as unknown as Record<string, (...all: unknown[]) => unknown>)[name];
+    Object.assign(gl, { [name]: (...all: unknown[]) => (names.push(nameOf(all[0])), own.apply(gl, all)) });
+  }
+  call();
+  for (const name of read) delete (gl as unknown as Record<string, unknown>)[name];
+  return names.filter((name) => name !== 'MAX_TEXTURE_SIZE');
+}
+
 /** Bytes of a rectangle of a host's canvas, from its upper row on. */
 function read(gl: WebGL2RenderingContext, x: number, y: number, { width, height }: Camera): Uint8Array {
   const bytes = new Uint8Array(4 * width * height);
@@ -347,30 +364,35 @@ describe("splats in a host's frame", () => {
       isComplete: true,
     };
     const fetched: number[] = [];
-    const source = (): PageSource =>
-      treeSource(opened, async ({ own }, above) => {
-        fetched.push(own.length);
-        const finest = { cloud: pick(whole, own), volumes: [], isAdded: false, error: 0 };
-        return Promise.resolve({ ...packNodes([finest], scene, above), found: [] });
+    const source = (isExact = false): PageSource => {
+      const own: StreamedScene = isExact ? { ...scene, geometry: undefined } : scene;
+      const first = isExact ? packNodes([content], own) : opened.first;
+      return treeSource({ ...opened, scene: own, first }, async ({ own: indices }, above) => {
+        fetched.push(indices.length);
+        const finest = { cloud: pick(whole, indices), volumes: [], isAdded: false, error: 0 };
+        return Promise.resolve({ ...packNodes([finest], own, above), found: [] });
       });
+    };
     const at = { ...camera, worldToCamera: cameraOf(camera, cloud.origin) };
     const expected = await alone(whole, at, 0);
     const worker = new Worker(URL.createObjectURL(new Blob([SORTER], { type: 'text/javascript' })), { type: 'module' });
     const found: number[] = [];
-    for (const options of [{}, { worker }, { maxSplats: 1024 * (Math.ceil(coarse.count / 1024) + 4) }]) {
+    const maxSplats = 1024 * (Math.ceil(coarse.count / 1024) + 4);
+    for (const { isExact, ...options } of [{}, { worker }, { maxSplats }, { worker, isExact: true }]) {
       fetched.length = 0;
       const gl = context(camera.width, camera.height, { antialias: false, depth: true });
-      const host = new GlHost(gl);
+      const host = new GlHost(gl, { restores: !isExact });
       let changes = 0;
-      const splats = await host.stream(source(), { ...options, onChange: () => void changes++ });
+      const splats = await host.stream(source(isExact), { ...options, onChange: () => void changes++ });
       const draw = (): boolean => {
         gl.clearColor(0, 0, 0, 1);
         gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
-        return splats.draw(at, { depth: null }, { detail: 0.01 });
+        return splats.draw(at, { depth: null, depthRange: [0, 1] }, { detail: 0.01 });
       };
       for (let calm = 0; calm < 5; await new Promise((resolve) => setTimeout(resolve, 60)))
         calm = draw() && splats.progress!.coming === 0 ? calm + 1 : 0;
       const image = read(gl, 0, 0, camera);
+      if (isExact) assertEqual(queriesOf(gl, draw).join(), '', 'queries of the state, which wait for the GPU process');
       const sum = image.reduce((total, value, i) => total + (value - expected[i]) ** 2, 0);
       found.push(10 * Math.log10(255 ** 2 / (sum / image.length)));
       const { limit, resident, bytes } = splats.progress!;
@@ -385,7 +407,36 @@ describe("splats in a host's frame", () => {
     }
     worker.terminate();
     console.log(`streamed in a host: ${found.map((value) => value.toFixed(1)).join(', ')} dB`);
-    assert(found[0] > 50 && found[1] > 50 && found[2] < found[0] && found[2] > 12, found.join(' '));
+    assert(found[0] > 50 && found[1] > 50 && found[3] > 50, found.join(' '));
+    assert(found[2] < found[0] && found[2] > 12, found.join(' '));
+  });
+
+  it('of a streamed scene are coarser while late frames move, and as fine as asked at rest', async () => {
+    const gl = context(WIDTH, WIDTH, { antialias: false, depth: true });
+    const host = new GlHost(gl);
+    const whole = { ...cloud, origin: [0, 0, 0] as const };
+    const { shDegree, antialiased } = whole;
+    const bounds = { min: [-1, -1, -1], max: [1, 1, 1], center: [0, 0, 0], radius: 1 } as const;
+    const format = { shDegree, shPrecision: 'float16', geometry: 'quantized', antialiased } as const;
+    const scene: StreamedScene = { ...format, splats: cloud.count, origin: [0, 0, 0], bounds };
+    const first = packNodes([{ cloud: whole, volumes: [], isAdded: false, error: 0 }], scene);
+    const never = (): Promise<never> => Promise.reject(new Error('no node below'));
+    const splats = await host.stream(treeSource({ scene, first, children: [], isComplete: true }, never));
+    const at = { ...camera, worldToCamera: cameraOf(camera, cloud.origin) };
+    const errors = (count: number, step: number, frameMs: number): number[] =>
+      Array.from({ length: count }, (_, k) => {
+        const moved = Float64Array.from(at.worldToCamera, (value, i) => value + (i === 3 ? step * k : 0));
+        splats.draw({ ...at, worldToCamera: moved }, { depth: null }, { detail: 2, frameMs });
+        return splats.progress!.budgetError;
+      });
+    assertEqual(Math.max(...errors(5, 1e-3, 1e6)), 0, 'in time');
+    // No frame takes less than this.
+    const late = errors(40, 1e-3, 1e-6);
+    assert(late[3] > 2 && late.at(-1)! > 7.9 && late.at(-1)! <= 8, `up to four times the error: ${late.join(' ')}`);
+    const still = errors(300, 0, 1e-6);
+    assert(still.at(-1)! < 0.8 * still[1], `${still[1]} and ${still.at(-1)} at rest`);
+    splats.destroy();
+    host.destroy();
   });
 
   it('with levels of detail are those of the scene, or as near as the pixels that they may be off', async () => {

@@ -45,6 +45,8 @@ export interface SceneRequest extends FileRequest {
   readonly downloaded?: Blob | undefined;
   /** Renderer of the scene; default: WebGPU. */
   readonly renderer?: RendererChoice;
+  /** Whether nodes of a tree are packed in float32, as WebGL draws them; default: quantized. */
+  readonly isExact?: boolean | undefined;
   /** Whether a streamed SOG scene is loaded completely, in its finest level. */
   readonly isWhole?: boolean;
   /**

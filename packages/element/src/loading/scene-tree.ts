@@ -87,7 +87,7 @@ export async function openTree(
   signal: AbortSignal,
   { onProgress }: Pick<TaskListeners, 'onProgress'>,
 ): Promise<LoadedTree | undefined> {
-  const { url, credentials, sh } = request;
+  const { url, credentials, sh, isExact } = request;
   const name = fileName(url);
   const limits = limitsFrom({ limits: { ...request.limits, maxSplats: undefined } });
   const progress = new ProgressSum(throttled(onProgress), true);
@@ -106,7 +106,7 @@ export async function openTree(
     if (!tree) return undefined;
     const nodes = await readFirst(tree, files);
     const clouds = nodes.flatMap(([, { cloud }]) => cloud ?? []);
-    const scene = sceneOf(clouds, tree, { sh, name, budget });
+    const scene = sceneOf(clouds, tree, { sh, isExact, name, budget });
     const first = await packed(nodes, scene, files);
     const children = nodes.flatMap(childrenOf);
     const { container, facts, isComplete, splats } = tree;
@@ -187,7 +187,7 @@ async function packed(
 function sceneOf(
   clouds: readonly GaussianCloud[],
   { roots: [root], up }: SceneTree,
-  { sh, ...account }: Pick<SceneRequest, 'sh'> & Pick<TreeFiles, 'budget' | 'name'>,
+  { sh, isExact, ...account }: Pick<SceneRequest, 'sh' | 'isExact'> & Pick<TreeFiles, 'budget' | 'name'>,
 ): StreamedScene {
   const merged = mergeClouds(
     clouds.map((cloud) => ({ cloud, first: 0, count: cloud.count })),
@@ -201,7 +201,8 @@ function sceneOf(
   const isEmpty = usable.length === 0;
   const bounds = isEmpty ? { min: center, max: center, center, radius: root.volume?.[12] ?? 1 } : boundsOf(whole);
   return {
-    ...{ shDegree, antialiased, filterVariance, order: hints?.order, geometry: 'quantized', splats: whole.count },
+    ...{ shDegree, antialiased, filterVariance, order: hints?.order, splats: whole.count },
+    geometry: isExact ? undefined : 'quantized',
     shPrecision: sh === 'auto' ? choosePrecision(noiseIn(whole, usable), usable.length) : sh,
     origin: isEmpty ? center : whole.origin,
     // The page takes the vertical axis from the bounds, as for files.

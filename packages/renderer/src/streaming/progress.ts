@@ -16,8 +16,8 @@ export interface StreamProgress {
    */
   readonly error: number;
   /**
-   * Error threshold in pixels that keeps the view within the splat budget, as in `FrameStats`; 0 if all splats fit, and
-   * in WebGL.
+   * Error threshold in pixels that keeps the view within the splat budget, as in `FrameStats`, or in WebGL the time of
+   * frames; 0 if all splats fit.
    */
   readonly budgetError: number;
   /**

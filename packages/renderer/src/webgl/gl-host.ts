@@ -3,6 +3,7 @@ import { deviceReading, type DepthPlanes } from '../depth-reading.js';
 import { constants } from '../generated/shaders.js';
 import { DETAIL_NUMBERS, DETAIL_PLACES, ENDLESS } from '../levels/chunk-detail.js';
 import { pickedSurface, placeOfSurface, surfacePoints, type PickedPlace } from '../picked-surface.js';
+import { FrameDetail } from './frame-detail.js';
 import { GlProgram, makeTarget, makeTexture, requireMemory } from './gl.js';
 import type { PackedGaussians } from '../pack/pack.js';
 import { GlGaussians, positionsIn, type RunGl } from './gl-gaussians.js';
@@ -18,7 +19,7 @@ import {
   type GlQuads,
   type GlQuadsFrame,
 } from './gl-renderer.js';
-import { borrowState } from './gl-state.js';
+import { borrowState, setState } from './gl-state.js';
 import { DATA_WIDTH, hostedQuadsFragment, hostedQuadsVertex, HostedView } from './shaders.js';
 import type { SortAnswer, SortRequest } from './sort-splats.js';
 import { isSameView, orderView, SplatOrder, type OrderView } from './splat-order.js';
@@ -36,6 +37,8 @@ export interface GlHostFrame extends Omit<GlFrameTarget, 'keeps'>, DepthPlanes {
    * the rectangle. Null: no depth.
    */
   readonly depth?: 'framebuffer' | WebGLTexture | null | undefined;
+  /** `DEPTH_RANGE` of the host's objects. Default: that of the context, a query that waits for the GPU process. */
+  readonly depthRange?: readonly [near: number, far: number] | undefined;
 }
 
 export interface GlHostOptions {
@@ -81,8 +84,16 @@ export class GlHost {
   #program: GlProgram<typeof HostedView> | undefined;
   #copy: DepthCopy | undefined;
 
-  constructor(gl: WebGL2RenderingContext) {
+  readonly #restores: boolean;
+
+  /**
+   * @param options `restores`: whether frames restore the state of the context. Default: true. Set it to false for a host
+   * that sets its own state after each call, as MapLibre does after a custom layer: reading the state makes the thread
+   * wait for the GPU process.
+   */
+  constructor(gl: WebGL2RenderingContext, { restores = true }: { readonly restores?: boolean } = {}) {
     this.#gl = gl;
+    this.#restores = restores;
   }
 
   /** Runs calls of the renderer or of WebGL, and then restores the state of the context. */
@@ -98,11 +109,14 @@ export class GlHost {
   /**
    * Draws the splats of a renderer over the host's frame.
    * @param request Image to draw, with the host's camera: see `cameraFromProjection`, with `clipDepth: '-1..1'`.
+   * @param before Called first, with the state that the renderer assumes.
    * @throws GaussianSplatError `argument/value` for a framebuffer whose depth cannot be copied; errors of
    * `GlRenderer.render`.
    */
-  draw(renderer: GlRenderer, request: GlFrameRequest, frame: GlHostFrame = {}): void {
-    this.run(() => {
+  draw(renderer: GlRenderer, request: GlFrameRequest, frame: GlHostFrame = {}, before?: () => void): void {
+    const run: RunGl = this.#restores ? this.run : (work) => (setState(this.#gl), work());
+    run(() => {
+      before?.();
       const { depth = 'framebuffer' } = frame;
       const texture = depth === 'framebuffer' ? this.#copyDepth(request, frame) : depth;
       renderer.render(request, texture === null ? undefined : this.#quads({ texture, frame, request }));
@@ -186,7 +200,7 @@ export class GlHost {
       use({ camera, count, textures }: GlQuadsFrame): void {
         const values = {
           ...{ viewport: [camera.width, camera.height], count },
-          ...deviceReading(frame, whole, gl.getParameter(gl.DEPTH_RANGE) as [number, number]),
+          ...deviceReading(frame, whole, frame.depthRange ?? (gl.getParameter(gl.DEPTH_RANGE) as [number, number])),
           scale: [whole.width / camera.width, whole.height / camera.height],
           corner: [x, y + whole.height],
         };
@@ -253,6 +267,11 @@ interface HostedScene {
 export interface GlHostDrawing extends Partial<Omit<GlFrameRequest, 'camera' | 'cameras'>> {
   /** Maximum error of levels of detail, pixels; 0 draws the finest level. Default: 0, and 1 for a streamed scene. */
   readonly detail?: number;
+  /**
+   * Milliseconds between frames to keep while the camera moves: `detail` rises to at most four times itself while they
+   * take longer, and falls when they do not. Default: none.
+   */
+  readonly frameMs?: number;
 }
 
 /** One scene, or several in one order, in the frames of a host. */
@@ -266,9 +285,14 @@ export class HostedSplats {
   /** Empty while the worker has it. */
   #order: Uint32Array<ArrayBuffer>;
   #sorted: readonly OrderView[] | undefined;
+  /** Number of splats in an order that the next frame uploads: a task of its own would wait for the GPU process. */
+  #arrived: number | undefined;
   #sortedAt = -Infinity;
   #sortMs = 0;
   #cameras: readonly Camera[] | undefined;
+  readonly #frameDetail = new FrameDetail();
+  /** Error in pixels that the time of frames allows; 0 if it is the wanted one. */
+  #budgetError = 0;
 
   /** @internal */
   constructor(
@@ -292,7 +316,7 @@ export class HostedSplats {
 
   /** Resident pages of a streamed scene, and what limits them; undefined for other scenes. */
   get progress(): StreamProgress | undefined {
-    return this.#stream?.progress;
+    return this.#stream && { ...this.#stream.progress, budgetError: this.#budgetError };
   }
 
   /**
@@ -304,16 +328,22 @@ export class HostedSplats {
    * depth cannot be copied; `out-of-memory/allocation` if the device has too little memory.
    */
   draw(given: Camera | readonly Camera[], frame?: GlHostFrame, drawing: GlHostDrawing = {}): boolean {
-    const { detail = this.#stream ? 1 : 0, ...how } = drawing;
+    const { detail: wanted = this.#stream ? 1 : 0, frameMs = Infinity, ...how } = drawing;
     const cameras = [given].flat();
     if (cameras.length !== this.#scenes.length) throw wrongCameras(this.#scenes.length, cameras.length);
     for (const camera of cameras) validateCamera(camera);
-    const isSorted = this.#sort(cameras, detail);
+    const isMoving = !cameras.every((camera, k) => isSamePose(camera, this.#cameras?.[k]));
+    const factor = frameMs < Infinity ? this.#frameDetail.next(performance.now(), frameMs, isMoving) : 1;
+    const detail = factor * wanted;
+    this.#budgetError = factor > 1 ? detail : 0;
+    const isHere = this.#sorter instanceof SplatOrder;
+    const isSortedHere = isHere && this.#sort(cameras, detail);
     const camera = cameras[0];
     const request = { camera, cameras, accumulation: 'rgba16float', shDegree: 3, resolutionScale: 1, ...how } as const;
-    this.#host.draw(this.#renderer, request, frame);
+    this.#host.draw(this.#renderer, request, frame, this.#upload);
     this.#cameras = cameras;
-    return isSorted;
+    // The frame has uploaded the order of the worker, which gets its buffer again.
+    return isHere ? isSortedHere : this.#sort(cameras, detail);
   }
 
   /**
@@ -369,13 +399,20 @@ export class HostedSplats {
   }
 
   #take(view: readonly OrderView[], count: number): void {
-    this.#host.run(() => {
-      if (this.#stream?.write()) this.#renderer.splatsChanged();
-      this.#renderer.setOrder(this.#order, count);
-    });
+    this.#arrived = count;
     this.#sorted = view;
   }
+
+  readonly #upload = (): void => {
+    if (this.#arrived === undefined) return;
+    if (this.#stream?.write()) this.#renderer.splatsChanged();
+    this.#renderer.setOrder(this.#order, this.#arrived);
+    this.#arrived = undefined;
+  };
 }
+
+const isSamePose = (a: Camera, b: Camera | undefined): boolean =>
+  b !== undefined && a.worldToCamera.every((value, k) => value === b.worldToCamera[k]);
 
 const NO_ORDER = new Uint32Array(0);
 

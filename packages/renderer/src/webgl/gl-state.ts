@@ -28,6 +28,18 @@ const PIXEL_STORE = {
   PACK_SKIP_ROWS: 0,
 } as const;
 
+/** Sets the state that the renderer assumes, without reading any. */
+export function setState(gl: WebGL2RenderingContext): void {
+  for (const name of ENABLED) gl.disable(gl[name]);
+  for (const [name, value] of Object.entries(PIXEL_STORE)) gl.pixelStorei(gl[name as keyof typeof PIXEL_STORE], value);
+  for (let i = 0; i < UNITS; i++) gl.bindSampler(i, null);
+  gl.bindBuffer(gl.PIXEL_UNPACK_BUFFER, null);
+  gl.bindBuffer(gl.PIXEL_PACK_BUFFER, null);
+  gl.bindVertexArray(null);
+  gl.colorMask(true, true, true, true);
+  gl.blendEquation(gl.FUNC_ADD);
+}
+
 /**
  * Saves the state of a context that other code also uses, and sets the state that the renderer assumes.
  * @returns A function that restores the saved state.
@@ -35,9 +47,9 @@ const PIXEL_STORE = {
 export function borrowState(gl: WebGL2RenderingContext): () => void {
   const get = (name: GLenum): never => gl.getParameter(name) as never;
   const enabled = ENABLED.map((name) => [gl[name], gl.isEnabled(gl[name])] as const);
-  const stored = Object.entries(PIXEL_STORE).map(([name, value]) => {
+  const stored = Object.keys(PIXEL_STORE).map((name) => {
     const key = gl[name as keyof typeof PIXEL_STORE];
-    return [key, get(key) as number | boolean, value] as const;
+    return [key, get(key) as number | boolean] as const;
   });
   const unit = get(gl.ACTIVE_TEXTURE) as GLenum;
   const textures = Array.from({ length: UNITS }, (_, i) => {
@@ -57,15 +69,7 @@ export function borrowState(gl: WebGL2RenderingContext): () => void {
   const equations = [get(gl.BLEND_EQUATION_RGB), get(gl.BLEND_EQUATION_ALPHA)] as const;
   const factors = [gl.BLEND_SRC_RGB, gl.BLEND_DST_RGB, gl.BLEND_SRC_ALPHA, gl.BLEND_DST_ALPHA].map(get);
 
-  for (const [name] of enabled) gl.disable(name);
-  for (const [name, , value] of stored) gl.pixelStorei(name, value);
-  textures.forEach((_, i) => gl.bindSampler(i, null));
-  gl.bindBuffer(gl.PIXEL_UNPACK_BUFFER, null);
-  gl.bindBuffer(gl.PIXEL_PACK_BUFFER, null);
-  gl.bindVertexArray(null);
-  gl.colorMask(true, true, true, true);
-  gl.blendEquation(gl.FUNC_ADD);
-
+  setState(gl);
   return () => {
     for (const [name, was] of enabled) gl[was ? 'enable' : 'disable'](name);
     for (const [name, was] of stored) gl.pixelStorei(name, was);

@@ -9,7 +9,7 @@ import { ARRIVED } from '../streaming/page-rows.js';
 import { childrenIn, NONE } from '../streaming/page-list.js';
 import type { PageSource } from '../streaming/page-source.js';
 import { PageStreamer } from '../streaming/page-streamer.js';
-import { PageUnpacker, UNPACKED_AT_ONCE, type UnpackedPage } from '../streaming/page-unpacker.js';
+import { EXACT, PageUnpacker, UNPACKED_AT_ONCE, type UnpackedPage } from '../streaming/page-unpacker.js';
 import { turn } from '../gpu/page-thread.js';
 import { progressOf, type StreamProgress } from '../streaming/progress.js';
 import { Residency } from '../streaming/residency.js';
@@ -88,7 +88,7 @@ export class GlStream {
       onArrival: () => onChange?.(),
       onError: (reason) => onError?.(reason),
     });
-    this.#unpacker = new PageUnpacker(() => this.#traffic.next(), this.#unpack);
+    this.#unpacker = new PageUnpacker(() => this.#traffic.next(), this.#unpack, scene.geometry ? 1 : EXACT);
     this.#rows = new TranslatedRows(list, this.#residency, scene);
     this.#details = new Float32Array(DETAIL_NUMBERS * SLOT_CHUNKS * slots);
   }
