@@ -64,6 +64,12 @@ export const COMMANDS = {
     smallest: ['{detail}', '64', '20'],
   },
   firefox: { what: 'element and site in Firefox', command: [SOCKETS, QUIET, 'scripts/firefox.mjs'] },
+  flight: {
+    what: 'a flight over a streamed tileset: error, late frames, requests',
+    in: 'chromium',
+    command: [...TSX, 'scripts/flight/run-flight.mjs'],
+    smallest: ['--blocks', '1', '--frames', '4', '--warm', '2', '--size', '96x54', '--megabytes', '60'],
+  },
   frontier: {
     what: 'speed against accuracy on this GPU',
     in: 'chromium',

@@ -188,7 +188,7 @@ test('pages in transit are bounded in bytes: of their words, twice while they ar
   const bytesOf = (pages: Iterable<number>): number =>
     [...pages].reduce((sum, page) => sum + slotBytes * list.slots[page], 0);
   const largest = 2 * slotBytes * Math.max(...sizes.subarray(1));
-  let [most, seen] = [0, 0];
+  let [fullest, seen] = [0, 0];
   for (let round = 0; round < 600 && residency.slots.count < list.count; round++) {
     const before = fetching.size;
     residency.note(
@@ -202,7 +202,7 @@ test('pages in transit are bounded in bytes: of their words, twice while they ar
     const bytes = 2 * bytesOf(fetching.keys()) + bytesOf(waiting);
     assert.equal(traffic.bytes, bytes);
     if (fetching.size > before) assert.ok(bytes < MAX_TRANSIT_BYTES + largest, `${bytes} bytes`);
-    [most, seen] = [Math.max(most, bytes), Math.max(seen, fetching.size + waiting.size)];
+    [fullest, seen] = [Math.max(fullest, bytes), Math.max(seen, fetching.size + waiting.size)];
     // Pages arrive faster than they are uploaded.
     for (const [page, arrive] of [...fetching].slice(0, 3)) {
       arrive();
@@ -213,8 +213,8 @@ test('pages in transit are bounded in bytes: of their words, twice while they ar
     const next = traffic.next();
     if (next !== undefined && residency.settle(next.page)) waiting.delete(next.page);
   }
-  console.log(`up to ${seen} pages and ${most / 1e6} MB in transit`);
-  assert.ok(most >= MAX_TRANSIT_BYTES, 'the limit is used');
+  console.log(`up to ${seen} pages and ${fullest / 1e6} MB in transit`);
+  assert.ok(fullest >= MAX_TRANSIT_BYTES, 'the limit is used');
   assert.equal(residency.slots.count, list.count);
   assert.equal(traffic.underWay, 0);
   assert.equal(traffic.bytes, 0);
