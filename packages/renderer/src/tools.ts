@@ -60,6 +60,7 @@ export { packNodes, type NodeContent, type NodePage, type RunError } from './str
 export { MAX_UNPACKED, PageUnpacker, UNPACKED_AT_ONCE } from './streaming/page-unpacker.js';
 export { folderSource, type FetchPage } from './streaming/page-source.js';
 export { treeSource, type FetchedNode, type OpenedTree } from './streaming/tree-source.js';
+export { hasMemory } from './gpu/has-memory.js';
 export { readPacked } from './pack/packed-scene.js';
 export type { PackedGaussians, PackedHead, PackOptions } from './pack/pack.js';
 export { sceneBytes, type PackedPortion } from './gaussian-buffers.js';

@@ -158,6 +158,34 @@ describe('a streamed scene', () => {
     }
   });
 
+  itInLab('has less memory and coarser levels on a device that refuses more', async () => {
+    claimComing(/too little memory for .* of pages/);
+    const { stop } = await serve('/net/kept/little/');
+    const { createBuffer } = GPUDevice.prototype;
+    // Beside a large buffer of pages the device must also allocate 200 GB.
+    const pools: number[] = [];
+    GPUDevice.prototype.createBuffer = function (descriptor) {
+      const isPool = descriptor.label === 'gs.pool.geometry';
+      if (isPool) pools.push(descriptor.size);
+      if (isPool && descriptor.size > pools[0] / 3)
+        this.createTexture({ size: [8192, 8192, 200], format: 'rgba32float', usage: GPUTextureUsage.COPY_DST });
+      return createBuffer.call(this, descriptor);
+    };
+    const element = show({ src: '/net/kept/little/detail.json', 'camera-orbit': '200deg 80deg 1m' });
+    await element.ready;
+    GPUDevice.prototype.createBuffer = createBuffer;
+    assert(element.loaded && element.error === null, `loaded: ${element.error?.message}`);
+    assert(pools.length > 2 && pools.at(-1)! <= pools[0] / 3, `pools of ${pools.join(' ')} bytes`);
+    await until(() => element.stats!.streamed[0].limit === 'memory', 'pages in all of the memory');
+    const { warnings, reasons } = element.stats!;
+    assert(
+      /too little memory/.test(warnings.join()) && /is full/.test(reasons.join()),
+      [...warnings, ...reasons].join(),
+    );
+    await close(element);
+    stop();
+  });
+
   it('stays visible if a page is missing, and fails with a name if the first is', async () => {
     const warned: string[] = [];
     const original = console.warn;

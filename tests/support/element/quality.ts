@@ -18,4 +18,4 @@ export {
   waitForRest,
   type QualityState,
 } from '../../../packages/element/src/dynamic-quality/start.js';
-export { type BudgetedScene } from '../../../packages/element/src/dynamic-quality/splat-budgets.js';
+export { SplatBudgets, type BudgetedScene } from '../../../packages/element/src/dynamic-quality/splat-budgets.js';

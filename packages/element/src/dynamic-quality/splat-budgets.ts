@@ -1,6 +1,6 @@
 /** Splat budgets of streamed scenes, which follow the headroom of frames. */
 import type { MemoryLedger, StreamProgress } from '@gaussian-splat/renderer';
-import { budgetBytes, type Reservation } from '@gaussian-splat/renderer/tools';
+import { budgetBytes, hasMemory, type Reservation } from '@gaussian-splat/renderer/tools';
 import type { LodSettings } from '../gpu/backend.js';
 import { AIM, LONGER, LONGEST_HOLD_MS } from './next-quality.js';
 import { HOLD_MS } from './start.js';
@@ -12,7 +12,7 @@ const SHARE_OF_REST = 0.5;
 
 /** The streamed scene whose budget changes. */
 export interface BudgetedScene {
-  readonly place: { readonly memory: MemoryLedger };
+  readonly place: { readonly memory: MemoryLedger; readonly context?: GPUDevice | WebGL2RenderingContext };
   readonly gaussians: { readonly progress?: Pick<StreamProgress, 'error' | 'budgetError'> };
   readonly detail: LodSettings;
   setDetail(detail: LodSettings): void;
@@ -35,6 +35,10 @@ export class SplatBudgets {
   /** Scenes with a changed budget. */
   readonly #changed = new Set<BudgetedScene>();
   #reservation: Reservation | undefined;
+  /** Largest budget for which the device has memory, and the smallest one that it refuses, as far as they are known. */
+  #confirmed = 0;
+  #refused = Infinity;
+  #isAsking = false;
   #heldUntil = -Infinity;
   #grewAt = -Infinity;
   #hold = HOLD_MS;
@@ -51,7 +55,7 @@ export class SplatBudgets {
     const isLimited = ({ gaussians: { progress }, detail: { detail = 0 } }: BudgetedScene): boolean =>
       (progress?.budgetError ?? 0) > Math.max(detail, progress?.error ?? 0);
     const limited = this.#scenes().filter(isLimited);
-    if (limited.length === 0 || !this.#reserve(limited, factor)) return false;
+    if (limited.length === 0 || !this.#isConfirmed(limited, factor) || !this.#reserve(limited, factor)) return false;
     this.#grewAt = now;
     return this.#scale(limited, factor);
   }
@@ -72,6 +76,8 @@ export class SplatBudgets {
     this.#changed.clear();
     this.#reservation?.release();
     this.#reservation = undefined;
+    this.#confirmed = 0;
+    this.#refused = Infinity;
     this.#heldUntil = this.#grewAt = -Infinity;
     this.#hold = HOLD_MS;
   }
@@ -82,6 +88,27 @@ export class SplatBudgets {
       return setBudget(scene, scaled(scene, factor));
     });
     return isChanged.includes(true);
+  }
+
+  /**
+   * Returns whether the device has confirmed memory for the larger budgets, beside the present buffers, and asks it
+   * otherwise. After a refusal the budgets stay as they are.
+   */
+  #isConfirmed(scenes: readonly BudgetedScene[], factor: number): boolean {
+    const max = (step: number): number => Math.max(...scenes.map((scene) => scaled(scene, step)));
+    const { context } = scenes[0].place;
+    if (context === undefined || max(factor) <= this.#confirmed) return true;
+    const wanted = max(MAX_STEP);
+    if (!this.#isAsking && wanted < this.#refused) void this.#ask(context as GPUDevice, wanted);
+    return false;
+  }
+
+  async #ask(device: GPUDevice, splatBudget: number): Promise<void> {
+    this.#isAsking = true;
+    const hasRoom = await hasMemory(device, budgetBytes(splatBudget)).catch(() => false);
+    this.#isAsking = false;
+    if (hasRoom) this.#confirmed = splatBudget;
+    else this.#refused = splatBudget;
   }
 
   /** Reserves the memory of the larger budgets. @returns False if the memory budget of the page leaves too little. */

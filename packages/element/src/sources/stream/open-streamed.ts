@@ -1,6 +1,12 @@
 /** Opens streamed scenes on the GPU. */
-import type { Credits, TrainedOrder } from '@gaussian-splat/core';
-import { MemoryLedger, pickInitialVariants, StreamedGaussians, type PoolOptions } from '@gaussian-splat/renderer';
+import type { Credits, GaussianSplatError, TrainedOrder } from '@gaussian-splat/core';
+import {
+  MemoryLedger,
+  pickInitialVariants,
+  StreamedGaussians,
+  type PageSource,
+  type PoolOptions,
+} from '@gaussian-splat/renderer';
 import { maxSplatBudget } from '@gaussian-splat/renderer/tools';
 import type { SceneRequest } from '../../loading/protocol.js';
 import type { SceneBounds } from '../../viewer/camera/settings.js';
@@ -67,7 +73,7 @@ async function openStreamed(
   const opened = await openPages(request, { ...options, onError: pool.onError });
   if (!opened) return undefined;
   const { source, credits } = opened;
-  const gaussians = await StreamedGaussians.openSource(device, source, pool);
+  const gaussians = await openWithin(device, source, pool, warnings);
   const { bounds, order } = gaussians;
   const { maxSplats = Infinity } = request.limits ?? {};
   const splatBudget = Math.min(caps.splats, maxSplats);
@@ -78,6 +84,38 @@ async function openStreamed(
   gaussians.destroy();
   throw signal.reason;
 }
+
+/**
+ * Opens pages in as much memory as the device has: half as much after each refusal, which is added to the warnings. Levels
+ * are coarser then.
+ */
+async function openWithin(
+  device: GPUDevice,
+  source: PageSource,
+  pool: PoolOptions,
+  warnings: string[],
+): Promise<StreamedGaussians> {
+  const { memoryBudget: wanted = 0 } = pool;
+  let refusal: unknown;
+  for (let memoryBudget = wanted; ; memoryBudget /= 2) {
+    try {
+      const opened = await StreamedGaussians.openSource(device, source, { ...pool, memoryBudget });
+      if (refusal !== undefined) warnings.push(lessMemory(wanted, memoryBudget));
+      return opened;
+    } catch (error) {
+      const { code } = error as GaussianSplatError;
+      // The last halves have no room for the first page.
+      if (refusal !== undefined && code === 'out-of-memory/budget') throw refusal;
+      if (code !== 'out-of-memory/allocation' && code !== 'out-of-memory/buffer-limit') throw error;
+      refusal ??= error;
+    }
+  }
+}
+
+const lessMemory = (wanted: number, found: number): string =>
+  `The device has too little memory for ${inMegabytes(wanted)} of pages: the scene has ${inMegabytes(found)}, and coarser levels.`;
+
+const inMegabytes = (bytes: number): string => `${(bytes / 1e6).toFixed(1)} MB`;
 
 /** Opens a streamed scene; a file without levels as a whole. */
 export const open: OpenSource = async (request, options, acquiring) => {
