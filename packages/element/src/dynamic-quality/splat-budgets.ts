@@ -63,10 +63,10 @@ export class SplatBudgets {
   /** Reduces enlarged budgets to what the time allows. @returns Whether a budget has changed. */
   shrink({ now, milliseconds, targetMs }: FrameTime): boolean {
     if (!this.#scale([...this.#changed], Math.min(1, (AIM * targetMs) / milliseconds))) return false;
-    // A step that must be undone at once is not repeated soon.
-    const isOscillation = now - this.#grewAt < HOLD_MS;
-    this.#hold = isOscillation ? Math.min(LONGEST_HOLD_MS, LONGER * this.#hold) : HOLD_MS;
+    // A step that must be undone at once, more than once, is not repeated soon. Arriving pages may slow single frames.
+    if (now - this.#grewAt >= HOLD_MS) this.#hold = HOLD_MS;
     this.#heldUntil = now + this.#hold;
+    this.#hold = Math.min(LONGEST_HOLD_MS, LONGER * this.#hold);
     return true;
   }
 

@@ -1,12 +1,12 @@
 /** Pages of a streamed scene in the textures of WebGL, chosen on the CPU. */
-import { GaussianSplatError, length, type Camera, type Vector3 } from '@gaussian-splat/core';
+import { GaussianSplatError, type Camera, type Vector3 } from '@gaussian-splat/core';
 import { constants } from '../generated/shaders.js';
 import { DETAIL_NUMBERS, DETAIL_PLACES } from '../levels/chunk-detail.js';
 import { aheadMs, CameraMotion } from '../streaming/camera-motion.js';
 import { exactGeometry } from '../streaming/exact-slot.js';
 import { SLOT_CHUNKS } from '../streaming/manifest.js';
 import { ARRIVED } from '../streaming/page-rows.js';
-import { childrenIn, NONE } from '../streaming/page-list.js';
+import { NONE } from '../streaming/page-list.js';
 import type { PageSource } from '../streaming/page-source.js';
 import { PageStreamer } from '../streaming/page-streamer.js';
 import { EXACT, PageUnpacker, UNPACKED_AT_ONCE, type UnpackedPage } from '../streaming/page-unpacker.js';
@@ -181,11 +181,21 @@ export class GlStream {
     return { positions, details };
   }
 
-  /** Uploads the splats of the last {@link take}. @returns Whether there were any. */
+  /**
+   * Uploads the splats of the last {@link take}: consecutive slots at once, because a call costs as much as thousands of
+   * splats. @returns Whether there were any.
+   */
   write(): boolean {
-    const writes = this.#writes;
+    const writes = this.#writes.sort((a, b) => a.first - b.first);
     this.#writes = [];
-    for (const { first, geometry, sh } of writes) this.gaussians.write(first, geometry, sh);
+    const full = SLOT_CHUNKS * chunkLayout(this.#source.scene).sh;
+    for (let from = 0, to = 1; from < writes.length; from = to++) {
+      const isNext = (k: number): boolean =>
+        writes[k]?.first === writes[k - 1].first + SLOT_SPLATS && writes[k - 1].sh.length === full;
+      while (isNext(to)) to++;
+      const run = writes.slice(from, to);
+      this.gaussians.write(run[0].first, joined(run.map((slot) => slot.geometry)), joined(run.map((slot) => slot.sh)));
+    }
     return writes.length > 0;
   }
 
@@ -233,50 +243,83 @@ export class GlStream {
       sees: sightOf(camera, origin),
     }));
     const details = this.#details;
-    for (const page of slots.pages())
-      for (const [k, slot] of slots.of(page).entries())
-        for (const [chunk, child] of childrenIn(list, page, k).entries()) {
+    // Without iterators: the main thread reads tens of thousands of chunks.
+    for (const page of slots.pages()) {
+      const own = slots.of(page);
+      for (let k = 0, children = list.firstChunk[page]; k < own.length; k++, children += SLOT_CHUNKS) {
+        const chunks = Math.min(SLOT_CHUNKS, list.chunks[page] - SLOT_CHUNKS * k);
+        for (let chunk = 0; chunk < chunks; chunk++) {
+          const child = list.children[children + chunk];
           if (child === NONE) continue;
-          const at = DETAIL_NUMBERS * (SLOT_CHUNKS * slot + chunk);
-          for (const [n, { choice, sees }] of views.entries()) {
+          const at = DETAIL_NUMBERS * (SLOT_CHUNKS * own[k] + chunk);
+          for (let n = 0; n < views.length; n++) {
+            const { choice, sees } = views[n];
             const pixels = pixelsOf(details, at + sphere, details[at + fullError], choice);
             if (pixels <= SOON * allowed) continue;
             const needed = pixels * sees(details, at + sphere);
-            requests[child] = Math.max(requests[child], needed);
+            if (needed > requests[child]) requests[child] = needed;
             const isMissing = n === 0 && details[at + error] === 0 && pixels > allowed;
-            if (isMissing) requests[0] = Math.max(requests[0], needed);
+            if (isMissing && needed > requests[0]) requests[0] = needed;
           }
         }
+      }
+    }
     this.#lacking = requests[0];
     return requests;
   }
 }
 
+/** Returns arrays as one. */
+function joined(parts: readonly Uint32Array[]): Uint32Array {
+  if (parts.length === 1) return parts[0];
+  const all = new Uint32Array(parts.reduce((sum, { length }) => sum + length, 0));
+  let at = 0;
+  for (const part of parts) {
+    all.set(part, at);
+    at += part.length;
+  }
+  return all;
+}
+
+/** Middle and half of the image along an axis at depth 1, and the reach of a sphere of radius 1 beyond its edge. */
+interface Side {
+  readonly middle: number;
+  readonly half: number;
+  readonly wide: number;
+}
+
+const reaches = ({ middle, half, wide }: Side, place: number, scale: number, radius: number): boolean =>
+  Math.abs(place - middle * scale) <= half * scale + radius * wide;
+
 /** Returns a function that weights a sphere by its place: 1 in the image, less beside it. */
 function sightOf(camera: Camera, origin: Vector3): (numbers: Float32Array, at: number) => number {
   const { worldToCamera: m, near, fx, fy, cx, cy, width, height, orthographic = false } = camera;
-  const rows = [0, 4, 8].map((row) => {
-    const axis: Vector3 = [m[row], m[row + 1], m[row + 2]];
-    return { axis, offset: axis[0] * origin[0] + axis[1] * origin[1] + axis[2] * origin[2] + m[row + 3] };
+  const offsetOf = (row: number): number =>
+    m[row] * origin[0] + m[row + 1] * origin[1] + m[row + 2] * origin[2] + m[row + 3];
+  const [right, below, ahead] = [offsetOf(0), offsetOf(4), offsetOf(8)];
+  const size = Math.hypot(m[8], m[9], m[10]);
+  const sideOf = (middle: number, half: number): Side => ({
+    middle,
+    half,
+    wide: orthographic ? 1 : Math.hypot(1, Math.abs(middle) + half),
   });
-  const size = length(rows[2].axis);
-  const sides = [
-    { low: -cx / fx, high: (width - cx) / fx },
-    { low: -cy / fy, high: (height - cy) / fy },
+  const sidesOf = (factor: number): readonly [across: Side, down: Side] => [
+    sideOf((width / 2 - cx) / fx, (factor * width) / (2 * fx)),
+    sideOf((height / 2 - cy) / fy, (factor * height) / (2 * fy)),
   ];
+  const [image, nearby] = [sidesOf(1), sidesOf(NEARBY_SIZE)];
   return (numbers, at) => {
-    const [x, y, z] = [numbers[at], numbers[at + 1], numbers[at + 2]];
-    const [across, down, depth] = rows.map(({ axis, offset }) => axis[0] * x + axis[1] * y + axis[2] * z + offset);
+    const x = numbers[at];
+    const y = numbers[at + 1];
+    const z = numbers[at + 2];
+    const depth = m[8] * x + m[9] * y + m[10] * z + ahead;
     const radius = numbers[at + 3] * size;
     if (depth + radius < near) return UNSEEN;
-    const reaches = (factor: number): boolean =>
-      sides.every(({ low, high }, k) => {
-        const [middle, half] = [(low + high) / 2, (factor * (high - low)) / 2];
-        const scale = orthographic ? 1 : Math.max(0, depth);
-        const wide = orthographic ? 1 : Math.hypot(1, Math.abs(middle) + half);
-        return Math.abs([across, down][k] - middle * scale) <= half * scale + radius * wide;
-      });
-    return reaches(1) ? 1 : reaches(NEARBY_SIZE) ? NEARBY : UNSEEN;
+    const across = m[0] * x + m[1] * y + m[2] * z + right;
+    const down = m[4] * x + m[5] * y + m[6] * z + below;
+    const scale = orthographic ? 1 : Math.max(0, depth);
+    if (reaches(image[0], across, scale, radius) && reaches(image[1], down, scale, radius)) return 1;
+    return reaches(nearby[0], across, scale, radius) && reaches(nearby[1], down, scale, radius) ? NEARBY : UNSEEN;
   };
 }
 

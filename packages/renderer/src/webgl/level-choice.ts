@@ -50,7 +50,10 @@ export function drawnChunks(
 /** Returns `screen_error` of detail.wgsl, in pixels. @param at Index of the sphere. @param length World units. */
 export function pixelsOf(details: Float32Array, at: number, length: number, choice: LevelChoice): number {
   const { eye, focal, nearest, isParallel } = choice;
-  const [x, y, z] = [details[at] - eye[0], details[at + 1] - eye[1], details[at + 2] - eye[2]];
-  const distance = isParallel ? nearest : Math.max(Math.hypot(x, y, z) - details[at + 3], nearest);
+  const x = details[at] - eye[0];
+  const y = details[at + 1] - eye[1];
+  const z = details[at + 2] - eye[2];
+  // `Math.hypot` takes several times as long.
+  const distance = isParallel ? nearest : Math.max(Math.sqrt(x * x + y * y + z * z) - details[at + 3], nearest);
   return (focal * length) / distance;
 }
