@@ -426,6 +426,7 @@ describe("splats in a host's frame", () => {
     const errors = (count: number, step: number, frameMs: number): number[] =>
       Array.from({ length: count }, (_, k) => {
         const moved = Float64Array.from(at.worldToCamera, (value, i) => value + (i === 3 ? step * k : 0));
+        gl.clear(gl.COLOR_BUFFER_BIT);
         splats.draw({ ...at, worldToCamera: moved }, { depth: null }, { detail: 2, frameMs });
         return splats.progress!.budgetError;
       });
@@ -433,8 +434,21 @@ describe("splats in a host's frame", () => {
     // No frame takes less than this.
     const late = errors(40, 1e-3, 1e-6);
     assert(late[3] > 2 && late.at(-1)! > 7.9 && late.at(-1)! <= 8, `up to four times the error: ${late.join(' ')}`);
-    const still = errors(300, 0, 1e-6);
-    assert(still.at(-1)! < 0.8 * still[1], `${still[1]} and ${still.at(-1)} at rest`);
+    errors(1, 0, 1e-6);
+    const coarse = read(gl, 0, 0, camera);
+    const still = errors(30, 0, 1e-6);
+    assert(still[1] > 2 && still.at(-1) === 0, `${still[1]} and ${still.at(-1)} at rest`);
+    const fine = read(gl, 0, 0, camera);
+    errors(1, 0, Infinity);
+    const exact = read(gl, 0, 0, camera);
+    assert(
+      exact.every((value, i) => value === fine[i]),
+      'the image at rest is whole',
+    );
+    assert(
+      coarse.some((value, i) => value !== fine[i]),
+      'the image in motion has fewer pixels',
+    );
     splats.destroy();
     host.destroy();
   });

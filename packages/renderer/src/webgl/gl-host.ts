@@ -3,7 +3,7 @@ import { deviceReading, type DepthPlanes } from '../depth-reading.js';
 import { constants } from '../generated/shaders.js';
 import { DETAIL_NUMBERS, DETAIL_PLACES, ENDLESS } from '../levels/chunk-detail.js';
 import { pickedSurface, placeOfSurface, surfacePoints, type PickedPlace } from '../picked-surface.js';
-import { FrameDetail } from './frame-detail.js';
+import { FrameDetail, resolutionFor } from './frame-detail.js';
 import { GlProgram, makeTarget, makeTexture, requireMemory } from './gl.js';
 import type { PackedGaussians } from '../pack/pack.js';
 import { GlGaussians, positionsIn, type RunGl } from './gl-gaussians.js';
@@ -83,7 +83,6 @@ export class GlHost {
   readonly #gl: WebGL2RenderingContext;
   #program: GlProgram<typeof HostedView> | undefined;
   #copy: DepthCopy | undefined;
-
   readonly #restores: boolean;
 
   /**
@@ -269,7 +268,8 @@ export interface GlHostDrawing extends Partial<Omit<GlFrameRequest, 'camera' | '
   readonly detail?: number;
   /**
    * Milliseconds between frames to keep while the camera moves: `detail` rises to at most four times itself while they
-   * take longer, and falls when they do not. Default: none.
+   * take longer, and the resolution falls to at most half of each side. Both return when frames are in time, or the
+   * camera rests. Default: none.
    */
   readonly frameMs?: number;
 }
@@ -290,6 +290,8 @@ export class HostedSplats {
   #sortedAt = -Infinity;
   #sortMs = 0;
   #cameras: readonly Camera[] | undefined;
+  /** Matrices of these cameras, copied, because a host may reuse its arrays. */
+  #poses: readonly Float64Array[] = [];
   readonly #frameDetail = new FrameDetail();
   /** Error in pixels that the time of frames allows; 0 if it is the wanted one. */
   #budgetError = 0;
@@ -323,7 +325,7 @@ export class HostedSplats {
    * Draws the scene over the host's frame.
    * @param given Camera of the host: see `cameraFromProjection`, with `clipDepth: '-1..1'`. Its view includes the
    * position of the scene. Several scenes have a camera each, all with the same projection.
-   * @returns False if splats have the order of an older view: draw again soon.
+   * @returns False if splats have the order of an older view, or a larger error than asked: draw again soon.
    * @throws GaussianSplatError `argument/camera` for a camera out of range; `argument/value` for a framebuffer whose
    * depth cannot be copied; `out-of-memory/allocation` if the device has too little memory.
    */
@@ -332,18 +334,20 @@ export class HostedSplats {
     const cameras = [given].flat();
     if (cameras.length !== this.#scenes.length) throw wrongCameras(this.#scenes.length, cameras.length);
     for (const camera of cameras) validateCamera(camera);
-    const isMoving = !cameras.every((camera, k) => isSamePose(camera, this.#cameras?.[k]));
+    const isMoving = cameras.some(({ worldToCamera }, k) => !isSamePose(worldToCamera, this.#poses[k]));
+    if (isMoving) this.#poses = cameras.map(({ worldToCamera }) => Float64Array.from(worldToCamera));
     const factor = frameMs < Infinity ? this.#frameDetail.next(performance.now(), frameMs, isMoving) : 1;
     const detail = factor * wanted;
     this.#budgetError = factor > 1 ? detail : 0;
     const isHere = this.#sorter instanceof SplatOrder;
     const isSortedHere = isHere && this.#sort(cameras, detail);
     const camera = cameras[0];
-    const request = { camera, cameras, accumulation: 'rgba16float', shDegree: 3, resolutionScale: 1, ...how } as const;
-    this.#host.draw(this.#renderer, request, frame, this.#upload);
+    const request = { camera, cameras, accumulation: 'rgba16float', shDegree: 3, ...how } as const;
+    const resolutionScale = (how.resolutionScale ?? 1) * resolutionFor(factor);
+    this.#host.draw(this.#renderer, { ...request, resolutionScale }, frame, this.#upload);
     this.#cameras = cameras;
     // The frame has uploaded the order of the worker, which gets its buffer again.
-    return isHere ? isSortedHere : this.#sort(cameras, detail);
+    return (isHere ? isSortedHere : this.#sort(cameras, detail)) && factor === 1;
   }
 
   /**
@@ -411,8 +415,8 @@ export class HostedSplats {
   };
 }
 
-const isSamePose = (a: Camera, b: Camera | undefined): boolean =>
-  b !== undefined && a.worldToCamera.every((value, k) => value === b.worldToCamera[k]);
+const isSamePose = (a: ArrayLike<number>, b: ArrayLike<number> | undefined): boolean =>
+  b !== undefined && Array.from(a).every((value, k) => value === b[k]);
 
 const NO_ORDER = new Uint32Array(0);
 
