@@ -19,13 +19,19 @@ const isAlone = (file) => /\.alone\.(lab\.)?test\.ts$/.test(file);
 export const DENSE = 'tests/element/browser/high-density.lab.test.ts';
 /**
  * Files of Chromium that run in one page in `npm test`, which compiles the pipelines of a device once: they change nothing of the page that outlives them, and do not count what it has fetched or
- * holds.
+ * holds. `credits` comes first: no page has its code before.
  */
 export const SHARED_PAGES = [
-  ['element', 'accessibility', 'addresses', 'doors', 'embed', 'image-loss', 'clip', 'scenes'],
-  ['element', 'labels', 'meaning', 'measure', 'depth', 'slow-reads', 'splats'],
-  ['element', 'mesh-files', 'meshes', 'interaction', 'effects', 'views'],
-  ['generator', 'models', 'placement', 'post-gaussians', 'video-input'],
+  [
+    ...['element', 'credits', 'trees', 'pages', 'scene'],
+    ...['labels', 'meaning', 'measure', 'depth', 'slow-reads', 'splats'],
+  ],
+  [
+    ...['element', 'accessibility', 'addresses', 'doors', 'embed', 'image-loss', 'clip', 'scenes'],
+    ...['mesh-files', 'meshes', 'interaction', 'effects', 'views'],
+  ],
+  ['element', 'ar', 'vr'],
+  ['generator', 'models', 'placement', 'post-gaussians', 'video-input', 'cpu-check'],
   ['formats', 'gunzip', 'webp'],
 ].map(([folder, ...names]) => names.map((name) => `tests/${folder}/browser/${name}.test.ts`));
 

@@ -9,10 +9,12 @@ import { join } from 'node:path';
 import { test } from 'node:test';
 import { detectFormat, sceneFormats } from '@gaussian-splat/formats';
 import { allReaders, fuzzReader, type Reader } from './support/fuzz.js';
+import { isLab } from '../support/extent.js';
 import { fuzzScenes, type FuzzScene, type ReaderKind } from './support/fuzz-scenes.js';
 import { BOUNDS, excesses, growthDuring, measuredReading } from './support/reading.js';
 
-const COUNT = 80;
+/** `npm run lab -- fuzz-formats` reads hundreds. */
+const COUNT = isLab ? 80 : 40;
 const readers = await allReaders();
 
 test('each format of the registry has files to make hostile ones of, which are read', async () => {

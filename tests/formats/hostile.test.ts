@@ -6,7 +6,7 @@ import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import fc from 'fast-check';
 import { needsSharedData, sharedFile } from '../support/data.js';
-import { assertHelpful, expectRefusal, refusalOf } from './support/expect.js';
+import { assertHelpful, CUT_STEP, expectRefusal, refusalOf } from './support/expect.js';
 import { writePly } from './support/ply-writer.js';
 import { inriaColumns, rawSplats } from './support/splats.js';
 import { spzBody, writeSpz } from './support/spz-writer.js';
@@ -68,7 +68,7 @@ for (const [name, file] of Object.entries(FILES)) {
   test(`${name}, whole, is read`, async () => assert.equal(await refusalOf(file, { name }), undefined));
 
   test(`${name}, cut anywhere, is refused by name`, async () => {
-    for (let length = 0; length < file.length; length++) {
+    for (let length = 0; length < file.length; length += CUT_STEP) {
       const error = await refusalOf(file.subarray(0, length), { name });
       const isWholeRecord = name.endsWith('.splat') && length > 0 && length % 32 === 0;
       if (isWholeRecord) continue;

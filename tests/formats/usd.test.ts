@@ -12,6 +12,7 @@ import {
   assertHelpful,
   assertSameCloud,
   assertSameNumbers,
+  CUT_STEP,
   expectRefusal,
   largestDifference,
   largestRotationError,
@@ -188,7 +189,7 @@ const FILES: Readonly<Record<string, Uint8Array>> = {
 };
 for (const [name, file] of Object.entries(FILES)) {
   test(`${name}, cut anywhere, is refused by name`, async () => {
-    for (let length = 0; length < file.length; length++) {
+    for (let length = 0; length < file.length; length += CUT_STEP) {
       const error = await refusalOf(file.subarray(0, length), { name });
       // Text ends between two prims at the root.
       if (!error && name === 'scene.usda' && file[length - 1] !== undefined) {

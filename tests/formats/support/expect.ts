@@ -2,6 +2,10 @@
 import assert from 'node:assert/strict';
 import { GaussianSplatError, shCoefficientCount, validateCloud, type GaussianCloud } from '@gaussian-splat/core';
 import { readScene, type ReadSceneOptions } from '@gaussian-splat/formats';
+import { isLab } from '../../support/extent.js';
+
+/** Bytes from one cut of a file to the next: a prime number, so that cuts lie at all bytes of numbers and of records. */
+export const CUT_STEP = isLab ? 1 : 7;
 
 /** Asserts that a file is refused with this code, and that the error names the place of the fault and the remedy. */
 export async function expectRefusal(
