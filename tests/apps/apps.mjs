@@ -7,6 +7,7 @@
  * @property {Record<string, string>} dependencies exact versions; those on our packages are taken from the release
  * @property {string[]} [build] the command that makes `output` of it
  * @property {string} [output] folder that a static server then serves, or a page that is opened from the disk
+ * @property {boolean} [hasGenerator] whether it also shows a generator; default: true, unless `output` is a page
  * @property {RegExp} [faults] allowed console messages: the browser's reports of a policy's refusals
  * @property {string[]} [dev] its development server, `PORT` being a free port
  * @property {number} [most] bytes of gzip that may come until the visit ends, shortly after the scene is visible: with camera controls, the SPZ reader, the self-test of the GPU, and first late code
@@ -54,6 +55,8 @@ export const APPS = {
     dependencies: { ...ELEMENT, vite: '8.3.8' },
     build: ['npx', 'vite', 'build'],
     output: 'dist',
+    // ONNX Runtime is WebAssembly, which this policy refuses.
+    hasGenerator: false,
     // The worker as text is refused; the file that Vite has emitted is not.
     faults: /blob:.*Content Security Policy|Content Security Policy.*blob:/,
   },
