@@ -1,4 +1,4 @@
-import { GaussianSplatError, type GaussianCloud, type Vector3 } from '@gaussian-splat/core';
+import { GaussianSplatError, matrixOfQuaternion, type GaussianCloud, type Vector3 } from '@gaussian-splat/core';
 import type { LoadLimits } from '../budget.js';
 import { FloorWork } from './floor-work.js';
 
@@ -234,17 +234,11 @@ function covarianceOf(
   frame: UpFrame,
   metersPerUnit: number,
 ): [number, number, number, number, number, number] {
-  const [w, x, y, z] = [rotations[4 * i], rotations[4 * i + 1], rotations[4 * i + 2], rotations[4 * i + 3]];
-  const columns = [
-    [1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y)],
-    [2 * (x * y - w * z), 1 - 2 * (x * x + z * z), 2 * (y * z + w * x)],
-    [2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)],
-  ];
+  const m = matrixOfQuaternion(rotations[4 * i], rotations[4 * i + 1], rotations[4 * i + 2], rotations[4 * i + 3]);
   const sums: [number, number, number, number, number, number] = [0, 0, 0, 0, 0, 0];
   for (let axis = 0; axis < 3; axis++) {
     const scale = metersPerUnit * scales[3 * i + axis];
-    const column = columns[axis];
-    const [a, b, c] = frame.map((row) => scale * (row[0] * column[0] + row[1] * column[1] + row[2] * column[2]));
+    const [a, b, c] = frame.map((row) => scale * (row[0] * m[axis] + row[1] * m[3 + axis] + row[2] * m[6 + axis]));
     sums[0] += a * a;
     sums[1] += a * b;
     sums[2] += a * c;

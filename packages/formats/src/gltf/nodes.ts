@@ -1,3 +1,4 @@
+import { matrixOfQuaternion } from '@gaussian-splat/core';
 import type { Json } from './container.js';
 import type { GltfDocument } from './document.js';
 import { isObject } from '../json.js';
@@ -77,13 +78,10 @@ function localTransform(node: Json, document: GltfDocument): Affine {
     return [m[0], m[4], m[8], m[12], m[1], m[5], m[9], m[13], m[2], m[6], m[10], m[14]];
   }
   const [x, y, z, w] = numbers('rotation', [0, 0, 0, 1]);
-  const [tx, ty, tz] = numbers('translation', [0, 0, 0]);
-  const [sx, sy, sz] = numbers('scale', [1, 1, 1]);
-  return [
-    ...[(1 - 2 * (y * y + z * z)) * sx, 2 * (x * y - w * z) * sy, 2 * (x * z + w * y) * sz, tx],
-    ...[2 * (x * y + w * z) * sx, (1 - 2 * (x * x + z * z)) * sy, 2 * (y * z - w * x) * sz, ty],
-    ...[2 * (x * z - w * y) * sx, 2 * (y * z + w * x) * sy, (1 - 2 * (x * x + y * y)) * sz, tz],
-  ];
+  const move = numbers('translation', [0, 0, 0]);
+  const scale = numbers('scale', [1, 1, 1]);
+  const turn = matrixOfQuaternion(w, x, y, z);
+  return move.flatMap((offset, row) => [...scale.map((size, column) => turn[3 * row + column] * size), offset]);
 }
 
 /** Returns the product a · b, which applies `b` first. */

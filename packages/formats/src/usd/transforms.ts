@@ -1,3 +1,4 @@
+import { matrixOfQuaternion } from '@gaussian-splat/core';
 import { quote } from '../bytes.js';
 import { damaged } from '../faults.js';
 import { multiply, type Affine } from '../gltf/nodes.js';
@@ -106,11 +107,8 @@ function turnOf(q: Numbers): Affine {
   if (length === 0) return IDENTITY;
   const w = Math.min(1, Math.max(-1, q[0]));
   const [x, y, z] = [1, 2, 3].map((k) => (q[k] / length) * Math.sqrt(1 - w * w));
-  return [
-    ...[1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y), 0],
-    ...[2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x), 0],
-    ...[2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y), 0],
-  ];
+  const m = matrixOfQuaternion(w, x, y, z);
+  return [...m.slice(0, 3), 0, ...m.slice(3, 6), 0, ...m.slice(6), 0];
 }
 
 /** Inverse of a transform. Its numbers are not finite if it has none. */

@@ -1,4 +1,4 @@
-import { shCoefficientCount, type GaussianCloud } from '@gaussian-splat/core';
+import { matrixOfQuaternion, shCoefficientCount, type GaussianCloud } from '@gaussian-splat/core';
 import { PlaceGrid } from './place-grid.js';
 
 /**
@@ -75,19 +75,14 @@ export function featuresOf(cloud: GaussianCloud, origin: readonly number[]): Fea
 
 /** Writes the shape of splat `i`: its covariance scaled to trace 1, which does not depend on the order of its axes. */
 function putShape({ rotations, scales }: GaussianCloud, i: number, looks: Float32Array, at: number): void {
-  const [w, x, y, z] = [rotations[4 * i], rotations[4 * i + 1], rotations[4 * i + 2], rotations[4 * i + 3]];
-  const axes = [
-    [1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y)],
-    [2 * (x * y - w * z), 1 - 2 * (x * x + z * z), 2 * (y * z + w * x)],
-    [2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)],
-  ];
+  const m = matrixOfQuaternion(rotations[4 * i], rotations[4 * i + 1], rotations[4 * i + 2], rotations[4 * i + 3]);
   let trace = 0;
   for (let k = 0; k < 3; k++) trace += scales[3 * i + k] ** 2;
   let number = at;
   for (let a = 0; a < 3; a++) {
     for (let b = a; b < 3; b++, number++) {
       let sum = 0;
-      for (let k = 0; k < 3; k++) sum += scales[3 * i + k] ** 2 * axes[k][a] * axes[k][b];
+      for (let k = 0; k < 3; k++) sum += scales[3 * i + k] ** 2 * m[3 * a + k] * m[3 * b + k];
       looks[number] = ((a === b ? 1 : Math.SQRT2) * sum) / (Math.max(trace, 1e-30) * SHAPE_UNIT);
     }
   }

@@ -1,4 +1,5 @@
 /** Writes binary layers of OpenUSD (`.usdc`, version 0.8). Arrays are stored as they are, the structure as literals of LZ4. */
+import { concatenated } from '@gaussian-splat/core/fetch';
 import { fileBytes } from './file-bytes.js';
 
 /** Numbers of the type and width of an element of an array. */
@@ -198,7 +199,7 @@ function tokenSection(tokens: readonly string[]): Uint8Array[] {
 function integers(values: readonly number[]): Uint8Array[] {
   const codes = new Uint8Array(Math.ceil(values.length / 4)).fill(255);
   const differences = bytesOf(values.map((value, k) => value - (k > 0 ? values[k - 1] : 0)));
-  return sized(literal(joined([new Uint8Array(4), codes, differences])));
+  return sized(literal(concatenated(Uint8Array, [new Uint8Array(4), codes, differences])));
 }
 
 /** Returns a block of LZ4 that contains bytes without compression, after a count of chunks of 0. */
@@ -206,7 +207,7 @@ function literal(bytes: Uint8Array): Uint8Array {
   const { length } = bytes;
   const extra =
     length < 15 ? [] : [...new Array<number>(Math.floor((length - 15) / 255)).fill(255), (length - 15) % 255];
-  return joined([Uint8Array.of(0, Math.min(15, length) << 4, ...extra), bytes]);
+  return concatenated(Uint8Array, [Uint8Array.of(0, Math.min(15, length) << 4, ...extra), bytes]);
 }
 
 const sized = (bytes: Uint8Array): Uint8Array[] => [u64(bytes.length), bytes];
@@ -217,13 +218,3 @@ const bytesOf = (values: readonly number[]): Uint8Array => bytesIn(Int32Array.fr
 
 const bytesIn = ({ buffer, byteOffset, byteLength }: ArrayBufferView): Uint8Array =>
   new Uint8Array(buffer, byteOffset, byteLength);
-
-function joined(parts: readonly Uint8Array[]): Uint8Array {
-  const all = new Uint8Array(parts.reduce((sum, { length }) => sum + length, 0));
-  let at = 0;
-  for (const part of parts) {
-    all.set(part, at);
-    at += part.length;
-  }
-  return all;
-}
