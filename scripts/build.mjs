@@ -128,7 +128,7 @@ function writeLicensesOfBundle() {
     ['Lit (lit-html, lit-element, @lit/reactive-element), in gaussian-splat.min.js', 'node_modules/lit/LICENSE'],
     ['fflate, in readers/', 'node_modules/fflate/LICENSE'],
     ['three.js, in the script that is fetched for meshes', 'node_modules/three/LICENSE'],
-    ['meshoptimizer, in readers/', 'packages/element/third-party/meshoptimizer/LICENSE'],
+    ['meshoptimizer, in readers/', 'packages/formats/third-party/meshoptimizer/LICENSE'],
     ['Draco, in the script that is fetched for meshes with Draco', 'packages/formats/third-party/draco/LICENSE'],
     [
       'Basis Universal, in the script that is fetched for KTX2 textures',

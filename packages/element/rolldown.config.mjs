@@ -5,7 +5,7 @@
 import { cpSync, mkdirSync, rmSync, writeFileSync } from 'node:fs';
 import { dirname } from 'node:path';
 import { fileURLToPath } from 'node:url';
-import { sources, THREE_OF_PACKAGE } from './rollup.config.mjs';
+import { keepImports, sources, THREE_OF_PACKAGE } from './rollup.config.mjs';
 
 const path = (name) => fileURLToPath(new URL(name, import.meta.url));
 
@@ -28,6 +28,12 @@ const exportsOfPages = {
 
 /** Chunks are called by what is in them, and most carry a hash: those of earlier builds would pile up. */
 const MADE = ['./cdn', './dist/production', './dist/loading/worker-code'];
+
+/** The minifier drops the comments that bundlers of apps need. */
+const forBundlers = {
+  name: 'for-bundlers',
+  generateBundle: (_, bundle) => Object.values(bundle).forEach((chunk) => (chunk.code = keepImports(chunk.code))),
+};
 
 /** three.js, as much of it as meshes need. The package's own module is the file of the CDN build, whose types stay with the sources. */
 const threeOfPackage = {
@@ -57,7 +63,7 @@ const PARTS = {
     {
       // For bundlers (src/loading/worker-sources.ts), made of the CDN build.
       input: WORKER,
-      plugins: [exportsOfPages, withoutDecoders],
+      plugins: [exportsOfPages, withoutDecoders, forBundlers],
       output: { file: path('./dist/loading/scene-worker.bundle.js'), ...single },
     },
     {

@@ -60,6 +60,8 @@ export const sources = [
 ];
 /** A bundler of an app replaces an import whose address it does not know by one that throws, unless a comment in it says otherwise. */
 const UNKNOWN_IMPORT = /\bimport\(([\w$]+)\)/g;
+export const keepImports = (code) =>
+  code.replace(UNKNOWN_IMPORT, 'import(/* @vite-ignore */ /* webpackIgnore: true */ $1)');
 
 /** Oxc is within half a percent of Terser, and takes 1 CPU second for all chunks, not 60. */
 const short = {
@@ -72,7 +74,7 @@ const short = {
     });
     if (errors.length > 0) throw new Error(`${fileName}: ${errors[0].message}`);
     if (sourcemap) return made;
-    return { code: made.code.replace(UNKNOWN_IMPORT, 'import(/* @vite-ignore */ /* webpackIgnore: true */ $1)') };
+    return { code: keepImports(made.code) };
   },
 };
 

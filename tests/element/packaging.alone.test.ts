@@ -30,6 +30,26 @@ test(
 );
 
 test(
+  'bundlers of apps keep imports of addresses that only a page knows',
+  { skip: isBuilt ? false : 'no CDN build: npm run build' },
+  () => {
+    const dist = `${root}packages/element/dist/`;
+    const scripts = readdirSync(`${dist}production`, { recursive: true, encoding: 'utf8' })
+      .filter((file) => file.endsWith('.js'))
+      .map((file) => `production/${file}`);
+    let found = 0;
+    for (const script of [...scripts, 'loading/scene-worker.bundle.js']) {
+      const code = readFileSync(dist + script, 'utf8');
+      for (const [, comments] of code.matchAll(/\bimport\(((?:\/\*.*?\*\/\s*)*)[\w$]+\)/g)) {
+        assert.match(comments, /@vite-ignore.*webpackIgnore: true/, `${script}: an import that webpack warns of`);
+        found++;
+      }
+    }
+    assert.ok(found >= 3, `${found} such imports`);
+  },
+);
+
+test(
   'integrity.json has the hash of every script of the CDN build',
   { skip: isBuilt ? false : 'no CDN build: npm run build' },
   () => {

@@ -1,6 +1,6 @@
 /**
  * Writes the decoders of Draco and Basis Universal as modules: the script of each, and its WebAssembly, deflated, in
- * base64. A module needs no address, so that a worker from text and every bundler can load it.
+ * base64. That of meshoptimizer is a module already, but Parcel does not find the parts of packages. A module needs no address, so that a worker from text and every bundler can load it.
  */
 import { readFileSync } from 'node:fs';
 import { createRequire } from 'node:module';
@@ -19,7 +19,12 @@ const DECODERS = {
   'basis-code': ['basis/basis_transcoder.js', 'basis/basis_transcoder.wasm', 'BASIS'],
 };
 
+const OPTIONS = { bundle: true, format: 'esm', platform: 'neutral', minify: true, logLevel: 'warning' };
+const inDist = (file) => fileURLToPath(new URL(`../dist/${file}`, import.meta.url));
+
 export async function writeDecoders() {
+  const entryPoints = [createRequire(import.meta.url).resolve('meshoptimizer/decoder')];
+  await build({ ...OPTIONS, entryPoints, outfile: inDist('gltf/meshopt-code.js') });
   for (const [name, [script, binary, global]] of Object.entries(DECODERS)) {
     const wasm = deflateRawSync(readFileSync(join(LIBS, binary)), { level: 9 }).toString('base64');
     await build({
@@ -27,15 +32,10 @@ export async function writeDecoders() {
         contents: `export { default as create } from './${script}';\nexport const wasm = '${wasm}';`,
         resolveDir: LIBS,
       },
-      outfile: fileURLToPath(new URL(`../dist/triangles/${name}.js`, import.meta.url)),
+      ...{ ...OPTIONS, outfile: inDist(`triangles/${name}.js`) },
       plugins: [asModule(global)],
       // The scripts look for the environment that loads their WebAssembly: they get it from the reader.
       define: Object.fromEntries(ENVIRONMENT.map((global) => [global, 'undefined'])),
-      bundle: true,
-      format: 'esm',
-      platform: 'neutral',
-      minify: true,
-      logLevel: 'warning',
     });
   }
 }

@@ -1,10 +1,10 @@
 /** Decompression of buffer views that meshoptimizer has compressed. This module is loaded for files that have some. */
 import { GaussianSplatError } from '@gaussian-splat/core';
-import { MeshoptDecoder } from 'meshoptimizer/decoder';
 import { grouped } from '../bytes.js';
 import { damaged } from '../faults.js';
 import type { Json } from './container.js';
 import type { GltfDocument } from './document.js';
+import { MeshoptDecoder } from './meshopt-code.js';
 import { meshoptParameters } from './meshopt-view.js';
 
 /**

@@ -1,0 +1,2 @@
+/** `npm run build` writes this module by scripts/decoders.mjs. */
+export { MeshoptDecoder } from 'meshoptimizer/decoder';
