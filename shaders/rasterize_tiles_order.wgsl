@@ -26,6 +26,9 @@ override writes_depth: bool = false;
 override is_parallel: bool = false;
 // True for a window of 32 splats instead of 16.
 override is_wide: bool = false;
+// True if a splat of the window is its key alone, for large images and windows of 16: a comparison is then a minimum and
+// a maximum, and alpha and color are found again when the splat is blended.
+override has_keys: bool = false;
 
 struct Pixel {
   color: vec3f,
@@ -41,6 +44,7 @@ const FINISHED = 2.0;
 
 // 2 ln 2: converts to r² from u² + v² in the axes of a batch.
 const RADIUS_2 = 1.3862943611198906;
+const FLOAT16_MAX = 65504.0;
 // Least 1 / depth.
 const NEARNESS_MIN = 1e-30;
 
@@ -49,9 +53,10 @@ const NEARNESS_MIN = 1e-30;
 var<workgroup> nearness: array<f32, BATCH + 1u>;
 var<workgroup> slopes: array<vec2f, BATCH + 1u>;
 
-// First depth of the steps, as float32 bits, and the number of low bits that one step covers.
+// First and last depth of the steps, as float32 bits, and how many bits keys shift them to the left.
 var<private> first_depth: u32;
-var<private> step_bits: u32;
+var<private> last_depth: u32;
+var<private> shift: u32;
 // Depth of the next layer, number of blended layers, and the texel of all of them.
 var<private> limit: f32;
 var<private> passed: u32;
@@ -59,7 +64,8 @@ var<private> own_texel: vec2u;
 var<private> half_depth: f32;
 
 // Four splats of a pixel. `key` has the depth in 20 bits above the alpha in 12, and is 0 for an empty place, so that it
-// sorts first. `color` has three 9-bit mantissas with a shared exponent.
+// sorts first. `color` has three 9-bit mantissas with a shared exponent. With `has_keys`, the depth has 23 bits above the
+// place in 9: NO_SPLAT - k for splat k of the batch, and NO_SPLAT + 1 + k for splat k of `carried`; `color` is 0.
 struct Four {
   key: vec4u,
   color: vec4u,
@@ -67,8 +73,7 @@ struct Four {
 
 const ALPHA_BITS = 12u;
 const ALPHA_MASK = (1u << ALPHA_BITS) - 1u;
-const DEPTH_BITS = 20u;
-const DEPTH_MASK = (1u << DEPTH_BITS) - 1u;
+const PLACE_MASK = 511u;
 
 // The window, from near to far. The second half is used only by wide windows.
 var<private> window_0: Four;
@@ -79,6 +84,10 @@ var<private> window_4: Four;
 var<private> window_5: Four;
 var<private> window_6: Four;
 var<private> window_7: Four;
+
+// The splats of the window that are of earlier batches, with `has_keys`: red and green in float16, then blue in float16
+// below alpha in 65,535ths.
+var<private> carried: array<vec2u, 16>;
 
 // Adding 2^23 to a smaller integer leaves it in the lowest bits of the float; conversions take a GPU four times as
 // long.
@@ -101,9 +110,12 @@ fn shared_exponent_color(bits: u32) -> vec3f {
   return steps * bitcast<f32>(((bits >> 27u) + 103u) << 23u);
 }
 
-// The color, and the bend of the splat's depth, in the axes of the batch.
+// The color, and the bend of the splat's depth, in the axes of the batch. With `has_keys` all in float16, blue and bend
+// in one word.
 fn packed_color(s: ProjectedSplat, slot: u32) -> vec2u {
-  return vec2u(shared_exponent(splat_color(s)), bitcast<u32>(RADIUS_2 * pixel_depths[slot].bend));
+  let bend = RADIUS_2 * pixel_depths[slot].bend;
+  if (has_keys) { return vec2u(s.paint.y, pack2x16float(vec2f(splat_color(s).b, min(bend, FLOAT16_MAX)))); }
+  return vec2u(shared_exponent(splat_color(s)), bitcast<u32>(bend));
 }
 
 fn load_more(k: u32, slot: u32, s: ProjectedSplat, tile_corner: vec2f) {
@@ -116,8 +128,8 @@ fn start_pixels(pixel: vec2u) -> Pixel {
   if (any(vec2f(pixel) >= view.viewport)) { return Pixel(vec3f(0.0), 1.0, FINISHED); }
   let margin = MARGIN_OCTAVES << OCTAVE_BITS;
   first_depth = max(~cull_stats[NEAREST_INVERTED], margin) - margin;
-  let range = max(cull_stats[FARTHEST] + margin, first_depth) - first_depth;
-  step_bits = max(32u - min(countLeadingZeros(range), 32u), DEPTH_BITS) - DEPTH_BITS;
+  last_depth = max(cull_stats[FARTHEST] + margin, first_depth);
+  shift = min(countLeadingZeros(last_depth - first_depth), 31u);
   if (tests_depth) {
     own_texel = scene_texel(vec2f(pixel) + 0.5);
     if (layers == 0u) { limit = limit_at(own_texel); } else { limit = layer_at(own_texel, 0u).depth; }
@@ -129,8 +141,11 @@ fn are_finished(pixel: Pixel) -> bool {
   return pixel.min_transmittance >= FINISHED;
 }
 
+// Bits of a key above its alpha or place.
+fn depth_mask() -> u32 { return ~select(ALPHA_MASK, PLACE_MASK, has_keys); }
+
 fn depth_of(key: u32) -> f32 {
-  return bitcast<f32>(first_depth + ((key >> ALPHA_BITS) << step_bits));
+  return bitcast<f32>(first_depth + ((key & depth_mask()) >> shift));
 }
 
 // Key and color of splat k of the batch at a pixel.
@@ -141,16 +156,80 @@ fn found_at(k: u32, place: vec2f, min_power: f32) -> vec2u {
   let v = axis.z * place.x + (axis.w * place.y + bitcast<f32>(paint.x));
   let radius_2 = u * u + v * v;
   let power = bitcast<f32>(paint.y) - radius_2;
+  let bend = select(bitcast<f32>(paint.w), unpack2x16float(paint.w).y, has_keys);
   let slope = slopes[k];
   let linear = nearness[k] + (slope.x * place.x + slope.y * place.y);
   var depth = max(linear, 0.0);
   // Behind the camera there is no densest point: the splat then surrounds the camera.
-  if (!is_parallel) { depth = select(max(1.0 - bitcast<f32>(paint.w) * radius_2, 0.0) / max(linear, NEARNESS_MIN), 0.0, linear <= 0.0); }
-  let steps = min((max(bitcast<u32>(depth), first_depth) - first_depth) >> step_bits, DEPTH_MASK);
-  let alpha = min(ALPHA_MAX, exp2(power));
-  let key = (steps << ALPHA_BITS) | whole(alpha * f32(ALPHA_MASK));
+  if (!is_parallel) { depth = select(max(1.0 - bend * radius_2, 0.0) / max(linear, NEARNESS_MIN), 0.0, linear <= 0.0); }
+  let steps = ((clamp(bitcast<u32>(depth), first_depth, last_depth) - first_depth) << shift) & depth_mask();
   let is_seen = power >= min_power && (!tests_depth || layers > 0u || depth <= limit);
-  return vec2u(select(0u, key, is_seen), paint.z);
+  if (has_keys) { return vec2u(select(0u, steps | (NO_SPLAT - k), is_seen), 0u); }
+  let alpha = min(ALPHA_MAX, exp2(power));
+  return vec2u(select(0u, steps | whole(alpha * f32(ALPHA_MASK)), is_seen), paint.z);
+}
+
+// Alpha and color of splat k of the batch at a pixel.
+fn splat_at(k: u32, place: vec2f) -> vec4f {
+  let axis = axes[k];
+  let paint = paints[k];
+  let u = axis.x * place.x + axis.y;
+  let v = axis.z * place.x + (axis.w * place.y + bitcast<f32>(paint.x));
+  let alpha = min(ALPHA_MAX, exp2(bitcast<f32>(paint.y) - (u * u + v * v)));
+  return vec4f(alpha, unpack2x16float(paint.z), unpack2x16float(paint.w).x);
+}
+
+// Alpha and color of a splat of the window.
+fn splat_of(key: u32, color: u32, place: vec2f) -> vec4f {
+  if (!has_keys) { return vec4f(number(key & ALPHA_MASK) / f32(ALPHA_MASK), shared_exponent_color(color)); }
+  let own = key & PLACE_MASK;
+  if (own <= NO_SPLAT) { return splat_at(NO_SPLAT - own, place); }
+  let words = carried[own - NO_SPLAT - 1u];
+  return vec4f(f32(words.y >> 16u) / 65535.0, unpack2x16float(words.x), unpack2x16float(words.y).x);
+}
+
+// The two words of a splat of the window that the next batch carries.
+fn to_carry(key: u32, place: vec2f) -> vec2u {
+  let own = key & PLACE_MASK;
+  if (own > NO_SPLAT) { return carried[own - NO_SPLAT - 1u]; }
+  let k = NO_SPLAT - own;
+  return vec2u(paints[k].z, (paints[k].w & 0xffffu) | (u32(splat_at(k, place).x * 65535.0 + 0.5) << 16u));
+}
+
+fn four_to_carry(four: Four, place: vec2f) -> array<vec2u, 4> {
+  return array<vec2u, 4>(
+    to_carry(four.key.x, place), to_carry(four.key.y, place), to_carry(four.key.z, place), to_carry(four.key.w, place),
+  );
+}
+
+// Carries four splats as numbers `first` to `first` + 3 of the window.
+fn carry_four(four: ptr<private, Four>, words: array<vec2u, 4>, first: u32) {
+  carried[first] = words[0];
+  carried[first + 1u] = words[1];
+  carried[first + 2u] = words[2];
+  carried[first + 3u] = words[3];
+  let key = (*four).key;
+  let places = vec4u(NO_SPLAT + 1u + first) + vec4u(0u, 1u, 2u, 3u);
+  (*four).key = select(vec4u(0u), (key & vec4u(~PLACE_MASK)) | places, key > vec4u(0u));
+}
+
+fn carry_pixels(pixel: ptr<function, Pixel>, place: vec2f) {
+  if (!has_keys || are_finished(*pixel)) { return; }
+  // All are read before any is replaced.
+  let a = four_to_carry(window_0, place);
+  let b = four_to_carry(window_1, place);
+  let c = four_to_carry(window_2, place);
+  let d = four_to_carry(window_3, place);
+  carry_four(&window_0, a, 0u);
+  carry_four(&window_1, b, 4u);
+  carry_four(&window_2, c, 8u);
+  carry_four(&window_3, d, 12u);
+}
+
+// No color with `has_keys`, so that compilers drop what would move it.
+fn with_color(key: vec4u, color: vec4u) -> Four {
+  if (has_keys) { return Four(key, vec4u(0u)); }
+  return Four(key, color);
 }
 
 // Orders four pairs at once: the nearer splat of each goes into the first.
@@ -158,8 +237,8 @@ fn put_in_order(near: ptr<function, Four>, far: ptr<function, Four>) {
   let a = *near;
   let b = *far;
   let swaps = a.key > b.key;
-  *near = Four(min(a.key, b.key), select(a.color, b.color, swaps));
-  *far = Four(max(a.key, b.key), select(b.color, a.color, swaps));
+  *near = with_color(min(a.key, b.key), select(a.color, b.color, swaps));
+  *far = with_color(max(a.key, b.key), select(b.color, a.color, swaps));
 }
 
 // Sorts behind all others.
@@ -237,10 +316,10 @@ fn merge_into(
   order_neighbors(&e, &f, &last);
   *p = a;
   *q = b;
-  *w = c;
-  *x = d;
-  *y = e;
-  *z = f;
+  *w = with_color(c.key, c.color);
+  *x = with_color(d.key, d.color);
+  *y = with_color(e.key, e.color);
+  *z = with_color(f.key, f.color);
 }
 
 fn blend_layer(pixel: ptr<function, Pixel>) {
@@ -253,12 +332,13 @@ fn blend_layer(pixel: ptr<function, Pixel>) {
   if ((*pixel).transmittance <= (*pixel).min_transmittance) { (*pixel).min_transmittance = FINISHED; }
 }
 
-fn blend_one(pixel: ptr<function, Pixel>, key: u32, color: u32) {
+// `splat`: its alpha and color.
+fn blend_one(pixel: ptr<function, Pixel>, key: u32, splat: vec4f) {
   if (tests_depth && layers > 0u) {
     while (depth_of(key) > limit) { blend_layer(pixel); }
   }
   let before = (*pixel).transmittance;
-  let full_weight = before * (number(key & ALPHA_MASK) / f32(ALPHA_MASK));
+  let full_weight = before * splat.x;
   let remaining = before - full_weight;
   let ends = remaining <= (*pixel).min_transmittance;
   var refuses = ends;
@@ -266,17 +346,26 @@ fn blend_one(pixel: ptr<function, Pixel>, key: u32, color: u32) {
   (*pixel).min_transmittance = select((*pixel).min_transmittance, FINISHED, ends);
   let after = select(remaining, before, refuses);
   if (writes_depth && before > 0.5 && after <= 0.5) { half_depth = depth_of(key); }
-  (*pixel).color += select(full_weight, 0.0, refuses) * shared_exponent_color(color);
+  (*pixel).color += select(full_weight, 0.0, refuses) * splat.yzw;
   (*pixel).transmittance = after;
 }
 
-fn blend_four(pixel: ptr<function, Pixel>, four: Four) {
+fn blend_four(pixel: ptr<function, Pixel>, four: Four, place: vec2f) {
   // Empty places sort before all others.
   if (four.key.w == 0u) { return; }
-  blend_one(pixel, four.key.x, four.color.x);
-  blend_one(pixel, four.key.y, four.color.y);
-  blend_one(pixel, four.key.z, four.color.z);
-  blend_one(pixel, four.key.w, four.color.w);
+  let places = four.key & vec4u(PLACE_MASK);
+  if (has_keys && all(places <= vec4u(NO_SPLAT))) {
+    let k = vec4u(NO_SPLAT) - places;
+    blend_one(pixel, four.key.x, splat_at(k.x, place));
+    blend_one(pixel, four.key.y, splat_at(k.y, place));
+    blend_one(pixel, four.key.z, splat_at(k.z, place));
+    blend_one(pixel, four.key.w, splat_at(k.w, place));
+    return;
+  }
+  blend_one(pixel, four.key.x, splat_of(four.key.x, four.color.x, place));
+  blend_one(pixel, four.key.y, splat_of(four.key.y, four.color.y, place));
+  blend_one(pixel, four.key.z, splat_of(four.key.z, four.color.z, place));
+  blend_one(pixel, four.key.w, splat_of(four.key.w, four.color.w, place));
 }
 
 // Iterates over the splats of the batch that touch a block.
@@ -328,22 +417,23 @@ fn paint_batch(pixel: ptr<function, Pixel>, own_block: u32, place: vec2f, min_po
       window_2 = p;
       window_3 = q;
     }
-    blend_four(pixel, leaving_p);
-    blend_four(pixel, leaving_q);
+    blend_four(pixel, leaving_p, place);
+    blend_four(pixel, leaving_q, place);
   }
 }
 
 fn finish_pixels(pixel: ptr<function, Pixel>, position: vec2u) {
   if (any(vec2f(position) >= view.viewport)) { return; }
-  blend_four(pixel, window_0);
-  blend_four(pixel, window_1);
-  blend_four(pixel, window_2);
-  blend_four(pixel, window_3);
+  let place = vec2f(position % view.tile_side) + 0.5;
+  blend_four(pixel, window_0, place);
+  blend_four(pixel, window_1, place);
+  blend_four(pixel, window_2, place);
+  blend_four(pixel, window_3, place);
   if (is_wide) {
-    blend_four(pixel, window_4);
-    blend_four(pixel, window_5);
-    blend_four(pixel, window_6);
-    blend_four(pixel, window_7);
+    blend_four(pixel, window_4, place);
+    blend_four(pixel, window_5, place);
+    blend_four(pixel, window_6, place);
+    blend_four(pixel, window_7, place);
   }
   while (passed < layers) { blend_layer(pixel); }
   if (writes_depth) { textureStore(median_depth, position, vec4f(half_depth)); }

@@ -74,3 +74,6 @@ fn paint_batch(pixels: ptr<function, Pixels>, own_block: u32, place: vec2f, min_
     }
   }
 }
+
+// Nothing of a pixel refers to the batch.
+fn carry_pixels(pixels: ptr<function, Pixels>, place: vec2f) {}

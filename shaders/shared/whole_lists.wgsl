@@ -56,6 +56,7 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
     splat_ahead = splats[slot];
 
     paint_batch(&pixels, own_block, place, min_power);
+    if (found_ahead > 0u) { carry_pixels(&pixels, place); }
     if (!are_finished(pixels)) { atomicStore(&unfinished, 1u); }
     workgroupBarrier();
 

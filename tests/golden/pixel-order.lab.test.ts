@@ -4,6 +4,7 @@ import { after, test } from 'node:test';
 import type { Camera, GaussianCloud } from '@gaussian-splat/core';
 import { readScene } from '@gaussian-splat/formats';
 import { GaussianBuffers, packGaussians, SceneDepth, settings, Viewpoint, World } from '@gaussian-splat/renderer';
+import { orderOn, PixelOrder } from '@gaussian-splat/renderer/stages';
 import { AuxiliaryOutputs } from '@gaussian-splat/renderer/tools';
 import { renderOracle, renderOracleWorld, toRgba, type Mode } from '../oracle/oracle.js';
 import { referenceViews } from '../support/cameras.js';
@@ -93,6 +94,22 @@ for (const [make, min] of [
     assert.ok(found >= min, `${found} dB`);
   });
 }
+
+test('one word a splat, as in large images', async () => {
+  const order = orderOn(await anyDevice());
+  await order.load();
+  const ofSmallImages = order.now;
+  order.now = new PixelOrder(await anyDevice(), 0);
+  const [flat] = await compare('crossing, keys', crossing(14), view, [NARROW]);
+  const [parallel] = await compare('parallel, keys', crossing(14), { ...view, orthographic: true, fx: 30, fy: 30 }, [
+    NARROW,
+  ]);
+  // The window is carried from batch to batch.
+  const { cloud, cameras } = needles();
+  const [many] = await compare('needles, keys', cloud, resized(cameras[0], 120), [NARROW]);
+  order.now = ofSmallImages;
+  assert.ok(flat >= 59 && parallel >= 59 && many >= 55, `${flat}, ${parallel} and ${many} dB`);
+});
 
 const views = hasSharedData ? referenceViews() : [];
 /** The view that needs the widest window; the laboratory draws all of them, in their own size. */

@@ -59,3 +59,5 @@ export { cameraValues } from './view.js';
 export { Ingest } from './generated/live-layouts.js';
 export { fewTilesOn } from './rasterizers/few-tiles-loader.js';
 export { FewTiles } from './rasterizers/few-tiles.js';
+export { orderOn } from './pixel-order-loader.js';
+export { PixelOrder } from './rasterizers/pixel-order.js';

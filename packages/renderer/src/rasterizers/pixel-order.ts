@@ -8,8 +8,14 @@ import type { RenderSettings } from '../render-settings.js';
 import type { Scratch } from '../scratch.js';
 import { PixelDepths } from './pixel-depths.js';
 import type { PaintingDepth } from './rasterizer.js';
-import { rasterizeKernel } from './tile-kernels.js';
+import { rasterizeKernel, type RasterizeKernel, type RasterizeVariant } from './tile-kernels.js';
 import { BoundImages, type TilePainter } from './tile-painter.js';
+
+/**
+ * Minimum number of pixels of an image whose windows of 16 splats have one word for each: see `has_keys` of
+ * shaders/rasterize_tiles_order.wgsl. In smaller images more time is spent between batches.
+ */
+const KEYS_PIXELS = 1920 * 1080;
 
 type DepthResources = PaintingDepth['resources'];
 
@@ -18,9 +24,12 @@ export class PixelOrder {
   readonly #device: GPUDevice;
   readonly #depths: PixelDepths;
   readonly #bound = new BoundImages();
+  readonly #keysPixels: number;
 
-  constructor(device: GPUDevice) {
+  /** @param keysPixels Minimum number of pixels of an image whose windows have one word a splat, for tests. */
+  constructor(device: GPUDevice, keysPixels: number = KEYS_PIXELS) {
     this.#device = device;
+    this.#keysPixels = keysPixels;
     this.#depths = new PixelDepths(device, true);
   }
 
@@ -43,13 +52,18 @@ export class PixelOrder {
     scratch?: Scratch,
     depth?: PaintingDepth,
   ): TilePainter {
-    const overrides = {
-      ...{ is_wide: +(orderWindow === 32), is_parallel: +(camera?.orthographic === true) },
-      ...depth?.overrides,
-    };
+    const isWide = orderWindow === 32;
+    const kernel = (variant: RasterizeVariant, hasKeys: boolean): RasterizeKernel =>
+      rasterizeKernel(this.#device, rasterizeTilesOrder, variant, {
+        ...{ is_wide: +isWide, has_keys: +hasKeys, is_parallel: +(camera?.orthographic === true) },
+        ...depth?.overrides,
+      });
     return {
       tile: constants.SMALL_TILE,
-      kernel: (variant) => rasterizeKernel(this.#device, rasterizeTilesOrder, variant, overrides),
+      kernel: (variant) => {
+        if (!camera && !isWide) kernel(variant, true).prepare();
+        return kernel(variant, !isWide && camera !== undefined && camera.width * camera.height >= this.#keysPixels);
+      },
       bind: (kernel, painted) =>
         this.#bound.bind(kernel, painted, {
           ...{ pixel_depths: this.#depths.in(scratch!), cull_stats: scratch!.cullStats },

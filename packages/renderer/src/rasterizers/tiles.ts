@@ -170,10 +170,8 @@ export class TilesRasterizer extends BufferOwner implements Rasterizer {
       label: 'gs.rasterize',
       timestampWrites: timer?.timestampWrites('rasterize'),
     });
-    const variant = {
-      ...{ format: surface.format, isFinal: background !== undefined },
-      refusesLast: refusesLast(settings),
-    };
+    const own = { format: surface.format, isFinal: background !== undefined };
+    const variant = { ...own, refusesLast: refusesLast(settings) };
     const isDivided = bound.grid.isDivided && slice.count === 1;
     const dispatches = bound.grid.isFew
       ? this.#few!.dispatches(painter, variant, isDivided, tiles)
