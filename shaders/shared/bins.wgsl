@@ -4,6 +4,8 @@
 // tiles are rasterized together, except those of the bins with the longest lists.
 const TILE = 32u;
 const SMALL_TILE = 16u;
+// Side of a tile where a small image has very long lists.
+const TINY_TILE = 8u;
 const BIN_COLUMNS = 8u;
 const BIN_ROWS = 4u;
 const TILES_PER_BIN = BIN_COLUMNS * BIN_ROWS;

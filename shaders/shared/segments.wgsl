@@ -27,6 +27,8 @@ fn begin_segment(bin: u32, tile: u32, begin: u32, end: u32) -> ListPlace {
 fn pixel_of(lane: u32) -> vec2u {
   let own_block = lane / (block_side * block_side);
   let in_block = lane % (block_side * block_side);
+  // A tiny tile has fewer pixels than threads.
+  if (own_block >= BLOCKS) { return vec2u(NOWHERE); }
   let corner = vec2u(own_block % BLOCK_COLUMNS, own_block / BLOCK_COLUMNS) * block_side;
   return corner + vec2u(in_block % block_side, in_block / block_side);
 }
@@ -177,7 +179,7 @@ fn paint_segment(segment: u32, tile: u32, nth: u32, count: u32, lane: u32) {
 @compute @workgroup_size(TILE_THREADS)
 fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_index) lane: u32) {
   let group = group_index(workgroup_id);
-  block_side = SMALL_TILE / BLOCK_COLUMNS;
+  block_side = view.tile_side / BLOCK_COLUMNS;
   if (stage == UNDIVIDED || (stage == 0u && group >= MAX_SEGMENTS)) {
     let number = select(group - MAX_SEGMENTS, group * view.parts + view.part, stage == UNDIVIDED);
     if (number >= view.bins.x * view.bins.y * TILES_PER_BIN) { return; }

@@ -10,6 +10,7 @@ import { endNodeDevice, nodeDevice } from '../support/node-device.js';
 import { seededRandom } from '../support/random.js';
 import { readFrame } from '../support/read-frame.js';
 import { cameraAt } from '../support/scenes.js';
+import { countWork } from '../support/work-counters.js';
 import { Renderer } from '../support/renderer.js';
 
 after(endNodeDevice);
@@ -196,6 +197,26 @@ test('a tile of few splats is divided where its bin has many pairs; one without 
   assert.ok(row[0] > 16 && row[4] >= 4 && row[4] < 16, `${row[0]} and ${row[4]} segments`);
   assert.deepEqual([row[2], row[5]], [EMPTY_LIST, EMPTY_LIST]);
   assert.ok(largest(whole, divided) <= MAX_DIFFERENCE, `a pixel differs by ${largest(whole, divided)}`);
+  renderer.destroy();
+  gaussians.destroy();
+});
+
+test('tiles of 8 x 8 pixels give what those of 16 x 16 give', async () => {
+  const device = await nodeDevice();
+  const counter = countWork(device);
+  const few = fewTilesOn(device);
+  few.load = () => undefined;
+  const gaussians = await GaussianBuffers.upload(device, packGaussians(layered()));
+  const renderer = new Renderer(device, { rasterizer: 'tiles', threads: 'parallel' });
+  const draw = async (veryLongPairs: number): Promise<{ image: Float32Array; workgroups: number }> => {
+    few.now = new FewTiles(device, SEGMENT_SPLATS, veryLongPairs);
+    counter.take();
+    const image = await readFrame(device, renderer, { gaussians, camera });
+    return { image, workgroups: counter.take().workgroups };
+  };
+  const [small, tiny] = [await draw(Infinity), await draw(0)];
+  assert.ok(tiny.workgroups > small.workgroups, 'the image has more tiles');
+  assert.ok(largest(small.image, tiny.image) <= MAX_DIFFERENCE, 'a pixel differs');
   renderer.destroy();
   gaussians.destroy();
 });

@@ -15,8 +15,10 @@ import {
 } from './tile-kernels.js';
 
 const { DIVISION_WORDS, END_AT, MAX_DIVIDED, MAX_SEGMENTS, MAX_TILES, PROJECT_GROUP, TILES_PER_BIN } = constants;
+const { SMALL_TILE, TINY_TILE } = constants;
 
 const LONG_PAIRS = 8_192;
+const VERY_LONG_PAIRS = 98_304;
 
 /** Buffers of one rasterizer for divided lists. */
 export interface FewBuffers {
@@ -35,17 +37,32 @@ export class FewTiles {
   /** Minimum number of pairs of the longest list from which lists are divided. Shorter ones would gain nothing. */
   readonly longPairs: number;
   readonly #device: GPUDevice;
+  readonly #veryLongPairs: number;
   readonly #index: ComputeKernel<typeof binIndexFew>;
   readonly #order: ComputeKernel<typeof binOrderFew>;
   readonly #cut: ComputeKernel<typeof binCut>;
 
-  /** @param segmentSplats Minimum number of splats of a segment, for tests with short lists. Default: 512. */
-  constructor(device: GPUDevice, segmentSplats?: number) {
+  /**
+   * @param segmentSplats Minimum number of splats of a segment, for tests with short lists. Default: 512.
+   * @param veryLongPairs Minimum number of pairs of the longest list for tiny tiles, for tests.
+   */
+  constructor(device: GPUDevice, segmentSplats?: number, veryLongPairs: number = VERY_LONG_PAIRS) {
     this.#device = device;
+    this.#veryLongPairs = veryLongPairs;
     this.longPairs = segmentSplats ? 0 : LONG_PAIRS;
     this.#index = kernelOf(device, binIndexFew);
     this.#order = kernelOf(device, binOrderFew, segmentSplats ? { segment_splats: segmentSplats } : {});
     this.#cut = kernelOf(device, binCut);
+  }
+
+  /**
+   * Returns the side of the tiles of a small image. Lists of tiny tiles are about a quarter as long, and they may shrink
+   * by half before tiles are larger again, so that frames do not alternate.
+   * @param longest Number of pairs of the longest list. @param tile Side of the tiles of the last frame.
+   */
+  tileFor(longest: number, tile?: number): number {
+    const isVeryLong = longest >= this.#veryLongPairs / (tile === TINY_TILE ? 8 : 1);
+    return isVeryLong ? TINY_TILE : SMALL_TILE;
   }
 
   buffers(memory: GpuMemory, pairCapacity: number): FewBuffers {

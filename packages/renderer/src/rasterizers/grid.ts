@@ -40,6 +40,7 @@ export function gridFor(
   const columns = Math.ceil(width / (BIN_COLUMNS * tile));
   const rows = Math.ceil(height / (BIN_ROWS * tile));
   const count = columns * rows;
+  if (tile < SMALL_TILE && count > FEW_BINS) return gridFor({ width, height }, painter, few, hasLongLists);
   if (count > DIGITS && tile < painter.tile)
     return gridFor({ width, height }, painter, few, hasLongLists, painter.tile);
   const isFew = few !== undefined && painter.few !== undefined && count <= FEW_BINS;

@@ -140,8 +140,7 @@ export class TilesRasterizer extends BufferOwner implements Rasterizer {
     // Lists may shrink by a quarter before they are whole again, so that frames do not alternate.
     const longPairs = (this.#few?.longPairs ?? 0) * (this.#hasLongLists ? 0.75 : 1);
     this.#hasLongLists = this.#longest >= longPairs;
-    const bound = this.#boundFor(painting, this.#inputs, this.#buffers);
-    this.#last = bound;
+    const bound = (this.#last = this.#boundFor(painting, this.#inputs, this.#buffers));
     this.#writeView(painting, bound.grid, { index: 0, count: 1 });
 
     const { count, plan, emit } = this.#kernels;
@@ -196,7 +195,8 @@ export class TilesRasterizer extends BufferOwner implements Rasterizer {
     inputs: RasterizerInputs,
     buffers: PairBuffers,
   ): GridBindings {
-    const grid = gridFor(surface, painter, this.#few, this.#hasLongLists);
+    const tile = painter === this.#plain ? this.#few?.tileFor(this.#longest, this.#last?.grid.tile) : undefined;
+    const grid = gridFor(surface, painter, this.#few, this.#hasLongLists, tile);
     if (grid.count <= FEW_BINS) this.#fewLoader?.load();
     const key = JSON.stringify(grid);
     const known = this.#bound.get(key);
