@@ -19,6 +19,6 @@ struct PagePlan {
 }
 
 // Keys of one workgroup of the sort.
-const SORT_BLOCK = 2048u;
+const SORT_BLOCK = 1024u;
 // Quads drawn as one instance, because instances of four vertices leave most lanes of a GPU idle.
 const QUAD_BATCH = 128u;

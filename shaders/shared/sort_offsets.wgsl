@@ -7,8 +7,9 @@
 const ITEMS = SORT_BLOCK / SORT_THREADS;
 alias Items = array<u32, ITEMS>;
 
-// Counters while keys are ranked; afterwards words exchanged between threads.
-var<workgroup> exchange: array<atomic<u32>, SORT_BLOCK>;
+// One bit for each digit and thread while keys are ranked; afterwards words exchanged between threads, SORT_BLOCK at most.
+const EXCHANGE_WORDS = SORT_THREADS / 32u * DIGITS;
+var<workgroup> exchange: array<atomic<u32>, EXCHANGE_WORDS>;
 // For each digit the index in the block of its first key, and the offset from an index in the block to the index among
 // all keys.
 var<workgroup> first_in_block: array<u32, DIGITS>;

@@ -120,7 +120,7 @@ const MUTANTS: readonly Mutant[] = [
     what: 'keys of a full block are not all counted',
     shader: /gs.sort_count$/,
     from: 'atomicAdd(&histogram[digit_of(own[r], digit_pass.shift)], 1u)',
-    to: 'atomicAdd(&histogram[digit_of(own[r], digit_pass.shift)], u32(r < 7u))',
+    to: 'atomicAdd(&histogram[digit_of(own[r], digit_pass.shift)], u32(r < 3u))',
     threads: 'parallel',
   },
   {
@@ -162,7 +162,7 @@ const MUTANTS: readonly Mutant[] = [
     what: 'bitmaps are not emptied between rounds',
     shader: /gs.sort_scatter$/,
     from: 'atomicStore(&exchange[w * DIGITS + digit], 0u);',
-    to: 'if (r < 5u) { atomicStore(&exchange[w * DIGITS + digit], 0u); }',
+    to: 'if (r < 1u) { atomicStore(&exchange[w * DIGITS + digit], 0u); }',
     threads: 'parallel',
   },
   {
