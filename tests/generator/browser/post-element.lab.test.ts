@@ -52,6 +52,18 @@ async function untilLight(
   }
 }
 
+/** Keeps the GPU at one run until the returned function is called. */
+function holdGpu(): () => void {
+  const { onSubmittedWorkDone } = GPUQueue.prototype;
+  let end = (): void => undefined;
+  const finished = new Promise<undefined>((resolve) => (end = () => resolve(undefined)));
+  GPUQueue.prototype.onSubmittedWorkDone = () => finished;
+  return () => {
+    Object.assign(GPUQueue.prototype, { onSubmittedWorkDone });
+    end();
+  };
+}
+
 beforeEach(() => hurry(3));
 
 describe('a post-processor in the element', () => {
@@ -140,6 +152,21 @@ describe('a post-processor in the element', () => {
     await untilLight(element, (mean) => mean < 250, `the processed frame again (${settled.mean})`);
   });
 
+  it('takes a control that has changed during a run, without another reason for a frame', async () => {
+    const element = await showLoaded({ src: COMPASS }, STYLE);
+    const plain = await lightOf(element);
+    element.setAttribute('control-gain', '0');
+    element.setAttribute('postprocess', `${FIXTURES}post-fixed.onnx`);
+    await untilLight(element, (mean) => mean < plain.mean - 2, 'a darker frame');
+    const finish = holdGpu();
+    element.setAttribute('control-gain', '0.5');
+    await frames(3);
+    element.setAttribute('control-gain', '1');
+    await frames(3);
+    finish();
+    await untilLight(element, (mean) => Math.abs(mean - plain.mean) < 1.5, 'the frame of the last value');
+  });
+
   it('reports a control that neither it nor the scene has, and no other', async () => {
     const reported: ElementError[] = [];
     const attributes = { postprocess: `${FIXTURES}post.onnx`, 'control-gain': '0', 'control-gaim': '1' };
@@ -180,11 +207,7 @@ describe('a post-processor in the element', () => {
       live.delete(this);
       return destroy.call(this);
     };
-    // A GPU that is at one run all the time.
-    const { onSubmittedWorkDone } = GPUQueue.prototype;
-    let finish = (): void => undefined;
-    const finished = new Promise<undefined>((resolve) => (finish = () => resolve(undefined)));
-    GPUQueue.prototype.onSubmittedWorkDone = () => finished;
+    const finish = holdGpu();
     try {
       const max: number[] = [];
       for (let width = 121; width <= 150; width++) {
@@ -195,7 +218,6 @@ describe('a post-processor in the element', () => {
       assert(Math.max(...max) <= 20, `textures: ${max.join(' ')}`);
     } finally {
       finish();
-      Object.assign(GPUQueue.prototype, { onSubmittedWorkDone });
       Object.assign(GPUDevice.prototype, { createTexture });
       Object.assign(GPUTexture.prototype, { destroy });
     }

@@ -230,7 +230,8 @@ export class PostView implements FrameFilter {
       this.#request.onError(error);
     }
     void this.#post.idle.then(() => {
-      if (shown.handed !== shown.drawn || this.#post.isConverging) this.#request.onChange();
+      // The frame or the page's values have changed during the run.
+      if (this.#said(shown.drawn) !== this.#tried || this.#post.isConverging) this.#request.onChange();
     });
   }
 
