@@ -269,7 +269,10 @@ def test_a_decorated_function_and_class(tmp_path: Path) -> None:
         return torch.cat([torch.zeros(COUNT, 3), torch.ones(COUNT, 10) * 0.5], -1) * (1 + 0 * t)
 
     report = rows.export(tmp_path / "rows.onnx", quiet=True)
-    assert contract_of(report.path)["license"] == "MIT"
+    contract = contract_of(report.path)
+    assert contract["license"] == "MIT"
+    # Pages show credits: a name that was not given is not among them.
+    assert "attribution" not in contract
     decorated = gs.generator(INPUTS)(type("Ball2", (Ball,), {}))
     assert decorated().export(tmp_path / "b.onnx", quiet=True).contract["name"] == "b"
 

@@ -93,8 +93,8 @@ def export_module(
     *,
     out: str | Path,
     name: str | None = None,
-    license: str = "not stated",
-    attribution: str = "not stated",
+    license: str | None = None,
+    attribution: str | None = None,
     n_max: int | None = None,
     coordinates: Coordinates | Mapping[str, Any] | None = None,
     antialiased: bool = False,
@@ -134,7 +134,9 @@ def export_module(
     given = {"version": 1, "name": name or path.stem}
     facts = _facts(inputs, n_max, fps, antialiased, filter)
     contract: Json = {**given, "inputs": {}, "outputs": layout.json(), **facts}
-    contract |= {"coordinates": Coordinates.of(coordinates).json(), "license": license, "attribution": attribution}
+    credits = {"license": license, "attribution": attribution}
+    contract |= {"coordinates": Coordinates.of(coordinates).json()}
+    contract |= {key: text for key, text in credits.items() if text is not None}
     refusals: list[str] = []
     for exporter in OPSETS:
         try:
