@@ -155,7 +155,7 @@ test('gaussian-splat page brings what descriptions in JSON name, and what these 
   }
 });
 
-test('gaussian-splat page copies files, not links to them, none from outside of the folder, and says what it cannot copy', () => {
+test('gaussian-splat copies files, not links to them, none from outside of the folder, and says what it cannot copy', () => {
   mkdirSync(inFolder('links', 'scene'), { recursive: true });
   copyFileSync(join(fixtures, 'compass.ply'), inFolder('links', 'real.ply'));
   symlinkSync('../real.ply', inFolder('links', 'scene', 'a.ply'));
@@ -172,6 +172,10 @@ test('gaussian-splat page copies files, not links to them, none from outside of 
     /names files that were not copied: \.\.\/real\.ply \(outside of its folder\), a\.ply \(a link out of its folder\), missing\.bin \(missing\)/,
   );
   rmSync(inFolder('page'), { recursive: true });
+  const outside = [{ uri: '../real.ply', byteLength: OWN_BUFFER.byteLength }];
+  writeFileSync(inFolder('links', 'scene', 'out.gltf'), JSON.stringify({ ...GLTF.json, buffers: outside }));
+  const place = /expected names of files in the folder of the scene, found "\.\.\/real\.ply".*\[decode\/unsupported\]/;
+  refused(1, place, 'optimize', 'links/scene/out.gltf', '--format-only', '--out', 'links/out.ply');
 });
 
 test('gaussian-splat page copies no page and no script that a scene names', () => {
@@ -256,6 +260,7 @@ test('gaussian-splat page reads what it publishes: meshes have their tag, and wh
   for (const [name, content] of Object.entries(files)) writeFileSync(inFolder('read', name), content);
   for (const name of ['textured.glb', 'lfs-pointer.ply', 'compass.splat'])
     copyFileSync(join(fixtures, name), inFolder('read', name));
+  for (const name of ['post.onnx', 'link.onnx']) copyFileSync(fixturePath(name), inFolder('read', name));
   const shown = ['textured.glb', 'mesh.ply', 'compass.splat'].map((name) => `read/${name}`);
   const { status, text: said } = command('page', ...shown, 'several', '--no-serve');
   assert.equal(status, 0, said);
@@ -274,6 +279,8 @@ test('gaussian-splat page reads what it publishes: meshes have their tag, and wh
     ['photo.spz', /a PNG image/],
     ['cut.ply', /decode\/truncated/],
     ['cut.onnx', /contract|decode/],
+    ['post.onnx', /post-processor.*postprocess="post\.onnx"/],
+    ['link.onnx', /\[contract\/inference\]/],
     ['empty.json', /decode\/unknown-format/],
     ['mine.gsv', /decode\/unknown-format/],
     ['lfs-pointer.ply', /git lfs pull/],
@@ -311,6 +318,8 @@ test('gaussian-splat page adds ONNX Runtime for a generator, for any case of its
     'ort.jspi.bundle.min.mjs',
     'ort.webgpu.bundle.min.mjs',
   ]);
+  const page = readFileSync(inFolder('loud', 'index.html'), 'utf8');
+  assert.match(page, /src="LOUD\.ONNX" alt="LOUD" camera-controls autoplay loop>/, 'a model with a time plays');
   refused(1, /needs ONNX Runtime/, 'page', 'LOUD.ONNX', 'single', '--single');
 });
 

@@ -28,6 +28,8 @@ export type CheckFault = ContractFault | GaussianSplatError;
 export interface CheckReport {
   readonly sections: readonly ReportSection[];
   readonly faults: readonly CheckFault[];
+  /** The contract; undefined without a valid one. */
+  readonly contract?: Contract | undefined;
   /** Assumptions that were made because the model has no contract. */
   readonly warnings: readonly string[];
 }
@@ -59,9 +61,11 @@ async function checkLocation(location: ModelLocation, options: CheckOptions): Pr
     : [...checkFile(header, { files }), ...contractFaults];
   const sections = contractReport(header, resolved);
   const warnings = resolved?.notes ?? [];
-  if (!options.run || !resolved || headerFaults.length > 0) return { sections, faults: headerFaults, warnings };
-  const { faults, rows } = await runLocation(location, header, resolved.contract);
-  return { sections: rows.length > 0 ? [...sections, { title: 'Runs', rows }] : sections, faults, warnings };
+  const contract = resolved?.contract;
+  if (!options.run || !contract || headerFaults.length > 0)
+    return { sections, faults: headerFaults, warnings, contract };
+  const { faults, rows } = await runLocation(location, header, contract);
+  return { sections: rows.length > 0 ? [...sections, { title: 'Runs', rows }] : sections, faults, warnings, contract };
 }
 
 /** Returns the contract, or its faults if it is missing or invalid. */

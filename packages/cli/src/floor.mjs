@@ -8,9 +8,9 @@ import {
   readVoxels,
   voxelTreePath,
 } from '@gaussian-splat/formats/floor';
-import { basename, dirname, join, resolve } from 'node:path';
+import { basename, resolve } from 'node:path';
 import { CommandError, parseSceneOptions, report, runCommand, sayWarnings, UsageError } from './lib/command.mjs';
-import { readWhole } from './lib/input-file.mjs';
+import { readerBeside, readWhole } from './lib/input-file.mjs';
 import { checkOutput, writeWhole } from './lib/output-file.mjs';
 
 const USAGE = `usage: gaussian-splat floor SCENE|VOXELS.voxel.json --out FILE.floor [options]
@@ -92,8 +92,7 @@ async function floorOfVoxels(scene, up, options) {
 }
 
 async function floorOfScene(scene, up, options) {
-  const openFile = (part) => readWhole(join(dirname(scene), part));
-  const cloud = await readScene(await readWhole(scene), { name: basename(scene), openFile });
+  const cloud = await readScene(await readWhole(scene), { name: basename(scene), openFile: readerBeside(scene) });
   sayWarnings(basename(scene), cloud);
   report({ splats: cloud.count });
   return makeFloorMap(cloud, { ...options, frame: frameOf(up ?? cloud.hints?.up ?? AXES['-y']) });

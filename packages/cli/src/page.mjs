@@ -22,7 +22,7 @@ import { CREDIT_OPTIONS, CREDIT_USAGE, credited } from './lib/credits.mjs';
 import { filesBeside } from './lib/files-beside.mjs';
 import { obstacleToFolder, writeWhole } from './lib/output-file.mjs';
 import { serve } from './lib/server.mjs';
-import { tagShowing } from './lib/shown-as.mjs';
+import { shownAs } from './lib/shown-as.mjs';
 
 /** Number of splats that phones draw, by reports. */
 const MAX_USDZ = 200_000;
@@ -45,26 +45,26 @@ const SCRIPT = '<script type="module" src="cdn/gaussian-splat.min.js"></script>'
 
 async function makePage({ scenes, folder, port, isServed, isSingle, isSceneOnly, hasUsdz, credits }) {
   const page = join(folder, 'index.html');
-  const tags = [];
-  for (const scene of scenes) tags.push(await tagShowing(scene));
+  const shown = [];
+  for (const scene of scenes) shown.push(await shownAs(scene));
   mkdirSync(folder, { recursive: true });
   if (isSceneOnly)
-    for (const [k, scene] of scenes.entries()) report({ source: await copyScene(scene, folder), tag: tags[k] });
-  else if (isSingle) await writeSingle(scenes[0], tags[0], page, attributesOf(scenes[0], { credits, hasUsdz }));
-  else await writeFolder(scenes, tags, folder, page, { credits, hasUsdz });
+    for (const [k, scene] of scenes.entries()) report({ source: await copyScene(scene, folder), ...shown[k] });
+  else if (isSingle) await writeSingle(scenes[0], shown[0], page, attributesOf(scenes[0], { credits, hasUsdz }));
+  else await writeFolder(scenes, shown, folder, page, { credits, hasUsdz });
   for (const scene of hasUsdz ? scenes : []) await writeUsdz(scene, folder, credits);
   if (!isSceneOnly) console.log(`\nThe page is ${isSingle ? page : `in ${folder}`}`);
   if (isServed) await show(folder, port);
 }
 
-async function writeFolder(scenes, tags, folder, page, options) {
+async function writeFolder(scenes, shown, folder, page, options) {
   copyElement(join(folder, 'cdn'), scenes.some(isModel));
   if (scenes.some(isModel)) await copyRuntime(join(folder, 'cdn/onnxruntime'));
   const elements = [];
   for (const [i, scene] of scenes.entries()) {
     const source = await copyScene(scene, folder);
     const own = attributesOf(scene, options);
-    elements.push((style) => elementOf(tags[i], titleOf(scene), ` src="${addressOf(source)}"`, own + style));
+    elements.push((style) => elementOf(shown[i], titleOf(scene), ` src="${addressOf(source)}"`, own + style));
   }
   const markup = (style) => elements.map((element) => element(style)).join('\n  ');
   const size = ' style="display: block; width: 100%; height: 80vh"';
@@ -97,7 +97,7 @@ const MAX_SINGLE = 384e6;
  * Writes an index.html that contains the element and the scene as text. The page converts the scene to a file with its
  * name, because the name identifies some formats.
  */
-async function writeSingle(scene, tag, page, attributes) {
+async function writeSingle(scene, shown, page, attributes) {
   if (existsSync(page)) throw new CommandError(`${page} exists. With --single name a folder without an index.html.`);
   const { found, missing } = await filesBeside(scene);
   if (isJson(scene) || found.length + missing.length > 0 || isModel(scene))
@@ -117,10 +117,10 @@ async function writeSingle(scene, tag, page, attributes) {
   <script type="module">${readFileSync(ELEMENT, 'utf8').replaceAll(/<(?=\/script|!--)/gi, '\\x3c')}</script>
   <script type="module">
     const data = await fetch('data:application/octet-stream;base64,' + document.getElementById('scene').textContent);
-    await customElements.whenDefined('${tag}');
-    document.querySelector('${tag}').src = new File([await data.blob()], ${name});
+    await customElements.whenDefined('${shown.tag}');
+    document.querySelector('${shown.tag}').src = new File([await data.blob()], ${name});
   </script>`;
-  writeWhole(page, htmlOf(`${elementOf(tag, title, '', attributes)}\n  ${script}`, title));
+  writeWhole(page, htmlOf(`${elementOf(shown, title, '', attributes)}\n  ${script}`, title));
 }
 
 function parseOptions(args) {
@@ -241,9 +241,9 @@ const attributesOf = (scene, { credits: { attribution, license }, hasUsdz }) =>
     .join('') + (hasUsdz ? ' ar' : '');
 
 /** Returns the HTML that shows a scene, or a mesh, which is a child of the element. */
-function elementOf(tag, title, src = '', attributes = '') {
+function elementOf({ tag, attributes: flags }, title, src = '', attributes = '') {
   const [own, child] = tag === 'splat-mesh' ? ['', `\n    <splat-mesh${src}></splat-mesh>\n  `] : [src, ''];
-  return `<gaussian-splat${own} alt="${title}" camera-controls${attributes}>${child}</gaussian-splat>`;
+  return `<gaussian-splat${own} alt="${title}" ${['camera-controls', ...flags].join(' ')}${attributes}>${child}</gaussian-splat>`;
 }
 
 /** Browsers load modules by http only, so that the page of a folder stays empty when it is opened from a disk. */
@@ -280,9 +280,9 @@ async function show(folder, port) {
 
 /** Writes the page of a batch, with ONNX Runtime if a scene needs it. */
 async function finishCatalogue(folder, rows) {
-  const shown = rows.map((row) => ({ ...row, src: row.error ? undefined : `${row.out}/${row.source}` }));
-  writeCatalogue(folder, shown);
-  if (shown.some(({ src }) => src && isModel(src))) await copyRuntime(join(folder, 'cdn/onnxruntime'));
+  const listed = rows.map((row) => ({ ...row, src: row.error ? undefined : `${row.out}/${row.source}` }));
+  writeCatalogue(folder, listed);
+  if (listed.some(({ src }) => src && isModel(src))) await copyRuntime(join(folder, 'cdn/onnxruntime'));
 }
 
 await runCommand(USAGE, parseOptions, makePage, {

@@ -26,7 +26,8 @@ const MARK = '<meta name="generator" content="gaussian-splat catalogue" />';
 
 /**
  * Writes the page of a folder, and the element beside it. A page of another author stays.
- * @param rows Rows of the table of `runBatch`, with `src`: the address of the scene relative to the folder, and `tag`.
+ * @param rows Rows of the table of `runBatch`, with `src`: the address of the scene relative to the folder, `tag`, and
+ * `attributes` without values.
  */
 export function writeCatalogue(folder, rows) {
   const page = join(folder, 'index.html');
@@ -42,10 +43,10 @@ export function writeCatalogue(folder, rows) {
 
 const megabytes = (bytes) => (bytes === undefined ? '' : `${(bytes / 1e6).toFixed(2)} MB`);
 
-function lineOf({ file, src, tag = 'gaussian-splat', splats, bytesBefore, bytesAfter, psnr, error }) {
+function lineOf({ file, src, tag = 'gaussian-splat', attributes = [], splats, bytesBefore, bytesAfter, psnr, error }) {
   const name = escaped(file);
   const link = src
-    ? `<a href="#${encodeURIComponent(file)}" data-tag="${tag}" data-src="${addressOf(src)}">${name}</a>`
+    ? `<a href="#${encodeURIComponent(file)}" data-tag="${tag}"${attributes.length > 0 ? ` data-attributes="${attributes.join(' ')}"` : ''} data-src="${addressOf(src)}">${name}</a>`
     : name;
   const cells = [splats?.toLocaleString('en') ?? '', megabytes(bytesBefore), megabytes(bytesAfter)];
   const rest = [...cells, psnr === undefined ? '' : `${psnr.toFixed(2)} dB`, escaped(error?.split('\n')[0] ?? '')];
@@ -81,7 +82,8 @@ function pageOf(rows) {
       if (!link) return;
       for (const one of links) one.toggleAttribute('aria-current', one === link);
       const element = document.createElement('gaussian-splat');
-      element.setAttribute('camera-controls', '');
+      for (const name of ['camera-controls', ...(link.dataset.attributes ?? '').split(' ')])
+        if (name) element.setAttribute(name, '');
       element.setAttribute('alt', link.textContent);
       const isMesh = link.dataset.tag === 'splat-mesh';
       const source = isMesh ? element.appendChild(document.createElement('splat-mesh')) : element;

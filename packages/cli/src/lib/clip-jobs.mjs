@@ -7,7 +7,7 @@ import { codeClipRange, drawOn } from '@gaussian-splat/optimize';
 import { framePath, parseSequence, readScene } from '@gaussian-splat/formats';
 import { pickInitialVariants } from '@gaussian-splat/renderer';
 import { encodeWebp } from './encoders.mjs';
-import { readWhole } from './input-file.mjs';
+import { readerBeside, readWhole } from './input-file.mjs';
 import { requestNodeDevice } from './node-gpu.mjs';
 import { packError, unpackError } from './thread-errors.mjs';
 
@@ -29,7 +29,7 @@ export async function openFrames({ manifest, ...given }) {
   const paths = Array.from({ length: frameCount }, (_, frame) => join(dirname(manifest), framePath(sequence, frame)));
   const openFrame = async (frame) => {
     const path = paths[frame];
-    return readScene(await readWhole(path), { name: path, openFile: (part) => readWhole(join(dirname(path), part)) });
+    return readScene(await readWhole(path), { name: path, openFile: readerBeside(path) });
   };
   const draw = drawOn(await openDevice());
   return { sequence, paths, options: { ...given, frameCount, framesPerSecond, openFrame, draw, encodeWebp } };

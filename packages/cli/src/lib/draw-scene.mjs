@@ -1,5 +1,5 @@
 /** Functions of the commands that draw a scene: reading, rendering, and encoding of images. */
-import { dirname, join, resolve } from 'node:path';
+import { resolve } from 'node:path';
 import { PNG } from 'pngjs';
 import { boundsOf, SPLAT_FILTERS } from '@gaussian-splat/core';
 import { readScene } from '@gaussian-splat/formats';
@@ -7,7 +7,7 @@ import { capture, GaussianBuffers, packGaussians, Viewpoint, World } from '@gaus
 import { renderDepth, renderFisheye } from '@gaussian-splat/renderer/depth';
 import { clipMoment, isClip, openClip } from './clip-frame.mjs';
 import { CommandError, UsageError } from './command.mjs';
-import { readWhole } from './input-file.mjs';
+import { readerBeside, readWhole } from './input-file.mjs';
 import { requestNodeDevice } from './node-gpu.mjs';
 
 /** Command-line options that control the rendering of a scene, for `parseArgs`. */
@@ -50,8 +50,7 @@ function readBackground(text) {
 export async function readSceneFile(name, seconds = 0) {
   const path = resolve(name);
   if (isClip(name)) return clipMoment(await readWhole(path), name, seconds);
-  const openFile = (part) => readWhole(join(dirname(path), part));
-  return readScene(await readWhole(path), { name, openFile });
+  return readScene(await readWhole(path), { name, openFile: readerBeside(path) });
 }
 
 /**

@@ -1,6 +1,9 @@
 /** Readers of the input files of commands. */
 import { readFileSync } from 'node:fs';
 import { open } from 'node:fs/promises';
+import { dirname, join, posix } from 'node:path';
+import { GaussianSplatError } from '@gaussian-splat/core';
+import { isInside } from '@gaussian-splat/core/contract';
 import { CommandError, UsageError } from './command.mjs';
 
 /** Maximum bytes of a read, so that the threads of Node's pool read in parallel, and no read exceeds the limit of Node. */
@@ -21,6 +24,22 @@ export async function readWhole(path) {
   } finally {
     await file.close();
   }
+}
+
+/**
+ * Returns the reader of the files that a scene names, by their paths relative to its folder. Scenes may be untrusted, so
+ * that none may name a file of the machine outside of its folder.
+ */
+export function readerBeside(scene) {
+  return async (part) => {
+    if (isInside(posix.normalize(part))) return readWhole(join(dirname(scene), part));
+    throw new GaussianSplatError('decode/unsupported', {
+      where: scene,
+      expected: 'names of files in the folder of the scene',
+      found: JSON.stringify(part),
+      remedy: 'copy the file into this folder, and correct its name in the scene',
+    });
+  };
 }
 
 /** Fills an array with bytes of a file, from the offset `from` on. Throws if the file ends before. */

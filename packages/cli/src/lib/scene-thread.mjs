@@ -1,8 +1,7 @@
 /** Module of a thread that reads a scene file, and {@link readInThread}, which starts this thread. */
-import { dirname, join } from 'node:path';
 import { isMainThread, parentPort, Worker, workerData } from 'node:worker_threads';
 import { readScene } from '@gaussian-splat/formats';
-import { readWhole } from './input-file.mjs';
+import { readerBeside, readWhole } from './input-file.mjs';
 import { packError, unpackError } from './thread-errors.mjs';
 
 /**
@@ -21,9 +20,8 @@ export function readInThread(path) {
 }
 
 async function answer(path) {
-  const openFile = (part) => readWhole(join(dirname(path), part));
   try {
-    const cloud = await readScene(await readWhole(path), { name: path, openFile });
+    const cloud = await readScene(await readWhole(path), { name: path, openFile: readerBeside(path) });
     parentPort.postMessage({ cloud: shared(cloud) });
   } catch (error) {
     parentPort.postMessage({ error: packError(error) });

@@ -9,12 +9,12 @@ import {
   rmSync,
   statSync,
 } from 'node:fs';
-import { dirname, extname, join, resolve } from 'node:path';
+import { dirname, extname, resolve } from 'node:path';
 import { pipeline } from 'node:stream/promises';
 import { createGunzip, gzipSync } from 'node:zlib';
 import { readPrefix, readScene, turned, upright, uprightRotation } from '@gaussian-splat/formats';
 import { CommandError, UsageError } from '../command.mjs';
-import { readJson, readWhole } from '../input-file.mjs';
+import { readerBeside, readJson, readWhole } from '../input-file.mjs';
 import { rangesOf } from '../scene-in-parts.mjs';
 
 /** Splats of a block. */
@@ -157,14 +157,13 @@ async function* spzBlocks(path, { head, count, widths, end, size }, temporary) {
 }
 
 async function* wholeBlocks(path, maxBytes) {
-  const openFile = (part) => readWhole(join(dirname(path), part));
   const { size } = statSync(path);
   if (size > maxBytes)
     throw new CommandError(
       `${path}: expected at most ${Math.floor(maxBytes / 1e6)} MB, because this format is read whole, found ${Math.ceil(size / 1e6)} MB. ` +
         'Raise --memory, or convert it to PLY or SPZ.',
     );
-  const cloud = await readScene(await readWhole(path), { name: path, openFile, maxBytes });
+  const cloud = await readScene(await readWhole(path), { name: path, openFile: readerBeside(path), maxBytes });
   const stride = cloud.sh.length / cloud.count;
   for (let first = 0; first < cloud.count; first += BLOCK) {
     const end = Math.min(cloud.count, first + BLOCK);
