@@ -210,6 +210,13 @@ for (const [what, header, contract, expected] of CASES) {
   });
 }
 
+test('a symbolic width is to be a number, a wrong one is to be another', () => {
+  const remedyOf = (width: number | string): string =>
+    checkContract(headerWith([TIME], [tensor('gaussians', [10, width])]), PACKED)[0].remedy;
+  assert.match(remedyOf('d'), /fixed sizes must be numbers/);
+  assert.match(remedyOf(14), /rows of this width/);
+});
+
 test('external data: there, missing, short, unknown, outside', () => {
   const header = { ...ready, externalFiles: external };
   const codes = (files?: ReadonlyMap<string, number>): string[] => brief(checkContract(header, PACKED, { files }));

@@ -288,7 +288,7 @@ test('gzip of something else is named', async () => {
   const gzip = (text: string) => new Uint8Array(gzipSync(Buffer.from(text)));
   await expectRefusal(gzip('ply\nformat ascii 1.0\n'), 'decode/truncated', /PLY header/);
   await expectRefusal(gzip('<!doctype html><p>no</p>'), 'decode/unknown-format', /a web page/);
-  await expectRefusal(gzip(''), 'decode/unknown-format', /inside the gzip file/);
+  await expectRefusal(gzip(''), 'decode/unknown-format', /inside the gzip file.*found no bytes/);
   await expectRefusal(gzip('NGSP'), 'decode/truncated', /SPZ header of 16 bytes, found 4/);
 });
 

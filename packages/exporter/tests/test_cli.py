@@ -79,6 +79,19 @@ def test_a_folder_is_no_avatar_file(name: str, family: str, tmp_path: Path, caps
     assert family in capsys.readouterr().err
 
 
+def test_gaussians_without_a_body_are_no_avatar(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    write_cloud(tmp_path / "scene.ply", cloud(5, 1))
+    assert main(["avatar", str(tmp_path / "scene.ply"), str(tmp_path / "o.onnx"), *FACTS]) == 1
+    message = capsys.readouterr().err
+    assert "Gaussians at rest need --smplx MODEL.npz" in message and "pickle" not in message
+
+
+def test_a_byte_order_mark_before_a_ply(tmp_path: Path) -> None:
+    write_cloud(tmp_path / "scene.ply", cloud(5, 1))
+    (tmp_path / "mark.ply").write_bytes(b"\xef\xbb\xbf" + (tmp_path / "scene.ply").read_bytes())
+    assert main(["classic", str(tmp_path / "mark.ply"), str(tmp_path / "o.onnx"), *FACTS]) == 0
+
+
 def test_what_leaves_the_gpu_is_said_without_a_contract_too(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     rule = FIXTURES / "rules/grid-sample-20.onnx"
     (tmp_path / "a.onnx").write_bytes(rule.read_bytes())

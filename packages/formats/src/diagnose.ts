@@ -46,7 +46,7 @@ const SIGNED_KINDS: Readonly<Record<ForeignName, ForeignKind>> = {
   sequence: {
     code: 'decode/unsupported',
     found: 'the manifest of a sequence, which names many scenes',
-    remedy: 'read it with parseSequence, and its frames one by one',
+    remedy: 'give it to the element or to gaussian-splat sequence; scripts read it with parseSequence',
   },
   json: foreign('a JSON text', true),
   png: foreign('a PNG image'),
@@ -91,7 +91,7 @@ function unsignedKind(bytes: Uint8Array): ForeignKind {
   if (isOnnx(bytes)) return ONNX_MODEL;
   return /^[\t\n\r -~]+$/.test(sampleText(bytes))
     ? foreign('a text', true)
-    : foreign(`bytes that begin with ${hexOf(bytes)}`);
+    : foreign(bytes.length > 0 ? `bytes that begin with ${hexOf(bytes)}` : 'no bytes');
 }
 
 /** Whether a protobuf begins as ONNX does: field 1 (IR version), then field 2 (producer) or 7 (graph). */

@@ -130,7 +130,7 @@ function checkTensor(tensor: OnnxTensor, rule: TensorRule, where: string): Contr
       remedy,
     });
   } else if (!shapeFits(tensor.dims, rule)) {
-    const isRow = /\(gaussians\)$/.test(where) && tensor.dims.length > 1;
+    const isRow = /\(gaussians\)$/.test(where) && typeof tensor.dims.slice(1).at(-1) === 'number';
     const remedy = isRow
       ? 'export rows of this width, or declare your columns in outputs.columns, in their order'
       : 'export the tensor in this shape; fixed sizes must be numbers, not symbols';

@@ -166,7 +166,9 @@ def cost(given: argparse.Namespace) -> None:
 def frames(given: argparse.Namespace) -> None:
     """Writes moments of a generator as PLY files, and prints the command that makes a clip from them."""
     if not given.fps > 0:
-        raise ExportError("argument/value", where="--fps", expected="more than 0", found=str(given.fps), remedy="30")
+        raise ExportError(
+            "argument/value", where="--fps", expected="more than 0", found=str(given.fps), remedy="take 30"
+        )
     model = loaded(given.file)
     raise_faults(add_contract(model, given.file) or [])
     count = write_frames(model, given.file, given.folder, given.fps, given.duration)

@@ -61,4 +61,5 @@ def _folder(path: Path) -> ExportError:
 
 def read_npz(path: Path) -> dict[str, AnyArray]:
     """All arrays of a .npz file, without objects."""
-    return read_arrays(path, "a .npz file of plain arrays", "write it with numpy.savez, without objects in it")
+    remedy = "write it with numpy.savez, without objects in it; Gaussians at rest need --smplx MODEL.npz"
+    return read_arrays(path, "a .npz file of plain arrays", remedy)

@@ -65,7 +65,7 @@ class Vertices:
 
 def read_ply(path: Path) -> Vertices:
     """Reads a PLY file. Raises ExportError for anything else."""
-    data = existing(path, "a PLY file").read_bytes()
+    data = existing(path, "a PLY file").read_bytes().removeprefix(b"\xef\xbb\xbf")
     end = data.find(b"end_header", 0, _LONGEST_HEADER)
     if not data.startswith(b"ply") or end < 0:
         raise _unreadable(path, "a PLY header", _what(data))

@@ -50,6 +50,9 @@ def read_arrays(path: Path, what: str, remedy: str, only: Collection[str] | None
     """
     try:
         budget = Budget(existing(path, what))
+        # numpy takes other files for pickles, and proposes to run their code.
+        if not zipfile.is_zipfile(path):
+            raise ValueError("no archive of arrays")
         with np.load(path, allow_pickle=False) as archive:
             if not isinstance(archive, np.lib.npyio.NpzFile):
                 raise ValueError("a single array")
