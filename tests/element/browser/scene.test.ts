@@ -10,6 +10,7 @@ import {
   frames,
   gated,
   nextEvent,
+  printed,
   show,
   showLoaded,
   until,
@@ -157,6 +158,15 @@ describe('a scene', () => {
     await element.updateComplete;
     assert(isGreen((await screenOf(element)).at(60, 50)), 'the scene is seen');
     assertEqual(element.shadowRoot?.querySelector('[role=progressbar]'), null, 'progress bar');
+  });
+
+  it('shows no symbol of a broken image for a missing poster, and the next poster', async () => {
+    const element = show({ src: COMPASS, poster: '/net/status/404', reveal: 'manual' });
+    const image = (await rendered(element, 'img')) as HTMLImageElement;
+    const isShown = (): boolean => getComputedStyle(image).visibility === 'visible';
+    await until(() => image.complete && !isShown(), 'the missing poster to be hidden');
+    element.poster = document.createElement('canvas').toDataURL();
+    await until(() => isShown() && image.naturalWidth === 300, 'the next poster');
   });
 
   it('keeps properties that were set before the element was defined', async () => {
@@ -332,6 +342,7 @@ describe('a bad source', () => {
       assertEqual([element.loaded, states(element)], [false, ['error']], 'state');
       const text = element.shadowRoot?.querySelector('[part=error]')?.textContent ?? '';
       assert(text.includes(detail.message) && /3D scene could not be/.test(text), text);
+      assertEqual(printed, [`<gaussian-splat>: ${detail.message}`], 'console');
       element.src = COMPASS;
       await element.ready;
       assert(element.loaded, 'a good scene loads afterwards');

@@ -13,6 +13,7 @@ import {
   FIXTURES,
   frames,
   nextEvent,
+  printed,
   submits,
   until,
 } from './support/harness.js';
@@ -213,6 +214,8 @@ describe('several scenes in one element', () => {
     const all = childrenOf(element);
     assertEqual(all.filter(({ loaded }) => loaded).length, 22, 'visible');
     assertEqual([all[5].error?.reason, all[11].error?.code], ['network/status', 'decode'], 'errors');
+    const lines = [all[5], all[11]].map(({ error }) => `<splat-scene>: ${error?.message}`);
+    assertEqual([...printed].sort(), lines.sort(), 'console');
     assertEqual([element.error, element.loaded, loads.length], [null, true, 1], 'the element');
     assert(element.shadowRoot?.querySelector('[part=error]') === null, 'no message covers them');
     const screen = await screenOf(element);

@@ -364,10 +364,7 @@ export class SourceEntry implements SceneHost, SourceHost, PlaybackHost, Dynamic
     if (this.#isIn) this.core!.sources.left(clear);
   }
 
-  /**
-   * Removes the source from the world, before its splats are freed or shown in another element. Its clock stops until it
-   * is shown again.
-   */
+  /** Removes the source from the world, before its splats are freed or shown elsewhere. Its clock stops meanwhile. */
   leave(): void {
     this.ownClock.suspend();
     this.member?.remove();
@@ -422,6 +419,7 @@ export class SourceEntry implements SceneHost, SourceHost, PlaybackHost, Dynamic
 
   failed(error: ElementError): void {
     this.progress = null;
+    console.error(`<${this.element.localName}>: ${error.message}`);
     this.notifyFailed(error);
     this.core?.sources.settledOne();
   }

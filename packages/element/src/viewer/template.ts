@@ -1,5 +1,6 @@
 import { html, nothing, type TemplateResult } from 'lit';
 import { visitorMessage, type ElementError } from './errors.js';
+import { posterImage } from './poster-image.js';
 import { languageOf, word, type A11yStrings } from './strings.js';
 
 /** Data that the template of the shadow tree renders. */
@@ -77,14 +78,12 @@ function slots({ slots, showPoster }: TemplateModel): TemplateResult {
 }
 
 /**
- * Template of the poster. Its image has no text alternative, because it shows the same scene. If the poster waits for
- * the visitor, a button with a play symbol encloses the image or the slotted content.
+ * Template of the poster. If it waits for the visitor, a button with a play symbol encloses the image or the slotted
+ * content.
  */
 function poster(model: TemplateModel): TemplateResult {
   const { poster, posterLoading, showPoster, onReveal } = model;
-  const image = poster
-    ? html`<img part="poster" alt="" loading=${posterLoading} decoding="async" src=${poster} />`
-    : nothing;
+  const image = poster ? posterImage(poster, posterLoading) : nothing;
   const content = html`<slot name="poster">${image}</slot>`;
   return html`<div class="layer poster ${showPoster ? '' : 'gone'}">
     ${onReveal ? revealButton(model, onReveal, content) : content}

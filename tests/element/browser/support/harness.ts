@@ -157,8 +157,16 @@ GPUAdapter.prototype.requestDevice = async function watchingRequestDevice(this: 
   return device;
 };
 
+/** Errors of elements and their children on the console, which tests expect by the event `error`. */
+export const printed: string[] = [];
+const OF_ELEMENT = /^<[\w-]+>: .* \[[\w-]+\/[\w-]+\]$/s;
+
 for (const level of ['warn', 'error'] as const) {
-  console[level] = (...words: unknown[]) => void faults.push(`console.${level}: ${words.join(' ')}`);
+  console[level] = (...words: unknown[]) => {
+    const text = words.join(' ');
+    if (level === 'error' && OF_ELEMENT.test(text)) printed.push(text);
+    else faults.push(`console.${level}: ${text}`);
+  };
 }
 addEventListener('error', (event) => faults.push(`uncaught: ${event.message}`));
 addEventListener('unhandledrejection', (event) => faults.push(`unhandled: ${String(event.reason)}`));
@@ -183,6 +191,7 @@ const EXPECTED = /does not name its axes|no worker could be started \(none has s
 
 afterEach(() => {
   document.body.replaceChildren();
+  printed.length = 0;
   const unclaimed = faults.splice(0).filter((fault) => !EXPECTED.test(fault));
   assert(unclaimed.length === 0, `warnings or errors that no test expected:\n${unclaimed.join('\n')}`);
 });
