@@ -36,6 +36,22 @@ test('another motion ends the search for a path', async () => {
   assert.deepEqual(walker.at, at);
 });
 
+test('a body looks along the length of its floor, unless the camera looks far already', () => {
+  /** A corridor of 8 x 1 m along x, whose columns in `gap` have no floor. */
+  const corridor = (gap: readonly number[] = []) => ({
+    ...{ cell: 0.1, corner: [-4, -0.5] as const, width: 80, depth: 10, step: 0.3, area: 8 },
+    layers: [Float32Array.from({ length: 800 }, (_, i) => (gap.includes(i % 80) ? NaN : 0))],
+    start: [-2, 0, 0] as const,
+  });
+  const open = (floor: ReturnType<typeof corridor>, theta: number): number =>
+    new FloorBody(floor, [-2, 1.6, 0]).openDirection(theta) % (2 * Math.PI);
+  // A camera of azimuth 0 looks to -z, one of -90 degrees to +x.
+  assert.ok(Math.abs(open(corridor(), 0) - 1.5 * Math.PI) < 1e-6, `${open(corridor(), 0)}`);
+  assert.equal(open(corridor(), -Math.PI / 2), -Math.PI / 2);
+  // A step without floor ends the view, and the other way is longer then.
+  assert.ok(Math.abs(open(corridor([25, 26, 27]), 0) - Math.PI / 2) < 1e-6);
+});
+
 interface Pad {
   readonly axes: readonly number[];
   readonly mapping: string;

@@ -16,8 +16,8 @@ import {
   until,
 } from './support/harness.js';
 
-/** Flat splats on the floor and walls of a room of `side` by `side` meters, the floor at height 0: a `.splat` file, y down. */
-function room(side: number, unit = 1): string {
+/** Flat splats on the floor and walls of a room of `side` by `depth` meters, the floor at height 0: a `.splat` file, y down. */
+function room(side: number, unit = 1, depth = side): string {
   const [step, sigma, half] = [0.1, 0.07, side / 2];
   const splats: [number, number, number, number][] = [];
   for (let a = -half; a <= half; a += step)
@@ -29,7 +29,7 @@ function room(side: number, unit = 1): string {
     }
   const bytes = new DataView(new ArrayBuffer(32 * splats.length));
   splats.forEach(([x, y, z, flat], i) => {
-    [x, -y, -z].forEach((value, axis) => bytes.setFloat32(32 * i + 4 * axis, value / unit, true));
+    [x, -y, (-z * depth) / side].forEach((value, axis) => bytes.setFloat32(32 * i + 4 * axis, value / unit, true));
     for (const axis of [0, 1, 2])
       bytes.setFloat32(32 * i + 12 + 4 * axis, (axis === flat ? 0.005 : sigma) / unit, true);
     const color = flat === 1 ? [200, 60, 60, 250] : [80, 80, 200, 250];
@@ -97,6 +97,17 @@ describe('navigation="walk"', () => {
     assert(toZ > -2.35 && toZ < -1.9, `it stopped at ${toZ}, the wall is at -2.5`);
     // Idle pages draw nothing.
     await atRest(element);
+  });
+
+  it('looks along a long room first, unless camera-orbit has a direction', async () => {
+    const long = room(8, 1, 2.5);
+    const { theta } = (await walkIn(long)).getCameraOrbit();
+    near(Math.abs(Math.sin(theta)), 1, 0.1, 'along x');
+    const given = await walkIn(long, { 'camera-orbit': '10deg auto auto' });
+    near(given.getCameraOrbit().theta, Math.PI / 18, 1e-6, 'the direction of the attribute');
+    given.resetCamera();
+    await atRest(given);
+    near(given.getCameraOrbit().theta, Math.PI / 18, 1e-6, 'the same after a reset');
   });
 
   it('turns by the arrow keys and walks to a click on the floor', async () => {

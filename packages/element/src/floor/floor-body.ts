@@ -8,6 +8,12 @@ const FAST = 2.5;
 const EYE_SECONDS = 0.08;
 /** Distance to a waypoint, meters, below which it is reached. */
 const REACHED = 0.05;
+/** Number of directions that are compared for the first view. */
+const DIRECTIONS = 32;
+/** Distance, meters, beyond which floor is equally far. */
+const FAR = 20;
+/** Fraction of the longest way that is long enough to keep the direction of the camera. */
+const LONG_ENOUGH = 0.7;
 
 type Place = readonly [x: number, y: number, z: number];
 
@@ -105,6 +111,33 @@ export class FloorBody {
     const share = 1 - Math.exp(-seconds / EYE_SECONDS);
     const rest = this.#at[1] - this.#eyeFloor;
     this.#eyeFloor = Math.abs(rest) < 1e-3 ? this.#at[1] : this.#eyeFloor + share * rest;
+  }
+
+  /**
+   * Returns the azimuth of a camera, radians, in whose direction the floor extends farthest, so that a room is seen along
+   * its length. Returns `theta`, its present azimuth, if the floor extends nearly as far there.
+   */
+  openDirection(theta: number): number {
+    const azimuths = Array.from({ length: DIRECTIONS }, (_, k) => theta + (2 * Math.PI * k) / DIRECTIONS);
+    const ways = azimuths.map((azimuth) => this.#wayAlong(azimuth));
+    // A gap between two pieces of furniture is narrow, so its neighbors count, too.
+    const views = ways.map((way, k) => way + ways.at(k - 1)! + ways[(k + 1) % DIRECTIONS]);
+    const longest = Math.max(...views);
+    return views[0] >= LONG_ENOUGH * longest ? theta : azimuths[views.indexOf(longest)];
+  }
+
+  /** Returns how far the body could walk straight in the direction of a camera's azimuth, meters, {@link FAR} at most. */
+  #wayAlong(azimuth: number): number {
+    const step = this.map.cell;
+    const [dx, dz] = [-step * Math.sin(azimuth), -step * Math.cos(azimuth)];
+    let at = this.#at;
+    for (let way = 0; way < FAR; way += step) {
+      const to = stepOn(this.map, at, dx, dz);
+      // A body that slides along a wall has reached it.
+      if (to === at || to[0] !== at[0] + dx || to[2] !== at[2] + dz) return way;
+      at = to;
+    }
+    return FAR;
   }
 
   #follow(way: number): void {

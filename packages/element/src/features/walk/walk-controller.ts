@@ -152,11 +152,16 @@ export class WalkController implements ReactiveController, Feature {
     this.#follow();
   }
 
-  /** Moves the walker to its start at once, and levels the view. */
+  /**
+   * Moves the walker to its start at once, and levels the view. Unless `camera-orbit` has a direction, it looks where the
+   * floor extends farthest.
+   */
   #begin(map: FloorMap): void {
     const { camera } = this.#viewer;
-    this.#walker = new FloorBody(map, this.#start);
-    camera.lookBy(0, Math.PI / 2 - camera.goal.phi);
+    const { settings, from } = camera.context;
+    const walker = (this.#walker = new FloorBody(map, this.#start));
+    const turn = settings.orbit.theta === 'auto' ? walker.openDirection(from.theta) - from.theta : 0;
+    camera.lookBy(turn, Math.PI / 2 - from.phi);
     this.#follow();
     camera.jumpToGoal();
   }
