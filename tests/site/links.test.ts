@@ -3,6 +3,7 @@ import assert from 'node:assert/strict';
 import { existsSync, readdirSync, readFileSync, statSync } from 'node:fs';
 import { join, posix } from 'node:path';
 import { test } from 'node:test';
+import { snippets } from './snippets.js';
 import { isBuilt, pagesOf, root, site } from './support.js';
 
 const skip = isBuilt ? false : 'no site: npm run build';
@@ -124,4 +125,13 @@ test('every attribute that a tag has on a page or in a document is in the manife
   }
   assert.ok(count > 100, `${count} attributes`);
   assert.deepEqual(unknown, []);
+});
+
+test('a tag whose style has a height has a width, too: without one it is 300 pixels wide', { skip }, () => {
+  const styles = snippets('html', 'vue', 'astro', 'svelte').flatMap(({ place, code }) =>
+    [...code.matchAll(/<gaussian-splat\s[^>]*?\sstyle="([^"]*)"/g)].map(([, style]) => ({ place, style })),
+  );
+  assert.ok(styles.length > 5, `${styles.length} styles`);
+  const narrow = styles.filter(({ style }) => /(^|[\s;])height:/.test(style) && !/(^|[\s;])width:/.test(style));
+  assert.deepEqual(narrow, []);
 });
