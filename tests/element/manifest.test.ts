@@ -121,7 +121,7 @@ check('names the events of the typed map, with their types, and every one that t
 });
 
 check('names the slots, parts, custom properties and states that there are', () => {
-  const late = features.map(source);
+  const late = ['viewer/poster-image.ts', ...features].map(source);
   // The code of VR and of AR forms its names from the kind of session.
   for (const kind of ['vr', 'ar'])
     late.push(source('features/xr/xr-offer.ts').replaceAll('`${kind.name}-button`', `'${kind}-button'`));

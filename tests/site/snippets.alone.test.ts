@@ -9,6 +9,7 @@ import type { Page } from 'playwright-core';
 import { build } from 'esbuild';
 import { PNG } from 'pngjs';
 import { compileTemplate, parse } from 'vue/compiler-sfc';
+import { encodeFloorMap } from '@gaussian-splat/formats/floor';
 import { clipOf } from '../support/clips.js';
 import { fountain } from '../support/scenes/fountain.js';
 import { isBuilt, openSite, root } from './support.js';
@@ -245,9 +246,10 @@ async function serveScenes(tab: Page, origin: string): Promise<void> {
   await tab.route(/\/skull\.(webp|jpg)$/, (route) =>
     route.fulfill({ path: join(root, 'demo/scenes/skull-poster.webp') }),
   );
-  await tab.route(/\/(hall|study)\.floor$/, (route) =>
-    route.fulfill({ path: join(root, 'demo/scenes/studio/apartment.floor') }),
-  );
+  // Visitors begin within the small scene, at its height, in the middle of a square.
+  const layers = [new Float32Array(40 * 40).fill(-1.6)];
+  const map = encodeFloorMap({ cell: 0.1, corner: [-2, -2], width: 40, depth: 40, layers, step: 0.3, start: [0, -1.6, 0], area: 16 }); // prettier-ignore
+  await tab.route(/\/(hall|study)\.floor$/, (route) => route.fulfill({ body: Buffer.from(map) }));
   const clip = await clipOf(fountain({ splats: 300, frames: 8, framesPerSecond: 10 }), {
     frames: 8,
     framesPerGroup: 4,

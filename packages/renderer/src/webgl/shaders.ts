@@ -2,7 +2,7 @@
  * Written by `npm run shaders:webgl` from shaders/webgl and shaders/shared, and committed: see scripts/lib/webgl-shaders.mjs. Do not edit.
  */
 /** Digest of the WGSL that this file was generated from. */
-export const SOURCE_DIGEST = '7fa4f27da9d88338be897e2c00b07fda';
+export const SOURCE_DIGEST = 'b4416f6725e0931fb3cfb5b7956e7642';
 /** Texels in a row of the textures that hold arrays. */
 export const DATA_WIDTH = 4096;
 export const QuadsView = {
