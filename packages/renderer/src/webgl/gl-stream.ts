@@ -1,5 +1,6 @@
 /** Pages of a streamed scene in the textures of WebGL, chosen on the CPU. */
 import { GaussianSplatError, type Camera, type Vector3 } from '@gaussian-splat/core';
+import { concatenated } from '@gaussian-splat/core/fetch';
 import { constants } from '../generated/shaders.js';
 import { DETAIL_NUMBERS, DETAIL_PLACES } from '../levels/chunk-detail.js';
 import { aheadMs, CameraMotion } from '../streaming/camera-motion.js';
@@ -194,7 +195,13 @@ export class GlStream {
         writes[k]?.first === writes[k - 1].first + SLOT_SPLATS && writes[k - 1].sh.length === full;
       while (isNext(to)) to++;
       const run = writes.slice(from, to);
-      this.gaussians.write(run[0].first, joined(run.map((slot) => slot.geometry)), joined(run.map((slot) => slot.sh)));
+      const [geometry, sh] = (['geometry', 'sh'] as const).map((part) =>
+        concatenated(
+          Uint32Array,
+          run.map((slot) => slot[part]),
+        ),
+      );
+      this.gaussians.write(run[0].first, geometry, sh);
     }
     return writes.length > 0;
   }
@@ -267,18 +274,6 @@ export class GlStream {
     this.#lacking = requests[0];
     return requests;
   }
-}
-
-/** Returns arrays as one. */
-function joined(parts: readonly Uint32Array[]): Uint32Array {
-  if (parts.length === 1) return parts[0];
-  const all = new Uint32Array(parts.reduce((sum, { length }) => sum + length, 0));
-  let at = 0;
-  for (const part of parts) {
-    all.set(part, at);
-    at += part.length;
-  }
-  return all;
 }
 
 /** Middle and half of the image along an axis at depth 1, and the reach of a sphere of radius 1 beyond its edge. */
