@@ -260,7 +260,8 @@ test('gaussian-splat page reads what it publishes: meshes have their tag, and wh
   for (const [name, content] of Object.entries(files)) writeFileSync(inFolder('read', name), content);
   for (const name of ['textured.glb', 'lfs-pointer.ply', 'compass.splat'])
     copyFileSync(join(fixtures, name), inFolder('read', name));
-  for (const name of ['post.onnx', 'link.onnx']) copyFileSync(fixturePath(name), inFolder('read', name));
+  for (const name of ['post.onnx', 'post.contract.json', 'link.onnx'])
+    copyFileSync(fixturePath(name), inFolder('read', name));
   const shown = ['textured.glb', 'mesh.ply', 'compass.splat'].map((name) => `read/${name}`);
   const { status, text: said } = command('page', ...shown, 'several', '--no-serve');
   assert.equal(status, 0, said);
