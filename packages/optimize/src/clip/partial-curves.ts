@@ -19,6 +19,8 @@ const [FIRMER, FIRMEST] = [100, 1e14];
 const MIN_NOISE = 1e-10;
 /** Approximate number of rows that are sampled for the typical weight of each curve. */
 const SAMPLES = 4000;
+/** Maximum number of factorizations that a fit keeps, one for each span: some MB. */
+const MAX_FACTORS = 2000;
 
 /**
  * Finds the curves that approximate rows best in their valid frames, and their weights for each row. Rows that are valid
@@ -215,7 +217,8 @@ class RowFit {
   readonly #weights: readonly number[];
   /** [frames + 1, size, size] sums over the frames before a frame of the products of two curves, b <= a. */
   readonly #products: Float64Array;
-  readonly #matrix: Float64Array;
+  /** Factorizations without firmness by span, which many rows share. */
+  readonly #factors = new Map<number, Float64Array>();
   readonly #solution: Float64Array;
 
   constructor(curves: readonly Float64Array[], powers: readonly number[], noise: number) {
@@ -229,7 +232,6 @@ class RowFit {
     for (let f = 0, at = 0; f < frames; f++)
       for (const one of curves)
         for (const other of curves) this.#products[square + at] = this.#products[at++] + one[f] * other[f];
-    this.#matrix = new Float64Array(square);
     this.#solution = new Float64Array(curves.length);
   }
 
@@ -243,28 +245,36 @@ class RowFit {
    * @param firmness Factor of the regularization.
    */
   of(row: Float32Array, first: number, end: number, firmness = 1): Float64Array {
-    const [curves, matrix, solution] = [this.#curves, this.#matrix, this.#solution];
-    const products = this.#products;
-    const size = curves.length;
-    const [from, to] = [size * size * first, size * size * end];
-    for (let a = 0; a < size; a++) {
+    const [curves, solution] = [this.#curves, this.#solution];
+    for (let a = 0; a < curves.length; a++) {
       const curve = curves[a];
       let right = 0;
       for (let f = first; f < end; f++) right += row[f] * curve[f];
       solution[a] = right;
+    }
+    substitute(this.#factorOf(first, end, firmness), solution);
+    return solution;
+  }
+
+  #factorOf(first: number, end: number, firmness: number): Float64Array {
+    const key = (this.#products.length + 1) * first + end;
+    const known = firmness === 1 ? this.#factors.get(key) : undefined;
+    if (known !== undefined) return known;
+    const [size, products] = [this.size, this.#products];
+    const [from, to] = [size * size * first, size * size * end];
+    const matrix = new Float64Array(size * size);
+    for (let a = 0; a < size; a++) {
       for (let at = size * a; at <= (size + 1) * a; at++) matrix[at] = products[to + at] - products[from + at];
       matrix[(size + 1) * a] += firmness * this.#weights[a];
     }
-    solveInPlace(matrix, solution, size);
-    return solution;
+    factorize(matrix, size);
+    if (firmness === 1 && this.#factors.size < MAX_FACTORS) this.#factors.set(key, matrix);
+    return matrix;
   }
 }
 
-/**
- * Solves a symmetric positive definite system by a Cholesky factorization of the lower triangle of `matrix`, in place.
- * @param solution Right side of the system; becomes its solution.
- */
-function solveInPlace(matrix: Float64Array, solution: Float64Array, size: number): void {
+/** Replaces the lower triangle of a symmetric positive definite matrix by its Cholesky factor. */
+function factorize(matrix: Float64Array, size: number): void {
   for (let a = 0; a < size; a++) {
     for (let b = 0; b <= a; b++) {
       let sum = matrix[size * a + b];
@@ -272,12 +282,17 @@ function solveInPlace(matrix: Float64Array, solution: Float64Array, size: number
       matrix[size * a + b] = a === b ? Math.sqrt(Math.max(sum, 1e-30)) : sum / matrix[size * b + b];
     }
   }
+}
+
+/** Solves a system by the Cholesky factor of its matrix. @param solution Right side; becomes the solution. */
+function substitute(factor: Float64Array, solution: Float64Array): void {
+  const size = solution.length;
   for (let a = 0; a < size; a++) {
-    for (let k = 0; k < a; k++) solution[a] -= matrix[size * a + k] * solution[k];
-    solution[a] /= matrix[size * a + a];
+    for (let k = 0; k < a; k++) solution[a] -= factor[size * a + k] * solution[k];
+    solution[a] /= factor[size * a + a];
   }
   for (let a = size - 1; a >= 0; a--) {
-    for (let k = a + 1; k < size; k++) solution[a] -= matrix[size * k + a] * solution[k];
-    solution[a] /= matrix[size * a + a];
+    for (let k = a + 1; k < size; k++) solution[a] -= factor[size * k + a] * solution[k];
+    solution[a] /= factor[size * a + a];
   }
 }
