@@ -93,6 +93,8 @@ describe('generators among other scenes', () => {
       generator.position = '-3 0 0';
       element.currentTime = 0;
       await nextEvent(element, 'seeked');
+      // A scene that loses its device twice while it loads has failed for good.
+      await until(() => movie.loaded, 'the movie, which was removed');
       for (let i = 0; i < LOSSES; i++) {
         const restored = nextEvent(element, 'contextrestored', 60_000);
         devices.at(-1)!.destroy();
