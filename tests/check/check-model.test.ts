@@ -9,6 +9,7 @@ import { basename, join } from 'node:path';
 import { after, test } from 'node:test';
 import { fileURLToPath } from 'node:url';
 import { checkModel, formatReport, type CheckReport } from '@gaussian-splat/check';
+import { ContractError } from '@gaussian-splat/core/contract';
 import { needsSharedData, sharedPath } from '../support/data.js';
 import { fixtureBytes, fixtureNames, fixturePath } from '../support/generators.js';
 
@@ -198,6 +199,7 @@ test('--draft writes the contract that a file lacks, asks about properties that 
   const first = command(path, '--draft');
   assert.equal(first.status, 0, first.text);
   assert.match(first.text, /opacityActivation/);
+  assert.match(first.text, /Then: gaussian-check ".*" --run/);
   const contract = JSON.parse(readFileSync(join(folder, 'drafted #1.contract.json'), 'utf8')) as {
     outputs: Record<string, string>;
   };
@@ -215,6 +217,23 @@ test('--draft writes the contract that a file lacks, asks about properties that 
   assert.equal(refused.status, 1);
   assert.match(refused.text, /contains its contract/);
   assert.equal(command(carrying, '--draft', '--run').status, 2);
+});
+
+test('names of any length in a contract make neither long tables nor long messages', async () => {
+  const path = join(folder, 'named.onnx');
+  writeFileSync(path, fixtureBytes('split.onnx'));
+  const long = 'n'.repeat(200_000);
+  const own = JSON.parse(readFileSync(fixturePath('split.contract.json'), 'utf8')) as { outputs: object };
+  const contract = { ...own, name: long, outputs: { ...own.outputs, opacities: long } };
+  writeFileSync(join(folder, 'named.contract.json'), JSON.stringify(contract));
+  const report = await checkModel(path);
+  assert.ok(codes(report).includes('contract/missing-tensor'), codes(report).join());
+  const lines = formatReport('named', report, false).split('\n');
+  assert.ok(Math.max(...lines.map(({ length }) => length)) < 5000);
+  const single = new ContractError([
+    { code: 'contract/shape', where: long, expected: long, found: long, remedy: long },
+  ]);
+  assert.ok(single.message.length < 5000);
 });
 
 /**

@@ -50,6 +50,17 @@ test('the spoilt room: jitter, faint splats and floaters let no one out', () => 
   assert.equal(wander(map, isOutside).out, 0);
 });
 
+test('a clump of floaters blocks no one, a lamp of three times its size does', () => {
+  const hanging = (x: number, half: number): (typeof ROOM)[number] => ({
+    min: [x - half, 1 - half, -half],
+    max: [x + half, 1 + half, half],
+  });
+  const cloud = cloudOf([{ min: [-2, -0.2, -2], max: [2, 0, 2] }, hanging(-1, 0.06), hanging(1, 0.18)]);
+  const scales = cloud.scales.map((scale, k) => (cloud.positions[3 * Math.floor(k / 3) + 1] < -0.5 ? 0.02 : scale));
+  const map = makeFloorMap({ ...cloud, scales }, { frame: FRAME, near: [0, 1.5, 1] });
+  assert.deepEqual([floorAt(map, -1, 0, 0) === undefined, floorAt(map, 1, 0, 0) === undefined], [false, true]);
+});
+
 /** How phones capture: 2 cm of noise, opacities of 0.05 to 1, 15 % of the splats missing. */
 const CAPTURE = { noise: 0.02, faintest: 0.05, missing: 0.15 } as const;
 const CAPTURES: Readonly<Record<string, CaptureOptions>> = {

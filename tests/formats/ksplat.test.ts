@@ -54,3 +54,23 @@ test('headers that announce more than the file has are refused before anything i
   await expectRefusal(changed(4096 + 32, 0xffff), 'decode/header', /buckets/, { name: 'a.ksplat' });
   await expectRefusal(changed(4096 + 40, 9), 'decode/header', /degree/, { name: 'a.ksplat' });
 });
+
+test('a range of coefficients that is not finite is refused; the zeros of old files mean the default range', async () => {
+  const cloud = smallCloud(23, 1);
+  const file = writeKsplat(cloud, { level: 2 });
+  const ranged = (low: number, high: number): Uint8Array => {
+    const copy = Uint8Array.from(file);
+    const view = new DataView(copy.buffer);
+    view.setFloat32(36, low, true);
+    view.setFloat32(40, high, true);
+    return copy;
+  };
+  for (const [low, high] of [
+    [NaN, 1.5],
+    [-1.5, NaN],
+    [-Infinity, 1.5],
+  ] as const)
+    // prettier-ignore
+    await expectRefusal(ranged(low, high), 'decode/header', /numbers that are not finite/, { name: 'a.ksplat' });
+  assertSameCloud(await readScene(ranged(0, 0), { name: 'a' }), await readScene(ranged(-1.5, 1.5), { name: 'a' }));
+});

@@ -44,6 +44,14 @@ test('a scene of which next to nothing can be drawn is an error', async () => {
   await expectRefusal(spoiled(91, 'x', NaN), 'decode/corrupt', /91 of 100 splats cannot be drawn: 91 with values/);
 });
 
+test('a PLY whose header states the wrong byte order is an error, although some of its splats can be drawn', async () => {
+  const big = writePly([{ name: 'vertex', columns: inriaColumns(rawSplats(300, 0)) }], {
+    encoding: 'binary_big_endian',
+  });
+  const wrong = Buffer.from(Buffer.from(big).toString('latin1').replace('_big_', '_little_'), 'latin1');
+  await expectRefusal(wrong, 'decode/corrupt', /byte order that its header states/);
+});
+
 test('triangles beside splats, in PLY and glTF', async () => {
   const vertex: PlyWriterElement = { name: 'vertex', columns: inriaColumns(rawSplats(5, 0)) };
   const face: PlyWriterElement = { name: 'face', columns: [column('weight', 7)] };

@@ -80,6 +80,9 @@ test('a meta.json of another program hides no scene, and of two scenes none is c
   for (const path of ['meta.json', 'a/meta.json', 'z/meta.json', 'a/b/c/meta.json']) {
     assertSameCloud(await readScene(zipSync({ [path]: other, ...within('scene', files) }), { name: 'a.zip' }), direct);
   }
+  const large = { ...files, 'meta.json': new Uint8Array(2 ** 20 + 1).fill(32) };
+  const { message } = await expectRefusal(zipSync(large), 'decode/corrupt', /1,048,577/, { name: 'a.sog' });
+  assert.match(message, /^a\.sog, meta\.json: expected a description of at most 1,048,576 bytes/);
   // Images further down may be the source of the one above.
   const deeper = { ...files, ...within('old', files) };
   assertSameCloud(await readScene(zipSync(deeper), { name: 'a.zip' }), direct);

@@ -40,9 +40,11 @@ after(() => rmSync(folder, { recursive: true }));
 const inFolder = (...path: string[]): string => join(folder, ...path);
 
 /** Runs a command in the test's folder, as a script that npm has been asked for from another folder. */
-function command(...args: string[]): { status: number | null; text: string } {
+const command = (...args: string[]): ReturnType<typeof commandIn> => commandIn({}, ...args);
+
+function commandIn(more: NodeJS.ProcessEnv, ...args: string[]): { status: number | null; text: string } {
   const bin = join(root, 'packages/cli/bin/gaussian-splat.mjs');
-  const env = { ...process.env, ...gpuEnvironment(), INIT_CWD: root };
+  const env = { ...process.env, ...gpuEnvironment(), INIT_CWD: root, ...more };
   const { status, stdout, stderr } = spawnSync(process.execPath, [bin, ...args], {
     cwd: folder,
     encoding: 'utf8',
@@ -526,6 +528,25 @@ test('gaussian-splat video says in a sentence what it was asked wrongly', () => 
     assert.notEqual(status, 0, text);
     assert.match(text, sentence);
     assert.doesNotMatch(text, /\n\s+at /, 'no stack');
+  }
+});
+
+test('texts name a command as it was called: from a checkout, by npx, or as an installed program', () => {
+  const called = {
+    'gaussian-splat': 'npm run gaussian-splat --',
+    npx: 'npx @gaussian-splat/cli',
+    other: 'gaussian-splat',
+  };
+  for (const [npm_lifecycle_event, program] of Object.entries(called)) {
+    copyFileSync(fixturePath('split.onnx'), inFolder('draft.onnx'));
+    rmSync(inFolder('draft.contract.json'), { force: true });
+    const env = { npm_lifecycle_event };
+    assert.ok(
+      commandIn(env, 'check', 'draft.onnx', '--draft').text.includes(`Then: ${program} check "draft.onnx" --run`),
+    );
+    assert.ok(commandIn(env, 'check', '--help').text.startsWith(`Usage: ${program} check MODEL`));
+    assert.ok(commandIn(env, 'floor', '--help').text.startsWith(`usage: ${program} floor SCENE`));
+    assert.ok(commandIn(env).text.startsWith(`usage: ${program} COMMAND`));
   }
 });
 

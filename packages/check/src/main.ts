@@ -7,7 +7,7 @@ import { draftContract } from './draft-contract.js';
 import { openModel } from './model-location.js';
 import { checkModel, type CheckFault, type CheckReport } from './check-model.js';
 
-const USAGE = `Usage: gaussian-check MODEL [--contract CONTRACT.json] [--run] [--draft]
+const usageOf = (command: string): string => `Usage: ${command} MODEL [--contract CONTRACT.json] [--run] [--draft]
 
 Checks an ONNX file (a path or an address) against the Gaussian Generator contract.
 
@@ -21,32 +21,34 @@ Exit status: 0 if it keeps the contract, 1 if not, 2 if the command is wrong.`;
 /**
  * Runs the command and prints tables and faults.
  * @param args Arguments without the name of the program.
+ * @param command Words that run the program, for the texts that name it.
  * @returns The exit status: 0, 1 for faults, 2 for wrong arguments.
  */
-export async function main(args: readonly string[]): Promise<number> {
+export async function main(args: readonly string[], command = 'gaussian-check'): Promise<number> {
+  const usage = usageOf(command);
   let parsed: ReturnType<typeof parse>;
   try {
     parsed = parse(args);
   } catch (error) {
-    console.error(`${(error as Error).message}\n\n${USAGE}`);
+    console.error(`${(error as Error).message}\n\n${usage}`);
     return 2;
   }
   const { values, positionals } = parsed;
   if (values.help) {
-    console.log(USAGE);
+    console.log(usage);
     return 0;
   }
   if (positionals.length !== 1) {
-    console.error(`Expected one model, found ${positionals.length}.\n\n${USAGE}`);
+    console.error(`Expected one model, found ${positionals.length}.\n\n${usage}`);
     return 2;
   }
   if (values.draft && (values.run || values.contract !== undefined)) {
     console.error(
-      `--draft writes a contract and checks nothing: expected no --run or --contract beside it.\n\n${USAGE}`,
+      `--draft writes a contract and checks nothing: expected no --run or --contract beside it.\n\n${usage}`,
     );
     return 2;
   }
-  if (values.draft) return draft(positionals[0]);
+  if (values.draft) return draft(positionals[0], command);
   const report = await checkModel(positionals[0], { contract: values.contract, run: values.run });
   console.log(formatReport(positionals[0], report, values.run ?? false));
   return report.faults.length > 0 ? 1 : 0;
@@ -66,7 +68,7 @@ function parse(args: readonly string[]) {
 }
 
 /** Writes the draft of a contract next to the model, unless the file exists. Returns the exit status. */
-async function draft(model: string): Promise<number> {
+async function draft(model: string, command: string): Promise<number> {
   const isRemote = URL.canParse(model) && /^https?:/i.test(model);
   // A contract for a model on a server is written to the working directory.
   const path = sidecarPath(isRemote ? basename(new URL(model).pathname) : model);
@@ -81,7 +83,7 @@ async function draft(model: string): Promise<number> {
     const { contract, questions } = draftContract(header);
     await writeFile(path, `${JSON.stringify(contract, undefined, 2)}\n`, { flag: 'wx' });
     console.log([`wrote ${path}. To be decided:`, ...questions.map((question) => `  ${question}`)].join('\n'));
-    console.log(`Then: gaussian-splat check "${model}"${isRemote ? ` --contract "${path}"` : ''} --run`);
+    console.log(`Then: ${command} "${model}"${isRemote ? ` --contract "${path}"` : ''} --run`);
     return 0;
   } catch (error) {
     const isThere = (error as { code?: string }).code === 'EEXIST';

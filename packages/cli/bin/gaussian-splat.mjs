@@ -15,7 +15,8 @@ const [command] = process.argv.splice(2, 1);
 if (Object.hasOwn(COMMANDS, command ?? '')) await import(`../src/${command}.mjs`);
 else {
   const lines = Object.entries(COMMANDS).map(([name, text]) => `  ${name.padEnd(10)} ${text}`);
-  const usage = `usage: gaussian-splat COMMAND ..., or gaussian-splat COMMAND --help\n\n${lines.join('\n')}`;
+  const { PROGRAM } = await import('../src/lib/command.mjs');
+  const usage = `usage: ${PROGRAM} COMMAND ..., or ${PROGRAM} COMMAND --help\n\n${lines.join('\n')}`;
   const isAsked = command === undefined || ['--help', '-h', 'help'].includes(command);
   if (isAsked) console.log(usage);
   else console.error(`expected a command, found "${command}"\n\n${usage}`);

@@ -1,6 +1,6 @@
 /** Implementation of `gaussian-splat check MODEL [--contract CONTRACT.json] [--run]`, by @gaussian-splat/check. */
 import { main } from '@gaussian-splat/check';
-import { parseSceneOptions, runCommand, SeveralInputs } from './lib/command.mjs';
+import { parseSceneOptions, PROGRAM, runCommand, SeveralInputs } from './lib/command.mjs';
 
 const flag = { type: 'boolean' };
 const OPTIONS = { contract: { type: 'string' }, out: { type: 'string' }, run: flag, draft: flag };
@@ -15,7 +15,7 @@ function parse(args) {
   return args;
 }
 
-await runCommand('', parse, async (args) => process.exit(await main(args)), {
+await runCommand('', parse, async (args) => process.exit(await main(args, `${PROGRAM} check`)), {
   name: 'check',
   accepts: (path) => /\.onnx$/i.test(path),
 });

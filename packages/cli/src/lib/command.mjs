@@ -3,6 +3,11 @@ import { existsSync, statSync } from 'node:fs';
 import { parseArgs } from 'node:util';
 import { GaussianSplatError } from '@gaussian-splat/core';
 
+/** Words that run the program: those of a checkout, of `npx`, or the name of an installed one. */
+export const PROGRAM =
+  { 'gaussian-splat': 'npm run gaussian-splat --', npx: 'npx @gaussian-splat/cli' }[process.env.npm_lifecycle_event] ??
+  'gaussian-splat';
+
 /** The command line is invalid; its message is shown above the usage. */
 export class UsageError extends Error {}
 
@@ -96,9 +101,10 @@ const send = (message) => new Promise((resolve) => (process.send ? process.send(
  * @param batch How the command runs for several files: see `runBatch` of batch.mjs.
  */
 export async function runCommand(usage, parse, main, batch) {
+  const shownUsage = usage.replaceAll('gaussian-splat ', `${PROGRAM} `) + SEVERAL;
   try {
     const options = parse(process.argv.slice(2));
-    if (options === undefined) console.log(usage + SEVERAL);
+    if (options === undefined) console.log(shownUsage);
     else await main(options);
     await send({ figures });
     process.exit(0);
@@ -106,7 +112,7 @@ export async function runCommand(usage, parse, main, batch) {
     const shown = error instanceof SeveralInputs ? await runSeveral(error, batch) : error;
     const { message, code } = shown;
     await send({ error: { message, code } });
-    if (shown instanceof UsageError) console.error(`${message}\n\n${usage}${SEVERAL}`);
+    if (shown instanceof UsageError) console.error(`${message}\n\n${shownUsage}`);
     // File system errors contain the file name, except for reading a folder.
     else if (code === 'EISDIR') console.error(`${message}: expected a file, found a folder`);
     else if (shown instanceof GaussianSplatError || shown instanceof CommandError || isOfFiles(shown))

@@ -1,4 +1,5 @@
-import { GaussianSplatError, type ContractErrorCode, type ErrorData } from '../errors.js';
+import { GaussianSplatError, type ContractErrorCode, type ErrorData, type ErrorDetails } from '../errors.js';
+import { clipped } from './validate.js';
 
 /** One fault of a file, its contract or its outputs. Texts are phrases without a trailing full stop. */
 export interface ContractFault {
@@ -27,7 +28,7 @@ export class ContractError extends GaussianSplatError {
 
   /** @param faults One or more faults. */
   constructor(faults: readonly ContractFault[]) {
-    super(faults[0].code, faults[0]);
+    super(faults[0].code, shortened(faults[0]));
     this.faults = faults;
     if (faults.length > 1) {
       const lines = faults.slice(0, MESSAGE_FAULTS).map((fault) => `- ${describeFault(fault)}`);
@@ -46,6 +47,13 @@ export class ContractError extends GaussianSplatError {
 }
 
 /** Formats a fault as one line. */
-export function describeFault({ code, where, expected, found, remedy }: ContractFault): string {
-  return `${where}: expected ${expected}, found ${found}. ${remedy.charAt(0).toUpperCase()}${remedy.slice(1)}. [${code}]`;
+export function describeFault(fault: ContractFault): string {
+  const { where, expected, found, remedy } = shortened(fault);
+  return `${where}: expected ${expected}, found ${found}. ${remedy.charAt(0).toUpperCase()}${remedy.slice(1)}. [${fault.code}]`;
+}
+
+/** Returns the texts of a fault with 1,000 characters at most, because they contain names of the file. */
+function shortened({ where, expected, found, remedy }: ContractFault): ErrorDetails {
+  const [a, b, c, d] = [where, expected, found, remedy].map((text) => clipped(text, 1000));
+  return { where: a, expected: b, found: c, remedy: d };
 }

@@ -5,8 +5,12 @@ import type { Contract, InputBinding } from './contract.js';
 import { tensorNames } from './parse-contract.js';
 import type { ResolvedContract } from './resolve-contract.js';
 import { findTensor } from './tensor-rules.js';
+import { clipped } from './validate.js';
 
-/** A table for display: all rows have the same number of cells. */
+/** Maximum number of characters of a cell. */
+const MAX_CELL = 1000;
+
+/** A table for display: all rows have the same number of cells, of 1,000 characters at most. */
 export interface ReportSection {
   readonly title: string;
   readonly rows: readonly (readonly string[])[];
@@ -22,7 +26,9 @@ export function contractReport(header: OnnxHeader, resolved: ResolvedContract | 
     ...(resolved ? [{ title: 'Contract', rows: contractRows(resolved) }] : []),
     { title: 'Inputs', rows: inputRows(header, resolved?.contract) },
     { title: 'Outputs', rows: outputRows(header, resolved?.contract) },
-  ].filter(({ rows }) => rows.length > 0);
+  ]
+    .filter(({ rows }) => rows.length > 0)
+    .map(({ title, rows }) => ({ title, rows: rows.map((row) => row.map((cell) => clipped(cell, MAX_CELL))) }));
 }
 
 function fileRows(header: OnnxHeader): string[][] {
@@ -85,7 +91,7 @@ function inputRows(header: OnnxHeader, contract: Contract | undefined): string[]
 function describeBinding({ role, ...details }: InputBinding): string {
   const entries = Object.entries(details).map(([key, value]) => {
     const text = typeof value === 'string' ? value : JSON.stringify(value);
-    return `${key} ${text.length > 40 ? `${text.slice(0, 37)}...` : text}`;
+    return `${key} ${clipped(text, 40)}`;
   });
   return [role, ...entries].join(', ');
 }

@@ -182,5 +182,10 @@ export function describe(value: unknown): string {
     // Nested lists may be deeper than the call stack.
     return 'a value that is too deep to be shown';
   }
-  return json === undefined ? 'nothing' : json.length > 60 ? `${json.slice(0, 57)}...` : json;
+  return json === undefined ? 'nothing' : clipped(json, 60);
+}
+
+/** Returns the first characters of a text, `max` at most. A file may have names of any length. */
+export function clipped(text: string, max: number): string {
+  return text.length > max ? `${text.slice(0, max - 3)}...` : text;
 }

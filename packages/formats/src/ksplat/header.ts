@@ -70,9 +70,17 @@ export function parseKsplatHeader(bytes: Uint8Array, name: string, isPrefix = fa
   if (!isPrefix) sections.forEach((section) => requireRoom(section, bytes, name));
   const count = sections.reduce((sum, section) => sum + section.count, 0);
   if (count === 0) throw noSplats(where(16));
-  const range = [view.getFloat32(36, true) || -1.5, view.getFloat32(40, true) || 1.5] as const;
+  const range = [36, 40].map((at) => view.getFloat32(at, true)) as [number, number];
+  if (range.some((end) => !Number.isFinite(end)))
+    throw damaged(where(36), 'a range of coefficients', 'numbers that are not finite', 'decode/header');
   const degree = sections.reduce<ShDegree>((max, own) => (own.degree > max ? own.degree : max), 0);
-  return { level: level as KsplatHeader['level'], count, degree, coefficientRange: range, sections };
+  return {
+    level: level as KsplatHeader['level'],
+    count,
+    degree,
+    coefficientRange: [range[0] || -1.5, range[1] || 1.5],
+    sections,
+  };
 }
 
 function parseSections(bytes: Uint8Array, name: string, level: 0 | 1 | 2): KsplatSection[] {

@@ -1,6 +1,7 @@
 import { GaussianSplatError, type GaussianCloud } from '@gaussian-splat/core';
-import { asciiOf, viewOf } from '../bytes.js';
+import { asciiOf, grouped, viewOf } from '../bytes.js';
 import { findFormat } from '../detect.js';
+import { damaged } from '../faults.js';
 import { loadDiagnosis, loadReader } from '../load-files.js';
 import { MAX_INDEX_BYTES } from '../lod/meta.js';
 import type { SceneSource } from '../scene-format.js';
@@ -96,8 +97,16 @@ async function namedArchive({ paths }: Archive, name: string): Promise<GaussianS
 }
 
 async function noSceneIn(archive: Archive, name: string): Promise<GaussianSplatError> {
-  const found = `a ZIP archive with ${listed(relevant(archive.paths))}`;
-  return (await namedArchive(archive, name)) ?? noScene(name, undefined, found);
+  const known = await namedArchive(archive, name);
+  if (known) return known;
+  const paths = relevant(archive.paths);
+  for (const [description, max] of DESCRIPTIONS)
+    for (const path of namedLike(description, paths)) {
+      const length = archive.lengthOf(path);
+      if (length > max)
+        return damaged(`${name}, ${path}`, `a description of at most ${grouped(max)} bytes`, grouped(length));
+    }
+  return noScene(name, undefined, `a ZIP archive with ${listed(paths)}`);
 }
 
 /** Returns the path with the most iterations if all paths are the same scene during training; otherwise undefined. */
