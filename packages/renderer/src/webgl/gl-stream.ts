@@ -2,12 +2,11 @@
 import { GaussianSplatError, type Camera, type Vector3 } from '@gaussian-splat/core';
 import { concatenated } from '@gaussian-splat/core/fetch';
 import { constants } from '../generated/shaders.js';
-import { DETAIL_NUMBERS, DETAIL_PLACES } from '../levels/chunk-detail.js';
+import { DETAIL_NUMBERS } from '../levels/chunk-detail.js';
 import { aheadMs, CameraMotion } from '../streaming/camera-motion.js';
 import { exactGeometry } from '../streaming/exact-slot.js';
 import { SLOT_CHUNKS } from '../streaming/manifest.js';
 import { ARRIVED } from '../streaming/page-rows.js';
-import { NONE } from '../streaming/page-list.js';
 import type { PageSource } from '../streaming/page-source.js';
 import { PageStreamer } from '../streaming/page-streamer.js';
 import { EXACT, PageUnpacker, UNPACKED_AT_ONCE, type UnpackedPage } from '../streaming/page-unpacker.js';
@@ -18,16 +17,15 @@ import { chunkLayout, startOf, type SlotWords } from '../streaming/slot-words.js
 import { TranslatedRows } from '../streaming/translated-rows.js';
 import { GEOMETRY_WORDS } from '../pack/words.js';
 import { GlGaussians, positionsIn, type RunGl } from './gl-gaussians.js';
-import { levelChoice, pixelsOf } from './level-choice.js';
+import { pageRequests } from './page-requests.js';
 import type { SplatUpdate } from './splat-order.js';
 
-const { CULL_GROUP, NEARBY, NEARBY_SIZE, SOON, UNSEEN } = constants;
+const { CULL_GROUP } = constants;
 const SLOT_SPLATS = SLOT_CHUNKS * CULL_GROUP;
 const DEFAULT_SPLATS = 1_000_000;
 /** Milliseconds between two requests for pages while the camera moves. */
 const REQUEST_MS = 50;
 const IN_PLACE: Vector3 = [0, 0, 0];
-const { sphere, error, fullError } = DETAIL_PLACES;
 
 export interface GlStreamOptions {
   /** Maximum number of splats on the GPU, of all levels. Default: one million. */
@@ -164,7 +162,15 @@ export class GlStream {
     if (now - this.#requestedAt < REQUEST_MS) return;
     this.#requestedAt = now;
     const later = this.#motion.ahead(aheadMs(this.#traffic.arrivalMs));
-    this.#residency.note(this.#requests(later === camera ? [camera] : [camera, later], allowed));
+    const pages = {
+      list: this.#source.list,
+      slots: this.#residency.slots,
+      details: this.#details,
+      origin: this.gaussians.facts.origin,
+    };
+    const requests = pageRequests(pages, later === camera ? [camera] : [camera, later], allowed);
+    this.#lacking = requests[0];
+    this.#residency.note(requests);
     this.#traffic.follow();
   }
 
@@ -238,84 +244,6 @@ export class GlStream {
   #translation(page: number): Vector3 {
     return this.#source.translate?.(page) ?? IN_PLACE;
   }
-
-  /** Returns the errors in pixels of all missing pages, and at index 0 that of the first view, as page_feedback.wgsl does. */
-  #requests(cameras: readonly Camera[], allowed: number): Float32Array {
-    const { list } = this.#source;
-    const requests = new Float32Array(list.count);
-    const { slots } = this.#residency;
-    const { origin } = this.gaussians.facts;
-    const views = cameras.map((camera) => ({
-      choice: levelChoice(camera, origin, allowed),
-      sees: sightOf(camera, origin),
-    }));
-    const details = this.#details;
-    // Without iterators: the main thread reads tens of thousands of chunks.
-    for (const page of slots.pages()) {
-      const own = slots.of(page);
-      for (let k = 0, children = list.firstChunk[page]; k < own.length; k++, children += SLOT_CHUNKS) {
-        const chunks = Math.min(SLOT_CHUNKS, list.chunks[page] - SLOT_CHUNKS * k);
-        for (let chunk = 0; chunk < chunks; chunk++) {
-          const child = list.children[children + chunk];
-          if (child === NONE) continue;
-          const at = DETAIL_NUMBERS * (SLOT_CHUNKS * own[k] + chunk);
-          for (let n = 0; n < views.length; n++) {
-            const { choice, sees } = views[n];
-            const pixels = pixelsOf(details, at + sphere, details[at + fullError], choice);
-            if (pixels <= SOON * allowed) continue;
-            const needed = pixels * sees(details, at + sphere);
-            if (needed > requests[child]) requests[child] = needed;
-            const isMissing = n === 0 && details[at + error] === 0 && pixels > allowed;
-            if (isMissing && needed > requests[0]) requests[0] = needed;
-          }
-        }
-      }
-    }
-    this.#lacking = requests[0];
-    return requests;
-  }
-}
-
-/** Middle and half of the image along an axis at depth 1, and the reach of a sphere of radius 1 beyond its edge. */
-interface Side {
-  readonly middle: number;
-  readonly half: number;
-  readonly wide: number;
-}
-
-const reaches = ({ middle, half, wide }: Side, place: number, scale: number, radius: number): boolean =>
-  Math.abs(place - middle * scale) <= half * scale + radius * wide;
-
-/** Returns a function that weights a sphere by its place: 1 in the image, less beside it. */
-function sightOf(camera: Camera, origin: Vector3): (numbers: Float32Array, at: number) => number {
-  const { worldToCamera: m, near, fx, fy, cx, cy, width, height, orthographic = false } = camera;
-  const offsetOf = (row: number): number =>
-    m[row] * origin[0] + m[row + 1] * origin[1] + m[row + 2] * origin[2] + m[row + 3];
-  const [right, below, ahead] = [offsetOf(0), offsetOf(4), offsetOf(8)];
-  const size = Math.hypot(m[8], m[9], m[10]);
-  const sideOf = (middle: number, half: number): Side => ({
-    middle,
-    half,
-    wide: orthographic ? 1 : Math.hypot(1, Math.abs(middle) + half),
-  });
-  const sidesOf = (factor: number): readonly [across: Side, down: Side] => [
-    sideOf((width / 2 - cx) / fx, (factor * width) / (2 * fx)),
-    sideOf((height / 2 - cy) / fy, (factor * height) / (2 * fy)),
-  ];
-  const [image, nearby] = [sidesOf(1), sidesOf(NEARBY_SIZE)];
-  return (numbers, at) => {
-    const x = numbers[at];
-    const y = numbers[at + 1];
-    const z = numbers[at + 2];
-    const depth = m[8] * x + m[9] * y + m[10] * z + ahead;
-    const radius = numbers[at + 3] * size;
-    if (depth + radius < near) return UNSEEN;
-    const across = m[0] * x + m[1] * y + m[2] * z + right;
-    const down = m[4] * x + m[5] * y + m[6] * z + below;
-    const scale = orthographic ? 1 : Math.max(0, depth);
-    if (reaches(image[0], across, scale, radius) && reaches(image[1], down, scale, radius)) return 1;
-    return reaches(nearby[0], across, scale, radius) && reaches(nearby[1], down, scale, radius) ? NEARBY : UNSEEN;
-  };
 }
 
 const tooFew = (needed: number, found: number): GaussianSplatError =>

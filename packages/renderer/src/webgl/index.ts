@@ -1,7 +1,9 @@
 /** WebGL 2 backend for browsers without WebGPU: whole scenes, sorted on the CPU, with the same shaders. */
 export { drawn, GlClock } from './gl-clock.js';
 export { glBytes, GlGaussians, positionsIn, type GlGaussianFacts, type RunGl } from './gl-gaussians.js';
-export { GlHost, HostedSplats, type GlHostDrawing, type GlHostFrame, type GlHostOptions } from './gl-host.js';
+export { GlHost, type GlHostOptions } from './gl-host.js';
+export type { GlHostFrame } from './host-depth.js';
+export { HostedSplats, type GlHostDrawing } from './hosted-splats.js';
 export type { GlStreamOptions } from './gl-stream.js';
 export {
   blendable,
