@@ -2,7 +2,8 @@
 import { copyFileSync, mkdirSync, readFileSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { encodingsFor } from '@gaussian-splat/optimize';
-import { readScene, toDegree } from '@gaussian-splat/formats';
+import { toDegree } from '@gaussian-splat/core';
+import { readScene } from '@gaussian-splat/formats';
 
 const [made, data, scenes] = process.argv.slice(2);
 const truth = JSON.parse(readFileSync(join(made, 'truth.json'), 'utf8'));

@@ -32,7 +32,7 @@ export interface Camera {
 }
 
 /** Near plane of INRIA's rasterizer, which is used in training, in world units. */
-export const DEFAULT_NEAR = 0.2;
+const DEFAULT_NEAR = 0.2;
 /** Far plane of gsplat, in world units. */
 export const DEFAULT_FAR = 1e10;
 
@@ -46,7 +46,7 @@ export interface CalibratedView {
   readonly K: readonly (readonly number[])[];
   /** 4x4 matrix from world to camera coordinates, row-major, OpenCV axes. */
   readonly worldToCamera: readonly (readonly number[])[];
-  /** Near plane in world units; default {@link DEFAULT_NEAR}. */
+  /** Near plane in world units; default 0.2. */
   readonly near?: number;
   /** Far plane in world units; default {@link DEFAULT_FAR}. */
   readonly far?: number;

@@ -23,6 +23,15 @@ export function damaged(
   return new GaussianSplatError(code, { where, expected, found, remedy, cause });
 }
 
+/** Returns the error for a file whose header declares no splats, at the place `where`. */
+export const noSplatsAt = (where: string): GaussianSplatError =>
+  new GaussianSplatError('decode/empty', {
+    where,
+    expected: '1 splat or more',
+    found: '0',
+    remedy: 'export the scene again; this file is empty',
+  });
+
 /** Warning for spherical harmonics of degree 4, which are truncated to degree 3. */
 export const DEGREE_4 =
   'Spherical harmonics of degree 4 are drawn up to degree 3; the finest changes of color with direction are left out.';

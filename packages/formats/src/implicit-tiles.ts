@@ -5,8 +5,8 @@ import { multiply, type Affine } from './gltf/nodes.js';
 import { isObject, parseJson, show, type Json, type JsonSource } from './json.js';
 import { MAX_PATH } from './lod/meta.js';
 import type { Tile } from './tile.js';
-import { countTile, TO_CLOUD, type TreeLoad } from './tileset.js';
-import { partOfVolume, volumeOf } from './tile-volume.js';
+import { countTile, type TreeLoad } from './tileset.js';
+import { partOfVolume, TO_CLOUD, volumeOf } from './tile-volume.js';
 
 /** Opens a file by its URI from the outermost tileset. */
 export type OpenSubtree = (uri: string) => Promise<Uint8Array>;
@@ -155,7 +155,7 @@ export function propertiesOf(implicit: ImplicitTile): Tile {
   const { root, shape, level } = implicit;
   const { isAdded, error, boundingVolume, toTileset } = root;
   const part = partOfVolume(boundingVolume, implicit, shape.axes);
-  const volume = volumeOf(part, multiply(TO_CLOUD, toTileset), TO_CLOUD);
+  const volume = volumeOf(part, multiply(TO_CLOUD, toTileset));
   return { isAdded, error: error / 2 ** level, volume, contents: [], children: [], implicit };
 }
 

@@ -62,6 +62,5 @@ export {
 } from './clip.js';
 export type { OpenFile, SceneFormat, SceneFormatName, SceneReader, SceneSource, SplatRange } from './scene-format.js';
 export { readSplats, splatRanges, type SplatRanges } from './splat-ranges.js';
-export { toDegree } from './to-degree.js';
 export { turned, upright, uprightRotation } from './transform/upright.js';
 export { samplePreview } from './preview.js';

@@ -73,6 +73,16 @@ export function isObject(value: unknown): value is Json {
   return typeof value === 'object' && value !== null && !Array.isArray(value);
 }
 
+/** Throws `decode/header` for the value at a path in a file. */
+export type FailAt = (path: string, expected: string, found: unknown) => never;
+
+/** Returns the function that reports values of a file. */
+export const failIn =
+  (name: string): FailAt =>
+  (path, expected, found) => {
+    throw damaged(`${name}, ${path}`, expected, show(found), 'decode/header');
+  };
+
 /** Formats a JSON value for error messages, with at most 80 characters of it. */
 export function show(value: unknown): string {
   if (value === undefined) return 'nothing';

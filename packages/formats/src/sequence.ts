@@ -3,7 +3,7 @@ import { LoadBudget } from './budget.js';
 import { grouped } from './bytes.js';
 import { creditsOf } from './credits.js';
 import { damaged } from './faults.js';
-import { parseJson, show } from './json.js';
+import { failIn, parseJson, show, type FailAt } from './json.js';
 import { MAX_PATH } from './lod/meta.js';
 import { MAX_MANIFEST_BYTES } from './signatures.js';
 
@@ -51,9 +51,7 @@ type Fail = (path: string, expected: string, found: unknown) => never;
  */
 export function parseSequence(bytes: Uint8Array, name: string): SceneSequence {
   const json = parseJson({ bytes, name, budget: new LoadBudget(bytes.length) }, MAX_MANIFEST_BYTES);
-  const fail = (path: string, expected: string, found: unknown): never => {
-    throw damaged(`${name}, ${path}`, expected, show(found), 'decode/header');
-  };
+  const fail: FailAt = failIn(name);
   const { gaussianSplatSequence: version, framesPerSecond, frames, count } = json;
   if (version !== 1) throw damaged(`${name}, gaussianSplatSequence`, 'version 1', show(version), 'decode/unsupported');
   if (!(Number.isFinite(framesPerSecond) && (framesPerSecond as number) > 0 && (framesPerSecond as number) <= 1000)) {

@@ -5,6 +5,8 @@ import type { Volume } from './tree/types.js';
 
 type Vector = readonly number[];
 
+/** Transform from the coordinates of tiles (z up) to those of a cloud (x right, y down, z forward): its own inverse. */
+export const TO_CLOUD: Affine = [-1, 0, 0, 0, 0, 0, -1, 0, 0, -1, 0, 0];
 /** WGS 84: semi-major axis in meters, and the square of the first eccentricity. */
 const [EARTH_RADIUS, EARTH_ECCENTRICITY] = [6_378_137, 6.694_379_990_141_3e-3];
 /** Fractions of the sides of a region whose points bound it. */
@@ -13,12 +15,11 @@ const SAMPLES = [0, 0.5, 1];
 /**
  * Returns a bounding volume in the coordinates of a cloud; undefined for kinds other than boxes, spheres and regions.
  * @param toCloud Transform from the coordinates of the tile.
- * @param earthToCloud The same from the coordinates of the Earth, which regions have.
  */
-export function volumeOf(value: unknown, toCloud: Affine, earthToCloud: Affine): Volume | undefined {
+export function volumeOf(value: unknown, toCloud: Affine): Volume | undefined {
   const { box, sphere, region } = isObject(value) ? value : {};
   if (isList(box, 12)) return moved(box, toCloud);
-  if (isList(region, 6)) return moved(boxOfRegion(region), earthToCloud);
+  if (isList(region, 6)) return moved(boxOfRegion(region), TO_CLOUD);
   if (!isList(sphere, 4)) return undefined;
   const [x, y, z, r] = sphere;
   const volume = moved([x, y, z, r, 0, 0, 0, r, 0, 0, 0, r], toCloud);

@@ -3,18 +3,15 @@ import { grouped } from './bytes.js';
 import { damaged } from './faults.js';
 import { multiply, type Affine } from './gltf/nodes.js';
 import { implicitTile, propertiesOf, readImplicit, type SubtreeFiles } from './implicit-tiles.js';
-import { isObject, parseJson, show, type Json, type JsonSource } from './json.js';
+import { failIn, isObject, parseJson, show, type FailAt, type Json, type JsonSource } from './json.js';
 import { MAX_INDEX_BYTES } from './lod/meta.js';
-import { scaleOf, volumeOf } from './tile-volume.js';
+import { scaleOf, TO_CLOUD, volumeOf } from './tile-volume.js';
 import type { Tile, TileContent } from './tile.js';
 
 const MAX_TILES = 100_000;
 const MAX_DEPTH = 500;
 
 const IDENTITY: Affine = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0];
-
-/** Transform from the coordinates of tiles (z up) to those of a cloud (x right, y down, z forward): its own inverse. */
-export const TO_CLOUD: Affine = [-1, 0, 0, 0, 0, 0, -1, 0, 0, -1, 0, 0];
 
 /** Figures of all tilesets of one load. */
 export interface TreeLoad {
@@ -39,9 +36,7 @@ export function countTile(load: TreeLoad, where: string): void {
 export function parseTileset(source: JsonSource, load: TreeLoad, folder = '', toParent: Affine = IDENTITY): Tile {
   const { root, asset } = parseJson(source, MAX_INDEX_BYTES);
   const turn = turnOf(asset, source.name);
-  const fail = (path: string, expected: string, found: unknown): never => {
-    throw damaged(`${source.name}, ${path}`, expected, show(found), 'decode/header');
-  };
+  const fail: FailAt = failIn(source.name);
   const open = (json: unknown, parent: Affine, isParentAdded: boolean, path: string, depth: number): Tile => {
     if (!isObject(json)) return fail(path, 'a tile', json);
     const where = `${source.name}, ${path}`;
@@ -53,7 +48,7 @@ export function parseTileset(source: JsonSource, load: TreeLoad, folder = '', to
       json.refine === undefined ? isParentAdded : /^add$/i.test(typeof json.refine === 'string' ? json.refine : '');
     const { boundingVolume, geometricError } = json;
     const error = Number.isFinite(geometricError) ? (geometricError as number) * scaleOf(toTileset) : Infinity;
-    const volume = volumeOf(boundingVolume, multiply(TO_CLOUD, toTileset), TO_CLOUD);
+    const volume = volumeOf(boundingVolume, multiply(TO_CLOUD, toTileset));
     const own = { isAdded, error, volume };
     const tiling = json.implicitTiling ?? extensionOf(json, '3DTILES_implicit_tiling');
     if (tiling !== undefined) {

@@ -65,17 +65,25 @@ const EVERYWHERE = [...DISTANCES, 0.6];
  * Returns views of a subject from all directions, including from below and from within. Splats that none of these views
  * shows are considered unimportant.
  */
-export function viewsFromEverywhere(bounds: Bounds, count: number, options: ViewOptions = {}): Camera[] {
-  const { center, radius } = bounds;
-  return viewsAround(bounds, count, options).map((view, k) => {
-    const azimuth = 2 * Math.PI * ((0.6180339887 * (k + 0.5)) % 1);
+export function viewsFromEverywhere(bounds: Bounds, count: number): Camera[] {
+  return viewsAround(bounds, count).map((view, k) => {
     const height = 2 * ((0.7548776662 * (k + 0.5)) % 1) - 1;
-    const distance = radius * EVERYWHERE[k % EVERYWHERE.length];
-    const across = Math.sqrt(1 - height * height);
-    const direction = [across * Math.sin(azimuth), -height, -across * Math.cos(azimuth)];
-    const eye = center.map((value, axis) => value + distance * direction[axis]) as [number, number, number];
-    return { ...view, worldToCamera: lookAt(eye, center, [0, -1, 0]) };
+    const eye = eyeFrom(bounds, (0.6180339887 * (k + 0.5)) % 1, height, EVERYWHERE[k % EVERYWHERE.length]);
+    return { ...view, worldToCamera: lookAt(eye, bounds.center, [0, -1, 0]) };
   });
+}
+
+/**
+ * Returns a point around the center of a subject.
+ * @param turn Azimuth as a fraction of a turn.
+ * @param height Sine of the elevation.
+ * @param distance Distance in radii.
+ */
+function eyeFrom({ center, radius }: Bounds, turn: number, height: number, distance: number): Vector3 {
+  const azimuth = 2 * Math.PI * turn;
+  const across = Math.sqrt(1 - height * height);
+  const direction = [across * Math.sin(azimuth), -height, -across * Math.cos(azimuth)];
+  return center.map((value, axis) => value + radius * distance * direction[axis]) as unknown as Vector3;
 }
 
 /**
@@ -93,12 +101,9 @@ function viewsOfVisitors(bounds: Bounds, count: number, options: ViewOptions): C
   const { center, radius } = bounds;
   return viewsAround(bounds, count, options).map((view, k) => {
     const at = (step: number): number => ((k + 0.5 + 97 * (options.seed ?? 0)) * step) % 1;
-    const azimuth = 2 * Math.PI * at(0.6180339887);
     const height = Math.sin(VISITED_ELEVATION) * (2 * at(0.7548776662) - 1);
-    const distance = radius * VISITED_DISTANCES[(k + (options.seed ?? 0)) % VISITED_DISTANCES.length];
-    const across = Math.sqrt(1 - height * height);
-    const direction = [across * Math.sin(azimuth), -height, -across * Math.cos(azimuth)];
-    const eye = center.map((value, axis) => value + distance * direction[axis]) as [number, number, number];
+    const distance = VISITED_DISTANCES[(k + (options.seed ?? 0)) % VISITED_DISTANCES.length];
+    const eye = eyeFrom(bounds, at(0.6180339887), height, distance);
     const aside = [0.5698402909, 0.3247179572, 0.4142135623].map((step) => 0.3 * radius * (at(step) - 0.5));
     const target = center.map((value, axis) => value + aside[axis]) as [number, number, number];
     return { ...view, worldToCamera: lookAt(eye, target, [0, -1, 0]) };

@@ -6,6 +6,7 @@ import { constants } from './generated/shaders.js';
 import { BUFFER_USAGE } from './gpu/kernel.js';
 import { type GpuMemory, withMemoryCheck } from './gpu/memory.js';
 import { writeStruct } from './gpu/struct.js';
+import { submitPass } from './gpu/one-off.js';
 import { bytesPerSplat } from './memory-ledger.js';
 import { animationBytes, planeCodes, type PackedAnimation } from './pack/pack-animated.js';
 import { SceneBuffers } from './scene-buffers.js';
@@ -171,9 +172,11 @@ export class AnimatedGaussians extends SceneBuffers {
    * @param isWhole False while parts of the group are missing: the splats of the uploaded parts are then enlarged.
    */
   show(slot: number, frame: number, isWhole: boolean): void {
-    const encoder = this.#device.createCommandEncoder({ label: 'gs.animate' });
-    const pass = encoder.beginComputePass({ label: 'gs.animate' });
-    const factor = isWhole ? 1 : this.#grow;
+    submitPass(this.#device, 'gs.animate', (pass) => this.#record(pass, slot, frame, isWhole ? 1 : this.#grow));
+    this.#version++;
+  }
+
+  #record(pass: GPUComputePassEncoder, slot: number, frame: number, factor: number): void {
     this.#frameCount = 0;
     for (let k = 0; k < this.#slots[slot].length; k++) this.#evaluate(pass, slot, k, frame, factor);
     const still = this.#slots[STILL_SLOT];
@@ -186,9 +189,6 @@ export class AnimatedGaussians extends SceneBuffers {
       else this.#evaluate(pass, STILL_SLOT, k, 0, factor);
     }
     this.#stillShown = factor === 1 ? written : -1;
-    pass.end();
-    this.#device.queue.submit([encoder.finish()]);
-    this.#version++;
   }
 
   #evaluate(pass: GPUComputePassEncoder, slot: number, k: number, frame: number, factor: number): void {

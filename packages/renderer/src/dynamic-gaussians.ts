@@ -6,6 +6,8 @@ import * as layouts from './generated/live-layouts.js';
 import { BUFFER_USAGE } from './gpu/kernel.js';
 import { type GpuMemory, withMemoryCheck } from './gpu/memory.js';
 import { writeStruct } from './gpu/struct.js';
+import { submitPass, writeUniform } from './gpu/one-off.js';
+import { readBack } from './gpu/read-back.js';
 import { readSamples } from './read-samples.js';
 import { SceneBuffers } from './scene-buffers.js';
 import { ingestStage } from './stages/ingest.js';
@@ -139,10 +141,9 @@ export class DynamicGaussians extends SceneBuffers {
       for (const { uniform } of this.blocks)
         encoder.copyBufferToBuffer(counter, countBytes(this.layout) * instance, uniform, offset, 4);
     }
-    const pass = encoder.beginComputePass({ label: 'gs.ingest' });
-    this.blocks.forEach(({ count }, page) => this.#stage.record(pass, bindings[page], count));
-    pass.end();
-    this.#device.queue.submit([encoder.finish()]);
+    const record = (pass: GPUComputePassEncoder): void =>
+      this.blocks.forEach(({ count }, page) => this.#stage.record(pass, bindings[page], count));
+    submitPass(this.#device, 'gs.ingest', record, encoder);
     this.#version++;
   }
 
@@ -168,18 +169,10 @@ export class DynamicGaussians extends SceneBuffers {
 
   /** Reads the count of valid rows of the last run, and its number of rows. */
   async #readCount(): Promise<RowSample['counted']> {
-    const { mapRead, copyDestination } = BUFFER_USAGE;
-    const staging = this.#device.createBuffer({ label: 'gs.counted', size: 8, usage: mapRead | copyDestination });
-    try {
-      const encoder = this.#device.createCommandEncoder({ label: 'gs.counted' });
-      encoder.copyBufferToBuffer(this.blocks[0].uniform, layouts.Ingest.fields.count.offset, staging, 0, 8);
-      this.#device.queue.submit([encoder.finish()]);
-      await staging.mapAsync(0x1);
-      const [count, rows] = new Int32Array(staging.getMappedRange());
-      return { count, rows };
-    } finally {
-      staging.destroy();
-    }
+    const byteOffset = layouts.Ingest.fields.count.offset;
+    const [words] = await readBack(this.#device, [{ buffer: this.blocks[0].uniform, byteOffset, byteLength: 8 }]);
+    const [count, rows] = new Int32Array(words);
+    return { count, rows };
   }
 
   /** Number of rows with unusable values in the last sample; 0 before the first sample. */
@@ -209,9 +202,7 @@ export class DynamicGaussians extends SceneBuffers {
         chunks: part('chunks', CHUNK_NUMBERS * cullGroups(count)),
         uniform: this.memory.buffer('gs.ingest.uniform', layouts.Ingest.size, uniform | copyDestination | copySource),
       };
-      const bytes = new ArrayBuffer(layouts.Ingest.size);
-      writeStruct(layouts.Ingest, ingestValues(this.layout, first, count, 0), bytes);
-      this.#device.queue.writeBuffer(page.uniform, 0, bytes);
+      writeUniform(this.#device, page.uniform, layouts.Ingest, ingestValues(this.layout, first, count, 0));
       blocks.push(page);
     }
     return blocks;

@@ -3,6 +3,7 @@ import { GaussianBuffers, type UploadOptions } from './gaussian-buffers.js';
 import type { GaussianBlock, GaussianScene } from './gaussian-scene.js';
 import { constants } from './generated/shaders.js';
 import { type PackedGaussians } from './pack/pack.js';
+import { padded } from './pack/padded.js';
 import { CHUNK_NUMBERS, GEOMETRY_WORDS, type ShPrecision, shWords } from './pack/words.js';
 
 const { CULL_GROUP } = constants;
@@ -114,16 +115,4 @@ export class SequenceGaussians implements GaussianScene {
     const rest = stride * last - Math.max(end, stride * first);
     if (rest > 0) queue.writeBuffer(buffer, 4 * (stride * (last - first) - rest), new Uint32Array(rest));
   }
-}
-
-/** Returns the frame with `count` splats; the added ones have opacity 0. */
-function padded(frame: PackedGaussians, count: number): PackedGaussians {
-  const stride = shWords(frame.shDegree, frame.shPrecision);
-  const geometry = new Uint32Array(GEOMETRY_WORDS * count);
-  const sh = new Uint32Array(stride * count);
-  const chunks = new Float32Array((CHUNK_NUMBERS * count) / CULL_GROUP);
-  geometry.set(frame.geometry);
-  sh.set(frame.sh);
-  chunks.set(frame.chunks);
-  return { ...frame, count, geometry, sh, chunks };
 }

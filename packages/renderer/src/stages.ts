@@ -17,6 +17,7 @@ export * from './generated/streamed-shaders.js';
 export { BUFFER_USAGE, dispatchGrid, kernelOf, rareKernelOf, TEXTURE_USAGE, type ComputeKernel } from './gpu/kernel.js';
 export { PACKED, type GeometryReading } from './geometry-reading.js';
 export { BufferOwner, GpuMemory, withMemoryCheck } from './gpu/memory.js';
+export { submitPass, uniformWith, writeUniform } from './gpu/one-off.js';
 export { BLOCK_BYTES, StagingBelt } from './gpu/staging-belt.js';
 export { writeStruct, type StructLayout, type StructValues } from './gpu/struct.js';
 export { pageCapacity } from './gaussian-buffers.js';

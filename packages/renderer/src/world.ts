@@ -1,4 +1,4 @@
-import { GaussianSplatError, type Bounds, type Matrix4, type Vector3 } from '@gaussian-splat/core';
+import { GaussianSplatError, linearDeterminant, type Bounds, type Matrix4, type Vector3 } from '@gaussian-splat/core';
 import type { GaussianScene } from './gaussian-scene.js';
 import type { PlacementModifier } from './placement-modifier.js';
 
@@ -199,10 +199,7 @@ export class World {
 function requireAffine(m: Matrix4): void {
   const isAffine =
     m.length === 16 && m.every(Number.isFinite) && m[12] === 0 && m[13] === 0 && m[14] === 0 && m[15] === 1;
-  const determinant = isAffine
-    ? m[0] * (m[5] * m[10] - m[6] * m[9]) - m[1] * (m[4] * m[10] - m[6] * m[8]) + m[2] * (m[4] * m[9] - m[5] * m[8])
-    : NaN;
-  if (Number.isFinite(1 / determinant)) return;
+  if (isAffine && Number.isFinite(1 / linearDeterminant(m))) return;
   throw wrong(
     'sceneToWorld',
     '16 finite numbers, row-major, last row 0, 0, 0, 1, of a matrix that can be inverted',

@@ -1,5 +1,5 @@
 /** Parts of every procedural scene. */
-import { DEFAULT_FAR, DEFAULT_NEAR, lookAt, type Camera, type GaussianCloud, type Vector3 } from '@gaussian-splat/core';
+import { DEFAULT_FAR, lookAt, type Camera, type GaussianCloud, type Vector3 } from '@gaussian-splat/core';
 
 export interface Scene {
   readonly name: string;
@@ -58,7 +58,7 @@ export function cameraAt(
     readonly near?: number;
   } = {},
 ): Camera {
-  const { width = 480, height = 320, fovXDegrees = 70, near = DEFAULT_NEAR } = options;
+  const { width = 480, height = 320, fovXDegrees = 70, near = 0.2 } = options;
   const focal = width / 2 / Math.tan((fovXDegrees * Math.PI) / 360);
   return {
     width,

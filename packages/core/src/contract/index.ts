@@ -2,6 +2,7 @@ export * from './contract.js';
 export { checkContract } from './check-contract.js';
 export { checkFile, RUNTIME_LIMITS, isInside, type CheckFileOptions } from './check-file.js';
 export { checkBounds, checkOutputs, compareRuns, type OutputReport, type OutputTensor } from './check-outputs.js';
+export type { ContractErrorCode } from '../errors.js';
 export { ContractError, describeFault, type ContractErrorData, type ContractFault } from './contract-error.js';
 export { hasInstances, ofInstances, oneInstance, outputsOfInstance } from './instances.js';
 export { gaussianLayout, type AttributeSlice, type GaussianLayout } from './layout.js';

@@ -1,5 +1,5 @@
 /** Parts of clips: their splats, their motion, and the frames that they have together. */
-import { keepUsable, type GaussianCloud, type ShDegree } from '@gaussian-splat/core';
+import { keepUsable, toDegree, type GaussianCloud, type ShDegree } from '@gaussian-splat/core';
 import { LoadBudget, type LoadLimits } from '../budget.js';
 import { grouped } from '../bytes.js';
 import type { ClipPart } from '../clip.js';
@@ -7,7 +7,6 @@ import { damaged } from '../faults.js';
 import { mergeClouds } from '../merge-clouds.js';
 import { applyMotion, ANIMATED_ATTRIBUTES, ANIMATED_ATTRIBUTE_NAMES, stillMotion, type Motion } from '../motion.js';
 import { readScene } from '../read-scene.js';
-import { toDegree } from '../to-degree.js';
 import { readMotion } from './read-motion.js';
 
 /** Bytes of a decoded splat without its codes: attributes, coefficients of degree 0 and fades. */

@@ -1,6 +1,6 @@
 import { GaussianSplatError, type ShDegree } from '@gaussian-splat/core';
 import { grouped, viewOf } from '../bytes.js';
-import { damaged } from '../faults.js';
+import { damaged, noSplatsAt } from '../faults.js';
 import { KSPLAT_HEADER_BYTES as HEADER_BYTES } from '../signatures.js';
 
 const SECTION_HEADER_BYTES = 1024;
@@ -69,7 +69,7 @@ export function parseKsplatHeader(bytes: Uint8Array, name: string, isPrefix = fa
   );
   if (!isPrefix) sections.forEach((section) => requireRoom(section, bytes, name));
   const count = sections.reduce((sum, section) => sum + section.count, 0);
-  if (count === 0) throw noSplats(where(16));
+  if (count === 0) throw noSplatsAt(where(16));
   const range = [36, 40].map((at) => view.getFloat32(at, true)) as [number, number];
   if (range.some((end) => !Number.isFinite(end)))
     throw damaged(where(36), 'a range of coefficients', 'numbers that are not finite', 'decode/header');
@@ -149,14 +149,5 @@ function cut(bytes: Uint8Array, name: string, needed: number, what: string): Gau
     expected: `${what}, which end at byte ${grouped(needed)}`,
     found: `${grouped(bytes.length)} bytes`,
     remedy: 'download or export the file again; it is incomplete or its header is damaged',
-  });
-}
-
-function noSplats(where: string): GaussianSplatError {
-  return new GaussianSplatError('decode/empty', {
-    where,
-    expected: '1 splat or more',
-    found: '0',
-    remedy: 'export the scene again; this file is empty',
   });
 }

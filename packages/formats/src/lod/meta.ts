@@ -2,7 +2,7 @@ import type { Credits } from '@gaussian-splat/core';
 import { creditsOfAsset } from '../credits.js';
 import { damaged } from '../faults.js';
 import { grouped } from '../bytes.js';
-import { isObject, parseJson, show, type JsonSource } from '../json.js';
+import { failIn, isObject, parseJson, show, type FailAt, type JsonSource } from '../json.js';
 
 /** Range of splats in a file: `offset` to `offset + count`, excluding the latter. */
 export interface LodRun {
@@ -46,9 +46,7 @@ const MAX_LEVELS = 64;
 export function parseLodMeta(source: JsonSource): LodMeta {
   const { name } = source;
   const json = parseJson(source, MAX_INDEX_BYTES);
-  const fail = (path: string, expected: string, found: unknown): never => {
-    throw damaged(`${name}, ${path}`, expected, show(found), 'decode/header');
-  };
+  const fail: FailAt = failIn(name);
   const { version = 1, lodLevels, filenames, environment, tree } = json;
   if (version !== 1) throw damaged(`${name}, version`, 'version 1', show(version), 'decode/unsupported');
   if (!isCount(lodLevels) || lodLevels < 1 || lodLevels > MAX_LEVELS)

@@ -1,7 +1,7 @@
 import type { GaussianCloud } from '@gaussian-splat/core';
 import { checkedPart } from '../foreign-signatures.js';
 import { damaged, warn } from '../faults.js';
-import { isObject, parseJson, show, type Json, type JsonSource, type ParseJson } from '../json.js';
+import { failIn, isObject, parseJson, show, type FailAt, type Json, type JsonSource, type ParseJson } from '../json.js';
 import { MAX_INDEX_BYTES, MAX_PATH } from '../lod/meta.js';
 import { mergeClouds } from '../merge-clouds.js';
 import type { SceneSource } from '../scene-format.js';
@@ -61,9 +61,7 @@ export async function readLcc2(source: SceneSource): Promise<GaussianCloud> {
 /** Parses a description. Its earlier form has other names, and paths without `.sog`. */
 function parseLcc2Meta(source: JsonSource): Lcc2Meta {
   const json = parseJson(source, MAX_INDEX_BYTES, parseWithTrailingCommas);
-  const fail = (path: string, expected: string, found: unknown): never => {
-    throw damaged(`${source.name}, ${path}`, expected, show(found), 'decode/header');
-  };
+  const fail: FailAt = failIn(source.name);
   const { root, totalLevels = json.lod_level, lodSplats, lod_3dgs_info: earlier, splatType = '.sog' } = json;
   if (splatType !== '.sog')
     throw damaged(`${source.name}, splatType`, 'parts that are SOG', show(splatType), 'decode/unsupported');

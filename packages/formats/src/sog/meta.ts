@@ -1,9 +1,9 @@
 import { GaussianSplatError, type Credits, type ShDegree, type TrainedOrder } from '@gaussian-splat/core';
 import { grouped } from '../bytes.js';
 import { creditsOfAsset } from '../credits.js';
-import { damaged } from '../faults.js';
+import { damaged, noSplatsAt } from '../faults.js';
 import { trainedOrder } from '../trained-order.js';
-import { isObject, parseJson, show, type Json, type JsonSource } from '../json.js';
+import { failIn, isObject, parseJson, show, type FailAt, type Json, type JsonSource } from '../json.js';
 
 /** For each channel of an image, an array with the value of each byte 0..255. */
 export type ByteTable = readonly Float32Array[];
@@ -57,9 +57,7 @@ const MAX_PALETTE = 65_536;
 export function parseSogMeta(source: JsonSource): SogMeta {
   const { name } = source;
   const json = parseJson(source, MAX_META_BYTES);
-  const fail = (path: string, expected: string, found: unknown): never => {
-    throw damaged(`${name}, ${path}`, expected, show(found), 'decode/header');
-  };
+  const fail: FailAt = failIn(name);
   const version = json.version ?? 1;
   if (version !== 1 && version !== 2) {
     throw damaged(`${name}, version`, 'SOG version 1 or 2', show(version), 'decode/unsupported');
@@ -83,7 +81,7 @@ export function parseSogMeta(source: JsonSource): SogMeta {
   if (version === 1 && !part('means').files && part('means').dtype !== undefined) throw gsplatPngs(name);
   const count = version === 2 ? json.count : Array.isArray(shape) ? shape[0] : undefined;
   if (!Number.isSafeInteger(count) || (count as number) < 0) fail('count', 'the number of splats', count);
-  if (count === 0) throw noSplats(name);
+  if (count === 0) throw noSplatsAt(`${name}, count`);
   const codebook = (key: string): Float32Array => {
     const mended = withFirst(part(key).codebook);
     return tableOf(mended ?? numbers(key, 'codebook', 1));
@@ -158,14 +156,5 @@ function gsplatPngs(name: string): GaussianSplatError {
     expected: 'the meta.json of a SOG scene',
     found: "that of gsplat's PNG compression, which names no files",
     remedy: 'save the splats as PLY with the exporter of gsplat, and give that file or convert it to SOG',
-  });
-}
-
-function noSplats(name: string): GaussianSplatError {
-  return new GaussianSplatError('decode/empty', {
-    where: `${name}, count`,
-    expected: '1 splat or more',
-    found: '0',
-    remedy: 'export the scene again; this file is empty',
   });
 }

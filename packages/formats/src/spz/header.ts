@@ -1,5 +1,6 @@
 import { GaussianSplatError, type ShDegree } from '@gaussian-splat/core';
 import { grouped, startsWith, viewOf } from '../bytes.js';
+import { noSplatsAt } from '../faults.js';
 
 /** Header fields that all versions of SPZ have. */
 export interface SpzHeader {
@@ -89,14 +90,7 @@ export function bodyBytes({ count, degree }: SpzHeader, version: number): number
  * @param fileBytes Compressed size of the file.
  */
 export function requirePlausibleCount(header: SpzHeader, fileBytes: number, name: string): void {
-  if (header.count === 0) {
-    throw new GaussianSplatError('decode/empty', {
-      where: `${name}, byte 8 of the SPZ header`,
-      expected: '1 splat or more',
-      found: '0',
-      remedy: 'export the scene again; this file is empty',
-    });
-  }
+  if (header.count === 0) throw noSplatsAt(`${name}, byte 8 of the SPZ header`);
   const needed = Math.ceil(bodyBytes(header, header.version) / MAX_COMPRESSION_RATIO);
   if (fileBytes >= needed) return;
   throw new GaussianSplatError('decode/truncated', {

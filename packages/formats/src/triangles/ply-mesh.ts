@@ -48,7 +48,7 @@ export function readPlyMesh({ bytes, name, budget }: TriangleSource): TriangleFi
   budget.take(DRAW_BYTES, name);
   const alpha = colors && columnsOf(data, [ALPHA], source);
   const attributes: Record<string, Accessor> = { POSITION: positionsOf(positions!) };
-  if (normals) attributes.NORMAL = floats(normals, 'VEC3');
+  if (normals) attributes.NORMAL = floats(normals);
   if (colors) attributes.COLOR_0 = colorsOf(colors, alpha, vertex);
   const all = [
     ...Object.values(attributes),
@@ -156,13 +156,13 @@ function positionsOf(positions: Float32Array<ArrayBuffer>): Accessor {
     min[at % 3] = Math.min(min[at % 3], positions[at]);
     max[at % 3] = Math.max(max[at % 3], positions[at]);
   }
-  const { bytes, json } = floats(positions, 'VEC3');
+  const { bytes, json } = floats(positions);
   return { bytes, json: { ...json, min, max } };
 }
 
-const floats = (array: Float32Array<ArrayBuffer>, type: 'VEC3'): Accessor => ({
+const floats = (array: Float32Array<ArrayBuffer>): Accessor => ({
   bytes: bytesOf(array),
-  json: { componentType: FLOAT, count: array.length / 3, type },
+  json: { componentType: FLOAT, count: array.length / 3, type: 'VEC3' },
 });
 
 /** Converts sRGB colors, [vertices, 3], to an accessor of linear colors with alpha, as glTF specifies. */

@@ -49,7 +49,8 @@ export function readField(prim: UsdPrim, time: number, source: SceneSource): Dra
   const cloud = allocateCloud(count, hasHarmonics ? keptDegree(degree) : 0, source);
   const own = 3 * shCoefficientCount(cloud.shDegree);
   /** Fills an array of the cloud, or leaves its defaults with a warning if the attribute is too short. */
-  const fill = (name: string, to: Float32Array, defaults: readonly number[], from = numbersOf(name)): void => {
+  const fill = (name: string, to: Float32Array, defaults: readonly number[]): void => {
+    const from = numbersOf(name);
     if (from && from.length >= to.length) put(from, to);
     else {
       for (let k = 0; k < to.length; k++) to[k] = defaults[k % defaults.length];

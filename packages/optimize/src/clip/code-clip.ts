@@ -1,6 +1,6 @@
-import { boundsOf, type Credits, type GaussianCloud, type ShDegree } from '@gaussian-splat/core';
+import { boundsOf, toDegree, type Credits, type GaussianCloud, type ShDegree } from '@gaussian-splat/core';
 import { concatenated } from '@gaussian-splat/core/fetch';
-import { joinCredits, readScene, toDegree, upright, writeClipHead } from '@gaussian-splat/formats';
+import { joinCredits, readScene, upright, writeClipHead } from '@gaussian-splat/formats';
 import { decibels, mean, meanSquareOf } from '../measure.js';
 import type { Encoding } from '../write/index.js';
 import type { EncodeWebp } from '../write/sog.js';

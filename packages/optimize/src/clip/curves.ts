@@ -1,3 +1,4 @@
+import type { GaussianCloud } from '@gaussian-splat/core';
 import type { AnimatedAttributeName } from '@gaussian-splat/formats';
 import type { Steps } from '../steps.js';
 import { mainCurves } from './main-curves.js';
@@ -29,13 +30,11 @@ export interface Followed {
   readonly isAged: boolean;
 }
 
-/**
- * Writes to `turn` the quaternion that rotates one orientation to another, to · from⁻¹.
- * @param at Index of the first component in both arrays.
- */
-export function turnBetween(from: Float32Array, to: Float32Array, at: number, turn: Float64Array): void {
-  const [w, x, y, z] = [from[at], -from[at + 1], -from[at + 2], -from[at + 3]];
-  const [a, b, c, d] = [to[at], to[at + 1], to[at + 2], to[at + 3]];
+/** Writes to `turn` the quaternion that rotates splat `i` to splat `j` of another cloud, to · from⁻¹. */
+export function turnBetween(from: GaussianCloud, i: number, to: GaussianCloud, j: number, turn: Float64Array): void {
+  const [p, q, at, end] = [from.rotations, to.rotations, 4 * i, 4 * j];
+  const [w, x, y, z] = [p[at], -p[at + 1], -p[at + 2], -p[at + 3]];
+  const [a, b, c, d] = [q[end], q[end + 1], q[end + 2], q[end + 3]];
   turn[0] = a * w - b * x - c * y - d * z;
   turn[1] = a * x + b * w + c * z - d * y;
   turn[2] = a * y - b * z + c * w + d * x;

@@ -92,14 +92,8 @@ function numbersOf(name: Exclude<AnimatedAttributeName, 'rotation'>, cloud: Gaus
 function turnsOf({ cloud }: TrackedSplats): Read {
   const last = new Float64Array(3 * cloud.count);
   const turn = new Float64Array(4);
-  const from = new Float32Array(4);
-  const to = new Float32Array(4);
   return (frame, i, place, out) => {
-    for (let k = 0; k < 4; k++) {
-      from[k] = cloud.rotations[4 * place + k];
-      to[k] = frame.rotations[4 * i + k];
-    }
-    turnBetween(from, to, 0, turn);
+    turnBetween(cloud, place, frame, i, turn);
     const before = last.subarray(3 * place, 3 * place + 3);
     const size = Math.hypot(turn[1], turn[2], turn[3]);
     const lastSize = Math.hypot(before[0], before[1], before[2]);

@@ -17,7 +17,6 @@ export function harmonicsTurn(tracks: Tracks, { cloud, placeOf }: TrackedSplats)
   const numbers = 3 * shCoefficientCount(cloud.shDegree);
   const turner = new HarmonicsTurner(cloud.shDegree);
   const turn = new Float64Array(4);
-  const [from, to] = [new Float32Array(4), new Float32Array(4)];
   let [turned, kept] = [0, 0];
   const stride = Math.max(1, Math.floor(tracks.frames.length / FRAMES));
   for (let f = stride - 1; f < tracks.frames.length; f += stride) {
@@ -25,11 +24,7 @@ export function harmonicsTurn(tracks: Tracks, { cloud, placeOf }: TrackedSplats)
     for (let i = 0; i < frame.count; i += Math.max(1, Math.floor(frame.count / SPLATS))) {
       const place = placeOf[tracks.of[f][i]];
       if (place < 0) continue;
-      for (let k = 0; k < 4; k++) {
-        from[k] = cloud.rotations[4 * place + k];
-        to[k] = frame.rotations[4 * i + k];
-      }
-      turnBetween(from, to, 0, turn);
+      turnBetween(cloud, place, frame, i, turn);
       const still = cloud.sh.subarray(numbers * place, numbers * (place + 1));
       const moved = still.slice();
       turner.turn(moved, 0, [turn[0], turn[1], turn[2], turn[3]]);

@@ -13,7 +13,8 @@ import {
   SceneBuffers,
   shWords,
   withMemoryCheck,
-  writeStruct,
+  submitPass,
+  uniformWith,
 } from '@gaussian-splat/renderer/stages';
 import { widthsOf } from '../parts/cloud-memory.js';
 
@@ -82,11 +83,7 @@ function pack(device: GPUDevice, cloud: GaussianCloud, first: number, page: Gaus
       ...{ colors: part('sh'), opacities: part('opacities') },
       ...{ gaussians: page.geometry, sh: page.sh, chunks: page.chunks },
     });
-    const encoder = device.createCommandEncoder({ label: 'gs.optimize.pack' });
-    const pass = encoder.beginComputePass({ label: 'gs.optimize.pack' });
-    stage.record(pass, bindings, page.count);
-    pass.end();
-    device.queue.submit([encoder.finish()]);
+    submitPass(device, 'gs.optimize.pack', (pass) => stage.record(pass, bindings, page.count));
   } finally {
     passing.destroy();
   }
@@ -94,17 +91,11 @@ function pack(device: GPUDevice, cloud: GaussianCloud, first: number, page: Gaus
 
 /** Returns a uniform buffer of `Ingest` for `count` rows. Each row is a splat. */
 function uniformOf(memory: GpuMemory, degree: ShDegree, count: number): GPUBuffer {
-  const bytes = new ArrayBuffer(Ingest.size);
   const { positions, scales, rotations, sh, opacities } = widthsOf(degree);
-  writeStruct(
-    Ingest,
-    {
-      ...{ count, rows: count, page_rows: count, first_row: 0, is_half: 0, is_w_first: 1, is_logit: 0 },
-      ...{ shape_kind: SHAPE_SCALE, shape_numbers: 3, color_kind: COLOR_COEFFICIENT_MAJOR, sh_degree: degree },
-      ...{ positions: [0, positions], shapes: [0, scales], rotations: [0, rotations] },
-      ...{ colors: [0, sh], opacities: [0, opacities] },
-    },
-    bytes,
-  );
-  return memory.buffer('gs.optimize.ingest', bytes.byteLength, BUFFER_USAGE.uniform, new Uint32Array(bytes));
+  return uniformWith(memory, 'gs.optimize.ingest', Ingest, {
+    ...{ count, rows: count, page_rows: count, first_row: 0, is_half: 0, is_w_first: 1, is_logit: 0 },
+    ...{ shape_kind: SHAPE_SCALE, shape_numbers: 3, color_kind: COLOR_COEFFICIENT_MAJOR, sh_degree: degree },
+    ...{ positions: [0, positions], shapes: [0, scales], rotations: [0, rotations] },
+    ...{ colors: [0, sh], opacities: [0, opacities] },
+  });
 }

@@ -5,7 +5,8 @@ import {
   rareKernelOf,
   SceneBuffers,
   withMemoryCheck,
-  writeStruct,
+  submitPass,
+  writeUniform,
 } from '@gaussian-splat/renderer/stages';
 import { readBack } from '@gaussian-splat/renderer/tools';
 import { optimizeCut, GONE, SCORE_GROUP, UNJUDGED } from '../generated/shaders.js';
@@ -65,7 +66,6 @@ export class CutScene extends SceneBuffers {
   /** Applies a cut to the original scene, and writes the result to the copy. Splats must have been scored before. */
   apply({ minContribution = 0, removalPrice = 0, colorPrice = 0 }: Cut): void {
     const kernel = rareKernelOf(this.#device, optimizeCut);
-    const bytes = new ArrayBuffer(layouts.Cut.size);
     const prices = {
       min_contribution: minContribution,
       // WGSL has no infinity. UNJUDGED is its substitute in scores.
@@ -74,14 +74,13 @@ export class CutScene extends SceneBuffers {
     };
     const encoder = this.#device.createCommandEncoder({ label: 'gs.optimize.cut' });
     encoder.clearBuffer(this.#kept);
-    const pass = encoder.beginComputePass({ label: 'gs.optimize.cut' });
-    this.#scene.parts.forEach(({ page }, p) => {
-      writeStruct(layouts.Cut, { ...prices, splat_count: page.count, sh_degree: this.shDegree }, bytes);
-      this.#device.queue.writeBuffer(this.#uniforms[p], 0, bytes);
-      kernel.dispatch(pass, this.#bindings[p], Math.ceil(page.count / SCORE_GROUP));
-    });
-    pass.end();
-    this.#device.queue.submit([encoder.finish()]);
+    const record = (pass: GPUComputePassEncoder): void =>
+      this.#scene.parts.forEach(({ page }, p) => {
+        const values = { ...prices, splat_count: page.count, sh_degree: this.shDegree };
+        writeUniform(this.#device, this.#uniforms[p], layouts.Cut, values);
+        kernel.dispatch(pass, this.#bindings[p], Math.ceil(page.count / SCORE_GROUP));
+      });
+    submitPass(this.#device, 'gs.optimize.cut', record, encoder);
     this.#version++;
   }
 

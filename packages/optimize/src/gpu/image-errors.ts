@@ -1,6 +1,13 @@
 import type { Camera } from '@gaussian-splat/core';
 import type { GaussianScene, Viewpoint } from '@gaussian-splat/renderer';
-import { BUFFER_USAGE, GpuMemory, rareKernelOf, TEXTURE_USAGE, writeStruct } from '@gaussian-splat/renderer/stages';
+import {
+  BUFFER_USAGE,
+  GpuMemory,
+  rareKernelOf,
+  TEXTURE_USAGE,
+  submitPass,
+  uniformWith,
+} from '@gaussian-splat/renderer/stages';
 import { untilItHasRoom, readBack } from '@gaussian-splat/renderer/tools';
 import * as generated from '../generated/shaders.js';
 import { show } from './show.js';
@@ -11,9 +18,6 @@ const SUM_BYTES = 8;
 const COUNTS_BYTES = 16;
 /** Divisor of the number of tiles of each view, because bindings are aligned to 256 bytes. */
 const ALIGNED_TILES = 256 / SUM_BYTES;
-
-/** Function that is awaited between two images. */
-export type Pause = () => Promise<void>;
 
 /** A view, and its reference image. `columns` and `rows` are its number of tiles. */
 export interface Exhibit {
@@ -44,7 +48,7 @@ export class ImageErrors {
     this.#device = device;
     this.#viewpoint = viewpoint;
     this.#memory = new GpuMemory(device);
-    const { storage, uniform, copySource, copyDestination } = BUFFER_USAGE;
+    const { storage, copySource, copyDestination } = BUFFER_USAGE;
     const buffer = (name: string, bytes: number, usage: number): GPUBuffer =>
       this.#memory.buffer(`gs.optimize.${name}`, bytes, usage);
     const tilesOf = ({ width, height }: Camera): number =>
@@ -53,10 +57,7 @@ export class ImageErrors {
     const tiles = buffer('tile_errors', SUM_BYTES * room * views.length, storage);
     this.#errors = buffer('errors', SUM_BYTES * views.length, storage | copySource);
     this.#counts = buffer('counts', COUNTS_BYTES * views.length, copySource | copyDestination);
-    const images = buffer('images', layout.size, uniform | copyDestination);
-    const bytes = new ArrayBuffer(layout.size);
-    writeStruct(layout, { tiles: room }, bytes);
-    device.queue.writeBuffer(images, 0, bytes);
+    const images = uniformWith(this.#memory, 'gs.optimize.images', layout, { tiles: room });
     this.#sum = rareKernelOf(device, imageErrorSum).bind({ images, tiles, errors: this.#errors });
     const size = SUM_BYTES * room;
     this.#exhibits = views.map((camera, k) => this.#exhibit(camera, { buffer: tiles, offset: size * k, size }));
@@ -65,18 +66,16 @@ export class ImageErrors {
   /**
    * Allocates textures, and draws the reference images.
    * @param gaussians Reference scene.
-   * @param pause Function that is awaited between two images, to yield to other tasks.
    */
   static async of(
     device: GPUDevice,
     viewpoint: Viewpoint,
     gaussians: GaussianScene,
     views: readonly Camera[],
-    pause?: Pause,
   ): Promise<ImageErrors> {
     const made = new ImageErrors(device, viewpoint, views);
     try {
-      const sums = new Float32Array(await made.#draw(gaussians, ({ reference }) => reference, pause));
+      const sums = new Float32Array(await made.#draw(gaussians, ({ reference }) => reference));
       made.#covered = views.map((_, k) => sums[2 * k + 1]);
       return made;
     } catch (error) {
@@ -99,8 +98,8 @@ export class ImageErrors {
    * Returns the mean squared error of colors, peak 1, over the pixels that the reference image covers. Views whose
    * reference covers no pixel are omitted.
    */
-  async measure(gaussians: GaussianScene, pause?: Pause): Promise<number[]> {
-    const sums = new Float32Array(await this.#draw(gaussians, ({ camera }) => this.targetOf(camera), pause));
+  async measure(gaussians: GaussianScene): Promise<number[]> {
+    const sums = new Float32Array(await this.#draw(gaussians, ({ camera }) => this.targetOf(camera)));
     return this.#covered.flatMap((pixels, k) => (pixels === 0 ? [] : [sums[2 * k] / (3 * pixels)]));
   }
 
@@ -143,18 +142,13 @@ export class ImageErrors {
    * Draws all views, and repeats this if the capacity was not sufficient.
    * @returns For each view, a sum of squares and a number of pixels, float32.
    */
-  async #draw(
-    gaussians: GaussianScene,
-    targetOf: (exhibit: Exhibit) => GPUTexture,
-    pause: Pause | undefined,
-  ): Promise<ArrayBuffer> {
+  async #draw(gaussians: GaussianScene, targetOf: (exhibit: Exhibit) => GPUTexture): Promise<ArrayBuffer> {
     let sums = new ArrayBuffer(0);
     show(this.#viewpoint, gaussians);
     await untilItHasRoom(async () => {
       for (const [k, exhibit] of this.#exhibits.entries()) {
         this.#viewpoint.draw(exhibit.camera, { target: targetOf(exhibit) });
         this.#compare(exhibit, k);
-        await pause?.();
       }
       this.#addUp();
       const [found, counts] = await readBack(this.#device, [{ buffer: this.#errors }, { buffer: this.#counts }]);
@@ -171,17 +165,14 @@ export class ImageErrors {
   #compare({ columns, rows, compare }: Exhibit, k: number): void {
     const encoder = this.#device.createCommandEncoder({ label: 'gs.optimize.compare' });
     this.#viewpoint.copyCounts(encoder, this.#counts, COUNTS_BYTES * k);
-    const pass = encoder.beginComputePass({ label: 'gs.optimize.compare' });
-    rareKernelOf(this.#device, imageError).dispatchGrid(pass, compare, columns, rows);
-    pass.end();
-    this.#device.queue.submit([encoder.finish()]);
+    const kernel = rareKernelOf(this.#device, imageError);
+    const record = (pass: GPUComputePassEncoder): void => kernel.dispatchGrid(pass, compare, columns, rows);
+    submitPass(this.#device, 'gs.optimize.compare', record, encoder);
   }
 
   #addUp(): void {
-    const encoder = this.#device.createCommandEncoder({ label: 'gs.optimize.add_up' });
-    const pass = encoder.beginComputePass({ label: 'gs.optimize.add_up' });
-    rareKernelOf(this.#device, imageErrorSum).dispatchGrid(pass, this.#sum, this.#exhibits.length, 1);
-    pass.end();
-    this.#device.queue.submit([encoder.finish()]);
+    submitPass(this.#device, 'gs.optimize.add_up', (pass) =>
+      rareKernelOf(this.#device, imageErrorSum).dispatchGrid(pass, this.#sum, this.#exhibits.length, 1),
+    );
   }
 }

@@ -1,5 +1,5 @@
 import { shCoefficientCount, type ShDegree } from '@gaussian-splat/core';
-import { BUFFER_USAGE, GpuMemory, rareKernelOf, writeStruct } from '@gaussian-splat/renderer/stages';
+import { BUFFER_USAGE, GpuMemory, rareKernelOf, submitPass, uniformWith } from '@gaussian-splat/renderer/stages';
 import { readBackWith, type ReadPart } from '@gaussian-splat/renderer/tools';
 import { optimizeTake, SCORE_GROUP } from '../generated/shaders.js';
 import { partsOf, poolFor, type TaskPool } from '../parts/task-pool.js';
@@ -69,24 +69,18 @@ function take(
   { part, degree, places }: LoweredSplats,
   kept: Uint32Array,
 ): ReadPart {
-  const { uniform, storage, copySource } = BUFFER_USAGE;
+  const { storage, copySource } = BUFFER_USAGE;
   const splats = places.map((k) => kept[k] - part.first);
   const width = 3 * shCoefficientCount(degree);
   const count = width * splats.length;
-  const counts = new ArrayBuffer(layouts.Take.size);
-  writeStruct(layouts.Take, { count, width, sh_degree, degree }, counts);
   const taken = memory.buffer('gs.optimize.taken', 4 * count, storage | copySource);
   const kernel = rareKernelOf(device, optimizeTake);
   const bindings = kernel.bind({
-    take: memory.buffer('gs.optimize.take', counts.byteLength, uniform, new Uint32Array(counts)),
+    take: uniformWith(memory, 'gs.optimize.take', layouts.Take, { count, width, sh_degree, degree }),
     splats: memory.buffer('gs.optimize.splats', splats.byteLength, storage, splats),
     ...{ lowered: part.lowered, taken },
   });
-  const encoder = device.createCommandEncoder({ label: 'gs.optimize.take' });
-  const pass = encoder.beginComputePass({ label: 'gs.optimize.take' });
-  kernel.dispatch(pass, bindings, Math.ceil(count / SCORE_GROUP));
-  pass.end();
-  device.queue.submit([encoder.finish()]);
+  submitPass(device, 'gs.optimize.take', (pass) => kernel.dispatch(pass, bindings, Math.ceil(count / SCORE_GROUP)));
   return { buffer: taken, byteLength: 4 * count };
 }
 

@@ -8,8 +8,8 @@ import {
   rareKernelOf,
   TEXTURE_USAGE,
   writeStruct,
-  type StructLayout,
-  type StructValues,
+  submitPass,
+  uniformWith,
 } from '@gaussian-splat/renderer/stages';
 import { AuxiliaryOutputs, untilItHasRoom, readBack } from '@gaussian-splat/renderer/tools';
 import { optimizeLower, optimizeMoments, optimizeScore, SCORE_GROUP } from '../generated/shaders.js';
@@ -159,21 +159,21 @@ export class SceneScorer {
     const kernel = rareKernelOf(this.#device, optimizeScore);
     const encoder = this.#device.createCommandEncoder({ label: 'gs.optimize.score' });
     this.#viewpoint.copyCounts(encoder, this.#counts, COUNTS_BYTES * k);
-    const pass = encoder.beginComputePass({ label: 'gs.optimize.score' });
-    this.#scene.parts.forEach(({ page, first, row, scores, energies }, p) => {
-      const offset = VIEW_STRIDE * (this.#scene.parts.length * k + p);
-      const size = FLOAT_BYTES * row;
-      const bindings = kernel.bind({
-        view: { buffer: uniforms, offset, size: rendererLayouts.View.size },
-        gaussians: page.geometry,
-        peaks: { buffer: this.#peaks, offset: FLOAT_BYTES * first, size },
-        energies: { buffer: energies, offset: size * (k % this.#scene.views), size },
-        scores,
+    const { parts, views } = this.#scene;
+    const record = (pass: GPUComputePassEncoder): void =>
+      parts.forEach(({ page, first, row, scores, energies }, p) => {
+        const offset = VIEW_STRIDE * (parts.length * k + p);
+        const size = FLOAT_BYTES * row;
+        const bindings = kernel.bind({
+          view: { buffer: uniforms, offset, size: rendererLayouts.View.size },
+          gaussians: page.geometry,
+          peaks: { buffer: this.#peaks, offset: FLOAT_BYTES * first, size },
+          energies: { buffer: energies, offset: size * (k % views), size },
+          scores,
+        });
+        kernel.dispatch(pass, bindings, Math.ceil(page.count / SCORE_GROUP));
       });
-      kernel.dispatch(pass, bindings, Math.ceil(page.count / SCORE_GROUP));
-    });
-    pass.end();
-    this.#device.queue.submit([encoder.finish()]);
+    submitPass(this.#device, 'gs.optimize.score', record, encoder);
   }
 
   /** Adds the energies of views `first` to `end` to the moments of color. */
@@ -181,39 +181,28 @@ export class SceneScorer {
     const { shDegree } = this.#scene.gaussians;
     if (shDegree === 0) return;
     const kernel = rareKernelOf(this.#device, optimizeMoments);
-    const encoder = this.#device.createCommandEncoder({ label: 'gs.optimize.moments' });
-    const pass = encoder.beginComputePass({ label: 'gs.optimize.moments' });
-    this.#scene.parts.forEach(({ page, row, energies, moments }) => {
-      const counts = { splat_count: page.count, row, views: end - first, first_view: first, sh_degree: shDegree };
-      const seen = this.#uniform(layouts.MomentViews, counts);
-      const bindings = kernel.bind({ seen, eyes: this.#eyes, gaussians: page.geometry, energies, moments });
-      kernel.dispatch(pass, bindings, Math.ceil(page.count / SCORE_GROUP));
-    });
-    pass.end();
-    this.#device.queue.submit([encoder.finish()]);
+    submitPass(this.#device, 'gs.optimize.moments', (pass) =>
+      this.#scene.parts.forEach(({ page, row, energies, moments }) => {
+        const counts = { splat_count: page.count, row, views: end - first, first_view: first, sh_degree: shDegree };
+        const seen = uniformWith(this.#memory, 'gs.optimize.moments', layouts.MomentViews, counts);
+        const bindings = kernel.bind({ seen, eyes: this.#eyes, gaussians: page.geometry, energies, moments });
+        kernel.dispatch(pass, bindings, Math.ceil(page.count / SCORE_GROUP));
+      }),
+    );
   }
 
   /** Converts sums to scores and colors at lower degrees, in one submission for each part. */
   #lower(): void {
     const kernel = rareKernelOf(this.#device, optimizeLower);
     for (const { page, row, scores, moments, lowered } of this.#scene.parts) {
-      const lowering = this.#uniform(layouts.Lowering, {
+      const lowering = uniformWith(this.#memory, 'gs.optimize.lower', layouts.Lowering, {
         ...{ splat_count: page.count, row, views: this.#views.length, sh_degree: this.#scene.gaussians.shDegree },
         ...{ contrast: USUAL_CONTRAST + UNSEEN_CONTRAST, prior_views: PRIOR_VIEWS, min_looks: MIN_LOOKS },
       });
-      const encoder = this.#device.createCommandEncoder({ label: 'gs.optimize.lower' });
-      const pass = encoder.beginComputePass({ label: 'gs.optimize.lower' });
       const bindings = kernel.bind({ lowering, sh: page.sh, moments, scores, lowered });
-      kernel.dispatch(pass, bindings, Math.ceil(page.count / SCORE_GROUP));
-      pass.end();
-      this.#device.queue.submit([encoder.finish()]);
+      const groups = Math.ceil(page.count / SCORE_GROUP);
+      submitPass(this.#device, 'gs.optimize.lower', (pass) => kernel.dispatch(pass, bindings, groups));
     }
-  }
-
-  #uniform<L extends StructLayout>(layout: L, values: StructValues<L>): GPUBuffer {
-    const bytes = new ArrayBuffer(layout.size);
-    writeStruct(layout, values, bytes);
-    return this.#memory.buffer('gs.optimize.uniform', layout.size, BUFFER_USAGE.uniform, new Uint32Array(bytes));
   }
 
   #targetOf({ width, height }: Camera): GPUTexture {

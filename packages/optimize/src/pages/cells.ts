@@ -9,6 +9,7 @@ import {
 } from '@gaussian-splat/renderer/tools';
 import type { ChunkErrors, SplatLevel } from '@gaussian-splat/renderer/tools';
 import type { GaussianCloud, ShDegree } from '@gaussian-splat/core';
+import { concatenated } from '@gaussian-splat/core/fetch';
 import { cutPages, treeOfPlan, type BuiltPage, type DetailTree } from './build-pages.js';
 import type { ScenePlan } from './scene-plan.js';
 
@@ -88,13 +89,7 @@ export class SceneCells {
 export function packTop({ levels, errors }: DetailTree): Float32Array<ArrayBuffer> {
   const [level, own] = [levels[levels.length - 1], errors[errors.length - 1]];
   const arrays = [[level.count], own.spheres.subarray(0, 4), own.errors.subarray(0, 1), ...arraysOf(level)];
-  const packed = new Float32Array(arrays.reduce((sum, { length }) => sum + length, 0));
-  let at = 0;
-  for (const array of arrays) {
-    packed.set(array, at);
-    at += array.length;
-  }
-  return packed;
+  return concatenated<Float32Array<ArrayBuffer>>(Float32Array, arrays);
 }
 
 function unpackTops(

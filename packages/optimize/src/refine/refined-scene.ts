@@ -10,7 +10,8 @@ import {
   recentered,
   SceneBuffers,
   withMemoryCheck,
-  writeStruct,
+  submitPass,
+  uniformWith,
 } from '@gaussian-splat/renderer/stages';
 import { readBack } from '@gaussian-splat/renderer/tools';
 import { LOGIT_AT, ROTATION_AT, SCALE_AT, SCREEN_BYTES, SCREEN_NUMBERS, SH_AT, SH_STEP } from '../generated/shaders.js';
@@ -80,19 +81,17 @@ export class RefinedScene extends SceneBuffers {
     this.blocks = parts.map(({ page }) => page);
     const bytes = SCREEN_BYTES * SCREEN_NUMBERS * Math.max(CULL_GROUP, first);
     this.screen = memory.buffer('gs.refine.screen', bytes, storage | copyDestination);
-    this.#packAll();
+    submitPass(device, 'gs.refine.pack', (pass) => this.pack(pass));
   }
 
   /**
    * Uploads a reduced cloud. Each parameter of a splat takes 16 bytes of GPU memory. A splat of degree 3 takes about
    * 1.2 kB, including its packed form.
-   * @param maxSplats Maximum number of splats of a block; default: the limits of the device.
    * @throws GaussianSplatError `out-of-memory/*`
    */
-  static async of(device: GPUDevice, reduced: Omit<ReducedCloud, 'kept'>, maxSplats = Infinity): Promise<RefinedScene> {
+  static async of(device: GPUDevice, reduced: Omit<ReducedCloud, 'kept'>): Promise<RefinedScene> {
     const sought = SH_STEP + 3 * shCoefficientCount(reduced.cloud.shDegree);
-    const capacity = pageCapacity(device, 2 * FLOAT_BYTES * sought);
-    const max = Math.min(capacity, CULL_GROUP * Math.max(1, Math.floor(maxSplats / CULL_GROUP)));
+    const max = pageCapacity(device, 2 * FLOAT_BYTES * sought);
     const cloud = recentered(reduced.cloud);
     const where = `${cloud.count} splats to refine`;
     return withMemoryCheck(device, where, (memory) => new RefinedScene(device, memory, { ...reduced, cloud }, max));
@@ -136,16 +135,8 @@ export class RefinedScene extends SceneBuffers {
     return SH_AT + 3 * shCoefficientCount(this.shDegree);
   }
 
-  #packAll(): void {
-    const encoder = this.#device.createCommandEncoder({ label: 'gs.refine.pack' });
-    const pass = encoder.beginComputePass({ label: 'gs.refine.pack' });
-    this.pack(pass);
-    pass.end();
-    this.#device.queue.submit([encoder.finish()]);
-  }
-
   #partOf(begin: number, count: number, first: number, degrees: Uint8Array): RefinedPart {
-    const { storage, copySource, copyDestination, uniform } = BUFFER_USAGE;
+    const { storage, copySource, copyDestination } = BUFFER_USAGE;
     const row = CULL_GROUP * Math.ceil(count / CULL_GROUP);
     const sought = SH_STEP + this.#width - SH_AT;
     const buffer = (name: string, bytes: number, content?: Uint32Array): GPUBuffer =>
@@ -153,9 +144,8 @@ export class RefinedScene extends SceneBuffers {
     const page = pageOf(this.memory, this.shDegree, count);
     const rows = numbersOf(this.#cloud, begin, count, this.#width);
     const numbers = buffer('numbers', rows.byteLength, new Uint32Array(rows.buffer));
-    const bytes = this.#ingestOf(count);
     const packing = this.#ingest.bind({
-      ingest: this.memory.buffer('gs.refine.ingest', bytes.byteLength, uniform, new Uint32Array(bytes)),
+      ingest: this.#ingestOf(count),
       ...{ positions: numbers, shapes: numbers, rotations: numbers, colors: numbers, opacities: numbers },
       ...{ gaussians: page.geometry, sh: page.sh, chunks: page.chunks },
     });
@@ -169,25 +159,15 @@ export class RefinedScene extends SceneBuffers {
   }
 
   /** Returns the uniforms `Ingest` of a part with `count` splats, whose parameters are rows in one buffer. */
-  #ingestOf(count: number): ArrayBuffer {
-    const bytes = new ArrayBuffer(Ingest.size);
+  #ingestOf(count: number): GPUBuffer {
     const width = this.#width;
-    writeStruct(
-      Ingest,
-      {
-        ...{ count, rows: count, page_rows: count, first_row: 0, is_half: 0, is_w_first: 1, is_logit: 1 },
-        ...{
-          shape_kind: SHAPE_LOG_SCALE,
-          shape_numbers: 3,
-          color_kind: COLOR_COEFFICIENT_MAJOR,
-          sh_degree: this.shDegree,
-        },
-        ...{ positions: [0, width], shapes: [SCALE_AT, width], rotations: [ROTATION_AT, width] },
-        ...{ colors: [SH_AT, width], opacities: [LOGIT_AT, width] },
-      },
-      bytes,
-    );
-    return bytes;
+    return uniformWith(this.memory, 'gs.refine.ingest', Ingest, {
+      ...{ count, rows: count, page_rows: count, first_row: 0, is_half: 0, is_w_first: 1, is_logit: 1 },
+      ...{ shape_kind: SHAPE_LOG_SCALE, shape_numbers: 3 },
+      ...{ color_kind: COLOR_COEFFICIENT_MAJOR, sh_degree: this.shDegree },
+      ...{ positions: [0, width], shapes: [SCALE_AT, width], rotations: [ROTATION_AT, width] },
+      ...{ colors: [SH_AT, width], opacities: [LOGIT_AT, width] },
+    });
   }
 }
 

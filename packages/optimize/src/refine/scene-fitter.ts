@@ -8,6 +8,8 @@ import {
   layouts as rendererLayouts,
   rareKernelOf,
   writeStruct,
+  submitPass,
+  writeUniform,
 } from '@gaussian-splat/renderer/stages';
 import { AuxiliaryOutputs } from '@gaussian-splat/renderer/tools';
 import {
@@ -185,13 +187,9 @@ export class SceneFitter extends BufferOwner {
    */
   #step(number: number, share: number, { rates, keepMean, keepSquare, epsilon, newton }: OptimizerOptions): void {
     const kernel = rareKernelOf(this.#device, refineStep);
-    const encoder = this.#device.createCommandEncoder({ label: 'gs.refine.step' });
-    const pass = encoder.beginComputePass({ label: 'gs.refine.step' });
-    this.#scene.parts.forEach(({ page, row, numbers, degrees, gradients, means, bends }, p) => {
-      const bytes = new ArrayBuffer(layouts.RefineStep.size);
-      writeStruct(
-        layouts.RefineStep,
-        {
+    submitPass(this.#device, 'gs.refine.step', (pass) => {
+      this.#scene.parts.forEach(({ page, row, numbers, degrees, gradients, means, bends }, p) => {
+        writeUniform(this.#device, this.#steps[p], layouts.RefineStep, {
           ...{ splat_count: page.count, row, harmonics: 3 * shCoefficientCount(this.#scene.shDegree) },
           ...{ keep_mean: keepMean, keep_square: keepSquare, epsilon, newton },
           mean_scale: 1 / (1 - keepMean ** number),
@@ -199,16 +197,12 @@ export class SceneFitter extends BufferOwner {
           ...{ position_rate: share * rates.position, growth_rate: share * rates.growth },
           ...{ turn_rate: share * rates.turn, logit_rate: share * rates.logit },
           ...{ constant_rate: share * rates.constant, harmonic_rate: share * rates.harmonic },
-        },
-        bytes,
-      );
-      this.#device.queue.writeBuffer(this.#steps[p], 0, bytes);
-      const bindings = kernel.bind({ step: this.#steps[p], numbers, degrees, gradients, means, bends });
-      kernel.dispatch(pass, bindings, Math.ceil(page.count / REFINE_GROUP));
+        });
+        const bindings = kernel.bind({ step: this.#steps[p], numbers, degrees, gradients, means, bends });
+        kernel.dispatch(pass, bindings, Math.ceil(page.count / REFINE_GROUP));
+      });
+      this.#scene.pack(pass);
     });
-    this.#scene.pack(pass);
-    pass.end();
-    this.#device.queue.submit([encoder.finish()]);
   }
 
   /** Returns two buffers: the uniforms `View`, and the uniforms `RefineView`, of each view and part. */

@@ -46,8 +46,8 @@ export function writeUsdc(given: GaussianCloud, { hasHalves }: UsdOptions): Uint
     ...(isUniform && { variability: { isUniform: true } }),
     default: value,
   });
-  const array = (type: CrateType, width: number, numbers: CrateArray, typeName = `${type}[]`): CrateFields =>
-    attribute(typeName, { array: numbers, type, width });
+  const array = (type: CrateType, width: number, numbers: CrateArray): CrateFields =>
+    attribute(`${type}[]`, { array: numbers, type, width });
   /** Attribute of all splats in the precision of the options. The names of float16 attributes end in h. */
   const ofSplats = (name: string, types: readonly [CrateType, CrateType], width: number, numbers: Float32Array) =>
     hasHalves

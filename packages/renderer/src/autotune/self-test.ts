@@ -67,8 +67,7 @@ const packedScenes = (): readonly PackedGaussians[] => {
 };
 
 /** Starts to compute the expected image, which requires no device. */
-export const expectedImage = (): Promise<Float32Array> =>
-  (reference ??= drawReference(testScenes(), shearedCamera(WIDTH, HEIGHT)));
+export const expectedImage = (): Promise<Float32Array> => (reference ??= drawReference(testScenes(), shearedCamera()));
 
 /** Resolves to whether a renderer with these options draws the expected image of two scenes with interleaved splats. */
 export const passesSelfTest = async (device: GPUDevice, options: FrameSettings): Promise<boolean> =>
@@ -77,7 +76,7 @@ export const passesSelfTest = async (device: GPUDevice, options: FrameSettings):
 /** Resolves to the name of the first stage or frame that is wrong with these options; undefined if none is. */
 export async function faultOf(device: GPUDevice, options: FrameSettings): Promise<string | undefined> {
   const threads = options.threads === 'serial' ? 'serial' : 'parallel';
-  const camera = shearedCamera(WIDTH, HEIGHT);
+  const camera = shearedCamera();
   // The CPU computes the image while the GPU sums and sorts.
   const [isSorted, expected] = await Promise.all([
     perDevice(device, `sums and sorts ${threads}`, () => sumsAndSorts(device, threads)),
@@ -209,8 +208,8 @@ export function viewpointOf(device: GPUDevice, scenes: readonly GaussianScene[],
 }
 
 /** Returns {@link probeCamera} with a shear. Spheres become slanted ellipses, so that the test detects a wrong slope. */
-function shearedCamera(width: number, height: number): Camera {
-  const camera = probeCamera(width, height);
+function shearedCamera(): Camera {
+  const camera = probeCamera(WIDTH, HEIGHT);
   const shear = [1, 0.7, 0, 0, 0, 0.6, 0.2, 0, 0, 0, 1, 0, 0, 0, 0, 1];
   return { ...camera, worldToCamera: multiply(shear, camera.worldToCamera) };
 }

@@ -1,7 +1,7 @@
 import { present, tensorToImage } from '../generated/live-shaders.js';
 import * as layouts from '../generated/live-layouts.js';
 import { BUFFER_USAGE, TEXTURE_USAGE } from '../gpu/kernel.js';
-import { writeStruct } from '../gpu/struct.js';
+import { writeUniform } from '../gpu/one-off.js';
 import { FullScreenStage } from '../stages/full-screen.js';
 import { SceneDepth } from '../scene-depth.js';
 import { ImageTensor, type ImageShape } from './image-tensor.js';
@@ -123,13 +123,8 @@ export class FilteredFrame {
 
   /** Accepts the model's output for the last input frame. The work is submitted before the function returns. */
   accept({ buffer, dtype, dims }: ModelImage): void {
-    const bytes = new ArrayBuffer(layouts.TensorToImage.size);
-    writeStruct(
-      layouts.TensorToImage,
-      { size: [dims.at(-1)!, dims.at(-2)!], is_half: dtype === 'float16' ? 1 : 0 },
-      bytes,
-    );
-    this.#device.queue.writeBuffer(this.#uniform, 0, bytes);
+    const values = { size: [dims.at(-1)!, dims.at(-2)!], is_half: dtype === 'float16' ? 1 : 0 };
+    writeUniform(this.#device, this.#uniform, layouts.TensorToImage, values);
     const encoder = this.#device.createCommandEncoder({ label: 'gs.filter.accept' });
     this.#paint.record(encoder, this.#bindingsOf(buffer), this.#filteredView, FORMAT);
     this.#device.queue.submit([encoder.finish()]);

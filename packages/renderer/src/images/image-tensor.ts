@@ -4,7 +4,7 @@ import * as layouts from '../generated/live-layouts.js';
 import { constants } from '../generated/shaders.js';
 import { BUFFER_USAGE, kernelOf, TEXTURE_USAGE, type ComputeKernel } from '../gpu/kernel.js';
 import { BufferOwner, GpuMemory } from '../gpu/memory.js';
-import { writeStruct } from '../gpu/struct.js';
+import { submitPass, writeUniform } from '../gpu/one-off.js';
 
 /** Size and element type of a tensor [views, channels, height, width]. */
 export interface ImageShape {
@@ -38,7 +38,6 @@ export class ImageTensor extends BufferOwner {
   readonly #device: GPUDevice;
   readonly #kernel: ComputeKernel<typeof imageToTensor>;
   readonly #uniform: GPUBuffer;
-  readonly #uniformBytes = new ArrayBuffer(layouts.ImageToTensor.size);
   /** Number of words of one image. */
   readonly #words: number;
   readonly #bindings = new WeakMap<GPUTexture, GPUBindGroup>();
@@ -89,11 +88,8 @@ export class ImageTensor extends BufferOwner {
       bindings = this.#kernel.bind({ image: this.#uniform, source: texture.createView(), tensor: this.buffer });
       this.#bindings.set(texture, bindings);
     }
-    const encoder = this.#device.createCommandEncoder({ label: 'gs.picture' });
-    const pass = encoder.beginComputePass({ label: 'gs.picture' });
-    this.#kernel.dispatch(pass, bindings, Math.ceil(this.#words / constants.IMAGE_GROUP));
-    pass.end();
-    this.#device.queue.submit([encoder.finish()]);
+    const groups = Math.ceil(this.#words / constants.IMAGE_GROUP);
+    submitPass(this.#device, 'gs.picture', (pass) => this.#kernel.dispatch(pass, bindings, groups));
     this.#version++;
   }
 
@@ -127,8 +123,7 @@ export class ImageTensor extends BufferOwner {
       ...{ corner, step: [across, down], size: [columns, rows], is_half: dtype === 'float16' ? 1 : 0 },
       ...{ channels, first_word: view * this.#words },
     };
-    writeStruct(layouts.ImageToTensor, values, this.#uniformBytes);
-    this.#device.queue.writeBuffer(this.#uniform, 0, this.#uniformBytes);
+    writeUniform(this.#device, this.#uniform, layouts.ImageToTensor, values);
   }
 }
 

@@ -7,7 +7,8 @@ import { boundLevel, detailRows, DETAIL_NUMBERS, leafErrors, parentErrors, type 
 import { packFiller, packLevelGeometry, packLevelSh } from './pack-level.js';
 import { chunksOf, type SplatLevel, FACTOR_NUMBERS, type LevelSource } from './splat-level.js';
 import { shReader, unpackSplat } from '../pack/unpack.js';
-import { CHUNK_NUMBERS, GEOMETRY_WORDS, shWords } from '../pack/words.js';
+import { padded } from '../pack/padded.js';
+import { GEOMETRY_WORDS, shWords } from '../pack/words.js';
 
 /**
  * Returns the splats of a packed scene as the finest level. The source of the scene, a file or generator, is not
@@ -90,18 +91,13 @@ export function joinLevels(leaves: PackedGaussians, { leafDetails, coarser }: Pa
   const start = CULL_GROUP * (leafDetails.length / DETAIL_NUMBERS);
   const count = start + coarser.count;
   const stride = shWords(leaves.shDegree, leaves.shPrecision);
-  const geometry = new Uint32Array(GEOMETRY_WORDS * count);
-  const sh = new Uint32Array(stride * count);
-  const chunks = new Float32Array((CHUNK_NUMBERS * count) / CULL_GROUP);
-  geometry.set(leaves.geometry);
-  geometry.set(coarser.geometry, GEOMETRY_WORDS * start);
-  packFiller(geometry, leaves.count, start);
-  sh.set(leaves.sh);
-  sh.set(coarser.sh, stride * start);
-  chunks.set(leaves.chunks);
-  chunks.set(coarser.chunks, leaves.chunks.length);
+  const joined = padded(leaves, count);
+  joined.geometry.set(coarser.geometry, GEOMETRY_WORDS * start);
+  packFiller(joined.geometry, leaves.count, start);
+  joined.sh.set(coarser.sh, stride * start);
+  joined.chunks.set(coarser.chunks, leaves.chunks.length);
   const details = concatenated(Float32Array, [leafDetails, coarser.details!]);
-  return { ...leaves, count, geometry, sh, chunks, details, leafCount: leaves.count };
+  return { ...joined, details, leafCount: leaves.count };
 }
 
 /**

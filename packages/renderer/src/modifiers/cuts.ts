@@ -1,4 +1,4 @@
-import { inverse, multiply, type Matrix4, type Vector3 } from '@gaussian-splat/core';
+import { inverse, linearDeterminant, multiply, type Matrix4, type Vector3 } from '@gaussian-splat/core';
 import { constants } from '../generated/shaders.js';
 import type { ModifierCut } from '../generated/modified-layouts.js';
 import type { StructValues } from '../gpu/struct.js';
@@ -83,12 +83,11 @@ export function cutValues(cut: SplatCut, toWorld: Matrix4, toLocal: Matrix4): St
 }
 
 /** Transforms a direction by the linear part of a matrix. */
-export const directionIn = (m: Matrix4, [x, y, z]: Vector3): number[] =>
-  [0, 1, 2].map((k) => m[4 * k] * x + m[4 * k + 1] * y + m[4 * k + 2] * z);
+export const directionIn = (m: Matrix4, [x, y, z]: Vector3): Vector3 => [
+  m[0] * x + m[1] * y + m[2] * z,
+  m[4] * x + m[5] * y + m[6] * z,
+  m[8] * x + m[9] * y + m[10] * z,
+];
 
 /** Returns the mean scale factor of a matrix: the cube root of its factor of volumes. */
-function sizeOf(m: Matrix4): number {
-  const determinant =
-    m[0] * (m[5] * m[10] - m[6] * m[9]) - m[1] * (m[4] * m[10] - m[6] * m[8]) + m[2] * (m[4] * m[9] - m[5] * m[8]);
-  return Math.cbrt(Math.abs(determinant));
-}
+const sizeOf = (m: Matrix4): number => Math.cbrt(Math.abs(linearDeterminant(m)));

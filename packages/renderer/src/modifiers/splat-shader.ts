@@ -30,10 +30,10 @@ const FORBIDDEN = /@\s*(group|binding|compute|vertex|fragment|id)\b|\b(enable|re
 const DECLARED = /\b(?:fn|struct|alias|const)\s+([A-Za-z_]\w*)/g;
 const NAME = /^[A-Za-z]\w*$/;
 
-const refused = (expected: string, found: string, cause?: unknown): GaussianSplatError =>
+const refused = (expected: string, found: string): GaussianSplatError =>
   new GaussianSplatError('argument/splat-shader', {
     where: 'splatShader',
-    ...{ expected, found, cause },
+    ...{ expected, found },
     remedy: 'see the guide on effects; the scene is drawn without the shader',
   });
 

@@ -50,9 +50,9 @@ export function mortonOrder(positions: Float32Array, kept: Uint32Array): Uint32A
  * Whether splats are in planes or layers. Many of them then share a coordinate, and have equal depths for a camera
  * along its axis: another order would change the image.
  * @param positions [3 N] world units
- * @param kept Indices of splats; default: all.
  */
-export function isOfPlanes(positions: Float32Array, kept: Uint32Array = spread(positions.length / 3)): boolean {
+export function isOfPlanes(positions: Float32Array): boolean {
+  const kept = spread(positions.length / 3);
   return [0, 1, 2].some((axis) => isFlat(sampleAxis(positions, kept, axis)));
 }
 

@@ -115,17 +115,9 @@ export function usableIndices(cloud: GaussianCloud): Uint32Array {
   return indices.subarray(0, kept);
 }
 
-/**
- * Writes the geometry words of the splats `kept`.
- * @param words Zeroed memory with `stride` words for each splat. The first ones are written.
- * @returns `words`; by default [kept, 8]
- */
-export function packGeometry(
-  cloud: GaussianCloud,
-  kept: Uint32Array,
-  stride = GEOMETRY_WORDS,
-  words = new Uint32Array(kept.length * stride),
-): Uint32Array {
+/** Returns the geometry words of the splats `kept`, [kept, 8]. */
+export function packGeometry(cloud: GaussianCloud, kept: Uint32Array): Uint32Array {
+  const words = new Uint32Array(kept.length * GEOMETRY_WORDS);
   const floats = new Float32Array(words.buffer);
   const factor = new Float64Array(6);
   let at = 0;
@@ -135,7 +127,7 @@ export function packGeometry(
     floats[at + 2] = cloud.positions[3 * i + 2];
     scaleRotationFactor(cloud, i, factor);
     packShape(words, at + 3, factor, Math.min(1, cloud.opacities[i]));
-    at += stride;
+    at += GEOMETRY_WORDS;
   }
   return words;
 }

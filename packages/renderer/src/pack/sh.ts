@@ -100,24 +100,19 @@ export const CODE_NOISE = Float64Array.from(
  * `float16` stores all coefficients. `int8` stores the three of degree 0 in float16. Each band then has a scale (the
  * largest magnitude of the band, rounded up to an eighth of an octave), and its coefficients as multiples of 1/127 of
  * that scale.
- * @param words Zeroed memory with `stride` words for each splat, from word `first` on.
  */
-export function packSh(
-  cloud: GaussianCloud,
-  kept: Uint32Array,
-  precision: ShPrecision,
-  stride = shWords(cloud.shDegree, precision),
-  words = new Uint32Array(kept.length * stride),
-  first = 0,
-): Uint32Array {
-  (precision === 'float16' ? packHalf : packInt8)(cloud, kept, words.buffer, 4 * first, 4 * stride);
+export function packSh(cloud: GaussianCloud, kept: Uint32Array, precision: ShPrecision): Uint32Array {
+  const stride = shWords(cloud.shDegree, precision);
+  const words = new Uint32Array(kept.length * stride);
+  (precision === 'float16' ? packHalf : packInt8)(cloud, kept, words.buffer, 4 * stride);
   return words;
 }
 
-/** Writes the splats `kept` from byte `at` on, every `stride` bytes. */
-type Packer = (cloud: GaussianCloud, kept: Uint32Array, buffer: ArrayBuffer, at: number, stride: number) => void;
+/** Writes the splats `kept`, every `stride` bytes. */
+type Packer = (cloud: GaussianCloud, kept: Uint32Array, buffer: ArrayBuffer, stride: number) => void;
 
-const packHalf: Packer = ({ sh, shDegree }, kept, buffer, at, stride) => {
+const packHalf: Packer = ({ sh, shDegree }, kept, buffer, stride) => {
+  let at = 0;
   const numbers = 3 * shCoefficientCount(shDegree);
   const halves = new Uint16Array(buffer);
   for (const i of kept) {
@@ -134,7 +129,8 @@ export const PER_UNIT = Float64Array.from({ length: MAX_CODE + 1 }, (_, code) =>
   code && code < MAX_CODE ? 127 / scaleOf(code) : 0,
 );
 
-const packInt8: Packer = ({ sh, shDegree }, kept, buffer, at, stride) => {
+const packInt8: Packer = ({ sh, shDegree }, kept, buffer, stride) => {
+  let at = 0;
   const numbers = 3 * shCoefficientCount(shDegree);
   const bytes = new Uint8Array(buffer);
   const halves = new Uint16Array(buffer);

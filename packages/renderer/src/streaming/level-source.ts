@@ -1,4 +1,4 @@
-import { GaussianSplatError, shCoefficientCount, type GaussianCloud, type ShDegree } from '@gaussian-splat/core';
+import { GaussianSplatError, toDegree, type GaussianCloud } from '@gaussian-splat/core';
 import { mortonOrder } from '../pack/morton.js';
 import { usableIndices } from '../pack/pack.js';
 import type { LevelPage, LevelScene } from './level-pages.js';
@@ -44,18 +44,7 @@ export function placedIn(cloud: GaussianCloud, { origin, shDegree }: StreamedSce
       positions[k + 2] += shift[2];
     }
   }
-  return { ...cloud, origin, positions, sh: shOfDegree(cloud, shDegree), shDegree };
-}
-
-/** Returns the spherical harmonics of a cloud, truncated to a degree or padded with zeros. */
-function shOfDegree(cloud: GaussianCloud, degree: ShDegree): Float32Array {
-  if (cloud.shDegree === degree) return cloud.sh;
-  const [from, to] = [cloud.shDegree, degree].map((one) => 3 * shCoefficientCount(one));
-  const sh = new Float32Array(to * cloud.count);
-  for (let i = 0; i < cloud.count; i++) {
-    sh.set(cloud.sh.subarray(from * i, from * i + Math.min(from, to)), to * i);
-  }
-  return sh;
+  return { ...cloud, origin, positions, sh: toDegree(shDegree, cloud).sh, shDegree };
 }
 
 function listLevels({ first, firstChunks, pages, scene }: LevelScene): PageList {

@@ -12,7 +12,7 @@ const [QUICK_SORT_MS, SORT_SHARE] = [8, 0.25];
 const { CULL_GROUP } = constants;
 const NO_ORDER = new Uint32Array(0);
 
-/** What is sorted: [N, 3] positions, and [N / 256, 12] levels of detail, undefined without levels. */
+/** Splats to sort: [N, 3] positions, and [N / 256, 12] levels of detail, undefined without levels. */
 export interface SortedRows {
   readonly positions: Float32Array<ArrayBuffer>;
   readonly details: Float32Array<ArrayBuffer> | undefined;

@@ -17,7 +17,8 @@ import {
   writeFileSync,
 } from 'node:fs';
 import { dirname, join } from 'node:path';
-import { joinCredits, MAX_DROPPED_RATIO, readScene, toDegree } from '@gaussian-splat/formats';
+import { toDegree } from '@gaussian-splat/core';
+import { joinCredits, MAX_DROPPED_RATIO, readScene } from '@gaussian-splat/formats';
 import {
   countShells,
   keysOf,

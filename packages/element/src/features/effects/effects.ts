@@ -1,6 +1,7 @@
 /** Effects of an element with cuts, a reveal effect or a shader. Loaded on demand. */
-import { GaussianSplatError, multiply, type Matrix4, type Vector3 } from '@gaussian-splat/core';
+import { GaussianSplatError, linearDeterminant, multiply, type Matrix4 } from '@gaussian-splat/core';
 import {
+  directionIn,
   MAX_CUTS,
   SplatModifier,
   SplatProgram,
@@ -325,7 +326,7 @@ const isSameCode = (a: SplatShader, b: SplatShader): boolean => {
 
 /** Converts a cut from the coordinates of its parent to the world. */
 function inWorld({ placed, offset, edge, ...cut }: PlacedCut, toWorld: Matrix4): NamedCut {
-  const size = Math.cbrt(Math.abs(determinant(toWorld)));
+  const size = Math.cbrt(Math.abs(linearDeterminant(toWorld)));
   return {
     ...cut,
     edge: typeof edge === 'number' ? edge * size : edge,
@@ -333,9 +334,3 @@ function inWorld({ placed, offset, edge, ...cut }: PlacedCut, toWorld: Matrix4):
     shapeToWorld: multiply(toWorld, placed),
   };
 }
-
-const directionIn = (m: Matrix4, [x, y, z]: Vector3): Vector3 =>
-  [0, 1, 2].map((k) => m[4 * k] * x + m[4 * k + 1] * y + m[4 * k + 2] * z) as unknown as Vector3;
-
-const determinant = (m: Matrix4): number =>
-  m[0] * (m[5] * m[10] - m[6] * m[9]) - m[1] * (m[4] * m[10] - m[6] * m[8]) + m[2] * (m[4] * m[9] - m[5] * m[8]);

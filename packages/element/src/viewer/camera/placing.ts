@@ -1,5 +1,5 @@
 /** Converts the attributes of a child to matrices. */
-import { multiply, type Camera, type Matrix4, type Vector3 } from '@gaussian-splat/core';
+import { linearDeterminant, multiply, type Camera, type Matrix4, type Vector3 } from '@gaussian-splat/core';
 import type { ViewerFrame } from './orbit.js';
 
 /** Components of the transform of a child in viewer space. */
@@ -56,11 +56,7 @@ export const sceneToWorld = (world: ViewerFrame, placed: Matrix4, own: ViewerFra
 
 /** Returns whether a matrix is invertible. A singular one, such as a scale of 0, makes its content invisible. */
 export function isSolid(m: Matrix4): boolean {
-  return Number.isFinite(1 / determinant(m));
-}
-
-function determinant(m: Matrix4): number {
-  return m[0] * (m[5] * m[10] - m[6] * m[9]) - m[1] * (m[4] * m[10] - m[6] * m[8]) + m[2] * (m[4] * m[9] - m[5] * m[8]);
+  return Number.isFinite(1 / linearDeterminant(m));
 }
 
 /**
@@ -68,7 +64,7 @@ function determinant(m: Matrix4): number {
  * @param toWorld Transform from the scene to the world.
  */
 export function cameraInScene(camera: Camera, toWorld: Matrix4): Camera {
-  const size = Math.cbrt(Math.abs(determinant(toWorld)));
+  const size = Math.cbrt(Math.abs(linearDeterminant(toWorld)));
   const matrix = multiply(camera.worldToCamera, toWorld).map((value, k) => (k < 12 ? value / size : value));
   return { ...camera, worldToCamera: matrix, near: camera.near / size, far: camera.far / size };
 }

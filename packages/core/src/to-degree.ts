@@ -1,4 +1,4 @@
-import { shCoefficientCount, type GaussianCloud, type ShDegree } from '@gaussian-splat/core';
+import { shCoefficientCount, type GaussianCloud, type ShDegree } from './gaussian-cloud.js';
 
 /**
  * Returns a cloud with the spherical harmonics of a degree: coefficients above it are left out, missing ones are 0. The
