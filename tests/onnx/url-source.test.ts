@@ -184,6 +184,7 @@ test('no server, no address, and a caller who gave up', async () => {
     assert.rejects(openUrl(url), (error: unknown) => error instanceof GaussianSplatError && error.code === code);
   await refused('http://127.0.0.1:9/x.onnx', 'network/unreachable');
   await refused('x.onnx', 'network/url');
+  await refused('http://user:secret@127.0.0.1:9/x.onnx', 'network/url');
   const aborted = openUrl(`${base}/small.onnx`, { signal: AbortSignal.abort(new Error('gave up')) });
   await assert.rejects(aborted, /gave up/);
 });

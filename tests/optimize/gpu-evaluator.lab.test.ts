@@ -10,11 +10,11 @@ import {
   GpuEvaluator,
   meanSquare,
   MergingEvaluator,
-  reduce,
   type Cut,
   type Ranking,
   type Scores,
 } from '@gaussian-splat/optimize';
+import { reduce } from './twin/reduce.js';
 import { readScene } from '@gaussian-splat/formats';
 import { smallCloud } from '../formats/support/small-cloud.js';
 import { endNodeDevice, serialDevice } from '../support/node-device.js';

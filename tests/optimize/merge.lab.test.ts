@@ -8,10 +8,10 @@ import {
   optimize,
   meanSquare,
   MergingEvaluator,
-  reduce,
   type Cut,
   type ReducedCloud,
 } from '@gaussian-splat/optimize';
+import { reduce } from './twin/reduce.js';
 import { readScene } from '@gaussian-splat/formats';
 import { smallCloud } from '../formats/support/small-cloud.js';
 import { covarianceOf } from '../support/generator-tensors.js';

@@ -20,10 +20,10 @@ import {
   optimize,
   encodingsFor,
   meanSquare,
-  reduce,
   viewsAround,
   viewsBetween,
 } from '@gaussian-splat/optimize';
+import { reduce } from './twin/reduce.js';
 import { readPrefix, readScene } from '@gaussian-splat/formats';
 import { smallCloud } from '../formats/support/small-cloud.js';
 import { endNodeDevice, serialDevice } from '../support/node-device.js';

@@ -67,10 +67,7 @@ export function quote(text: string, limit = 60): string {
   return JSON.stringify(text.length > limit ? `${text.slice(0, limit)}...` : text);
 }
 
-/** Formats an integer with grouped digits, for example `1,234,567`. */
-export function grouped(value: number): string {
-  return String(value).replace(/\B(?=(\d{3})+$)/g, ',');
-}
+export { grouped } from '@gaussian-splat/core/fetch';
 
 /** Maximum number of bytes that the constructor of {@link GrowingBytes} reserves. */
 const MAX_RESERVED = 2 ** 28;

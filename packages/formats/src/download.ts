@@ -1,8 +1,16 @@
-import { chunksOf, fetchPatiently, SilenceError } from '@gaussian-splat/core/fetch';
+import {
+  badStatus,
+  chunksOf,
+  fetchPatiently,
+  forbidden,
+  interrupted,
+  label,
+  SilenceError,
+  unreachable,
+} from '@gaussian-splat/core/fetch';
 import { refuse } from './budget.js';
 import { grouped, GrowingBytes } from './bytes.js';
 import { lengthOf, tagOf } from './headers.js';
-import { badStatus, forbidden, interrupted, label, unreachable } from './network-errors.js';
 import type { FetchSceneOptions } from './fetch-scene.js';
 
 /** Number of received bytes that are requested again and compared, because two files may have the same ETag. */
@@ -115,7 +123,7 @@ export class Download {
   async read(): Promise<void> {
     const { signal, onProgress, onArrival } = this.#options;
     const body = this.#body;
-    const broken = (cause: unknown): Error => interrupted(this.#address, body.length, this.#total, cause);
+    const broken = (cause: unknown): Error => interrupted(this.#address, cause, body.length, this.#total);
     const failed = (cause: unknown): unknown => (signal?.aborted ? signal.reason : broken(cause));
     for await (const value of this.#response ? chunksOf(this.#response, failed) : []) {
       const rest = this.#rest(value);

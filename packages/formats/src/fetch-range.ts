@@ -1,8 +1,15 @@
-import { fetchPatiently, chunksOf } from '@gaussian-splat/core/fetch';
+import {
+  badStatus,
+  changed,
+  chunksOf,
+  fetchPatiently,
+  interrupted,
+  label,
+  unreachable,
+} from '@gaussian-splat/core/fetch';
 import { refuse } from './budget.js';
 import { lengthOf, tagOf } from './headers.js';
 import { grouped, GrowingBytes } from './bytes.js';
-import { badStatus, changed, interrupted, label, unreachable } from './network-errors.js';
 import type { FetchSceneOptions } from './fetch-scene.js';
 
 /** Result of {@link fetchRange}. */
@@ -93,7 +100,7 @@ async function attempt(
   const range = /^bytes (\d+)-(\d+)\/(\d+)?/.exec(response.headers.get('Content-Range') ?? '');
   const bytes = new GrowingBytes(end - start);
   const broken = (cause: unknown): unknown =>
-    signal?.aborted ? signal.reason : interrupted(address, bytes.length, end - start, cause);
+    signal?.aborted ? signal.reason : interrupted(address, cause, bytes.length, end - start);
   if (isPartial && range && Number(range[1]) !== start) throw broken(new Error('other bytes than requested'));
   let at = isPartial ? start : 0;
   for await (const chunk of chunksOf(response, broken)) {

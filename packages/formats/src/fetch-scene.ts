@@ -1,9 +1,7 @@
 import { GaussianSplatError } from '@gaussian-splat/core';
-import { partUrl } from '@gaussian-splat/core/fetch';
+import { label, parseUrl, partUrl } from '@gaussian-splat/core/fetch';
 import { refuse, type LoadLimits } from './budget.js';
-import { quote } from './bytes.js';
 import { Download } from './download.js';
-import { label } from './network-errors.js';
 import { outOfMemory } from './scene-errors.js';
 import type { OpenFile } from './scene-format.js';
 
@@ -94,31 +92,6 @@ async function bring(download: Download, signal: AbortSignal | undefined, retrie
       while (!(await download.resume()));
     }
   }
-}
-
-function parseUrl(url: string | URL): URL {
-  const base = globalThis.location?.href;
-  const refuse = (shown: string, found: string, cause?: unknown): never => {
-    throw new GaussianSplatError('network/url', {
-      where: `address ${quote(shown, 200)}`,
-      // In a worker the base is the worker's script, which is meaningless to the user.
-      expected: base ? 'an absolute URL or a relative one' : 'an absolute URL',
-      found,
-      remedy: 'correct the address of the scene',
-      cause,
-    });
-  };
-  let address: URL;
-  try {
-    address = new URL(url, base);
-  } catch (cause) {
-    return refuse(String(url), 'text that is none', cause);
-  }
-  // Browsers reject such requests with messages that repeat the password.
-  const { username, password, host, pathname } = address;
-  return username || password
-    ? refuse(host + pathname, 'one with a user name or password, which browsers refuse')
-    : address;
 }
 
 /** Returns a promise that resolves after `ms` milliseconds, or rejects with the signal's reason when it aborts. */

@@ -12,7 +12,7 @@ export { GpuEvaluator, type GpuEvaluatorOptions } from './gpu/gpu-evaluator.js';
 export { MergingEvaluator, type MergingOptions } from './merge/merging-evaluator.js';
 export { decibels, meanSquare, type Image } from './measure.js';
 export type { TaskPool } from './parts/task-pool.js';
-export { degreesOf, reduce, splatsOf, type Cut, type ReducedCloud } from './reduce.js';
+export { degreesOf, splatsOf, type Cut, type ReducedCloud } from './reduce.js';
 export { RefiningEvaluator, type RefiningOptions } from './refine/refining-evaluator.js';
 export type { OptimizerOptions } from './refine/scene-fitter.js';
 export type { ReducedSh, Ranking, Scores } from './score.js';

@@ -1,9 +1,8 @@
-import { shCoefficientCount, type GaussianCloud, type ShDegree } from '@gaussian-splat/core';
+import type { GaussianCloud, ShDegree } from '@gaussian-splat/core';
 import { isOfPlanes } from '@gaussian-splat/renderer/stages';
 import { coarseToFine } from './order.js';
 import { allocateColumns, arraysOf, columnsOf } from './parts/cloud-memory.js';
 import { inline, partsOf, poolFor, type TaskPool } from './parts/task-pool.js';
-import type { Scores } from './score.js';
 import { takeSplats } from './take-splats.js';
 
 /** Thresholds of the parts of a scene that are dropped. Default of all: 0, which keeps everything. */
@@ -55,26 +54,6 @@ export function writtenOrder(
   return isOfPlanes(cloud.positions) ? splats.slice() : coarseToFine(cloud, contribution, splats);
 }
 
-/** Returns a cloud after a cut, except for merges. The source is not modified. */
-export function reduce(cloud: GaussianCloud, scores: Scores, cut: Cut): ReducedCloud {
-  const { contribution, removalError, lowered } = scores;
-  const { minContribution = 0, removalPrice = 0, colorPrice = 0 } = cut;
-  const staying = new Uint32Array(cloud.count);
-  let count = 0;
-  for (let i = 0; i < cloud.count; i++) {
-    if (contribution[i] < minContribution || removalError[i] < removalPrice) continue;
-    staying[count++] = i;
-  }
-  const kept = writtenOrder(cloud, contribution, staying.subarray(0, count));
-  const degrees = Uint8Array.from(kept, (i) => degreeOf(cloud.shDegree, scores, i, colorPrice));
-  const reduced = reduceTo(cloud, { kept, degrees });
-  const length = 3 * shCoefficientCount(reduced.cloud.shDegree);
-  for (let k = 0; k < kept.length; k++) {
-    if (degrees[k] < cloud.shDegree) reduced.cloud.sh.set(lowered[degrees[k]].of(kept[k]), length * k);
-  }
-  return reduced;
-}
-
 /**
  * Returns the chosen splats in their order. All coefficients of splats with a reduced degree are 0; the caller sets them.
  */
@@ -106,18 +85,6 @@ function roomFor(cloud: GaussianCloud, { kept, degrees }: Choice, pool: TaskPool
   const highest = degreesOf(degrees).findLastIndex((count) => count > 0);
   const columns = allocateColumns(kept.length, Math.max(0, highest) as ShDegree, pool);
   return { cloud: { ...cloud, ...columns, count: kept.length }, degrees, kept };
-}
-
-/** Returns the degree of splat `i` that minimizes its error plus the price of the kept coefficients. */
-function degreeOf(full: ShDegree, { lowered }: Scores, i: number, price: number): ShDegree {
-  let best = full;
-  let min = price * shCoefficientCount(full);
-  for (let degree = 0; degree < full; degree++) {
-    const cost = lowered[degree].error[i] + price * shCoefficientCount(degree as ShDegree);
-    if (cost > min || (cost === min && price === 0)) continue;
-    [best, min] = [degree as ShDegree, cost];
-  }
-  return price > 0 ? best : full;
 }
 
 /** Returns the number of splats of each degree, [4]. */

@@ -2,7 +2,6 @@ import type { GaussianCloud } from '@gaussian-splat/core';
 import {
   degreesOf,
   meanSquare,
-  reduce,
   type Cut,
   type CutFigures,
   type ViewSplit,
@@ -13,6 +12,7 @@ import {
   type ReducedCloud,
   type Scores,
 } from '@gaussian-splat/optimize';
+import { reduce } from './reduce.js';
 import { isCovered, type Painter } from './painter.js';
 import { cpuPainter, cpuScorer } from './raster.js';
 import { scoreSplats } from './score.js';

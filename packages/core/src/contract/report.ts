@@ -1,3 +1,4 @@
+import { grouped } from '../grouped.js';
 import { describeTensor, type OnnxHeader } from '../onnx/header.js';
 import { modelMemory } from '../onnx/model-memory.js';
 import { gpuNotes } from '../onnx/webgpu-provider.js';
@@ -107,9 +108,4 @@ function outputRows(header: OnnxHeader, contract: Contract | undefined): string[
     ]),
     ...missing.map((name) => [name, 'not in the file', fields.get(name)!]),
   ];
-}
-
-/** Formats a number with grouped digits: 1,234,567. */
-function grouped(value: number): string {
-  return String(value).replace(/\B(?=(\d{3})+$)/g, ',');
 }

@@ -1,4 +1,5 @@
 import { GaussianSplatError } from '../errors.js';
+import { badStatus, interrupted, label, parseUrl, unreachable } from '../network-errors.js';
 import { bytesOf, fetchPatiently, SilenceError } from '../patient-fetch.js';
 import { type ByteSource } from './byte-source.js';
 
@@ -67,7 +68,7 @@ class RemoteFile implements UrlSource {
     this.#address = address;
     this.#options = options;
     this.#maxRequests = options.maxRequests ?? DEFAULT_MAX_REQUESTS;
-    this.name = address.href.slice(0, 200);
+    this.name = label(address);
     this.chunk = options.chunk ?? DEFAULT_CHUNK;
   }
 
@@ -126,7 +127,7 @@ class RemoteFile implements UrlSource {
     }
     await response.body?.cancel().catch(() => {});
     if (response.status === 206 || RANGE_REFUSALS.includes(response.status)) return undefined;
-    throw this.#badStatus(response);
+    throw badStatus(this.name, response);
   }
 
   /**
@@ -144,7 +145,7 @@ class RemoteFile implements UrlSource {
     const response = await this.#request({});
     if (!response.ok) {
       await response.body?.cancel().catch(() => {});
-      throw this.#badStatus(response);
+      throw badStatus(this.name, response);
     }
     this.#keepWhole(await this.#body(response));
   }
@@ -160,29 +161,13 @@ class RemoteFile implements UrlSource {
     this.requests++;
     return fetchPatiently(this.#address, { ...init, mode, credentials, signal }).catch((cause: unknown) => {
       signal?.throwIfAborted();
-      throw new GaussianSplatError('network/unreachable', {
-        where: this.name,
-        expected: 'a response from the server',
-        found: `no readable response (${(cause as Error)?.message ?? 'unknown cause'})`,
-        remedy:
-          'check the address and the connection; a server of another origin must send "Access-Control-Allow-Origin"',
-        cause,
-      });
+      throw unreachable(this.name, cause);
     });
   }
 
   async #body(response: Response): Promise<Uint8Array> {
     const { signal, maxBytes } = this.#options;
-    const failed = (cause: unknown): unknown =>
-      signal?.aborted
-        ? signal.reason
-        : new GaussianSplatError('network/interrupted', {
-            where: this.name,
-            expected: 'the rest of the file',
-            found: `the end of the connection (${(cause as Error)?.message ?? 'unknown cause'})`,
-            remedy: 'load the model again; the connection broke off',
-            cause,
-          });
+    const failed = (cause: unknown): unknown => (signal?.aborted ? signal.reason : interrupted(this.name, cause));
     const bytes = await bytesOf(response, failed, maxBytes).catch((cause: unknown) => {
       if (!(cause instanceof RangeError)) throw cause;
       throw new GaussianSplatError('out-of-memory/budget', {
@@ -196,16 +181,6 @@ class RemoteFile implements UrlSource {
     this.bytesReceived += bytes.length;
     return bytes;
   }
-
-  #badStatus({ status, statusText }: Response): GaussianSplatError {
-    return new GaussianSplatError('network/status', {
-      where: this.name,
-      expected: 'HTTP status 200 or 206',
-      found: `HTTP status ${status}${statusText ? ` (${statusText})` : ''}`,
-      remedy:
-        status === 404 ? 'check the path and the spelling, capital letters included' : 'check the address of the model',
-    });
-  }
 }
 
 function sizeFromContentRange(response: Response): number | undefined {
@@ -216,19 +191,4 @@ function sizeFromContentRange(response: Response): number | undefined {
 /** Whether a response has no content encoding: lengths and ranges of an encoded response differ from the file's. */
 function isPlain(response: Response): boolean {
   return /^\s*(identity)?\s*$/i.test(response.headers.get('Content-Encoding') ?? '');
-}
-
-function parseUrl(url: string | URL): URL {
-  const base = globalThis.location?.href;
-  try {
-    return new URL(url, base);
-  } catch (cause) {
-    throw new GaussianSplatError('network/url', {
-      where: `address ${JSON.stringify(String(url).slice(0, 200))}`,
-      expected: base ? `an absolute URL or one relative to ${base.slice(0, 200)}` : 'an absolute URL',
-      found: 'text that is none',
-      remedy: 'correct the address of the model',
-      cause,
-    });
-  }
 }

@@ -1,5 +1,4 @@
-import { GaussianSplatError } from '@gaussian-splat/core';
-import { bytesOf, chunksOf, fetchPatiently } from '@gaussian-splat/core/fetch';
+import { badStatus, bytesOf, chunksOf, fetchPatiently, interrupted, unreachable } from '@gaussian-splat/core/fetch';
 
 /** Called with the received and the total bytes. The total is undefined while unknown. */
 export type ProgressListener = (loaded: number, total: number | undefined) => void;
@@ -41,7 +40,7 @@ export async function fetchBytes(
   if (!response.ok) {
     await response.body?.cancel().catch(() => undefined);
     if (mayBeMissing && response.status < 500 && !isBusy(response)) return undefined;
-    throw badStatus(url, response.status);
+    throw badStatus(url, response);
   }
   try {
     return await readBody(response, options);
@@ -120,36 +119,3 @@ export function sumProgress(count: number, onProgress: ProgressListener): readon
 
 const addUnlessUnknown = (a: number | undefined, b: number | undefined): number | undefined =>
   a === undefined || b === undefined ? undefined : a + b;
-
-const shorten = (url: string): string => url.slice(0, 200);
-
-const unreachable = (url: string, cause: unknown): GaussianSplatError =>
-  new GaussianSplatError('network/unreachable', {
-    where: shorten(url),
-    expected: 'a response from the server',
-    found: `no readable response (${(cause as Error)?.message ?? 'unknown cause'})`,
-    remedy: 'check the address and the connection; a server of another origin must send "Access-Control-Allow-Origin"',
-    cause,
-  });
-
-const badStatus = (url: string, status: number): GaussianSplatError =>
-  new GaussianSplatError('network/status', {
-    where: shorten(url),
-    expected: 'HTTP status 200',
-    found: `HTTP status ${status}`,
-    remedy:
-      status === 404
-        ? 'check the path and the spelling, capital letters included'
-        : status === 429 || status >= 500
-          ? 'try again later; the server is busy or fails'
-          : 'check the address',
-  });
-
-const interrupted = (url: string, cause: unknown): GaussianSplatError =>
-  new GaussianSplatError('network/interrupted', {
-    where: shorten(url),
-    expected: 'the rest of the file',
-    found: `the end of the connection (${(cause as Error)?.message ?? 'unknown cause'})`,
-    remedy: 'load it again; the connection broke off',
-    cause,
-  });
