@@ -1,6 +1,7 @@
 import type { Compositor, Target } from './frame-target.js';
 import { composeRectangle } from './generated/rectangle-shaders.js';
 import { perDevice, SHADER_STAGE, ShaderProgram, type Resource } from './gpu/kernel.js';
+import { composingPipeline } from './stages/compose.js';
 
 /** Upper left corner and size of a rectangle in a target, in pixels. */
 export interface RectangleBounds {
@@ -9,9 +10,6 @@ export interface RectangleBounds {
   readonly width: number;
   readonly height: number;
 }
-
-/** Blends premultiplied color over the target. */
-const OVER: GPUBlendComponent = { srcFactor: 'one', dstFactor: 'one-minus-src-alpha', operation: 'add' };
 
 type ComposeResources = Parameters<Compositor['compose']>[1];
 
@@ -42,7 +40,7 @@ export class Rectangle implements Compositor {
       colorAttachments: [{ view, loadOp: 'load', storeOp: 'store' }],
     });
     pass.setViewport(x, y, width, height, 0, 1);
-    pass.setPipeline(pipelineOf(this.#device, format, keeps));
+    pass.setPipeline(composingPipeline(this.#device, 'compose.rectangle', programOf(this.#device), format, keeps));
     pass.setBindGroup(0, bind(this.#device, resources));
     pass.draw(3);
     pass.end();
@@ -66,21 +64,4 @@ function bind(device: GPUDevice, resources: ComposeResources): GPUBindGroup {
     known.set(accumulated, bound);
   }
   return bound.group;
-}
-
-function pipelineOf(device: GPUDevice, format: GPUTextureFormat, keeps: boolean): GPURenderPipeline {
-  const { module, pipelineLayout } = programOf(device);
-  const blend = keeps ? { color: OVER, alpha: OVER } : undefined;
-  return perDevice(device, `compose rectangle ${format} ${keeps}`, () =>
-    device.createRenderPipeline({
-      label: `gs.compose.rectangle.${format}`,
-      layout: pipelineLayout,
-      vertex: { module, entryPoint: 'vertex' },
-      fragment: {
-        ...{ module, entryPoint: 'fragment', targets: [{ format, blend }] },
-        constants: { is_encoding: Number(format.endsWith('-srgb')) },
-      },
-      primitive: { topology: 'triangle-list' },
-    }),
-  );
 }

@@ -91,19 +91,29 @@ export class ComposeStage {
   }
 
   #pipeline(format: GPUTextureFormat, keeps = false): GPURenderPipeline {
-    const blend = keeps ? { color: OVER, alpha: OVER } : undefined;
-    const { module, pipelineLayout } = this.#program;
-    return perDevice(this.#device, `compose ${format} ${keeps}`, () =>
-      this.#device.createRenderPipeline({
-        label: `gs.compose.${format}`,
-        layout: pipelineLayout,
-        vertex: { module, entryPoint: 'vertex' },
-        fragment: {
-          ...{ module, entryPoint: 'fragment', targets: [{ format, blend }] },
-          constants: { is_encoding: Number(format.endsWith('-srgb')) },
-        },
-        primitive: { topology: 'triangle-list' },
-      }),
-    );
+    return composingPipeline(this.#device, 'compose', this.#program, format, keeps);
   }
+}
+
+/** Returns the pipeline that composes splats into a target. @param keeps Whether its content is the background. */
+export function composingPipeline(
+  device: GPUDevice,
+  name: string,
+  { module, pipelineLayout }: Pick<ShaderProgram<typeof compose>, 'module' | 'pipelineLayout'>,
+  format: GPUTextureFormat,
+  keeps: boolean,
+): GPURenderPipeline {
+  const blend = keeps ? { color: OVER, alpha: OVER } : undefined;
+  return perDevice(device, `${name} ${format} ${keeps}`, () =>
+    device.createRenderPipeline({
+      label: `gs.${name}.${format}`,
+      layout: pipelineLayout,
+      vertex: { module, entryPoint: 'vertex' },
+      fragment: {
+        ...{ module, entryPoint: 'fragment', targets: [{ format, blend }] },
+        constants: { is_encoding: Number(format.endsWith('-srgb')) },
+      },
+      primitive: { topology: 'triangle-list' },
+    }),
+  );
 }
