@@ -2,6 +2,7 @@ import { loadModule } from '@gaussian-splat/core';
 import type * as detection from './detect.js';
 import type * as diagnosis from './diagnose.js';
 import type * as leftOut from './dropped-splats.js';
+import { signedFormat, type UsualFormat } from './formats.js';
 import type * as previews from './preview.js';
 import type { SceneFormat, SceneReader } from './scene-format.js';
 
@@ -17,6 +18,14 @@ export const loadDiagnosis = (): Promise<typeof diagnosis> =>
 /** Loads detect.ts, which detects formats without a common signature. */
 export const loadDetection = (): Promise<typeof detection> =>
   loadModule('the code that detects formats', () => import('./detect.js'));
+
+/** Returns the format of a file, or of its beginning; undefined if no format is detected. Most need no further code. */
+export const formatOf = async (
+  bytes: Uint8Array,
+  name: string,
+  contentType: string,
+): Promise<UsualFormat | undefined> =>
+  signedFormat(bytes) ?? (await loadDetection()).findFormat(bytes, name, contentType);
 
 /** Loads preview.ts, which creates previews of scenes that have been read. */
 export const loadPreviews = (): Promise<typeof previews> =>

@@ -1,8 +1,7 @@
 import { GaussianSplatError, keepUsable, type GaussianCloud } from '@gaussian-splat/core';
 import { LoadBudget } from './budget.js';
 import { plainBytes, type FileBytes } from './bytes.js';
-import { findFormat } from './detect.js';
-import { loadReader } from './load-files.js';
+import { formatOf, loadReader } from './load-files.js';
 import type { ReadSceneOptions } from './read-scene.js';
 
 /**
@@ -21,7 +20,7 @@ export async function readPrefix(
   const { name = 'scene', contentType = '', signal } = options;
   signal?.throwIfAborted();
   const bytes = plainBytes(beginning, name);
-  const format = bytes.length === 0 ? undefined : findFormat(bytes, name, contentType);
+  const format = bytes.length === 0 ? undefined : await formatOf(bytes, name, contentType);
   if (!format?.readsPrefix) return undefined;
   const read = await loadReader(format);
   try {

@@ -1,8 +1,7 @@
 import { keepUsable, type GaussianCloud } from '@gaussian-splat/core';
 import { LoadBudget, type LoadLimits } from './budget.js';
 import { plainBytes, type FileBytes } from './bytes.js';
-import { signedFormat } from './formats.js';
-import { loadDetection, loadDiagnosis, loadLeftOut, loadPreviews, loadReader } from './load-files.js';
+import { formatOf, loadDetection, loadDiagnosis, loadLeftOut, loadPreviews, loadReader } from './load-files.js';
 import { emptyFile, noSplats, outOfMemory } from './scene-errors.js';
 import { previewWanted, type OpenFile, type SceneSource } from './scene-format.js';
 
@@ -46,7 +45,7 @@ export interface ReadSceneOptions extends LoadLimits {
 export async function prepareReader(beginning: FileBytes, name = 'scene', contentType = ''): Promise<void> {
   try {
     const bytes = plainBytes(beginning, name);
-    const format = signedFormat(bytes) ?? (await loadDetection()).findFormat(bytes, name, contentType);
+    const format = await formatOf(bytes, name, contentType);
     if (format) await loadReader(format);
   } catch {
     // `readScene` reports the failure.
@@ -71,13 +70,11 @@ export async function readScene(file: FileBytes, options: ReadSceneOptions = {})
   signal?.throwIfAborted();
   const bytes = plainBytes(file, name);
   if (bytes.length === 0) throw emptyFile(name);
-  let format = signedFormat(bytes);
+  const format = await formatOf(bytes, name, contentType);
   if (!format) {
-    const { extensionOf, findFormat } = await loadDetection();
-    format = findFormat(bytes, name, contentType);
-    const diagnosis = format ? undefined : await loadDiagnosis();
+    const [{ extensionOf }, { diagnose }] = [await loadDetection(), await loadDiagnosis()];
     signal?.throwIfAborted();
-    if (!format) throw diagnosis!.diagnose(bytes, name, extensionOf(name));
+    throw diagnose(bytes, name, extensionOf(name));
   }
   const read = await loadReader(format);
   signal?.throwIfAborted();
