@@ -8,9 +8,9 @@ import { dirname, join } from 'node:path';
 import { root } from './lib/run.mjs';
 
 const MODULES = [
-  { source: 'packages/renderer/assembly/pack-rows.ts', name: 'ROWS_WASM' },
-  { source: 'packages/renderer/assembly/pack-nodes.ts', name: 'NODES_WASM' },
-  { source: 'packages/formats/assembly/unpack-splats.ts', name: 'UNPACK_WASM' },
+  { source: 'packages/renderer/assembly/pack-rows.ts', name: 'rowsWasm' },
+  { source: 'packages/renderer/assembly/pack-nodes.ts', name: 'nodesWasm' },
+  { source: 'packages/formats/assembly/unpack-splats.ts', name: 'unpackWasm' },
 ];
 /** Files that those of the modules import. */
 const SHARED = ['packages/core/assembly/exp.ts', 'packages/renderer/assembly/shared.ts'];
@@ -26,6 +26,12 @@ const OPTIONS = [
   'out.wasm',
 ];
 
+/** Hexadecimal digits, because gzip finds equal bytes in them, which base64 hides: a quarter less. */
+const moduleOf = (source, name, digits) => `/** Returns the WebAssembly of ${source}. */
+export const ${name} = (): Uint8Array<ArrayBuffer> =>
+  Uint8Array.from('${digits}'.match(/../g)!, (byte) => parseInt(byte, 16));
+`;
+
 const { version } = JSON.parse(readFileSync(join(root, 'node_modules/assemblyscript/package.json'), 'utf8'));
 
 for (const { source, name } of MODULES) {
@@ -33,6 +39,7 @@ for (const { source, name } of MODULES) {
   const inputs = [
     version,
     OPTIONS.join(' '),
+    moduleOf(source, name, ''),
     ...[source, ...SHARED].map((file) => readFileSync(join(root, file), 'utf8')),
   ];
   const stamp = `// ${createHash('sha256').update(inputs.join('\n')).digest('hex')}`;
@@ -55,9 +62,5 @@ for (const { source, name } of MODULES) {
     process.exit(1);
   }
   mkdirSync(dirname(target), { recursive: true });
-  const text = Buffer.from(wasm).toString('base64');
-  writeFileSync(
-    target,
-    `${stamp}\n/** WebAssembly of ${source}, in base64. */\nexport const ${name} =\n  '${text}';\n`,
-  );
+  writeFileSync(target, `${stamp}\n${moduleOf(source, name, Buffer.from(wasm).toString('hex'))}`);
 }

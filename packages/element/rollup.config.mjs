@@ -136,8 +136,21 @@ const nameOf = ({ name }) => NAMES[name] ?? name;
 const output = {
   dir: path('./cdn'),
   format: 'es',
-  sourcemap: true,
+  // The package has no maps, which scripts would ask for.
+  sourcemap: 'hidden',
   chunkFileNames: (chunk) => `readers/${nameOf(chunk)}-[hash].js`,
+};
+
+/** Modules that are loaded together: as one chunk they take a quarter less than as many, and one request. */
+const TOGETHER = {
+  packing:
+    /\/(renderer\/dist\/pack\/(joined-blocks|morton|pack|pack-cloud|radix-sort|recenter|unpack)|element\/dist\/loading\/pack-cloud)\.js$/,
+  previews: /\/(formats\/dist\/read-prefix|element\/dist\/loading\/preview-schedule)\.js$/,
+  reading: /\/formats\/dist\/(credits|decompression|faults|preview|safe-orbit)\.js$/,
+};
+const together = {
+  onlyExplicitManualChunks: true,
+  manualChunks: (id) => Object.keys(TOGETHER).find((name) => TOGETHER[name].test(id)),
 };
 
 /** Parts of the build, which the variable PART names, and which may run at the same time. */
@@ -185,7 +198,10 @@ const PARTS = {
       // The page imports `runOnPage` from it, so its exports stay; readers import what they share with it from it.
       preserveEntrySignatures: 'allow-extension',
       plugins,
-      output: [output, { dir: path('./dist/loading'), format: 'cjs', plugins: [workerAsText] }],
+      output: [
+        { ...output, ...together },
+        { dir: path('./dist/loading'), format: 'cjs', plugins: [workerAsText], ...together },
+      ],
     },
   ],
 };

@@ -10,8 +10,10 @@ const isBuilt = existsSync(`${root}packages/element/cdn/gaussian-splat.min.js`);
 
 interface SizeModule {
   readonly BUDGET: number;
-  readonly plyPageSize: () => number;
+  readonly SPZ_BUDGET: number;
+  readonly bytesOf: (scripts: readonly string[]) => number;
   readonly scriptsForPly: () => string[];
+  readonly scriptsForSpz: () => string[];
 }
 
 test(
@@ -23,9 +25,33 @@ test(
     assert.ok(files.includes('gaussian-splat.min.js') && files.includes('scene-worker.js'), files.join());
     assert.ok(files.length >= 3, 'the PLY reader is among them');
     assert.ok(!files.some((file) => file.includes('spz')), 'and no other reader');
-    const bytes = sizes.plyPageSize();
+    const bytes = sizes.bytesOf(files);
     t.diagnostic(`${bytes} bytes of gzip in ${files.length} files`);
     assert.ok(bytes < sizes.BUDGET, `${bytes} bytes`);
+  },
+);
+
+test(
+  'what a page with an SPZ scene fetches until its first image stays within 120,000 bytes of gzip',
+  { skip: isBuilt ? false : 'no CDN build: npm run build' },
+  async (t) => {
+    const sizes = (await import(`${root}packages/element/scripts/size.mjs`)) as SizeModule;
+    const files = sizes.scriptsForSpz();
+    const bytes = sizes.bytesOf(files);
+    t.diagnostic(`${bytes} bytes of gzip in ${files.length} files`);
+    assert.ok(files.length <= 24, `${files.length} requests: small modules that are loaded together are one chunk`);
+    assert.ok(bytes < sizes.SPZ_BUDGET, `${bytes} bytes`);
+  },
+);
+
+test(
+  'no script of the CDN build asks for a source map, because the package has none',
+  { skip: isBuilt ? false : 'no CDN build: npm run build' },
+  () => {
+    const cdn = `${root}packages/element/cdn/`;
+    const scripts = readdirSync(cdn, { recursive: true, encoding: 'utf8' }).filter((file) => file.endsWith('.js'));
+    const asking = scripts.filter((file) => readFileSync(cdn + file, 'utf8').includes('\n//# sourceMappingURL='));
+    assert.deepEqual(asking, []);
   },
 );
 

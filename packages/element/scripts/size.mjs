@@ -1,5 +1,5 @@
 /**
- * `npm run size -w @gaussian-splat/element`: bytes of the CDN build, and of what a page with a PLY scene fetches of it.
+ * `npm run size -w @gaussian-splat/element`: bytes of the CDN build, and of what pages with a PLY and an SPZ scene fetch of it.
  */
 import { readdirSync, readFileSync } from 'node:fs';
 import { basename, dirname, join, relative } from 'node:path';
@@ -20,16 +20,32 @@ export function scriptSizes() {
   });
 }
 
+/** Maximum bytes of gzip until the first image of a page with an SPZ scene and camera controls. */
+export const SPZ_BUDGET = 120_000;
+
 /**
  * Paths of what a page fetches to show a PLY scene: element, worker, PLY reader, and what these import. Parts that the element fetches later are not counted: the
  * self-test of the GPU, beside the scene, and printing, after the first frame.
  */
-export function scriptsForPly() {
-  const reader = readdirSync(join(CDN, 'readers')).find((file) => /^ply-[^.]+\.js$/.test(file));
-  if (reader === undefined) throw new Error(`no PLY reader found in ${CDN}readers`);
+export const scriptsForPly = () => withImports(['gaussian-splat.min.js', 'scene-worker.js', scriptOf('readers/ply')]);
+
+/** Scripts that a page with a large SPZ scene and camera controls also fetches until its first image; `npm run test:apps -- cdn` measures it. */
+const FOR_SPZ = [
+  ...['readers/spz', 'readers/packing', 'readers/row-packer', 'readers/previews', 'part-uploads'],
+  ...['timing', 'search', 'input-controller', 'print-controller'],
+];
+export const scriptsForSpz = () => withImports(['gaussian-splat.min.js', 'scene-worker.js', ...FOR_SPZ.map(scriptOf)]);
+
+/** Path of a script by its name before the hash. */
+function scriptOf(name) {
+  const found = scriptSizes().find(({ file }) => file.startsWith(`${name}-`) && file.length === name.length + 12);
+  if (found === undefined) throw new Error(`no script ${name} found in ${CDN}`);
+  return found.file;
+}
+
+function withImports(entries) {
   const needed = new Set();
-  for (const entry of ['gaussian-splat.min.js', 'scene-worker.js', join('readers', reader)])
-    addWithImports(entry, needed);
+  for (const entry of entries) addWithImports(entry, needed);
   return [...needed];
 }
 
@@ -46,23 +62,15 @@ function addWithImports(file, needed) {
 /** Scripts that a page fetches beside those of {@link scriptsForPly}, by purpose: docs/guide/performance.md has the sums. */
 const BESIDE = {
   'the self-test of the GPU': ['search', 'timing', 'sh'],
+  'packing of scenes': ['readers/packing', 'readers/sh', 'readers/words', 'readers/chunks'],
+  'packing of 16,384 splats and more': ['readers/row-packer'],
   'camera controls': ['input-controller', 'box-points', 'corner-button', 'label-parts'],
 };
 
-/** Total gzip bytes of scripts, by the names before their hashes. */
-function bytesOf(names) {
-  const sizes = scriptSizes();
-  return names.reduce((sum, name) => {
-    const found = sizes.find(({ file }) => new RegExp(`^${name}-[^.]{8}\\.js$`).test(file));
-    if (found === undefined) throw new Error(`no script ${name} found in ${CDN}`);
-    return sum + found.gzip;
-  }, 0);
-}
-
-/** Total gzip bytes of {@link scriptsForPly}. */
-export function plyPageSize() {
+/** Total gzip bytes of scripts, by their paths. */
+export function bytesOf(scripts) {
   const sizes = new Map(scriptSizes().map(({ file, gzip }) => [file, gzip]));
-  return scriptsForPly().reduce((sum, file) => sum + sizes.get(file), 0);
+  return scripts.reduce((sum, file) => sum + sizes.get(file), 0);
 }
 
 function print() {
@@ -72,8 +80,12 @@ function print() {
     const mark = forPly.has(file) ? '*' : ' ';
     console.log(`${mark} ${file.padEnd(40)}${String(raw).padStart(7)}${String(gzip).padStart(10)}`);
   }
-  console.log(`* fetched for a PLY scene: ${plyPageSize()} bytes of gzip (at most ${BUDGET})`);
-  for (const [purpose, names] of Object.entries(BESIDE)) console.log(`  ${purpose}: ${bytesOf(names)} bytes of gzip`);
+  console.log(`* fetched for a PLY scene: ${bytesOf([...forPly])} bytes of gzip (at most ${BUDGET})`);
+  console.log(
+    `  an SPZ scene, until its first image: ${bytesOf(scriptsForSpz())} bytes of gzip (at most ${SPZ_BUDGET})`,
+  );
+  for (const [purpose, names] of Object.entries(BESIDE))
+    console.log(`  ${purpose}: ${bytesOf(names.map(scriptOf))} bytes of gzip`);
   console.log(`integrity of gaussian-splat.min.js: ${integrityOf(join(CDN, 'gaussian-splat.min.js'))}`);
 }
 

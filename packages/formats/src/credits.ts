@@ -1,7 +1,6 @@
 /** Credits of files: who made a scene, and under which license. The texts come from files, and are not trusted. */
 import type { Credits } from '@gaussian-splat/core';
 import type { DraftCloud } from './cloud.js';
-import { isObject } from './json.js';
 
 /** Maximum length of a text in characters, because credits are a line over the frame. */
 const MAX_LENGTH = 2000;
@@ -15,6 +14,9 @@ const lineOf = (value: unknown): string | undefined =>
         .trim() || undefined
     : undefined;
 
+/** Returns the fields of any value of JSON; none for a value that is no object. */
+const fieldsOf = (value: unknown): Readonly<Record<string, unknown>> => Object(value) as Record<string, unknown>;
+
 /** Returns the credits in the fields `attribution` and `license` of a manifest; undefined if it has neither. */
 export function creditsOf(fields: { readonly attribution?: unknown; readonly license?: unknown }): Credits | undefined {
   const [attribution, license] = [lineOf(fields.attribution), lineOf(fields.license)];
@@ -26,9 +28,9 @@ export function creditsOf(fields: { readonly attribution?: unknown; readonly lic
  * `extras.author`, and Sketchfab's `extras.license`.
  */
 export function creditsOfAsset(asset: unknown): Credits | undefined {
-  if (!isObject(asset)) return undefined;
-  const extras = isObject(asset.extras) ? asset.extras : {};
-  return creditsOf({ attribution: lineOf(asset.copyright) ?? extras.author, license: extras.license });
+  const { copyright, extras } = fieldsOf(asset);
+  const { author, license } = fieldsOf(extras);
+  return creditsOf({ attribution: lineOf(copyright) ?? author, license });
 }
 
 /** Returns the part of the object `asset` that {@link creditsOfAsset} reads. */

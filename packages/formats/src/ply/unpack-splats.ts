@@ -1,7 +1,7 @@
 /** Unpacks the splats of a compressed PLY in WebAssembly. packages/formats/assembly/unpack-splats.ts is the code. */
 import { shCoefficientCount } from '@gaussian-splat/core';
 import type { DraftCloud } from '../cloud.js';
-import { UNPACK_WASM } from '../generated/unpack-splats.js';
+import { unpackWasm } from '../generated/unpack-splats.js';
 import type { ElementData } from './rows.js';
 
 /** Number of splats that are unpacked at once, a multiple of the 256 of a chunk. Their memory stays in the cache. */
@@ -18,7 +18,7 @@ let compiled: Promise<WebAssembly.Module | undefined> | undefined;
 
 /** Compiles the code once. Resolves with undefined without SIMD, or if the page's policy forbids WebAssembly. */
 const unpackerCode = (): Promise<WebAssembly.Module | undefined> =>
-  (compiled ??= WebAssembly.compile(Uint8Array.from(atob(UNPACK_WASM), (c) => c.charCodeAt(0))).catch(() => undefined));
+  (compiled ??= WebAssembly.compile(unpackWasm()).catch(() => undefined));
 
 /** Elements of a compressed PLY. */
 export interface PackedElements {

@@ -1,6 +1,6 @@
 /** The WebAssembly that packs splats, and its memory. packages/renderer/assembly/pack-rows.ts is the code. */
 import { shCoefficientCount } from '@gaussian-splat/core';
-import { ROWS_WASM } from '../generated/pack-rows.js';
+import { rowsWasm } from '../generated/pack-rows.js';
 import { constants } from '../generated/shaders.js';
 import type { RowLayout } from './joined-blocks.js';
 import { CODE_NOISE, MAX_BITS, PER_UNIT } from './sh.js';
@@ -42,7 +42,7 @@ let compiled: Promise<WebAssembly.Module | undefined> | undefined;
  * forbids WebAssembly.
  */
 export const packerCode = (): Promise<WebAssembly.Module | undefined> =>
-  (compiled ??= WebAssembly.compile(Uint8Array.from(atob(ROWS_WASM), (c) => c.charCodeAt(0))).catch(() => undefined));
+  (compiled ??= WebAssembly.compile(rowsWasm()).catch(() => undefined));
 
 /** Bytes of the words of a splat. */
 export const strideOf = ({ shDegree, shPrecision }: Pick<RowLayout, 'shDegree' | 'shPrecision'>): number =>

@@ -1,6 +1,6 @@
 /** Packs nodes of trees in WebAssembly. packages/renderer/assembly/pack-nodes.ts is the code. */
 import type { GaussianCloud } from '@gaussian-splat/core';
-import { NODES_WASM } from '../generated/pack-nodes.js';
+import { nodesWasm } from '../generated/pack-nodes.js';
 import { constants } from '../generated/shaders.js';
 import { chunksOf } from '../levels/splat-level.js';
 import { curveThrough } from '../pack/morton.js';
@@ -44,8 +44,7 @@ export class NodePacker {
 
   /** Starts the code once for the thread. Resolves with undefined without SIMD, or if the page's policy forbids it. */
   static open(): Promise<NodePacker | undefined> {
-    const bytes = (): Uint8Array<ArrayBuffer> => Uint8Array.from(atob(NODES_WASM), (c) => c.charCodeAt(0));
-    opening ??= WebAssembly.compile(bytes()).then(
+    opening ??= WebAssembly.compile(nodesWasm()).then(
       (module) => new NodePacker(module),
       () => undefined,
     );
