@@ -1,6 +1,6 @@
 /**
  * `npm run test:apps [-- NAME… [--newest]]`: the apps of tests/apps, each as a user would make it, with the versions that the list names or, with `--newest`, the latest ones. Installs our packages from the files of the release, builds, opens the
- * app in Chromium, and starts the development server if the list has one. Each has to be built without a warning, and to show its scene and a generator, with a worker and a clean console; the bytes received until the scene is visible are printed. Apps stay in .cache/apps, so that a second run installs our packages alone.
+ * app in Chromium, and starts the development server if the list has one. Each has to be built without a warning, and to show its scene and a generator, with a worker and a clean console; the bytes of code until the scene is visible, and after it, are printed. Apps stay in .cache/apps, so that a second run installs our packages alone.
  */
 import { spawn, spawnSync } from 'node:child_process';
 import { cpSync, existsSync, mkdirSync, readdirSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
@@ -87,13 +87,16 @@ async function tryApp(name, app) {
   }
 }
 
-function print(name, { weight, files, workers, painted, generated }, { most: max }) {
+function print(name, { code, workers, painted, generated }, { most: max }) {
   const percent = (share) => `${(share * 100).toFixed(0)} %`;
   const also = generated === undefined ? '' : ` and ${percent(generated)} by a generator`;
-  console.log(
-    `${name}: ${percent(painted)} painted${also}, ${workers} worker(s), ${weight} bytes of gzip in ${files} scripts`,
-  );
-  if (max !== undefined && weight > max) throw new Error(`${weight} bytes: expected at most ${max}`);
+  const { first, late, scripts } = code;
+  const bytes = `${first} bytes of gzip until the scene is visible and ${late} later`;
+  const sent = scripts.length > 0 ? `, ${bytes}, in ${scripts.length} scripts` : '';
+  console.log(`${name}: ${percent(painted)} painted${also}, ${workers} worker(s)${sent}`);
+  if (!max || (first <= max.first && late <= max.late)) return;
+  const list = scripts.map(({ name, gzip, isLate }) => `\n${gzip} ${name}${isLate ? ' (later)' : ''}`).join('');
+  throw new Error(`expected at most ${max.first} and ${max.late} bytes, found ${first} and ${late}:${list}`);
 }
 
 /** The app's files and its packages. Packages of others stay from one run to the next, except with `--newest`: npm would keep the versions that it finds. */

@@ -1,7 +1,8 @@
-/** Opens an app in Chromium as a visitor: are its scene and a generator visible, with a worker and a clean console, and how many bytes were received until the scene was? */
+/** Opens an app in Chromium as a visitor: are its scene and a generator visible, with a worker and a clean console, and how many bytes of code did the server send for it? */
 import { cpSync, existsSync, readFileSync, writeFileSync } from 'node:fs';
 import { createRequire } from 'node:module';
-import { dirname, join } from 'node:path';
+import { basename, dirname, join } from 'node:path';
+import { setTimeout } from 'node:timers/promises';
 import { gzipSync } from 'node:zlib';
 import { chromium } from 'playwright-core';
 import { RUNTIME_FILES } from '@gaussian-splat/generator';
@@ -14,20 +15,37 @@ const CORS = { 'access-control-allow-origin': '*' };
 const ABOUT_THE_FILE = /does not name its axes/;
 /** A development server may have to bundle first. */
 const MAX_MS = 120_000;
+/** Time without a request after which a page has loaded all that needs no visitor. */
+const QUIET_MS = 1_500;
+/** The event `load` follows the first image, whose code for motion may be requested before it. */
+const EVENT_MS = 50;
+const CODE = /\.(js|mjs|css)$/;
 
 /**
  * @param {{ folder?: string, elsewhere?: string, address?: string, faults?: RegExp, hasGenerator?: boolean }} app a folder to serve, with another one at another origin, whose address takes the
  *   place of `ELSEWHERE` in the page; or the address of a page; its allowed console messages; and whether the folder's code also shows a generator
- * @returns {Promise<{ weight: number, files: number, workers: number, painted: number, generated?: number }>} bytes of gzip of scripts and styles, their number, the workers, and the fraction of the element's pixels that the scene and the generator paint
+ * @returns {Promise<{ code: Code, workers: number, painted: number, generated?: number }>} what the server sent, the workers, and the fraction of the element's pixels that the scene and the generator paint
+ *
+ * @typedef {object} Code Scripts and styles of a folder, as often as they were requested
+ * @property {number} first bytes of gzip until the scene was visible
+ * @property {number} late bytes of gzip after that
+ * @property {{ name: string, gzip: number, isLate: boolean }[]} scripts
  */
 export async function visitApp({ folder, elsewhere, address, faults, hasGenerator }) {
   const other = elsewhere && existsSync(elsewhere) ? await serve({ '/': elsewhere }, { headers: CORS }) : undefined;
   const own = folder ? await serve({ '/': folder, '/generator/': writeGenerator(folder) }) : undefined;
+  const requests = [];
+  const record = (server, from) =>
+    server?.on('request', ({ url }) =>
+      requests.push({ at: Date.now(), file: join(from, new URL(url, 'http://localhost').pathname) }),
+    );
+  record(own, folder);
+  record(other, elsewhere);
   const browser = await chromium.launch({ executablePath: findChromium(), args: gpuFlags() });
   try {
     if (other) replaceElsewhere(folder, `http://127.0.0.1:${other.address().port}`);
     const at = address ?? `http://127.0.0.1:${own.address().port}/`;
-    return await visit(await browser.newPage(), faults, at, hasGenerator);
+    return await visit(await browser.newPage(), requests, faults, at, hasGenerator);
   } finally {
     await browser.close();
     for (const server of [own, other]) {
@@ -51,9 +69,8 @@ function writeGenerator(folder) {
   return target;
 }
 
-async function visit(page, faults, address, hasGenerator) {
+async function visit(page, requests, faults, address, hasGenerator) {
   const complaints = [];
-  const bodies = [];
   page.on('pageerror', (error) => complaints.push(`error: ${error.message}`));
   page.on('console', (message) => {
     if (
@@ -63,23 +80,39 @@ async function visit(page, faults, address, hasGenerator) {
     )
       complaints.push(`${message.type()}: ${message.text()}`);
   });
-  page.on('response', (response) => {
-    if (/javascript|css/.test(response.headers()['content-type'] ?? '') && !response.url().startsWith('blob:'))
-      bodies.push(response.body().catch(() => Buffer.alloc(0)));
-  });
   let max = 0;
   page.on('worker', () => (max = Math.max(max, page.workers().length)));
+  await page.addInitScript(noteLoad);
   await open(page, address);
   const found = await loading(page);
   if (found !== true) throw new Error([`no scene: ${found}`, ...complaints].join('\n'));
-  const scripts = await Promise.all(bodies);
+  const code = await codeOf(requests, await page.evaluate(() => globalThis.sceneLoadedAt));
   const painted = await page.evaluate(shareOfPaint);
   if (!(painted > 0.05)) throw new Error(`${painted} of the element is painted`);
   const generated = hasGenerator ? await showGenerator(page, complaints) : undefined;
   if (max === 0) complaints.push('there is no worker');
   if (complaints.length > 0) throw new Error(complaints.join('\n'));
-  const weight = scripts.reduce((sum, body) => sum + gzipSync(body, { level: 6 }).length, 0);
-  return { weight, files: scripts.length, workers: max, painted, generated };
+  return { code, workers: max, painted, generated };
+}
+
+/** In the page: notes when the scene is visible, ms since 1970. */
+function noteLoad() {
+  const note = ({ target }) => target.localName === 'gaussian-splat' && (globalThis.sceneLoadedAt ??= Date.now());
+  document.addEventListener('load', note, true);
+}
+
+/** Waits until the page requests nothing more. Returns the code that it has requested: Playwright's responses lack the bytes of some workers. */
+async function codeOf(requests, loadedAt) {
+  while (requests.length > 0 && Date.now() - requests.at(-1).at < QUIET_MS) await setTimeout(QUIET_MS / 4);
+  const scripts = requests
+    .filter(({ file }) => CODE.test(file) && existsSync(file))
+    .map(({ at, file }) => ({
+      name: basename(file),
+      gzip: gzipSync(readFileSync(file), { level: 6 }).length,
+      isLate: at > loadedAt - EVENT_MS,
+    }));
+  const sum = (isLate) => scripts.reduce((total, each) => total + (each.isLate === isLate ? each.gzip : 0), 0);
+  return { first: sum(false), late: sum(true), scripts };
 }
 
 /** Replaces the scene by a generator, with the code of the app. Returns the fraction of the pixels that it paints. */
@@ -120,7 +153,7 @@ async function open(page, address) {
     } catch (error) {
       // The browser's own page for a server that does not answer yet may come in between.
       if (!/ERR_CONNECTION_REFUSED|chrome-error:/.test(error.message) || Date.now() > end) throw error;
-      await new Promise((resolve) => setTimeout(resolve, 300));
+      await setTimeout(300);
     }
   }
 }
