@@ -59,6 +59,7 @@ function refused(status: number, sentence: RegExp, ...args: string[]): void {
   assert.equal(found.status, status, found.text);
   assert.match(found.text, sentence);
   assert.doesNotMatch(found.text, /\n\s+at /, 'no stack');
+  assert.ok(status !== 2 || found.text.split('\n').length < 16, 'the sentence stays in view above the usage');
 }
 
 const fixtures = join(root, 'tests/element/browser/fixtures');

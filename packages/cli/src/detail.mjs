@@ -262,7 +262,7 @@ async function main(options) {
   const perSplat = isTiled ? '' : `, ${(bytes / manifest.splats).toFixed(2)} bytes a splat`;
   const unusable = spool.droppedCount > 0 ? `, ${spool.droppedCount} unusable ones of the file left out,` : '';
   console.log(
-    `${manifest.splats} splats${unusable} in ${pages} pages (${files.length} files, ${(bytes / 1e6).toFixed(1)} MB${perSplat}) ` +
+    `${counted(manifest.splats, 'splat')}${unusable} in ${counted(pages, 'page')} (${counted(files.length, 'file')}, ${(bytes / 1e6).toFixed(1)} MB${perSplat}) ` +
       `in ${seconds(start)} s, ${memoryUsed()}: ${join(out, 'detail.json')}`,
   );
   if (choice?.psnr !== undefined)
@@ -279,5 +279,10 @@ const gigabytes = (bytes) => `${(bytes / 1e9).toFixed(2)} GB`;
 const seconds = (start) => ((performance.now() - start) / 1000).toFixed(1);
 /** Returns the peak memory of the process. */
 const memoryUsed = () => `${gigabytes(1024 * process.resourceUsage().maxRSS)} of memory at most`;
+
+/** A number with its noun. */
+function counted(count, noun) {
+  return `${count} ${noun}${count === 1 ? '' : 's'}`;
+}
 
 await runCommand(USAGE, parseOptions, main, { name: 'detail', endings: [''], single: ['part', 'join'] });

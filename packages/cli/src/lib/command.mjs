@@ -8,7 +8,7 @@ export const PROGRAM =
   { 'gaussian-splat': 'npm run gaussian-splat --', npx: 'npx @gaussian-splat/cli' }[process.env.npm_lifecycle_event] ??
   'gaussian-splat';
 
-/** The command line is invalid; its message is shown above the usage. */
+/** The command line is invalid; its message is shown with the first lines of the usage. */
 export class UsageError extends Error {}
 
 /** The command cannot do what is asked; its message has the reason and a remedy. */
@@ -101,10 +101,10 @@ const send = (message) => new Promise((resolve) => (process.send ? process.send(
  * @param batch How the command runs for several files: see `runBatch` of batch.mjs.
  */
 export async function runCommand(usage, parse, main, batch) {
-  const shownUsage = usage.replaceAll('gaussian-splat ', `${PROGRAM} `) + SEVERAL;
+  const shownUsage = usage.replaceAll('gaussian-splat ', `${PROGRAM} `);
   try {
     const options = parse(process.argv.slice(2));
-    if (options === undefined) console.log(shownUsage);
+    if (options === undefined) console.log(shownUsage + severalIn(usage));
     else await main(options);
     await send({ figures });
     process.exit(0);
@@ -112,7 +112,8 @@ export async function runCommand(usage, parse, main, batch) {
     const shown = error instanceof SeveralInputs ? await runSeveral(error, batch) : error;
     const { message, code } = shown;
     await send({ error: { message, code } });
-    if (shown instanceof UsageError) console.error(`${message}\n\n${shownUsage}`);
+    if (shown instanceof UsageError)
+      console.error(`${message}\n\n${shownUsage.split('\n\n')[0]}\n--help lists the options.`);
     // File system errors contain the file name, except for reading a folder.
     else if (code === 'EISDIR') console.error(`${message}: expected a file, found a folder`);
     else if (shown instanceof GaussianSplatError || shown instanceof CommandError || isOfFiles(shown))
@@ -122,10 +123,10 @@ export async function runCommand(usage, parse, main, batch) {
   }
 }
 
-const SEVERAL = `
-Several files, a folder, or a pattern such as "scenes/**/*.ply" in place of SCENE: --out names a folder for all outputs,
---as their extension. A file with an error does not stop the others; results.json has the table, and a second run
-continues. Exit status 1 if a file has an error.
+const severalIn = (usage) => `
+Several files, a folder, or a pattern such as "scenes/**/*.ply" in place of SCENE${usage.includes('--out') ? ': --out names a folder for all outputs,\n--as their extension' : ''}.
+A file with an error does not stop the others; results.json has the table, and a second run continues.
+Exit status 1 if a file has an error.
 `;
 
 /** Runs a command for several files, and ends the process. @returns The error of a run that could not begin. */

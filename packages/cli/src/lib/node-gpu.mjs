@@ -27,8 +27,7 @@ export async function requestNodeAdapter({ isTrusted = false } = {}) {
   if (adapter === null) {
     throw new CommandError(
       'No WebGPU adapter in Node: expected a Vulkan driver, found none. ' +
-        'Install one: Debian’s package mesa-vulkan-drivers also draws without a GPU. ' +
-        'In a checkout, Chromium’s SwiftShader is used (package chromium), or with GAUSSIAN_SPLAT_GPU=system such a driver.',
+        'Install one: Debian’s package mesa-vulkan-drivers also draws without a GPU.',
     );
   }
   return adapter;
