@@ -22,12 +22,13 @@ const BUILD_SECONDS = 1200;
 const NOT_NEWEST = new Set(['node', 'typescript', 'rxjs']);
 /** A line of a build's output that warns, with the lines below it. */
 const WARNING = /.*\bwarn(ing|ings)?\b(.*\n?){0,12}/i;
-/** Advice about the sizes of chunks that pages fetch late, such as three.js for meshes, and what Nuxt 4.4 says of a plugin of its own, followed by a warning without words. */
+/** Advice about the sizes of chunks that pages fetch late, such as three.js for meshes, what Nuxt 4.4 and Astro 6.0 say of modules of their own, and warnings without words. */
 const ADVICE = [
   /\(!\) Some chunks are larger than 500 kB[^]*?chunkSizeWarningLimit\.?/g,
   /WARNING in (⚠ )?(asset size limit|entrypoint size limit|webpack performance recommendations)[^]*?(?=\n\n|$)/g,
   /compiled with \d+ warnings?/g,
   /WARN +\[plugin nuxt:module-preload-polyfill\] Sourcemap is likely to be incorrect.*/g,
+  /\[WARN\] \[vite\] *("[^\n]*imported from external module "@astrojs\/[^\n]*)?$/gm,
   /^ *WARN *$/gm,
 ];
 /** Messages of Lit and the tools in development mode. */

@@ -143,6 +143,7 @@ export const APPS = {
     build: ['npx', 'nuxt', 'generate'],
     output: '.output/public',
     dev: ['npx', 'nuxt', 'dev', '--port', 'PORT'],
+    most: { first: 180_000, late: 6_500 },
   },
   astro: {
     dependencies: { ...ELEMENT, ...NODE, astro: '6.0.5' },

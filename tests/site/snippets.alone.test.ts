@@ -51,6 +51,9 @@ declare global {
   const boundsOf: typeof core.boundsOf;
   const gaussianLayout: typeof layoutOf;
   const views: optimize.ViewSplit;
+  const defineNuxtConfig: (config: {
+    hooks: Record<string, (manifest: Record<string, { dynamicImports?: string[] }>) => void>;
+  }) => void;
   const gaussians: drawing.GaussianBuffers;
   const roomGaussians: drawing.GaussianBuffers;
   const plantGaussians: drawing.GaussianBuffers;
