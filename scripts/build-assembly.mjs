@@ -26,10 +26,13 @@ const OPTIONS = [
   'out.wasm',
 ];
 
-/** Hexadecimal digits, because gzip finds equal bytes in them, which base64 hides: a quarter less. */
-const moduleOf = (source, name, digits) => `/** Returns the WebAssembly of ${source}. */
+/** Hexadecimal digits, because gzip finds equal bytes in them, which base64 hides: a quarter less. Not all browsers have `fromHex` yet. */
+const moduleOf = (source, name, digits) => `const DIGITS = '${digits}';
+const { fromHex } = Uint8Array as { fromHex?: (digits: string) => Uint8Array<ArrayBuffer> };
+
+/** Returns the WebAssembly of ${source}. */
 export const ${name} = (): Uint8Array<ArrayBuffer> =>
-  Uint8Array.from('${digits}'.match(/../g)!, (byte) => parseInt(byte, 16));
+  fromHex?.call(Uint8Array, DIGITS) ?? Uint8Array.from(DIGITS.match(/../g)!, (byte) => parseInt(byte, 16));
 `;
 
 const { version } = JSON.parse(readFileSync(join(root, 'node_modules/assemblyscript/package.json'), 'utf8'));
