@@ -43,7 +43,7 @@ export interface OpenSite {
 
 /** A model may have its contract beside it; that it has not is an answer, too. */
 const MAY_BE_MISSING = /\.contract\.json$/;
-/** What the elements of `/without-webgpu/` print, which shows them in a browser without WebGPU. */
+/** Code of the errors that elements print on the page `/without-webgpu/`, which shows them without WebGPU. */
 const WITHOUT_WEBGPU = '[unsupported/no-webgpu]';
 
 /** A scene of a few splats in place of the first page's and of the skull, for tests that are about something else. */
