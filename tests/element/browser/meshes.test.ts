@@ -48,6 +48,24 @@ function assertNear(
 }
 
 describe('meshes', () => {
+  it('alone, draw no empty batch of splats, which would cause a warning', async () => {
+    const drawIndexed = GPURenderPassEncoder.prototype.drawIndexed;
+    const counts: (number | undefined)[] = [];
+    GPURenderPassEncoder.prototype.drawIndexed = function watching(...args) {
+      counts.push(args[1]);
+      drawIndexed.apply(this, args);
+    };
+    try {
+      const element = place();
+      element.append(mesh({ color: [0, 0, 1] }));
+      await element.ready;
+      await comesToShow(element, (screen) => isBlue(screen.at(60, 50)));
+      assertEqual([counts.includes(0), counts.length > 0], [false, true], `instances: ${counts.join()}`);
+    } finally {
+      GPURenderPassEncoder.prototype.drawIndexed = drawIndexed;
+    }
+  });
+
   it('stand where their attributes say, and hide splats as these hide them', async () => {
     const element = place();
     const ball = document.createElement('splat-scene') as SplatSceneElement;

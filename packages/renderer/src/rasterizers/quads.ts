@@ -104,10 +104,12 @@ export class QuadsRasterizer implements Rasterizer {
       pass.setIndexBuffer(this.#indices, 'uint16');
       // Layers of meshes are blended between the splats behind and in front of them.
       for (let part = layers; part >= 0; part--) {
-        pass.setPipeline(this.#pipeline(deep, { layers, part }));
-        pass.setBindGroup(0, deep && depths ? deep.bind(resources, depth!, depths) : this.#bindings);
-        // Draws as many quads as the capacity; the vertices of missing splats are clipped.
-        pass.drawIndexed(QUAD_BATCH * INDICES_PER_QUAD, Math.ceil(capacity / QUAD_BATCH));
+        if (capacity > 0) {
+          pass.setPipeline(this.#pipeline(deep, { layers, part }));
+          pass.setBindGroup(0, deep && depths ? deep.bind(resources, depth!, depths) : this.#bindings);
+          // Draws as many quads as the capacity; the vertices of missing splats are clipped.
+          pass.drawIndexed(QUAD_BATCH * INDICES_PER_QUAD, Math.ceil(capacity / QUAD_BATCH));
+        }
         if (part === 0) break;
         pass.setPipeline(this.#layerPipeline(depth!, { layers, nth: part - 1 }));
         pass.setBindGroup(0, depth!.layerBindings);
