@@ -268,6 +268,13 @@ test('a PLY that is no mesh, or asks for more than it has, is refused by name', 
     await assert.rejects(read(text(file)), ({ message: found }: Error) => message.test(found), file.slice(0, 40));
 });
 
+test('a file that is no mesh is named: splats with their format and tag, others with what they are', async () => {
+  const splats = new Uint8Array(readFileSync(new URL('../../demo/scenes/skull.spz', import.meta.url)));
+  const png = Uint8Array.of(0x89, 0x50, 0x4e, 0x47, 0x0d, 0x0a, 0x1a, 0x0a, 0, 0);
+  await assert.rejects(read(splats), /a mesh.*Gaussian splats \(SPZ.*src of <gaussian-splat>/s);
+  await assert.rejects(read(png), /a mesh.*PNG image.*\.glb, \.gltf or \.ply/s);
+});
+
 test('faces of a PLY with very many sides cost what they weigh', async () => {
   // A fan of a million triangles: 2 bytes each.
   const fan = ` 0 1 2${' 1 2'.repeat(500_000)}`;

@@ -106,21 +106,35 @@ const A_SCENE = 'a Gaussian splat scene (PLY, compressed PLY, SPZ, SOG, .splat, 
  * signature, extension, or first bytes.
  * @param extension Extension of the file name in lower case, with its dot; may be empty.
  * @param expected Content that the caller expects, for the message.
+ * @param remedy Advice for a file that is neither a scene nor a known substitute for one.
  */
 export function diagnose(
   bytes: Uint8Array,
   name: string,
   extension: string,
   expected: string = A_SCENE,
+  remedy = NOT_A_SCENE,
 ): GaussianSplatError {
   const signed = foreignName(bytes);
   // Some known kinds, such as tilesets, are JSON. None has another of the signatures.
   const known = !signed || signed === 'json' ? unreadKind(bytes, sampleText(bytes), extension) : undefined;
   if (known) return refusal(unread(known), name, undefined);
   if (signed === 'html' && isViewerPage(bytes)) return refusal(VIEWER_PAGE, name, bytes, expected);
-  return signed
-    ? refusal(SIGNED_KINDS[signed], name, bytes, expected)
-    : refusal(unsignedKind(bytes), name, bytes, expected);
+  const kind = signed ? SIGNED_KINDS[signed] : unsignedKind(bytes);
+  return refusal(kind.remedy === NOT_A_SCENE ? { ...kind, remedy } : kind, name, bytes, expected);
+}
+
+/**
+ * Returns the error for a file that is not a mesh.
+ * @param splats Name of its format, if it is a scene of splats.
+ */
+export function diagnoseMesh(bytes: Uint8Array, name: string, extension: string, splats?: string): GaussianSplatError {
+  const expected = 'a mesh (glTF, GLB or PLY with faces)';
+  if (!splats) return diagnose(bytes, name, extension, expected, 'give the address of a mesh: .glb, .gltf or .ply');
+  return new GaussianSplatError('decode/unsupported', {
+    ...{ where: name, expected, found: `Gaussian splats (${splats})` },
+    remedy: 'show them by src of <gaussian-splat>, or of <splat-scene> beside other scenes',
+  });
 }
 
 /** Returns the error for an archive of an unsupported kind, which one of its paths identifies; otherwise undefined. */

@@ -2,6 +2,8 @@ import { GaussianSplatError } from '@gaussian-splat/core';
 import type { Credits } from '@gaussian-splat/core';
 import type { LoadBudget } from '../budget.js';
 import { creditsOfAsset } from '../credits.js';
+import { asciiOf } from '../bytes.js';
+import { loadDetection, loadDiagnosis } from '../load-files.js';
 import { isPly } from '../signatures.js';
 import { readPlyMesh } from './ply-mesh.js';
 import { leftOutExtensions, openContainer, type Json } from '../gltf/container.js';
@@ -58,6 +60,7 @@ const KNOWN =
 export async function readTriangles(source: TriangleSource): Promise<TriangleFile> {
   const { bytes, name, budget, openUri } = source;
   if (isPly(bytes)) return readPlyMesh(source);
+  if (!/^(glTF|(\u00ef\u00bb\u00bf)?\s*\{)/.test(asciiOf(bytes, 0, 64))) throw await notMesh(bytes, name);
   const file = openContainer({ bytes, name, budget }, KNOWN);
   const document = new GltfDocument(file, { name, budget }, { uri: openUri });
   const survey = new Survey(document);
@@ -75,6 +78,12 @@ export async function readTriangles(source: TriangleSource): Promise<TriangleFil
     credits: creditsOfAsset(file.json.asset),
     warnings: [...darkLights(survey.darkLights), ...leftOutExtensions(file.json, KNOWN)],
   };
+}
+
+/** Returns the error for a file of another kind, such as a scene of splats. */
+async function notMesh(bytes: Uint8Array, name: string): Promise<GaussianSplatError> {
+  const [{ extensionOf, findFormat }, { diagnoseMesh }] = await Promise.all([loadDetection(), loadDiagnosis()]);
+  return diagnoseMesh(bytes, name, extensionOf(name), findFormat(bytes, name, '')?.title);
 }
 
 function darkLights(count: number): string[] {
