@@ -12,6 +12,7 @@ import {
   devices,
   FIXTURES,
   frames,
+  gated,
   nextEvent,
   printed,
   submits,
@@ -232,6 +233,23 @@ describe('several scenes in one element', () => {
     const before = submits;
     await delay(300);
     assertEqual(submits - before, 0, 'nothing is drawn at rest');
+  });
+
+  it('without a source of its own the element is loaded when `load` is fired, not with the first child', async () => {
+    const slow = gated('green.splat');
+    const element = place(`<gaussian-splat ${VIEW}>
+      <splat-scene src="${COMPASS}"></splat-scene><splat-scene src="${slow.src}"></splat-scene></gaussian-splat>`);
+    const [first] = childrenOf(element);
+    await nextEvent(first, 'load');
+    assertEqual([first.loaded, element.loaded, element.progress < 1], [true, false, true], 'after the first child');
+    await comesToShow(element, (screen) => screen.middleOf(isRed) !== null);
+    const loads: boolean[] = [];
+    element.addEventListener('load', () => loads.push(element.loaded));
+    await slow.open();
+    await element.ready;
+    assertEqual([loads.join(), element.loaded, element.progress], ['true', true, 1], 'after both');
+    for (const child of childrenOf(element)) child.remove();
+    assertEqual(element.loaded, false, 'without children');
   });
 
   it('frame, pick and save images of the whole', async () => {

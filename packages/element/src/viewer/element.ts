@@ -158,9 +158,9 @@ export class GaussianSplatElement extends ViewingMethods {
     });
   }
 
-  /** Whether the scene is shown. */
+  /** Whether the scene is shown; without `src`, whether all children have loaded or failed, and one is shown. */
   get loaded(): boolean {
-    return this.core.sources.state === 'ready';
+    return this.core.sources.isLoaded;
   }
 
   /**

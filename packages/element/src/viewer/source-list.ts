@@ -228,6 +228,11 @@ export class SourceList implements EntryList {
     return STATES.find((each) => this.#all.some(({ scene }) => scene.state === each)) ?? state;
   }
 
+  /** Whether the scene is shown; for an element without a source of its own, whether `load` was fired. */
+  get isLoaded(): boolean {
+    return this.ownEntry.scene.state === 'empty' ? this.#isLoadReported : this.state === 'ready';
+  }
+
   /**
    * Reason that nothing is shown: the error of the element's own source, or else of the first child with an error; null
    * if there is none.
