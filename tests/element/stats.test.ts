@@ -60,6 +60,17 @@ test('a streamed scene says what it rests at', () => {
   assert.ok(found.reasons.includes(progress.reasons[0]));
 });
 
+test('the number of splats of a scene with levels is that of its finest level, or of its pages if those are fewer', () => {
+  const splatsOf = (gaussians: object): number[] => {
+    const context = { dynamicQuality: { moving: 'whole' }, parts: [] } as unknown as StatsContext;
+    const { splats, resident } = statsOf([{ ...scene, gaussians } as unknown as LoadedGaussians], context);
+    return [splats, resident];
+  };
+  assert.deepEqual(splatsOf({ count: 927_744, leafCount: 500_000 }), [500_000, 927_744]);
+  assert.deepEqual(splatsOf({ count: 4_096, leafCount: 500_000 }), [4_096, 4_096]);
+  assert.deepEqual(splatsOf({ count: 9, frameCount: 4 }), [4, 9]);
+});
+
 test('unusable rows of a generator are part of its total, those of a file are not', () => {
   const gaussians = { count: 64, droppedCount: 60, byteLength: 0 };
   const totalOf = (live: object | undefined): number => {

@@ -18,7 +18,7 @@ export interface SceneStats {
   readonly isPreview: boolean;
   /** Number of splats of the file that were left out because they have invalid values. */
   readonly dropped: number;
-  /** Number of splats on the GPU: those of the current frame for a sequence, and the capacity for a streamed scene. */
+  /** Number of splats: those of the current frame for a sequence, of the finest level for a scene with levels of detail. */
   readonly splats: number;
   /** Number of splats on the GPU with those of levels of detail; the capacity for a streamed scene. */
   readonly resident: number;
@@ -71,7 +71,7 @@ export interface ChildStats {
   readonly element: HTMLElement;
   readonly state: SceneState;
   readonly error: ElementError | null;
-  /** Number of splats on the GPU; 0 for a mesh. */
+  /** Number of splats, without those of coarser levels of detail; 0 for a mesh. */
   readonly splats: number;
   /** Number of triangles; 0 for a scene of splats. */
   readonly triangles: number;
@@ -85,11 +85,14 @@ export interface ChildStats {
 export const costOf = (
   scene: LoadedGaussians | null,
 ): Pick<ChildStats, 'splats' | 'triangles' | 'dropped' | 'bytes'> => ({
-  splats: scene ? (scene.gaussians.frameCount ?? scene.gaussians.count) : 0,
+  splats: scene ? splatsOf(scene.gaussians) : 0,
   triangles: scene?.model?.triangles ?? 0,
   dropped: scene?.gaussians.droppedCount ?? 0,
   bytes: scene ? scene.gaussians.byteLength + (scene.levels?.byteLength ?? 0) + (scene.model?.byteLength ?? 0) : 0,
 });
+
+const splatsOf = ({ frameCount, leafCount = Infinity, count }: LoadedGaussians['gaussians']): number =>
+  frameCount ?? Math.min(leafCount, count);
 
 /** Input of {@link statsOf} that the scenes themselves do not contain. */
 export interface StatsContext {
