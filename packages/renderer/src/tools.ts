@@ -66,6 +66,7 @@ export type { PackedGaussians, PackedHead, PackOptions } from './pack/pack.js';
 export { sceneBytes, type PackedPortion } from './gaussian-buffers.js';
 export { ArrayGaussians, type ArrayLayout } from './array-gaussians.js';
 export { boundsOfWorld } from './world-bounds.js';
+export { GEOMETRY_WORDS, shWords } from './pack/words.js';
 export { type Threads } from './stages/stage.js';
 export { bytesPerSplat, type Reservation } from './memory-ledger.js';
 export { boundsOfPacked, JoinedBlocks, type RowLayout, type SortedBlock } from './pack/joined-blocks.js';

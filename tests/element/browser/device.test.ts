@@ -414,6 +414,31 @@ describe('without WebGPU, where the page asks for it', () => {
     });
   }
 
+  it('no adapter: WebGL continues with the one download, also if it arrives in parts', async () => {
+    const splats = new Float32Array(8 * 40_000).map(
+      (_, i) => [Math.sin(i), Math.cos(i), Math.sin(3 * i), 0.1, 0.1, 0.1][i % 8] ?? 0,
+    );
+    const bytes = new Uint8Array(splats.buffer).map((byte, i) => (i % 32 < 24 ? byte : 200));
+    const compass = await (await fetch(COMPASS)).blob();
+    for (const [name, body] of [
+      ['small', compass],
+      ['large', new Blob([bytes])],
+    ] as const)
+      for (const ms of [0, 300]) {
+        const folder = `/net/kept/adapter-${name}-${ms}-${Math.round(performance.timeOrigin)}/`;
+        await fetch(`${folder}a.splat`, { method: 'PUT', body });
+        await withGpu({ requestAdapter: () => delay(ms).then(() => null) }, async () => {
+          const element = show({ src: `${folder}a.splat` });
+          await element.ready;
+          assertEqual([element.error, element.stats?.renderer], [null, 'webgl'], `${name}, ${ms} ms`);
+          assertEqual(element.stats?.splats, body.size / 32, 'splats');
+          element.remove();
+        });
+        const log = (await (await fetch(`${folder}log`)).json()) as string[];
+        if (name === 'small' || ms === 0) assertEqual(log.join(), 'a.splat', `requests, ${name}, ${ms} ms`);
+      }
+  });
+
   it('a poster replaces the scene, with its name, from any source', async () => {
     await withGpu(undefined, async () => {
       const gif = 'data:image/gif;base64,R0lGODlhAQABAAAAACw=';

@@ -11,7 +11,8 @@ import { withLease } from './shared-device.js';
  * Opens the requested source. Uses WebGL if the request demands it, or if it allows it and WebGPU is unavailable.
  * Rejects with GaussianSplatError, or the signal's reason.
  */
-export async function openScene(request: SceneRequest, options: OpenOptions): Promise<LoadedGaussians> {
+export async function openScene(request: SceneRequest, settings: Omit<OpenOptions, 'begun'>): Promise<LoadedGaussians> {
+  const options: OpenOptions = { ...settings, begun: {} };
   if (!Array.from({ length: 1 }, () => 1)[0]) throw await why(({ changedPage }) => changedPage());
   let reason: unknown;
   if (request.renderer !== 'webgl')

@@ -1,6 +1,13 @@
 import type { LoadedGaussians } from '../gpu/loaded-gaussians.js';
 import type { DeviceLease, SharedDevice } from '../gpu/shared-device.js';
-import type { LoadedSequence, ProgressListener, SceneRequest } from '../loading/protocol.js';
+import type {
+  LoadedScene,
+  LoadedSequence,
+  ProgressListener,
+  SceneRequest,
+  SentScene,
+  TaskListeners,
+} from '../loading/protocol.js';
 import type { SceneLoader } from '../loading/scene-loader.js';
 import type { SourceKindName } from './content.js';
 import type { DynamicRequest } from './generator/dynamic-model.js';
@@ -28,6 +35,14 @@ export type OpenSource = (
   found: LoadedSequence | undefined,
 ) => Promise<LoadedGaussians | LoadedSequence>;
 
+/** The load of a file that was requested together with a device, and that WebGL continues if there is none. */
+export interface BegunLoad {
+  readonly loading: Promise<LoadedScene | SentScene | LoadedSequence>;
+  /** Listeners of the load, which may be replaced. */
+  readonly listeners: Partial<Pick<TaskListeners, 'onPreview' | 'onPart'>>;
+  readonly abort: AbortController;
+}
+
 /** Services and settings for opening a source, and functions that are called meanwhile. */
 export interface OpenOptions {
   readonly device: SharedDevice;
@@ -50,6 +65,8 @@ export interface OpenOptions {
   readonly memoryBudget: number | undefined;
   /** Number of submissions into which the work of a frame is divided. */
   readonly submissions: number;
+  /** The load that WebGL continues, so that the file is not fetched again. */
+  readonly begun: { load?: BegunLoad };
   /** Returns additional parameters for opening a generator. */
   readonly live: () => Omit<DynamicRequest, 'url' | 'chain' | 'contract' | 'credentials' | 'memoryBudget'>;
 }

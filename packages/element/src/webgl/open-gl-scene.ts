@@ -7,8 +7,9 @@ import type { Content } from '../sources/content.js';
 import type { OpenOptions } from '../sources/source-kind.js';
 import { kindOf } from '../sources/source-kinds.js';
 import { streamCaps } from '../sources/stream/stream-caps.js';
-import type { LoadedScene, LoadedSequence, SceneRequest } from '../loading/protocol.js';
+import type { LoadedScene, LoadedSequence, SceneRequest, SentScene } from '../loading/protocol.js';
 import { GlLoaded } from './gl-loaded.js';
+import { JoinedParts } from './joined-parts.js';
 import { acquireGl, cannotShow, noWebGl, type GlLease } from './gl-session.js';
 import { WebGlBackend } from './webgl-backend.js';
 
@@ -41,7 +42,11 @@ export async function openGlScene(
   const streamBytes = isStream ? Math.min(memoryBudget, streamCaps().bytes) : undefined;
   const request = { ...asked, levels: asked.levels && WebGlBackend.can('levels'), streamBytes };
   const lease = acquireGl();
-  if (lease === undefined) throw reason ?? noWebGl();
+  const { load } = options.begun;
+  if (lease === undefined) {
+    load?.abort.abort(reason);
+    throw reason ?? noWebGl();
+  }
   if (reason instanceof Error) faultsOf(lease.gl)[0] = `WebGL 2 draws: ${reason.message}`;
   const { signal, onProgress, beforeUpload, loader, live } = options;
   const requireDrawable = (found?: LoadedSequence): void => {
@@ -55,17 +60,20 @@ export async function openGlScene(
       return await openGlSplats(lease, request, options, openOptions(options, signal));
     }
     const previews = new Previews(options);
-    const scene = await loader
-      .ask('load', request, signal, { onProgress, onPreview: options.onPreview && previews.show })
-      .finally(() => previews.end());
+    const parts = new JoinedParts();
+    const onPreview = options.onPreview && previews.show;
+    if (load) Object.assign(load.listeners, { onPreview, onPart: parts.add });
+    const loading = load?.loading ?? loader.ask('load', request, signal, { onProgress, onPreview });
+    const scene = await loading.finally(() => previews.end());
     signal.throwIfAborted();
     // Children may have been added meanwhile.
     requireDrawable('frames' in scene ? scene : undefined);
-    // Without `onPart`, the answer contains the splats.
-    const whole = scene as LoadedScene;
+    const answer = scene as LoadedScene | SentScene;
+    const whole: LoadedScene = { ...answer, packed: answer.packed ?? parts.packed! };
     beforeUpload(glBytes(whole.packed));
     return await GlLoaded.open(lease, whole, openOptions(options, signal));
   } catch (error) {
+    load?.abort.abort(error);
     lease.release();
     throw error;
   }

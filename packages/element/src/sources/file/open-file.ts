@@ -1,17 +1,17 @@
-import { loadModule } from '@gaussian-splat/core';
+import { loadModule, type GaussianSplatError } from '@gaussian-splat/core';
 import { pickInitialVariants, prepareInitialVariants } from '@gaussian-splat/renderer';
 import { sceneBytes } from '@gaussian-splat/renderer/tools';
 import { images, unlessWrong } from '../../gpu/initial-frames.js';
 import { limitScenes } from '../../gpu/memory-budget.js';
 import type { LoadedScene, PartListener } from '../../loading/protocol.js';
-import type { OpenSource } from '../source-kind.js';
+import type { BegunLoad, OpenSource } from '../source-kind.js';
 import type { PartUploads } from './part-uploads.js';
 import type { PreviewUploads } from './preview-uploads.js';
 import { shown, upload } from './upload.js';
 
 /** Requests the device and the file concurrently, then uploads the scene. */
 export const open: OpenSource = async (request, options, acquiring) => {
-  // If the device or the file fails, the other is canceled: bytes are useless without a GPU.
+  // If the device or the file fails, the other is canceled, except for WebGL: bytes are useless without a GPU.
   const abort = new AbortController();
   const giveUp = (): void => abort.abort(options.signal.reason);
   options.signal.addEventListener('abort', giveUp, { once: true });
@@ -46,10 +46,11 @@ export const open: OpenSource = async (request, options, acquiring) => {
     );
     return parts.then((uploads) => uploads.add(part));
   };
+  const listeners: BegunLoad['listeners'] = { onPreview: showPreview, onPart };
   const loading = options.loader.ask('load', request, abort.signal, {
     onProgress: options.onProgress,
-    onPreview: showPreview,
-    onPart,
+    onPreview: showPreview && ((preview) => listeners.onPreview?.(preview)),
+    onPart: (part) => listeners.onPart?.(part),
   });
   try {
     const chosen = choosing.catch(unlessWrong);
@@ -70,11 +71,13 @@ export const open: OpenSource = async (request, options, acquiring) => {
   } catch (error) {
     endPreviews();
     parts?.then((uploads) => uploads.destroy(), ignore);
-    abort.abort(error);
     loading.catch(ignore);
+    const isWithoutGpu = request.renderer === 'auto' && (error as Partial<GaussianSplatError>).family === 'unsupported';
+    if (isWithoutGpu && !parts && !request.levels) options.begun.load = { loading, listeners, abort };
+    else abort.abort(error);
     throw error;
   } finally {
-    options.signal.removeEventListener('abort', giveUp);
+    if (!options.begun.load) options.signal.removeEventListener('abort', giveUp);
   }
 };
 
