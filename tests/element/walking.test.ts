@@ -50,6 +50,14 @@ test('a body looks along the length of its floor, unless the camera looks far al
   assert.equal(open(corridor(), -Math.PI / 2), -Math.PI / 2);
   // A step without floor ends the view, and the other way is longer then.
   assert.ok(Math.abs(open(corridor([25, 26, 27]), 0) - Math.PI / 2) < 1e-6);
+  // A camera that faces +z from the middle of a corridor along x turns to the end on its side, not to the farther one.
+  const middle = new FloorBody(corridor(), [0.5, 1.6, 0]);
+  for (const [theta, side] of [
+    [0.9 * Math.PI, 1],
+    [1.1 * Math.PI, -1],
+  ])
+    // prettier-ignore
+    assert.ok(Math.abs(Math.sin(middle.openDirection(theta)) - side) < 0.02, `${theta}`);
 });
 
 interface Pad {

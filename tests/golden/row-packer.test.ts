@@ -207,7 +207,7 @@ test('the bounds of joined blocks are those of the cloud', async () => {
   const kept = keepUsable(scene({}));
   const expected = boundsOf(kept);
   const { packer, layout } = await packerOf(kept);
-  const { bounds } = await joined(packer, layout, 0);
+  const bounds = (await joined(packer, layout, 0)).boundsFor();
   assert.deepEqual([bounds.min, bounds.max], [expected.min, expected.max]);
   assert.ok(Math.abs(bounds.radius - expected.radius) < 0.01 * expected.radius, `${bounds.radius}`);
 });

@@ -1,4 +1,5 @@
 import type { GaussianCloud } from './gaussian-cloud.js';
+import type { InnerView } from './views/inner-view.js';
 import type { Vector3 } from './vector.js';
 
 /** A sphere, in world units. */
@@ -18,26 +19,19 @@ export interface Bounds {
   /** Radius of the sphere around {@link center} that contains 90 % of the opaque centers. */
   readonly radius: number;
   /**
-   * Sphere around an isolated subject, such as an avatar or a capture with its background removed. It contains 99.9 %
-   * of the opaque centers. Undefined if the density of the surroundings decreases gradually.
+   * Sphere around an isolated subject, such as an avatar, which contains 99.9 % of the opaque centers. Undefined if the
+   * density of the surroundings decreases gradually.
    */
   readonly subject?: Ball;
+  /** First view of a scene that hides itself from outside, such as a captured room; undefined for other scenes. */
+  readonly inside?: InnerView | undefined;
 }
 
-/**
- * Maximum number of centers that are sampled for medians. Sorting millions of centers would delay loading without
- * visible benefit.
- */
+/** Maximum number of centers that are sampled for medians. Sorting millions of centers would delay loading. */
 const SAMPLE_LIMIT = 65_536;
-/**
- * Fraction of the opaque centers that belong to a subject. The rest are specks that remain after the removal of a
- * background.
- */
+/** Fraction of the opaque centers that belong to a subject. The rest are specks after the removal of a background. */
 const OF_SUBJECT = 0.999;
-/**
- * Maximum ratio of two radii of an isolated subject: of all its centers, and of 99 % of them. The ratio is 1 to 1.3 in
- * six such captures, and 2.9 in a capture with surroundings.
- */
+/** Maximum ratio of two radii of an isolated subject, of all its centers and of 99 % of them: 1 to 1.3 in captures. */
 const ENDS_WITHIN = 1.5;
 
 /** Returns the bounds of a cloud; for an empty cloud, a unit sphere at its origin. */
@@ -115,10 +109,7 @@ function ballAround(places: Float32Array): { center: number[]; radius: number } 
   return { center, radius: distancesTo(places, center).reduce((max, x) => Math.max(max, x), 0) };
 }
 
-/**
- * Returns the indices of evenly spaced splats with an opacity of 0.1 or more; of all sampled splats if none is that
- * opaque.
- */
+/** Returns the indices of evenly spaced splats with an opacity of 0.1 or more; of all sampled ones if there are none. */
 function sampleOpaque(opacities: Float32Array, count: number): number[] {
   const step = Math.max(1, Math.floor(count / SAMPLE_LIMIT));
   const all = Array.from({ length: Math.ceil(count / step) }, (_, k) => k * step);

@@ -65,6 +65,8 @@ export interface CloudHints {
   readonly order?: TrainedOrder | undefined;
   /** Meters of a world unit, if the file declares it. */
   readonly metersPerUnit?: number | undefined;
+  /** Number of splats that each enlarged splat of a preview represents; absent for other clouds. */
+  readonly represented?: number;
   /** Whether the file also contains triangles, which are not part of a cloud. */
   readonly meshes?: boolean;
   /**

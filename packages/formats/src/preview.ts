@@ -29,11 +29,11 @@ export function samplePreview(cloud: GaussianCloud): GaussianCloud {
 }
 
 /**
- * Enlarges the splats of a preview in place, and returns the cloud. The factor is the square root of
+ * Enlarges the splats of a preview in place, and returns the cloud with `represented`. The factor is the square root of
  * {@link PREVIEW_STEP}, so that they cover the area of all splats of the scene.
  */
 export function sparse<T extends GaussianCloud>(cloud: T): T {
   const factor = Math.sqrt(PREVIEW_STEP);
   for (let i = 0; i < cloud.scales.length; i++) cloud.scales[i] *= factor;
-  return cloud;
+  return { ...cloud, hints: { ...cloud.hints, represented: PREVIEW_STEP } };
 }

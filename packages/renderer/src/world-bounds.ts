@@ -32,9 +32,12 @@ function placedBounds(bounds: Bounds, { sceneToWorld: m, crop }: Placed): Bounds
     return [at(0), at(1), at(2)];
   };
   const stretch = Math.max(...[0, 1, 2].map((column) => Math.hypot(m[column], m[4 + column], m[8 + column])));
-  const { subject } = cropped;
+  const { subject, inside } = cropped;
   const ball = ({ center, radius }: Ball): Ball => ({ center: inWorld(m, center), radius: radius * stretch });
-  return { min: of(Math.min), max: of(Math.max), ...ball(cropped), ...(subject && { subject: ball(subject) }) };
+  return {
+    ...{ min: of(Math.min), max: of(Math.max), ...ball(cropped), ...(subject && { subject: ball(subject) }) },
+    ...(inside && { inside: { ...ball(inside), toward: inWorld(m, inside.toward) } }),
+  };
 }
 
 /** Returns the bounds of a cropped scene, in its own coordinates. */
@@ -65,7 +68,8 @@ function union(a: Bounds, b: Bounds): Bounds {
   ];
   const boxes = { min: pick(Math.min, a.min, b.min), max: pick(Math.max, a.max, b.max) };
   const subject = a.subject && b.subject && joined(a.subject, b.subject);
-  return { ...boxes, ...joined(a, b), ...(subject && { subject }) };
+  const inside = a.inside ?? b.inside;
+  return { ...boxes, ...joined(a, b), ...(subject && { subject }), ...(inside && { inside }) };
 }
 
 /** Returns the smallest sphere that contains both spheres. */

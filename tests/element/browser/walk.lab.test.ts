@@ -38,6 +38,9 @@ function room(side: number, unit = 1, depth = side): string {
   return `${URL.createObjectURL(new Blob([bytes.buffer]))}#room.splat`;
 }
 
+/** A view of a room of 5 m from outside: a walk begins near the wall, in the direction of -z. */
+const OUTSIDE = '0deg 75deg 100%';
+
 async function walkIn(src: string, attributes: Record<string, string> = {}): Promise<GaussianSplatElement> {
   const element = show(
     {
@@ -46,6 +49,7 @@ async function walkIn(src: string, attributes: Record<string, string> = {}): Pro
       'camera-controls': '',
       'interpolation-decay': '0',
       'interaction-prompt': 'none',
+      'camera-orbit': OUTSIDE,
       ...attributes,
     },
     'width: 200px; height: 160px',
@@ -101,13 +105,33 @@ describe('navigation="walk"', () => {
 
   it('looks along a long room first, unless camera-orbit has a direction', async () => {
     const long = room(8, 1, 2.5);
-    const { theta } = (await walkIn(long)).getCameraOrbit();
-    near(Math.abs(Math.sin(theta)), 1, 0.1, 'along x');
+    for (const orbit of ['auto auto 100%', 'auto']) {
+      const { theta } = (await walkIn(long, { 'camera-orbit': orbit })).getCameraOrbit();
+      near(Math.abs(Math.sin(theta)), 1, 0.1, `along x, ${orbit}`);
+    }
     const given = await walkIn(long, { 'camera-orbit': '10deg auto auto' });
     near(given.getCameraOrbit().theta, Math.PI / 18, 1e-6, 'the direction of the attribute');
     given.resetCamera();
     await atRest(given);
     near(given.getCameraOrbit().theta, Math.PI / 18, 1e-6, 'the same after a reset');
+  });
+
+  it('begins in the room, with the direction of the first view, which is within it, too', async () => {
+    const element = show({ src: room(5), 'interaction-prompt': 'none' }, 'width: 200px; height: 160px');
+    await element.ready;
+    const first = eyeOf(element);
+    assert(first.every((value) => Math.abs(value) < 2.4) && first[1] > 0.2, `the first view: ${first.join()}`);
+    const { theta } = element.getCameraOrbit();
+    const ready = nextEvent(element, 'walk-ready');
+    element.setAttribute('navigation', 'walk');
+    await ready;
+    const [x, y, z] = eyeOf(element);
+    near(y, 1.6, 0.03, 'height of the eyes');
+    near(Math.hypot(x - first[0], z - first[2]), 0, 1.2, 'beside the first view');
+    near(element.getCameraOrbit().theta, theta, 1e-6, 'its direction');
+    // A direction of the page does not put the walker outside.
+    const given = eyeOf(await walkIn(room(5), { 'camera-orbit': '10deg' }));
+    near(Math.hypot(given[0] - x, given[2] - z), 0, 0.05, 'the same place');
   });
 
   it('turns by the arrow keys and walks to a click on the floor', async () => {
@@ -153,7 +177,10 @@ describe('navigation="walk"', () => {
 
   it('walks to a click beside a child that takes clicks, and not to one on it', async () => {
     const element = show(
-      { src: room(5), 'camera-controls': '', 'interpolation-decay': '0', 'interaction-prompt': 'none' },
+      {
+        ...{ src: room(5), 'camera-controls': '', 'camera-orbit': OUTSIDE },
+        ...{ 'interpolation-decay': '0', 'interaction-prompt': 'none' },
+      },
       'width: 200px; height: 160px',
     );
     const ball = document.createElement('splat-scene') as SplatSceneElement;

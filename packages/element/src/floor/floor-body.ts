@@ -12,7 +12,7 @@ const REACHED = 0.05;
 const DIRECTIONS = 32;
 /** Distance, meters, beyond which floor is equally far. */
 const FAR = 20;
-/** Fraction of the longest way that is long enough to keep the direction of the camera. */
+/** Minimum fraction of the longest way of the first view. */
 const LONG_ENOUGH = 0.7;
 
 type Place = readonly [x: number, y: number, z: number];
@@ -114,8 +114,8 @@ export class FloorBody {
   }
 
   /**
-   * Returns the azimuth of a camera, radians, in whose direction the floor extends farthest, so that a room is seen along
-   * its length. Returns `theta`, its present azimuth, if the floor extends nearly as far there.
+   * Returns the azimuth of a camera, radians, in whose direction the floor extends far, so that a room is seen along its
+   * length: `theta`, its present azimuth, or else the one that is nearest to it, because `theta` faces the scene.
    */
   openDirection(theta: number): number {
     const azimuths = Array.from({ length: DIRECTIONS }, (_, k) => theta + (2 * Math.PI * k) / DIRECTIONS);
@@ -123,7 +123,12 @@ export class FloorBody {
     // A gap between two pieces of furniture is narrow, so its neighbors count, too.
     const views = ways.map((way, k) => way + ways.at(k - 1)! + ways[(k + 1) % DIRECTIONS]);
     const longest = Math.max(...views);
-    return views[0] >= LONG_ENOUGH * longest ? theta : azimuths[views.indexOf(longest)];
+    const isLong = (k: number): boolean => views[k] >= LONG_ENOUGH * longest;
+    if (isLong(0)) return theta;
+    const isPeak = (k: number): boolean => views[k] >= Math.max(views.at(k - 1)!, views[(k + 1) % DIRECTIONS]);
+    const turnTo = (k: number): number => Math.min(k, DIRECTIONS - k);
+    const open = views.flatMap((_, k) => (isLong(k) && isPeak(k) ? [k] : []));
+    return azimuths[open.reduce((best, k) => (turnTo(k) < turnTo(best) ? k : best))];
   }
 
   /** Returns how far the body could walk straight in the direction of a camera's azimuth, meters, {@link FAR} at most. */

@@ -200,7 +200,7 @@ export class LargePly {
         ...{ count, shDegree: 0, shPrecision: 'int8', antialiased, filterVariance, origin },
         ...{ droppedCount: 0, geometry, sh, chunks },
       },
-      bounds: { ...boundsOfPacked(geometry, origin, 8), up: hints?.up },
+      bounds: { ...boundsOfPacked(geometry, origin, 8, hints?.up), up: hints?.up },
     });
   }
 
@@ -232,7 +232,7 @@ export class LargePly {
     void onPart?.({ head: joined.head });
     await packer.finish((block) => joined.add(block));
     const { up, order, credits } = hints ?? {};
-    const own = { bounds: { ...joined.bounds, up }, order, warnings, credits };
+    const own = { bounds: { ...joined.boundsFor(up), up }, order, warnings, credits };
     if (!onPart) return { ...own, packed: joined.packed };
     void onPart({ portion: { chunks: joined.chunks } });
     return own;

@@ -1,5 +1,6 @@
 /** Fetches, reads and packs one scene. Runs in the worker, or on the main thread if workers are not available. */
 import { boundsOf, Lazy, loadModule, type GaussianCloud } from '@gaussian-splat/core';
+import type { InnerView } from '@gaussian-splat/core/views';
 import {
   fetchScene,
   HEADER_BYTES,
@@ -58,21 +59,27 @@ export async function loadScene(
       ...fileLimits(limits()),
     });
     const packer = new Lazy('the code that packs scenes', () => import('./pack-cloud.js'));
-    const factsOf = (cloud: GaussianCloud): LoadedFacts => ({
-      bounds: { ...boundsOf(cloud), ...cloud.hints },
-      warnings: cloud.warnings,
-      order: cloud.hints?.order,
-      hasMeshes: cloud.hints?.meshes,
-      credits: cloud.hints?.credits,
-    });
-    const pack = async (cloud: GaussianCloud): Promise<LoadedScene> => ({
+    // A view that a preview of the whole scene has stays, because samples differ.
+    let inside: InnerView | undefined;
+    const factsOf = async (cloud: GaussianCloud, isPart = false): Promise<LoadedFacts> => {
+      const bounds = boundsOf(cloud);
+      if (!isPart) inside ??= (await packer.get()).innerViewOf(cloud, bounds);
+      return {
+        bounds: { ...bounds, inside, ...cloud.hints },
+        warnings: cloud.warnings,
+        order: cloud.hints?.order,
+        hasMeshes: cloud.hints?.meshes,
+        credits: cloud.hints?.credits,
+      };
+    };
+    const pack = async (cloud: GaussianCloud, isPart?: boolean): Promise<LoadedScene> => ({
       packed: await (await packer.get()).packCloud(cloud, { sh: request.sh }),
-      ...factsOf(cloud),
+      ...(await factsOf(cloud, isPart)),
     });
     /** Sends the blocks of a large cloud one after another, as the page uploads them. */
     const sendCloud = async (cloud: GaussianCloud): Promise<LoadedScene | SentScene> => {
       const { packCloudInto } = await packer.get();
-      const facts = factsOf(cloud);
+      const facts = await factsOf(cloud);
       const packed = await packCloudInto(onPart!, cloud, { sh: request.sh });
       return packed ? { packed, ...facts } : facts;
     };
@@ -85,7 +92,9 @@ export async function loadScene(
     const previews = new Lazy('the code of previews', async () => {
       const { PreviewSchedule } = await import('./preview-schedule.js');
       const within = { name, signal, ...limits() };
-      return new PreviewSchedule(within, start, async (cloud) => onPreview?.(await pack(cloud)), onReading);
+      const show = async (cloud: GaussianCloud): Promise<void> =>
+        onPreview?.(await pack(cloud, !cloud.hints?.represented));
+      return new PreviewSchedule(within, start, show, onReading);
     });
     const shared = new SharedReading(request, name, limits, listeners);
     let isPrepared = false;

@@ -1,9 +1,10 @@
 /** Packs clouds. The worker loads this module while a file is in transit. */
 import type { GaussianCloud } from '@gaussian-splat/core';
+import { innerViewOf } from '@gaussian-splat/core/views';
 import { packCloud, type PackedGaussians, type PackOptions } from '@gaussian-splat/renderer/tools';
 import type { PartListener } from './protocol.js';
 
-export { packCloud };
+export { innerViewOf, packCloud };
 export { prepareToPack } from '@gaussian-splat/renderer/tools';
 
 /** Sends the splats of a cloud as parts of a scene. Returns the packed cloud instead if it is too small for parts. */

@@ -1,5 +1,6 @@
 /** Reads scenes whose files are trees of levels, node by node. The worker loads this module for the first such scene. */
-import { boundsOf, type Credits, type GaussianCloud } from '@gaussian-splat/core';
+import { boundsOf, type Bounds, type Credits, type GaussianCloud } from '@gaussian-splat/core';
+import { innerViewOf } from '@gaussian-splat/core/views';
 import { SharedReads } from '@gaussian-splat/core/fetch';
 import {
   fetchRange,
@@ -199,14 +200,16 @@ function sceneOf(
   const [x, y, z] = root.volume ?? whole.origin;
   const center = [x, y, z] as const;
   const isEmpty = usable.length === 0;
-  const bounds = isEmpty ? { min: center, max: center, center, radius: root.volume?.[12] ?? 1 } : boundsOf(whole);
+  const bounds: Bounds = isEmpty
+    ? { min: center, max: center, center, radius: root.volume?.[12] ?? 1 }
+    : boundsOf(whole);
   return {
     ...{ shDegree, antialiased, filterVariance, order: hints?.order, splats: whole.count },
     geometry: isExact ? undefined : 'quantized',
     shPrecision: sh === 'auto' ? choosePrecision(noiseIn(whole, usable), usable.length) : sh,
     origin: isEmpty ? center : whole.origin,
     // The page takes the vertical axis from the bounds, as for files.
-    bounds: { ...bounds, ...hints, ...(up && { up }) },
+    bounds: { ...bounds, inside: isEmpty ? undefined : innerViewOf(whole, bounds), ...hints, ...(up && { up }) },
   };
 }
 

@@ -124,8 +124,8 @@ export const ATTRIBUTES = {
    * Theta, phi and radius. Angles have `deg` or `rad`. The radius has `m`, `cm`, `mm`, or `%` of the radius that frames
    * the scene: a single subject as a whole, else the central 90 % of the splats. Each may be `auto`, and trailing
    * values may be omitted. The syntax is that of `<model-viewer>`, without `calc()` and `env()`. Setting it moves the
-   * camera, also to the same value. `getCameraOrbit()` returns the current position. `auto` is `0deg 75deg 100%`, within
-   * the limits that the scene's file recommends.
+   * camera, also to the same value. `getCameraOrbit()` returns the current position. `auto` is `0deg 75deg 100%`, within the limits
+   * that the scene's file recommends; for a captured room a view from within, if `camera-target` is `auto`, too.
    * @default `auto`
    * @example camera-orbit="30deg 75deg 120%"
    */

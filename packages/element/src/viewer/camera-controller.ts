@@ -144,11 +144,13 @@ export class CameraController {
     const { theta, phi, radius, x, y, z, fieldOfView } = poseOf(settings, this.#bounds, this.#aspect);
     const changed = (key: keyof CameraSettings): boolean =>
       set.has(key) || JSON.stringify(old[key]) !== JSON.stringify(settings[key]);
+    // Both determine whether the first view is within the scene.
+    const isPlaced = this.#bounds.inside !== undefined && (changed('orbit') || changed('target'));
     this.#source = 'none';
     if (changed('up')) return this.#reframe('none');
     if (changed('fieldOfView')) this.#camera.setGoal({ fieldOfView });
-    if (changed('target')) this.#camera.setGoal({ x, y, z });
-    if (changed('orbit')) {
+    if (isPlaced || changed('target')) this.#camera.setGoal({ x, y, z });
+    if (isPlaced || changed('orbit')) {
       this.#userDistance = false;
       this.#camera.setGoal({ theta, phi, radius });
       this.#camera.unwind();
@@ -173,6 +175,7 @@ export class CameraController {
       this.#source = 'automatic';
       const { theta, ...pose } = poseOf(this.#settings, this.#bounds, this.#aspect);
       this.#camera.setGoal(this.#isTurned ? pose : { theta, ...pose });
+      if (this.#bounds.inside) this.jumpToGoal(); // A motion from the view of a preview could go through walls.
     }
     this.#onChange();
   }

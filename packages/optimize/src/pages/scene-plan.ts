@@ -1,4 +1,5 @@
 import { boundsOf, type Bounds, type Credits, type GaussianCloud, type Vector3 } from '@gaussian-splat/core';
+import { innerViewOf } from '@gaussian-splat/core/views';
 import {
   choosePrecision,
   codesAlong,
@@ -56,6 +57,7 @@ export function planScene(
   const { positions, antialiased, filterVariance, origin, hints } = near;
   const all = indices(near.count);
   const isFlat = isOfPlanes(positions);
+  const bounds = boundsOf(sample);
   const order = packedOrder(near);
   return {
     ...{
@@ -67,7 +69,7 @@ export function planScene(
       credits: hints?.credits,
       isOfPlanes: isFlat,
     },
-    bounds: { ...boundsOf(sample), min, max },
+    bounds: { ...bounds, inside: innerViewOf(sample, bounds), min, max },
     shPrecision: choosePrecision(noiseIn(near, order), order.length),
     curve: curveThrough(positions, all),
     shells: geometry && !isFlat ? ([0, 1, 2].map((axis) => sampleAxis(positions, all, axis)) as Curve) : undefined,

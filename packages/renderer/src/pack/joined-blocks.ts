@@ -1,5 +1,6 @@
 /** Joins the blocks of a scene, and finds its bounds. */
-import { boundsOf, type Bounds, type GaussianCloud, type ShDegree, type Vector3 } from '@gaussian-splat/core';
+import { boundsOf, type Bounds, type ShDegree, type Vector3 } from '@gaussian-splat/core';
+import { innerViewFrom, type SplatSample } from '@gaussian-splat/core/views';
 import { constants } from '../generated/shaders.js';
 import type { PackedGaussians, PackedHead } from './pack.js';
 import type { BlockReceiver } from './row-packer.js';
@@ -79,9 +80,10 @@ export class JoinedBlocks {
   }
 
   /**
-   * Bounds of the scene in world coordinates. Its box is exact; the other values are those of a sample of its splats.
+   * Returns the bounds of the scene in world coordinates. Its box is exact; the other values are those of a sample of
+   * its splats. @param up Unit vector; default: -y.
    */
-  get bounds(): Bounds {
+  boundsFor(up?: Vector3): Bounds {
     const { origin } = this.head;
     const edge = (first: number, farther: (a: number, b: number) => number): Vector3 => {
       const corner = [first, first, first];
@@ -90,29 +92,41 @@ export class JoinedBlocks {
           corner[axis] = farther(corner[axis], this.chunks[at + axis + (first > 0 ? 0 : 4)]);
       return corner.map((x, axis) => x + origin[axis]) as unknown as Vector3;
     };
-    const sample = boundsOfPacked(this.#sample, origin);
+    const sample = boundsFrom(this.#sample, origin, this.head.count, up);
     return { ...sample, min: edge(Infinity, Math.min), max: edge(-Infinity, Math.max) };
   }
 }
 
 /** Returns the bounds of packed splats, from every `step`-th. @param geometry [N, GEOMETRY_WORDS] */
-export function boundsOfPacked(geometry: Uint32Array, origin: Vector3, step = 1): Bounds {
-  if (step === 1) return boundsOf({ ...unpacked(geometry), origin });
-  const some = new Uint32Array(GEOMETRY_WORDS * Math.ceil(geometry.length / GEOMETRY_WORDS / step));
+export function boundsOfPacked(geometry: Uint32Array, origin: Vector3, step: number, up?: Vector3): Bounds {
+  const count = geometry.length / GEOMETRY_WORDS;
+  const some = new Uint32Array(GEOMETRY_WORDS * Math.ceil(count / step));
   for (let at = 0; at < some.length; at += GEOMETRY_WORDS)
     some.set(geometry.subarray(step * at, step * at + GEOMETRY_WORDS), at);
-  return boundsOf({ ...unpacked(some), origin });
+  return boundsFrom(some, origin, count, up);
+}
+
+/** Returns the bounds of a scene from some of its `total` splats. @param geometry [N, GEOMETRY_WORDS] */
+function boundsFrom(geometry: Uint32Array, origin: Vector3, total: number, up?: Vector3): Bounds {
+  const sample = { ...unpacked(geometry), origin };
+  const bounds = boundsOf(sample);
+  return { ...bounds, inside: innerViewFrom(sample, bounds, total, up) };
 }
 
 /** Maximum number of splats whose positions represent those of all splats. */
 const SAMPLE = 16_384;
 
-/** Returns the positions and opacities of packed splats. @param geometry [N, GEOMETRY_WORDS] */
-function unpacked(geometry: Uint32Array): Pick<GaussianCloud, 'count' | 'positions' | 'opacities'> {
+/** Returns packed splats as a sample. @param geometry [N, GEOMETRY_WORDS] */
+function unpacked(geometry: Uint32Array): Omit<SplatSample, 'origin'> {
   const count = geometry.length / GEOMETRY_WORDS;
   const positions = new Float32Array(3 * count);
   const factors = new Float32Array(6 * count);
   const opacities = new Float32Array(count);
-  for (let k = 0; k < count; k++) unpackSplat(geometry, k, positions, factors, opacities);
-  return { count, positions, opacities };
+  const axes = new Float32Array(9 * count);
+  for (let k = 0; k < count; k++) {
+    unpackSplat(geometry, k, positions, factors, opacities);
+    const [xx, yx, yy, zx, zy, zz] = factors.subarray(6 * k, 6 * k + 6);
+    axes.set([xx, yx, zx, 0, yy, zy, 0, 0, zz], 9 * k);
+  }
+  return { count, positions, axes, opacities };
 }

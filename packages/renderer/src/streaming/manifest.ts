@@ -153,9 +153,11 @@ export function checkManifest(value: unknown, where: string, maxPages = MAX_PAGE
   if (!isVector(origin)) fail('origin', '3 numbers', origin);
   const hasBounds = isVector(bounds?.min) && isVector(bounds.max) && isVector(bounds.center);
   if (!hasBounds || !Number.isFinite(bounds?.radius)) fail('bounds', 'min, max, center and radius', bounds);
-  const subject = bounds!.subject;
+  const { subject, inside } = bounds!;
   const isBall = subject === undefined || (isVector(subject?.center) && Number.isFinite(subject.radius));
   if (!isBall) fail('bounds.subject', 'center and radius, or nothing', subject);
+  const isView = inside === undefined || [inside?.center, inside?.toward, [inside?.radius, 0, 0]].every(isVector);
+  if (!isView) fail('bounds.inside', 'center, radius and toward, or nothing', inside);
   if (!Array.isArray(trees) || trees.length === 0) fail('trees', 'one tree or more', trees);
   trees!.forEach((tree, t) => checkTree(tree, (path, ...rest) => fail(`trees[${t}].${path}`, ...rest)));
   if (!Array.isArray(instances) || instances.length === 0) fail('instances', 'one instance or more', instances);

@@ -3,7 +3,7 @@ import type { FloorMap } from '@gaussian-splat/formats/floor';
 import type { ReactiveController } from 'lit';
 import { readAttribute } from '../../viewer/camera/grammar.js';
 import { lengthGrammar } from '../../viewer/camera/lengths.js';
-import { eyeOfPose } from '../../viewer/camera/orbit.js';
+import { eyeOfPose, toViewer } from '../../viewer/camera/orbit.js';
 import type { CameraAction } from '../../viewer/camera/gestures.js';
 import { MAX_MOVER_STEP_MS, prefersReducedMotion } from '../../viewer/motion.js';
 import type { Feature } from '../../viewer/features.js';
@@ -153,17 +153,24 @@ export class WalkController implements ReactiveController, Feature {
   }
 
   /**
-   * Moves the walker to its start at once, and levels the view. Unless `camera-orbit` has a direction, it looks where the
-   * floor extends farthest.
+   * Moves the walker to its start at once, and levels the view. Unless `camera-orbit` has a direction, or the first view
+   * is within the scene and shows much of it, the walker looks where the floor extends far.
    */
   #begin(map: FloorMap): void {
     const { camera } = this.#viewer;
-    const { settings, from } = camera.context;
+    const { settings, from, bounds } = camera.context;
     const walker = (this.#walker = new FloorBody(map, this.#start));
-    const turn = settings.orbit.theta === 'auto' ? walker.openDirection(from.theta) - from.theta : 0;
+    const isChosen = settings.orbit.theta !== 'auto' || (bounds.inside && this.#isFramed);
+    const turn = isChosen ? 0 : walker.openDirection(from.theta) - from.theta;
     camera.lookBy(turn, Math.PI / 2 - from.phi);
     this.#follow();
     camera.jumpToGoal();
+  }
+
+  /** Whether the attributes leave the position of the camera to the element. */
+  get #isFramed(): boolean {
+    const { orbit, target } = this.#viewer.camera.context.settings;
+    return [orbit.radius, ...target].every((value) => value === 'auto');
   }
 
   /** Moves the camera's eye to its height above the feet. */
@@ -202,7 +209,9 @@ export class WalkController implements ReactiveController, Feature {
     this.#forget();
     this.#askedFor = key;
     const metersPerUnit = unit ?? 1;
-    const near = (this.#start = inMeters(eyeOfPose(camera.goal), metersPerUnit));
+    const { inside } = camera.context.bounds;
+    const eye = inside && this.#isFramed && !camera.isTouched ? toViewer(frame, inside.center) : eyeOfPose(camera.goal);
+    const near = (this.#start = inMeters(eye, metersPerUnit));
     const options = { loader: services.sceneLoader, request, frame, metersPerUnit, eyeHeight, near };
     this.#opening.run(
       async (signal) => {

@@ -1,5 +1,5 @@
 /** Converts camera attributes for a given scene and frame: settings with `auto` and `%` become a pose. */
-import type { Bounds, CloudHints, Vector3 } from '@gaussian-splat/core';
+import { subtract, type Bounds, type CloudHints, type Vector3 } from '@gaussian-splat/core';
 import type { AngleSetting, OrbitSetting, RadiusSetting, TargetSetting } from './grammar.js';
 import { framingDistance, toViewer, viewerFrame, type CameraPose, type ViewerFrame } from './orbit.js';
 import type { CameraLimits } from './orbit-camera.js';
@@ -65,12 +65,20 @@ export function poseOf(settings: CameraSettings, bounds: SceneBounds, aspect: nu
   const { minPhi, maxPhi, minRadius } = { ...AUTO, ...bounds.orbit };
   const fieldOfView = given(settings.fieldOfView, AUTO.fieldOfView);
   const framing = framingDistance(bounds.radius, fieldOfView, aspect);
-  const center = toViewer(frameOf(settings, bounds), bounds.center);
+  const frame = frameOf(settings, bounds);
+  const center = toViewer(frame, bounds.center);
+  const { theta, phi, radius } = settings.orbit;
+  if (bounds.inside && [theta, phi, radius, ...settings.target].every((setting) => setting === 'auto')) {
+    const { inside } = bounds;
+    const [x, y, z] = toViewer(frame, inside.center);
+    const [dx, , dz] = subtract(toViewer(frame, inside.toward), [x, y, z]);
+    return { theta: Math.atan2(-dx, -dz), phi: Math.PI / 2, radius: inside.radius, x, y, z, fieldOfView };
+  }
   const [x, y, z] = settings.target.map((setting, axis) => given(setting, center[axis]));
   return {
-    theta: given(settings.orbit.theta, 0),
-    phi: given(settings.orbit.phi, Math.min(maxPhi, Math.max(minPhi, AUTO.phi))),
-    radius: distance(settings.orbit.radius, Math.max(framing, Math.min(minRadius, MAX_FRAMINGS * framing)), framing),
+    theta: given(theta, 0),
+    phi: given(phi, Math.min(maxPhi, Math.max(minPhi, AUTO.phi))),
+    radius: distance(radius, Math.max(framing, Math.min(minRadius, MAX_FRAMINGS * framing)), framing),
     x,
     y,
     z,

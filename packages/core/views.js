@@ -1,0 +1,2 @@
+/** For bundlers that do not read `exports` (Parcel). */
+export * from './dist/views/index.js';
