@@ -1,4 +1,4 @@
-/** Scenes whose files are trees of levels, node by node: the nodes of 3D Tiles, LCC and RAD, their volumes, and what is read for each. */
+/** Scenes whose files are trees of levels, node by node: the nodes of 3D Tiles, LCC, LCC2 and RAD, their volumes, and what is read for each. */
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import type { GaussianCloud } from '@gaussian-splat/core';
@@ -7,6 +7,8 @@ import {
   openTree as openAny,
   readNode,
   readScene,
+  sogAddress,
+  SogFiles,
   type SceneNode,
   type SceneTree,
   type TreeFiles,
@@ -14,6 +16,7 @@ import {
 import { writeRadTree } from '../support/rad-tree.js';
 import { splatTileset } from '../support/tileset.js';
 import { writeLcc } from './support/lcc-writer.js';
+import { writeLcc2 } from './support/lcc2-writer.js';
 import { smallCloud } from './support/small-cloud.js';
 
 type Files = ReadonlyMap<string, Uint8Array>;
@@ -44,7 +47,11 @@ function beside(files: Files): TreeFiles & { readonly opened: string[] } {
     kept.set(key, opening);
     return opening;
   };
-  return { name: 'scene', budget: new LoadBudget(1e9), openFile, openIndex, openShared, openRange, opened };
+  const sogs = new SogFiles();
+  const base = 'https://trees.test/';
+  const openSog = (path: string): Promise<GaussianCloud> =>
+    sogs.open(sogAddress(path, 'scene', base), (url) => openFile(url.replace(base, '')));
+  return { name: 'scene', budget: new LoadBudget(1e9), openFile, openIndex, openShared, openRange, openSog, opened };
 }
 
 async function openTree(bytes: Uint8Array, files: TreeFiles): Promise<SceneTree> {
@@ -208,6 +215,40 @@ test('a cell of LCC is a chain of levels, and only ranges of its files are read'
     807,
   );
   assert.equal(nodes, 4 + 1 + 1 + 1);
+});
+
+test('nodes of LCC2 have their boxes and their part of a file, which is read once', async () => {
+  const written = new Map(Object.entries(writeLcc2(cloud, { levels: 3, environment: smallCloud(7, 1, 5) })));
+  const files = beside(written);
+  const bytes = written.get('scene.lcc2')!;
+  const tree = await openTree(bytes, files);
+  assert.deepEqual([tree.container, tree.roots.length, tree.up], ['lcc2', 3, [0, 0, 1]]);
+  // Positions have 16 bits of a logarithm.
+  const { leaves, nodes, depth } = await walk(tree, files, 1e-3);
+  assert.deepEqual([nodes, depth], [2 + 4 + 8 + 1, 2]);
+  assert.deepEqual(files.opened.toSorted(), [...written.keys()].slice(1).toSorted(), 'each file once');
+  const { openFile } = beside(written);
+  assertSameSplats(leaves, await readScene(bytes, { name: 'scene.lcc2', openFile }), 0);
+});
+
+test('LCC2 without the file of its surroundings says so; one whose nodes have no boxes is no tree', async () => {
+  const written = new Map(Object.entries(writeLcc2(cloud, { levels: 2, environment: smallCloud(7, 1, 5) })));
+  const bytes = written.get('scene.lcc2')!;
+  written.delete('data/3dgs/env.sog');
+  const files = beside(written);
+  const tree = await openTree(bytes, files);
+  const around = await readNode(tree, tree.roots.at(-1)!, files);
+  assert.equal(around.cloud!.count, 0);
+  assert.match(around.cloud!.warnings!.join(), /surroundings \(data\/3dgs\/env\.sog\) are left out/);
+  const changed = (from: RegExp, to: string): Uint8Array =>
+    new TextEncoder().encode(new TextDecoder().decode(bytes).replace(from, to));
+  assert.equal(await openAny(changed(/"boundingBox":/, '"box":'), files), undefined);
+  await assert.rejects(openAny(changed(/"count":\d+/, '"count":-1'), files), /data\.3dgs.*whole numbers/);
+  const beyond = await openTree(changed(/"start":0/, '"start":9999'), files);
+  await assert.rejects(readNode(beyond, beyond.roots[0], files), /decode\/corrupt|runs within/);
+  const long = 'a'.repeat(2000);
+  const many = `{"totalLevels":1,"root":{"splatFiles":["${long}"],"child":[${Array(3000).fill('{"data":{"3dgs":{"name":0}}}').join()}]}}`;
+  await assert.rejects(openAny(new TextEncoder().encode(many), files), /nodes of at most/);
 });
 
 const stones = smallCloud(16_384, 1);

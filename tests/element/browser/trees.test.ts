@@ -1,6 +1,7 @@
-/** Scenes whose files are trees of levels, 3D Tiles, LCC and RAD, by view: requests, memory, and frames. */
+/** Scenes whose files are trees of levels, 3D Tiles, LCC, LCC2 and RAD, by view: requests, memory, and frames. */
 import { GaussianSplatElement } from '@gaussian-splat/element';
 import { writeLcc } from '../../formats/support/lcc-writer.js';
+import { writeLcc2 } from '../../formats/support/lcc2-writer.js';
 import { itInLab, someOf } from '../../support/extent-in-pages.js';
 import { pick } from '../../support/lod-folder.js';
 import { writeRadTree } from '../../support/rad-tree.js';
@@ -292,6 +293,34 @@ describe('LCC of three levels', () => {
     await close(element);
     GaussianSplatElement.memoryBudget = null;
   });
+});
+
+describe('LCC2 of three levels', () => {
+  itInLab(
+    'loads its coarsest files, then those that the view needs, each once, and shows what the whole scene shows',
+    async () => {
+      GaussianSplatElement.memoryBudget = AMPLE;
+      const view = viewOf(FEW, 0, ([x, y, z]) => [x, z, -y]);
+      const served = await serve(new Map(Object.entries(writeLcc2(FEW.cloud, { levels: 3 }))), 'scene.lcc2');
+      const element = await opened(served, { ...FAR, detail: '3px' });
+      const far = await calm(element, served);
+      assertEqual(far.toSorted().join(' '), 'data/3dgs/1-0.sog data/3dgs/1-1.sog scene.lcc2', 'from afar');
+      move(element, { ...view, detail: '0.02px' });
+      const near = await calm(element, served);
+      assert(near.includes('data/3dgs/3-0.sog') || near.includes('data/3dgs/3-1.sog'), near.join(', '));
+      assertEqual(new Set(near).size, near.length, near.join(', '));
+      const reference = await whole(served, view);
+      const truth = await pixelsOf(reference);
+      const [streamed, half] = [psnr(await pixelsOf(element), truth), psnr(shifted(truth, 1), truth)];
+      console.log(
+        `${near.length} requests; ${streamed.toFixed(1)} dB PSNR against the whole, a shift of a pixel ${half.toFixed(1)}`,
+      );
+      assert(streamed > half + 6, `${streamed} dB`);
+      await close(reference);
+      await close(element);
+      GaussianSplatElement.memoryBudget = null;
+    },
+  );
 });
 
 describe('RAD', () => {

@@ -11,6 +11,7 @@ import { pebbles } from '../../support/scenes/pebbles.js';
 import { buildGltf, writeGlb } from './gltf-writer.js';
 import { writeKsplat } from './ksplat-writer.js';
 import { writeLcc } from './lcc-writer.js';
+import { writeLcc2 } from './lcc2-writer.js';
 import { MULTIPLIED_MESHES } from './multiplied-meshes.js';
 import { writePly } from './ply-writer.js';
 import { smallCloud } from './small-cloud.js';
@@ -239,6 +240,7 @@ export async function otherScenes(): Promise<
   const gsv = await clipOf(() => smallCloud(30, 1), { frames: 6, framesPerGroup: 3 });
   const { manifest, files } = detailFolder(pebbles(2_000));
   const levels = writeRadTree(smallCloud(60, 1), { chunkSize: 16 });
+  const lcc2Levels = { name: 'scene.lcc2', files: writeLcc2(smallCloud(24, 1), { levels: 2 }) };
   const pages = Object.fromEntries([...files].map(([path, bytes]) => [path, new Uint8Array(bytes)]));
   const meshes = ['mesh: nodes of a mesh', 'mesh: lights', 'mesh: channels of an animation', 'mesh: joints'];
   return {
@@ -250,7 +252,7 @@ export async function otherScenes(): Promise<
       ],
     },
     streamed: { kind: 'levels', scenes: fuzzScenes().lod },
-    tree: { kind: 'tree', scenes: [...fuzzScenes().tiles, ...fuzzScenes().lcc, one('scene.rad', levels)] },
+    tree: { kind: 'tree', scenes: [...fuzzScenes().tiles, ...fuzzScenes().lcc, lcc2Levels, one('scene.rad', levels)] },
     clip: { kind: 'clip', scenes: [one('a.gsv', gsv.bytes)] },
     '4dgs': { kind: 'clip', scenes: states.map((name) => one('a.4dgs', new Uint8Array(corpus[name]))) },
     detail: { kind: 'manifest', scenes: [{ name: 'detail.json', files: { 'detail.json': json(manifest), ...pages } }] },

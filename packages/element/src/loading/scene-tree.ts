@@ -11,6 +11,8 @@ import {
   openTree as openFormat,
   partAddress,
   readNode as readFormat,
+  sogAddress,
+  SogFiles,
   type FetchSceneOptions,
   type LoadLimits,
   type ReadNode,
@@ -102,7 +104,7 @@ export async function openTree(
       ? (await fetchRange(url, 0, HEAD_BYTES, options())).bytes
       : await fetchScene(url, options());
     const budget = new LoadBudget(bytes.length, limits());
-    const files = filesBeside({ url, name, budget, signal, options });
+    const files = filesBeside({ url, name, budget, sogs: budget, signal, options });
     const tree = await openFormat(bytes, files);
     if (!tree) return undefined;
     const nodes = await readFirst(tree, files);
@@ -216,6 +218,8 @@ function sceneOf(
 interface Beside extends Pick<TreeFiles, 'name' | 'budget' | 'signal'> {
   readonly url: string;
   readonly options: () => FetchSceneOptions;
+  /** Account of SOG files. Without it each file has its own, so that nodes of all requests share its reading. */
+  readonly sogs?: LoadBudget;
 }
 
 /** Files of servers that do not support range requests, by address. Only the latest file is kept. */
@@ -225,8 +229,12 @@ const wholeFiles = new Map<string, Promise<Uint8Array>>();
 const INDEX_BYTES = 8e6;
 const indices = new SharedReads<Uint8Array>(({ byteLength }) => byteLength, INDEX_BYTES);
 
+/** Maximum bytes of decoded splats that are kept because several nodes share their file, of all scenes. */
+const SOG_BYTES = 32e6;
+const sogFiles = new SogFiles(SOG_BYTES);
+
 /** Returns access to the files beside a scene. */
-function filesBeside({ url, name, budget, signal, options }: Beside): TreeFiles {
+function filesBeside({ url, name, budget, signal, options, sogs }: Beside): TreeFiles {
   const counted = async (read: () => Promise<Uint8Array>): Promise<Uint8Array> => {
     budget.request(name);
     const bytes = await read();
@@ -256,6 +264,11 @@ function filesBeside({ url, name, budget, signal, options }: Beside): TreeFiles 
       const address = path === undefined ? url : partAddress(url, path).href;
       const read = (ended: AbortSignal): Promise<Uint8Array> => fetchPart(address, start, end, ended);
       return counted(() => indices.read(`${address} ${start}-${end}`, read, signal));
+    },
+    openSog: (path) => {
+      const fetch = (part: string, ended: AbortSignal): Promise<Uint8Array> =>
+        fetchScene(part, { ...options(), signal: ended });
+      return sogFiles.open(sogAddress(path, name, url), fetch, signal, sogs);
     },
     openRange: (path, start, end) => counted(() => fetchPart(partAddress(url, path).href, start, end)),
   };

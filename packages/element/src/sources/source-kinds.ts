@@ -22,10 +22,10 @@ const SOURCE_KINDS: readonly SourceKind[] = [
     load: () => import('./clip/clip-player.js'),
   },
   {
-    // A `detail.json`; or a `lod-meta.json`, a tileset, LCC or RAD, unless the request is for its finest level, complete.
+    // A `detail.json`; or a `lod-meta.json`, a tileset, LCC, LCC2 or RAD, unless the request is for its finest level, complete.
     name: 'stream',
     matches: ({ url, isWhole }) =>
-      (isWhole ? /(^|\/)detail\.json$/i : /(^|\/)(detail|lod-meta|tileset)\.json$|\.(lcc|rad)$/i).test(nameIn(url)),
+      (isWhole ? /(^|\/)detail\.json$/i : /(^|\/)(detail|lod-meta|tileset)\.json$|\.(lcc2?|rad)$/i).test(nameIn(url)),
     load: () => import('./stream/open-streamed.js'),
   },
   // The manifest of a sequence may have any name.

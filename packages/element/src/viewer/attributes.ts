@@ -298,8 +298,8 @@ export const ATTRIBUTES = {
   /**
    * Levels of detail. `auto` builds them if the GPU is too slow for the scene, and draws them only during motion. `off`
    * builds none. Pixels such as `1px` allow this error in every frame. Streamed scenes (`detail.json`,
-   * `lod-meta.json`, `tileset.json`, `.lcc`, `.rad`) contain levels: `auto` is `1px` for them, and `off` loads all but a
-   * `detail.json` completely at once.
+   * `lod-meta.json`, `tileset.json`, `.lcc`, `.lcc2`, `.rad`) contain levels: `auto` is `1px` for them, and `off` loads
+   * all but a `detail.json` completely at once.
    * @default `auto`
    * @example detail="2px"
    */

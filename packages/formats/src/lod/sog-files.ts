@@ -94,7 +94,7 @@ export class SogFiles {
   }
 }
 
-const whereOf = ({ name, first, count }: Omit<SogRun, 'file'>): string =>
+const whereOf = ({ name, first, count }: Omit<SogRun, 'file' | 'url'>): string =>
   `${name}, splats ${grouped(first)} to ${grouped(first + count)}`;
 
 const byteLengthOf = ({ positions, scales, rotations, opacities, sh }: GaussianCloud): number =>
@@ -105,7 +105,7 @@ const byteLengthOf = ({ positions, scales, rotations, opacities, sh }: GaussianC
  * @param budget Account that is charged for the new arrays.
  * @throws GaussianSplatError `decode/corrupt` if the range exceeds the cloud; `out-of-memory/budget`
  */
-export function cut(cloud: GaussianCloud, run: Omit<SogRun, 'file'>, budget?: LoadBudget): GaussianCloud {
+export function cut(cloud: GaussianCloud, run: Omit<SogRun, 'file' | 'url'>, budget?: LoadBudget): GaussianCloud {
   const { first, count, name } = run;
   if (first + count > cloud.count) {
     throw damaged(

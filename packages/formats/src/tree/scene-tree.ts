@@ -5,6 +5,7 @@ import type { ReadNode, SceneNode, SceneTree, TreeContainer, TreeFiles, TreeRead
 const READERS: Readonly<Record<TreeContainer, () => Promise<{ readonly reader: TreeReader }>>> = {
   tiles: () => import('./tiles.js'),
   lcc: () => import('./lcc.js'),
+  lcc2: () => import('./lcc2.js'),
   rad: () => import('./rad.js'),
 };
 
@@ -15,14 +16,14 @@ const readerOf = async (container: TreeContainer): Promise<TreeReader> =>
   (await loadModule('the code that reads levels', READERS[container])).reader;
 
 /**
- * Opens a scene whose file is a tree of levels: a tileset of 3D Tiles, LCC, or RAD. Its nodes can then be read separately.
+ * Opens a scene whose file is a tree of levels: a tileset of 3D Tiles, LCC, LCC2, or RAD. Its nodes can then be read separately.
  * @param bytes The file of the scene, which describes the tree or its beginning. The beginning of a RAD file is enough.
- * @returns Undefined for files without levels, and for LCC2, whose nodes have no places.
+ * @returns Undefined for files without levels, and for LCC2 whose nodes have no boxes.
  * @throws GaussianSplatError `decode/*`, `out-of-memory/budget`, or the errors of `files`.
  */
 export async function openTree(bytes: Uint8Array, files: TreeFiles): Promise<SceneTree | undefined> {
-  if (isLcc2(bytes)) return undefined;
-  return (await readerOf(isRad(bytes) ? 'rad' : isLcc(bytes) ? 'lcc' : 'tiles')).open(bytes, files);
+  const container = isRad(bytes) ? 'rad' : isLcc(bytes) ? 'lcc' : isLcc2(bytes) ? 'lcc2' : 'tiles';
+  return (await readerOf(container)).open(bytes, files);
 }
 
 /**

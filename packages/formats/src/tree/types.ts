@@ -15,6 +15,8 @@ export type Volume = readonly number[];
 export interface SceneNode {
   /** Volume that contains the node and all nodes below it; undefined if unknown. */
   readonly volume?: Volume | undefined;
+  /** File that other nodes share, and whose reader keeps it decoded. */
+  readonly file?: string | undefined;
   /** Known child nodes. Reading the node may find more. */
   readonly children: readonly SceneNode[];
 }
@@ -37,7 +39,7 @@ export interface ReadNode {
 }
 
 /** Names of the containers whose nodes can be read separately. */
-export type TreeContainer = 'tiles' | 'lcc' | 'rad';
+export type TreeContainer = 'tiles' | 'lcc' | 'lcc2' | 'rad';
 
 /** A tree of levels whose root or roots are known. */
 export interface SceneTree {
@@ -68,6 +70,8 @@ export interface TreeFiles {
   readonly openIndex: OpenFile;
   /** Opens bytes that describe several nodes, and keeps them. No path denotes the file of the scene. */
   readonly openShared: (path: string | undefined, start: number, end: number) => Promise<Uint8Array>;
+  /** Opens a SOG file, and keeps it decoded for some time. Its cloud must not be modified. */
+  readonly openSog: (path: string) => Promise<GaussianCloud>;
   /** Opens bytes `start` to `end`, excluding `end`, of a file. Resolves to fewer if the file ends before. */
   readonly openRange: (path: string, start: number, end: number) => Promise<Uint8Array>;
 }

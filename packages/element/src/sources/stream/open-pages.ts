@@ -93,7 +93,7 @@ const openBoxes: Open = async (request, { loader, signal, onProgress }) => {
 };
 
 const openNodes: Open = async (request, { loader, signal, onProgress, onError }) => {
-  // Nodes of RAD share chunks, which are fetched and decoded once by the worker that has them.
+  // Nodes of RAD share chunks, and those of LCC2 share files, which the worker that has them fetches and decodes once.
   const keeper = /\.rad$/i.test(nameIn(request.url)) ? request.url : undefined;
   const answer = await loader.ask('tree', request, signal, { onProgress, keeper });
   if (!answer) return undefined;
@@ -109,7 +109,7 @@ const openNodes: Open = async (request, { loader, signal, onProgress, onError })
     // The worker needs the volumes of the children alone.
     const bare = { ...node, children: node.children.map(({ volume }) => ({ volume, children: [] })) };
     const asked = { url, ...own, tree, node: bare, scene: opened.scene, above };
-    const page = await loader.ask('node', asked, aborted, { keeper });
+    const page = await loader.ask('node', asked, aborted, { keeper: keeper ?? (node.file && `${url} ${node.file}`) });
     await allowance.note(part, Promise.resolve(page.words));
     report(page.warnings);
     return page;
