@@ -43,7 +43,7 @@ function placementOnEarth(origin) {
   return placementAt([(180 * lon) / Math.PI, (180 * lat) / Math.PI], altitude, 1, axes);
 }
 
-const STREAMED = /(^|\/)(detail|lod-meta|tileset)\.json$|\.(lcc|rad)$/i;
+const STREAMED = /(^|\/)(detail|lod-meta|tileset)\.json$|\.(lcc2?|rad)$/i;
 
 export class SplatLayer {
   type = 'custom';

@@ -1,9 +1,7 @@
-/** The page of `npm run lab -- flight`: the element flies over a tileset, and leaves its rows in `window.report`. Its address has the parameters. */
-const query = new URLSearchParams(location.search);
-const number = (name) => Number(query.get(name));
-const [frames, warm, speed, half] = ['frames', 'warm', 'speed', 'half'].map(number);
-const [width, height] = ['width', 'height'].map(number);
-const center = query.get('center').split(',').map(Number);
+/** The page of `npm run lab -- flight`: flies over a tileset, and leaves its rows in `window.report`. Its address has the parameters. */
+const query = Object.fromEntries(new URLSearchParams(location.search));
+const [frames, warm, speed, half] = ['frames', 'warm', 'speed', 'half'].map((name) => Number(query[name]));
+const center = query.center.split(',').map(Number);
 
 /** Place on the curve of bench/detail.html: low, and up once to see all of it. y points up. */
 const place = (s) => [
@@ -12,65 +10,41 @@ const place = (s) => [
   center[2] + 0.8 * half * Math.sin(4 * Math.PI * s),
 ];
 
-/** Camera at a fraction of the curve, as attributes of the element, and its axis. */
-function view(s) {
-  const [eye, ahead] = [place(s), place(s + 0.02)];
-  ahead[1] -= 0.02 * half;
-  const [x, y, z] = eye.map((value, k) => value - ahead[k]);
-  const radius = Math.hypot(x, y, z);
-  return {
-    'camera-target': ahead.map((value) => `${value}m`).join(' '),
-    'camera-orbit': `${Math.atan2(x, z)}rad ${Math.atan2(Math.hypot(x, z), y)}rad ${radius}m`,
-    axis: [x, y, z].map((value) => value / radius),
-  };
-}
-
-const element = document.createElement('gaussian-splat');
 const nextFrame = () => new Promise(requestAnimationFrame);
 
-function fly(s) {
-  const { axis, ...attributes } = view(s);
-  for (const [name, value] of Object.entries(attributes)) element.setAttribute(name, value);
-  element.jumpCameraToGoal();
-  return axis;
-}
-
-/** Draws frames, one for each of the display. @returns a row for each */
-async function run(count, shareOf) {
+/** Draws frames for as long as a number of them takes at 60 Hz, two at least. @returns a row for each */
+async function run({ fly, progress }, count, placeAt) {
   const rows = [];
+  const start = await nextFrame();
   let axis;
-  for (let k = 0, last = await nextFrame(); k < count; k++) {
+  for (let last = start; rows.length < 2 || 0.06 * (last - start) < count;) {
     const before = axis;
-    axis = fly(shareOf(k));
+    // The clock moves the camera, so that late frames do not make the flight slower.
+    axis = fly(placeAt(0.06 * (last - start)));
     const now = await nextFrame();
-    const [{ error, budgetError, bytes, resident, coming, limit }] = element.stats.streamed;
+    const { error, budgetError, bytes, resident, coming, limit, drawMs } = progress();
     const cosine = axis.reduce((sum, value, n) => sum + value * (before ?? axis)[n], 0);
-    const turned = (180 / Math.PI) * Math.acos(Math.min(1, cosine));
-    rows.push({ ms: now - last, error, budgetError, bytes, resident, coming, limit, turned });
+    /** Degrees a second. */
+    const turned = ((180 / Math.PI) * Math.acos(Math.min(1, cosine)) * 1000) / (rows.at(-1)?.ms ?? Infinity);
+    rows.push({ ms: now - last, error, budgetError, bytes, resident, coming, limit, turned, drawMs });
     last = now;
   }
   return rows;
 }
 
 try {
-  const { GaussianSplatElement } = await import('/cdn/gaussian-splat.min.js');
-  if (query.has('megabytes')) GaussianSplatElement.memoryBudget = 1e6 * number('megabytes');
-  element.style.cssText = `width: ${width}px; height: ${height}px`;
-  const attributes = {
-    ...{ src: query.get('src'), interpolation: '0', interaction: 'none', 'field-of-view': '53.13deg' },
-    ...{ 'min-camera-orbit': 'auto 0deg auto', 'max-camera-orbit': 'auto 180deg auto' },
-  };
-  for (const [name, value] of Object.entries(attributes)) element.setAttribute(name, value);
+  const { open } = await import(query.in === 'maplibre' ? '/map/maplibre.js' : './element.js');
   const began = performance.now();
-  document.body.append(element);
-  await element.ready;
-  if (!element.loaded) throw element.error ?? new Error('the tileset did not load');
+  const view = await open({ ...query, half, place, splats: Number(query.splats) });
   const readyMs = performance.now() - began;
-  await run(warm, () => 0);
+  await run(view, warm, () => 0);
+  const longTasks = [];
+  new PerformanceObserver((list) => longTasks.push(...list.getEntries().map(({ duration }) => duration))).observe({
+    type: 'longtask',
+  });
   const start = performance.now();
-  const rows = await run(frames, (k) => (speed * k) / 900);
-  const { bytes, renderer, reasons } = element.stats;
-  window.report = { readyMs, seconds: (performance.now() - start) / 1000, rows, bytes, renderer, reasons };
+  const rows = await run(view, frames, (k) => (speed * k) / 900);
+  window.report = { readyMs, seconds: (performance.now() - start) / 1000, rows, longTasks, ...view.facts() };
 } catch (error) {
   window.report = { error: String(error.stack ?? error) };
 }

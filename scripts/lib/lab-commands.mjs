@@ -68,7 +68,10 @@ export const COMMANDS = {
     what: 'a flight over a streamed tileset: error, late frames, requests',
     in: 'chromium',
     command: [...TSX, 'scripts/flight/run-flight.mjs'],
-    smallest: ['--blocks', '1', '--frames', '4', '--warm', '2', '--size', '96x54', '--megabytes', '60'],
+    smallest: [
+      ...['--in', 'element,maplibre', '--blocks', '1', '--frames', '4', '--warm', '2', '--size', '96x54'],
+      ...['--megabytes', '60', '--splats', '300000'],
+    ],
   },
   frontier: {
     what: 'speed against accuracy on this GPU',
