@@ -15,7 +15,7 @@ const STYLE = {
 /** Place on the map of one in the element's axes, which point to the east, up and to the south. */
 const lngLat = ([x, , z]) => [PLACE[0] + (METERS * x) / DEGREES[0], PLACE[1] - (METERS * z) / DEGREES[1]];
 
-export async function open({ src, splats, width, height, place }) {
+export async function open({ src, maxSplats, width, height, place }) {
   const container = document.createElement('div');
   container.style.cssText = `width: ${width}px; height: ${height}px`;
   document.body.append(container);
@@ -39,7 +39,7 @@ export async function open({ src, splats, width, height, place }) {
     return axis.map((value) => value / Math.hypot(...axis));
   };
   const worker = new Worker('/map/sorter.js', { type: 'module' });
-  const layer = new SplatLayer({ id: 'city', src, lngLat: PLACE, metersPerUnit: METERS, maxSplats: splats, worker });
+  const layer = new SplatLayer({ id: 'city', src, lngLat: PLACE, metersPerUnit: METERS, maxSplats, worker });
   let drawMs = 0;
   const draw = layer.render;
   layer.render = function (...all) {

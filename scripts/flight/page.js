@@ -35,7 +35,7 @@ async function run({ fly, progress }, count, placeAt) {
 try {
   const { open } = await import(query.in === 'maplibre' ? '/map/maplibre.js' : './element.js');
   const began = performance.now();
-  const view = await open({ ...query, half, place, splats: Number(query.splats) });
+  const view = await open({ ...query, half, place, maxSplats: Number(query.maxSplats) });
   const readyMs = performance.now() - began;
   await run(view, warm, () => 0);
   const longTasks = [];

@@ -51,7 +51,7 @@ try {
   for (const kind of kinds) {
     asked.clear();
     const page = await browser.newPage({ viewport: { width: Number(width), height: Number(height) } });
-    const query = new URLSearchParams({ ...values, ...city, width, height, src, in: kind });
+    const query = new URLSearchParams({ ...values, ...city, width, height, src, in: kind, maxSplats: values.splats });
     await page.goto(`${originOf(server)}/flight/index.html?${query}`);
     await page.waitForFunction('window.report', undefined, { timeout: 600_000, polling: 500 });
     const report = await page.evaluate('window.report');
