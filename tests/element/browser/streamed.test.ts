@@ -1,5 +1,6 @@
 import { GaussianSplatElement } from '@gaussian-splat/element';
 import { MemoryLedger } from '@gaussian-splat/renderer';
+import { hasMemory } from '@gaussian-splat/renderer/tools';
 import { DEFAULT_STEPS } from '@gaussian-splat/optimize/pages';
 import { itInLab } from '../../support/extent-in-pages.js';
 import { detailFolder } from '../../support/detail-folder.js';
@@ -183,6 +184,38 @@ describe('a streamed scene', () => {
       [...warnings, ...reasons].join(),
     );
     await close(element);
+    stop();
+  });
+
+  itInLab('comes back with half of the memory, and fewer splats, if its allocation loses the device', async () => {
+    const { stop } = await serve('/net/kept/greedy/');
+    GaussianSplatElement.memoryBudget = 2e6;
+    const { createBuffer } = GPUDevice.prototype;
+    const pools: number[] = [];
+    GPUDevice.prototype.createBuffer = function (descriptor) {
+      const buffer = createBuffer.call(this, descriptor);
+      if (descriptor.label !== 'gs.pool.geometry') return buffer;
+      pools.push(descriptor.size);
+      if (descriptor.size > 0.7 * pools[0]) this.destroy();
+      return buffer;
+    };
+    const element = show({ src: '/net/kept/greedy/detail.json', 'camera-orbit': '200deg 80deg 1m' });
+    await element.ready;
+    assert(element.loaded && element.error === null, `loaded: ${element.error?.message}`);
+    assert(pools.length === 2 && pools[1] <= 0.7 * pools[0], `pools of ${pools.join(' ')} bytes`);
+    await until(() => element.stats!.streamed[0].limit === 'memory', 'pages in all of the memory');
+    assert(/is full/.test(element.stats!.reasons.join()), element.stats!.reasons.join());
+    // A later loss halves it again.
+    const restored = nextEvent(element, 'contextrestored');
+    const device = devices[devices.length - 1];
+    const asked = hasMemory(device, 1e6);
+    device.destroy();
+    assertEqual(await asked, false, 'memory of a device that was lost meanwhile');
+    await restored;
+    GPUDevice.prototype.createBuffer = createBuffer;
+    assert(pools.at(-1)! !== pools[1] && pools.at(-1)! <= 0.7 * pools[1], `pools of ${pools.join(' ')} bytes`);
+    await close(element);
+    GaussianSplatElement.memoryBudget = null;
     stop();
   });
 

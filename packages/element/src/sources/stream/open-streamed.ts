@@ -51,8 +51,10 @@ async function openStreamed(
   device: GPUDevice,
   options: StreamedOptions,
 ): Promise<OpenedStream | undefined> {
-  const { signal, memoryBudget = Infinity, onChange } = options;
+  const { signal, memoryBudget = Infinity, onChange, submissions } = options;
   const caps = streamCaps();
+  // Each loss of the device divides its work into four times as many parts. Its memory may have been the cause, too.
+  const share = 1 / Math.sqrt(submissions);
   const warnings: string[] = [];
   const pool: PoolOptions = {
     // Computed when the pool is allocated. Beside many other scenes this scene is coarser, but it always has a slot.
@@ -73,12 +75,13 @@ async function openStreamed(
   const opened = await openPages(request, { ...options, onError: pool.onError });
   if (!opened) return undefined;
   const { source, credits } = opened;
-  const gaussians = await openWithin(device, source, pool, warnings);
+  const gaussians = await openWithin(device, source, pool, share, warnings);
   const { bounds, order } = gaussians;
   const { maxSplats = Infinity } = request.limits ?? {};
-  const splatBudget = Math.min(caps.splats, maxSplats);
-  // More splats than the pool holds are never drawn.
-  const max = Math.max(splatBudget, Math.min(maxSplats, gaussians.count, maxSplatBudget(device)));
+  const splatBudget = Math.min(share * caps.splats, maxSplats);
+  // More splats than the pool holds are never drawn, and no more than at first after a loss.
+  const limit = share < 1 ? caps.splats : maxSplatBudget(device);
+  const max = Math.max(splatBudget, Math.min(maxSplats, gaussians.count, limit));
   const detail = { detail: DETAIL, splatBudget, splatRange: [splatBudget, max] as const };
   if (!signal.aborted) return { ...{ gaussians, bounds, order, warnings, credits }, detail };
   gaussians.destroy();
@@ -88,24 +91,29 @@ async function openStreamed(
 /**
  * Opens pages in as much memory as the device has: half as much after each refusal, which is added to the warnings. Levels
  * are coarser then.
+ * @param share Fraction of the memory to begin with, because the device was lost; all of it if the first page needs more.
  */
 async function openWithin(
   device: GPUDevice,
   source: PageSource,
   pool: PoolOptions,
+  share: number,
   warnings: string[],
 ): Promise<StreamedGaussians> {
   const { memoryBudget: wanted = 0 } = pool;
   let refusal: unknown;
-  for (let memoryBudget = wanted; ; memoryBudget /= 2) {
+  for (let memoryBudget = share * wanted; ; memoryBudget /= 2) {
     try {
       const opened = await StreamedGaussians.openSource(device, source, { ...pool, memoryBudget });
       if (refusal !== undefined) warnings.push(lessMemory(wanted, memoryBudget));
       return opened;
     } catch (error) {
       const { code } = error as GaussianSplatError;
-      // The last halves have no room for the first page.
-      if (refusal !== undefined && code === 'out-of-memory/budget') throw refusal;
+      if (code === 'out-of-memory/budget' && memoryBudget < wanted) {
+        // The last halves have no room for the first page.
+        if (refusal !== undefined) throw refusal;
+        return StreamedGaussians.openSource(device, source, pool);
+      }
       if (code !== 'out-of-memory/allocation' && code !== 'out-of-memory/buffer-limit') throw error;
       refusal ??= error;
     }
