@@ -65,6 +65,8 @@ export interface OpenOptions {
   readonly memoryBudget: number | undefined;
   /** Number of submissions into which the work of a frame is divided. */
   readonly submissions: number;
+  /** Number of devices that were lost in a row before the first frame, perhaps for lack of memory. */
+  readonly losses: number;
   /** The load that WebGL continues, so that the file is not fetched again. */
   readonly begun: { load?: BegunLoad };
   /** Returns additional parameters for opening a generator. */

@@ -346,7 +346,7 @@ export class SceneController implements ReactiveController {
   ): Promise<void> {
     for (let failures = 0; ;) {
       try {
-        return await this.#open(request, signal, isNew, onProgress);
+        return await this.#open(request, signal, isNew, onProgress, failures);
       } catch (error) {
         if (signal.aborted) return;
         if (!isDeviceFailure(error, isNew)) return this.fail(error);
@@ -364,7 +364,13 @@ export class SceneController implements ReactiveController {
     }
   }
 
-  async #open(request: SceneRequest, signal: AbortSignal, isNew: boolean, onProgress: ProgressListener): Promise<void> {
+  async #open(
+    request: SceneRequest,
+    signal: AbortSignal,
+    isNew: boolean,
+    onProgress: ProgressListener,
+    losses = 0,
+  ): Promise<void> {
     const { services, memoryBudget, core } = this.#of;
     const onPreview =
       isNew && core!.wantsPreviews ? (preview: LoadedGaussians) => this.#showPreview(preview) : undefined;
@@ -382,7 +388,7 @@ export class SceneController implements ReactiveController {
       loader: services.sceneLoader,
       frameUrl: (url) => this.#of.services.urlModifier?.(url) ?? url,
       live: () => this.#of.dynamicRequest,
-      ...{ signal, onProgress, onPreview, beforeUpload, memoryBudget, submissions: this.#submissions },
+      ...{ signal, onProgress, onPreview, beforeUpload, memoryBudget, submissions: this.#submissions, losses },
     }).finally(() => this.#setReleasable(false));
     if (signal.aborted) return scene.destroy();
     const entrance = !isNew ? 'again' : this.#isPreview ? 'whole' : 'new';

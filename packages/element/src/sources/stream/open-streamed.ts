@@ -51,10 +51,9 @@ async function openStreamed(
   device: GPUDevice,
   options: StreamedOptions,
 ): Promise<OpenedStream | undefined> {
-  const { signal, memoryBudget = Infinity, onChange, submissions } = options;
+  const { signal, memoryBudget = Infinity, onChange, losses } = options;
   const caps = streamCaps();
-  // Each loss of the device divides its work into four times as many parts. Its memory may have been the cause, too.
-  const share = 1 / Math.sqrt(submissions);
+  const share = 2 ** -losses;
   const warnings: string[] = [];
   const pool: PoolOptions = {
     // Computed when the pool is allocated. Beside many other scenes this scene is coarser, but it always has a slot.
@@ -91,7 +90,7 @@ async function openStreamed(
 /**
  * Opens pages in as much memory as the device has: half as much after each refusal, which is added to the warnings. Levels
  * are coarser then.
- * @param share Fraction of the memory to begin with, because the device was lost; all of it if the first page needs more.
+ * @param share Fraction of the memory to begin with; all of it is used if the first page needs more.
  */
 async function openWithin(
   device: GPUDevice,
