@@ -144,7 +144,7 @@ const output = {
 /** Modules that are loaded together: as one chunk they take a quarter less than as many, and one request. */
 const TOGETHER = {
   packing:
-    /\/(renderer\/dist\/pack\/(joined-blocks|morton|pack|pack-cloud|radix-sort|recenter|unpack)|element\/dist\/loading\/pack-cloud)\.js$/,
+    /\/(renderer\/dist\/pack\/(joined-blocks|morton|pack|pack-cloud|radix-sort|recenter|unpack)|element\/dist\/loading\/pack-cloud|core\/dist\/(linear|vector|views\/[^/]+))\.js$/,
   previews: /\/(formats\/dist\/read-prefix|element\/dist\/loading\/preview-schedule)\.js$/,
   reading: /\/formats\/dist\/(credits|decompression|faults|preview|safe-orbit)\.js$/,
 };

@@ -101,6 +101,17 @@ test('lists within lists, where a manifest has something else, are refused with 
   const deep: unknown = JSON.parse('['.repeat(100_000) + ']'.repeat(100_000));
   assert.throws(() => checkManifest({ ...manifests[0], bounds: deep }, 'detail.json'), { code: 'decode/header' });
   assert.throws(() => checkManifest({ format: deep }, 'detail.json'), { code: 'decode/unsupported' });
+  const inside = { center: [0, 1, 2], radius: 1, toward: [0, 1, 3] };
+  for (const [view, isRefused] of [
+    [inside, false],
+    [{ ...inside, toward: deep }, true],
+    [{ ...inside, radius: '1' }, true],
+  ]) {
+    const check = (): unknown =>
+      checkManifest({ ...manifests[0], bounds: { ...manifests[0].bounds, inside: view } }, 'detail.json');
+    if (isRefused) assert.throws(check, /bounds\.inside/);
+    else check();
+  }
 });
 
 test('an address that no server accepts is refused, because each request of a page parses it', () => {

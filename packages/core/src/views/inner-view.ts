@@ -93,9 +93,12 @@ function sampleOf(cloud: GaussianCloud): SplatSample {
   return { ...sample, count, origin, opacities: Float32Array.from({ length: count }, (_, k) => opacities[k * step]) };
 }
 
-/** Returns {@link innerViewFrom} for a cloud. */
-export function innerViewOf(cloud: GaussianCloud, bounds: Bounds): InnerView | undefined {
-  const total = cloud.count * (cloud.hints?.represented ?? 1);
+/** Returns {@link innerViewFrom} for a cloud, which may be a sample of `total` splats. */
+export function innerViewOf(
+  cloud: GaussianCloud,
+  bounds: Bounds,
+  total = cloud.count * (cloud.hints?.represented ?? 1),
+): InnerView | undefined {
   return total < MIN_SPLATS ? undefined : innerViewFrom(sampleOf(cloud), bounds, total, cloud.hints?.up);
 }
 

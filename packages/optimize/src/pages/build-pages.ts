@@ -78,7 +78,7 @@ export function buildDetailTree(given: GaussianCloud, { geometry }: DetailTreeOp
   validateCloud(given);
   const standing = upright(given);
   const usable = usableIndices(standing);
-  const plan = planScene(sampleOf(standing, usable), boundsOf(standing), geometry);
+  const plan = planScene(sampleOf(standing, usable), boundsOf(standing), geometry, usable.length);
   const cloud = { ...standing, origin: plan.origin, positions: positionsFrom(plan.origin, standing) };
   const { order, fillers } = orderOf(plan, cloud.positions, usable);
   const leaves = leafLevel(cloud, order);

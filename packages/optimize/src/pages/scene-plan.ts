@@ -46,12 +46,14 @@ export const sampleStep = (count: number): number => Math.max(1, Math.floor(coun
 /**
  * Returns the plan of a scene.
  * @param sample Every n-th usable splat of the scene, for the n of {@link sampleStep}, upright.
+ * @param total Number of usable splats of the scene.
  * @param box Lower and upper corner of the centers of all splats in world units.
  */
 export function planScene(
   sample: GaussianCloud,
   { min, max }: Pick<Bounds, 'min' | 'max'>,
   geometry?: 'quantized',
+  total = sample.count,
 ): ScenePlan {
   const near = recentered(sample);
   const { positions, antialiased, filterVariance, origin, hints } = near;
@@ -69,7 +71,7 @@ export function planScene(
       credits: hints?.credits,
       isOfPlanes: isFlat,
     },
-    bounds: { ...bounds, inside: innerViewOf(sample, bounds), min, max },
+    bounds: { ...bounds, inside: innerViewOf(sample, bounds, total), min, max },
     shPrecision: choosePrecision(noiseIn(near, order), order.length),
     curve: curveThrough(positions, all),
     shells: geometry && !isFlat ? ([0, 1, 2].map((axis) => sampleAxis(positions, all, axis)) as Curve) : undefined,

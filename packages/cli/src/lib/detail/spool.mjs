@@ -219,7 +219,7 @@ function findOrder(path, spool, geometry) {
     copyRows(part, degree, block.rows, true);
     part.positions.set(positionsFrom(sample.origin, { origin: block.origin, positions: part.positions }));
   });
-  const plan = planScene(sample, box, geometry);
+  const plan = planScene(sample, box, geometry, count);
   const shells = new Float64Array(MAX_SHELLS);
   const bins = [];
   forRows(path, spool, (block) => {
