@@ -11,6 +11,7 @@ import { readScene } from '@gaussian-splat/formats';
 import { changeFormat } from '@gaussian-splat/optimize';
 import { checkManifest } from '@gaussian-splat/renderer';
 import { blocksOf } from '../../packages/cli/src/lib/detail/inputs.mjs';
+import { openSpool } from '../../packages/cli/src/lib/detail/spool.mjs';
 import { writePly } from '../formats/support/ply-writer.js';
 import { inriaColumns, rawSplats, type RawSplats } from '../formats/support/splats.js';
 import { onlyInLab, someOf } from '../support/extent.js';
@@ -107,6 +108,23 @@ test(
     assert.deepEqual(readdirSync(out).sort(), ['detail.json', 'pages']);
   },
 );
+
+test('parts that begin at once in containers, whose processes have the same number, have one plan; --join begins none', async () => {
+  const path = write('containers.ply', rawSplats(20_000, 0));
+  const unfinished = inFolder('containers', 'unfinished');
+  const options = { degree: 0, geometry: 'quantized', maxBytes: 1e9, facts: [] };
+  // The second machine has more memory, for larger cells.
+  const spools = await Promise.all(
+    [2, 4].map((merges) => openSpool(unfinished, [{ path }], { ...options, divide: () => ({ merges }) })),
+  );
+  assert.deepEqual(spools[0], spools[1]);
+  assert.equal(spools[0].count, 20_000);
+  assert.deepEqual(readdirSync(unfinished).sort(), ['plan.json', 'rows']);
+  const { status, text } = detail(path, '--out', inFolder('mistyped'), '--join');
+  assert.equal(status, 1);
+  assert.match(text, /expected cells of parts, found none/);
+  assert.equal(existsSync(inFolder('mistyped')), false);
+});
 
 test('steps of several cells are measured once, and all parts have them', { skip: onlyInLab }, () => {
   // Small splats, because SwiftShader measures.

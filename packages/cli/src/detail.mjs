@@ -2,18 +2,7 @@
  * Implementation of `gaussian-splat detail`: reads a scene of any size, builds its levels of detail by cells, and writes
  * them as pages with a manifest.
  */
-import {
-  existsSync,
-  linkSync,
-  mkdirSync,
-  mkdtempSync,
-  readdirSync,
-  readFileSync,
-  rmdirSync,
-  rmSync,
-  statSync,
-  writeFileSync,
-} from 'node:fs';
+import { existsSync, mkdirSync, readdirSync, readFileSync, rmdirSync, rmSync, statSync, writeFileSync } from 'node:fs';
 import { join, resolve } from 'node:path';
 import { pickInitialVariants } from '@gaussian-splat/renderer';
 import { lossesIn } from '@gaussian-splat/optimize';
@@ -25,7 +14,7 @@ import {
   DEFAULT_STEPS,
   writePages,
 } from '@gaussian-splat/optimize/pages';
-import { parseSceneOptions, report, runCommand, sayWarnings, UsageError } from './lib/command.mjs';
+import { CommandError, parseSceneOptions, report, runCommand, sayWarnings, UsageError } from './lib/command.mjs';
 import { CREDIT_OPTIONS, CREDIT_USAGE, creditsWith } from './lib/credits.mjs';
 import {
   buildPart,
@@ -42,7 +31,7 @@ import {
 import { inputsOf } from './lib/detail/inputs.mjs';
 import { deflate, deflateQuickly } from './lib/encoders.mjs';
 import { dealViews, parseViews } from './lib/given-views.mjs';
-import { obstacleToFolder } from './lib/output-file.mjs';
+import { obstacleToFolder, writeOnce } from './lib/output-file.mjs';
 
 const USAGE = `usage: gaussian-splat detail SCENE --out FOLDER [options]
 
@@ -182,22 +171,10 @@ function codingOf(build, { minPsnr, scored, given, isMeasuring }) {
     const measured = isPart ? middleTree(build) : { tree, cloud };
     const choice = await measuredCoding({ ...measured, minPsnr, scored, views, isPart });
     const { coding, psnr, worstPsnr } = choice;
-    putOnce(join(folder, CODING), JSON.stringify({ coding, psnr, worstPsnr }));
+    // Two GPUs may choose differently.
+    writeOnce(join(folder, CODING), JSON.stringify({ coding, psnr, worstPsnr }));
     return isPart ? chosenCoding(build, minPsnr) : choice;
   };
-}
-
-/** Writes a file, unless another part has done it meanwhile: two GPUs may choose differently. */
-function putOnce(path, content) {
-  const own = mkdtempSync(`${path}-`);
-  writeFileSync(join(own, CODING), content);
-  try {
-    linkSync(join(own, CODING), path);
-  } catch (error) {
-    if (error.code !== 'EEXIST') throw error;
-  } finally {
-    rmSync(own, { recursive: true });
-  }
 }
 
 /** Returns the coding that the parts of a build have had. */
@@ -215,7 +192,7 @@ async function writeCopies(build, options) {
     rmSync(folder, { recursive: true });
     if (isEmpty(out)) rmdirSync(out);
     const expected = tree ? 'a scene of more than 256 splats' : 'a scene that fits into --memory';
-    throw new UsageError(`--tile: expected ${expected}`);
+    throw new UsageError(`--tile: expected ${expected}, found ${options.scene}`);
   }
   const coded = await codingOf(build, options)(tree, cloud);
   const places = placesOnGrid(columns, rows, spacing ?? 2.5 * tree.bounds.radius);
@@ -228,6 +205,8 @@ async function main(options) {
   const { scene, out, degree, geometry, minPsnr, scored, given, columns, rows, memory, part, isJoining } = options;
   const { isMeasuring, credits } = options;
   const inputs = inputsOf(scene);
+  if (isJoining && !existsSync(join(out, UNFINISHED)))
+    throw new CommandError(`${out}: expected cells of parts, found none. Run the parts first, with the same --out`);
   // Pages without a plan are those of another program.
   if (existsSync(out) && !existsSync(join(out, UNFINISHED)))
     rmSync(join(out, 'pages'), { recursive: true, force: true });
@@ -285,4 +264,10 @@ function counted(count, noun) {
   return `${count} ${noun}${count === 1 ? '' : 's'}`;
 }
 
-await runCommand(USAGE, parseOptions, main, { name: 'detail', endings: [''], single: ['part', 'join'] });
+await runCommand(USAGE, parseOptions, main, {
+  name: 'detail',
+  endings: [''],
+  single: ['part', 'join'],
+  emptied: [''],
+  continues: (folder) => existsSync(folder) && isUnfinished(folder),
+});

@@ -1,8 +1,10 @@
 /** Writer of the output files of commands, which are never partial and never replace an input file. */
+import { randomUUID } from 'node:crypto';
 import {
   accessSync,
   constants,
   existsSync,
+  linkSync,
   mkdirSync,
   realpathSync,
   renameSync,
@@ -59,13 +61,31 @@ function mayWrite(path) {
   }
 }
 
+/** Returns a name beside a file that no other process has: those of other machines and containers have the same numbers. */
+const partOf = (path) => `${path}.${randomUUID().slice(0, 13)}.part`;
+
+/** Writes a file, unless another process has done it meanwhile, whose file remains. */
+export function writeOnce(path, content) {
+  const part = partOf(path);
+  try {
+    writeFileSync(part, content);
+    linkSync(part, path);
+  } catch (error) {
+    if (error.code === 'ENOSPC') throw error;
+    // Some network drives have no links.
+    if (!existsSync(path)) renameSync(part, path);
+  } finally {
+    rmSync(part, { force: true });
+  }
+}
+
 /** Writes a file completely or not at all. An existing file remains until the new file is complete. */
 export function writeWhole(path, content) {
   const target = existsSync(path) ? realpathSync(path) : path;
   // Pipes, devices, and files in read-only folders are written directly.
   if (existsSync(target) && !(statSync(target).isFile() && mayWrite(dirname(target))))
     return writeFileSync(target, content);
-  const part = `${target}.${process.pid}.part`;
+  const part = partOf(target);
   try {
     writeFileSync(part, content);
     renameSync(part, target);

@@ -8,6 +8,7 @@ import {
   existsSync,
   fstatSync,
   mkdirSync,
+  mkdtempSync,
   openSync,
   readdirSync,
   readFileSync,
@@ -31,7 +32,7 @@ import {
 } from '@gaussian-splat/optimize/pages';
 import { CommandError } from '../command.mjs';
 import { readWhole } from '../input-file.mjs';
-import { writeWhole } from '../output-file.mjs';
+import { writeOnce } from '../output-file.mjs';
 import { blocksOf, readAt, stateOf } from './inputs.mjs';
 
 /** Rows that are read at once. */
@@ -94,17 +95,18 @@ export async function openSpool(folder, inputs, { degree: highest, geometry, max
     return { ...known, folder };
   }
   mkdirSync(folder, { recursive: true });
-  const temporary = join(folder, `${process.pid}.inflated`);
-  const own = join(folder, `${process.pid}.rows`);
+  // Processes of other machines and containers may have the same number.
+  const place = mkdtempSync(join(folder, 'reading-'));
+  const [temporary, own] = [join(place, 'inflated'), join(place, 'rows')];
   try {
     const rows = await writeRows(own, inputs, { highest, temporary, maxBytes });
     const found = { key, geometry, ...rows, ...findOrder(own, rows, geometry) };
-    const spool = { ...found, ...divide(found) };
     renameSync(own, join(folder, 'rows'));
-    writeWhole(path, JSON.stringify(spool));
-    return { ...spool, folder };
+    // The plan of the first part is that of all: they may have more memory, and larger cells.
+    writeOnce(path, JSON.stringify({ ...found, ...divide(found) }));
+    return { ...JSON.parse(readFileSync(path, 'utf8')), folder };
   } finally {
-    for (const file of [temporary, own]) rmSync(file, { force: true });
+    rmSync(place, { recursive: true, force: true });
     if (!existsSync(path)) removeEmpty([folder, dirname(folder)]);
   }
 }
