@@ -1,10 +1,20 @@
 /** Commands for several files: each has a row, broken files stop none, and a second call continues. */
 import assert from 'node:assert/strict';
-import { spawnSync } from 'node:child_process';
-import { existsSync, mkdirSync, mkdtempSync, readFileSync, rmSync, statSync, writeFileSync } from 'node:fs';
+import { spawn, spawnSync } from 'node:child_process';
+import {
+  existsSync,
+  mkdirSync,
+  mkdtempSync,
+  readFileSync,
+  rmSync,
+  statSync,
+  symlinkSync,
+  writeFileSync,
+} from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { after, test } from 'node:test';
+import { setTimeout } from 'node:timers/promises';
 import type { ShDegree } from '@gaussian-splat/core';
 import { writePly } from '../formats/support/ply-writer.js';
 import { inriaColumns, rawSplats } from '../formats/support/splats.js';
@@ -86,6 +96,45 @@ test('a folder with three broken files: the others are written, the three are na
   assert.equal(rowsOf('small').find(({ file }) => file === 'scene-2.ply')?.splats, 33);
   const page = readFileSync(inFolder('small', 'index.html'), 'utf8');
   assert.match(page, /data-src="more\/scene-5\.spz"/);
+});
+
+test('a second call replaces folders of changed scenes and of an ended run, and reads neither its outputs nor links to above', async () => {
+  const write = (name: string, count: number): void =>
+    writeFileSync(inFolder('cases', name), writePly([{ name: 'vertex', columns: inriaColumns(rawSplats(count, 0)) }]));
+  // A folder that was there before is of the user, and stays.
+  mkdirSync(inFolder('cases', 'c'), { recursive: true });
+  writeFileSync(inFolder('cases', 'c', 'notes.txt'), 'of the user');
+  ['a.ply', 'b.ply'].forEach((name) => write(name, 300));
+  symlinkSync('.', inFolder('cases', 'loop'));
+  const args = ['detail', 'cases', '--quantized', '--out', 'cases'];
+  const argv = [join(process.cwd(), 'packages/cli/bin/gaussian-splat.mjs'), ...args];
+  const ended = spawn(process.execPath, argv, { cwd: folder, stdio: 'ignore' });
+  while (!existsSync(inFolder('cases', 'b')) && ended.exitCode === null) await setTimeout(2);
+  ended.kill('SIGKILL');
+  assert.equal(command(...args).status, 0);
+  const splatsIn = (): unknown[] => rowsOf('cases').map(({ file, splats }) => [file, splats]);
+  assert.deepEqual(splatsIn(), [['a.ply', 300], ['b.ply', 300]]); // prettier-ignore
+  write('a.ply', 400);
+  write('c.ply', 300);
+  command(...args);
+  const { status, text } = command(...args);
+  assert.equal(status, 1, text);
+  assert.ok(existsSync(inFolder('cases', 'c', 'notes.txt')));
+  assert.deepEqual(splatsIn(), [['a.ply', 400], ['b.ply', 300], ['c.ply', undefined]]); // prettier-ignore
+});
+
+test('an option that is wrong for one file alone stops no other', { skip: onlyInLab }, () => {
+  mkdirSync(inFolder('sizes'));
+  [200, 300].forEach((count) =>
+    writeFileSync(
+      inFolder('sizes', `${count}.ply`),
+      writePly([{ name: 'vertex', columns: inriaColumns(rawSplats(count, 0)) }]),
+    ),
+  );
+  const { status, text } = command('detail', 'sizes', '--quantized', '--tile=2x1', '--out=tiled');
+  assert.equal(status, 1, text);
+  assert.match(text, /1 of 2 files written/);
+  assert.match(rowsOf('tiled')[0].error ?? '', /more than 256 splats, found .*200\.ply/);
 });
 
 test('patterns and lists of files; what cannot begin ends with status 2 and writes nothing', () => {

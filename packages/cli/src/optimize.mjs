@@ -324,6 +324,7 @@ await runCommand(USAGE, parseOptions, main, {
   name: 'optimize',
   endings: ['.sog', '.glb', '.spz', '.ply', '.usdz', '.usdc', '/lod-meta.json'],
   single: ['report'],
+  emptied: ['/lod-meta.json'],
   finish: (folder, rows) =>
     writeCatalogue(
       folder,

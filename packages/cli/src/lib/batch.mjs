@@ -4,7 +4,7 @@
  */
 import { spawn } from 'node:child_process';
 import { createHash } from 'node:crypto';
-import { existsSync, mkdirSync, readdirSync, readFileSync, statSync } from 'node:fs';
+import { existsSync, mkdirSync, readdirSync, readFileSync, realpathSync, rmSync, statSync } from 'node:fs';
 import { basename, dirname, extname, join, relative, resolve, sep } from 'node:path';
 import { fileURLToPath } from 'node:url';
 import { sceneFormats } from '@gaussian-splat/formats';
@@ -34,6 +34,7 @@ const isFolder = (path) => existsSync(path) && statSync(path).isDirectory();
  * `name` of the command; `endings` of its outputs, the default first, '' for a folder; undefined if it writes none;
  * `accepts(path, isScene)`: whether a file of a folder is an input; `single`: options that need a single input;
  * `argumentsFor(input, out)`: arguments of one file; `own`: options of the batch, not of its files;
+ * `emptied`: endings of outputs whose folder must be empty; `continues(folder)`: whether it holds what a run continues;
  * `finish(folder, rows)`: called with all rows; `afterwards(folder, values)`: called after the table.
  * @param inputs {string[]} Files, folders and patterns.
  * @param values Options of the command line, without their defaults.
@@ -49,19 +50,31 @@ export async function runBatch(batch, inputs, values) {
   const ending = endingOf(endings, values.as);
   const obstacle = folder && obstacleToFolder(folder);
   if (obstacle) throw new UsageError(`--out: ${obstacle}; several files need a folder`);
-  const jobs = jobsOf(inputs, { ...batch, ending, folder });
-  if (folder) mkdirSync(folder, { recursive: true });
   const known = new Map(recorded(folder, name).map((row) => [row.file, row]));
+  const jobs = jobsOf(inputs, { ...batch, ending, folder, known });
+  if (folder) mkdirSync(folder, { recursive: true });
   const rows = [];
   for (const [k, job] of jobs.entries()) {
     const before = await inputOf(job.path);
     const key = keyOf({ name, values, before });
     const last = known.get(job.file);
     const isDone = last?.key === key && (last.error ? isOfFile(last.code) : hasOutput(job.out, last));
-    if (!isDone) process.stderr.write(`${k + 1} of ${jobs.length}  ${job.file}\n`);
-    const row = isDone ? { ...last, isKept: true } : await runJob(batch, job, values);
-    rows.push({ file: job.file, out: job.out && relative(folder, job.out), key, ...row, bytesBefore: before.bytes });
-    if (folder) record(folder, name, [...rows, ...jobs.slice(k + 1).flatMap(({ file }) => known.get(file) ?? [])]);
+    const out = job.out && relative(folder, job.out);
+    const recordWith = (row) => {
+      rows[k] = { file: job.file, out, key, ...row, bytesBefore: before.bytes };
+      if (folder) record(folder, name, [...rows, ...jobs.slice(k + 1).flatMap(({ file }) => known.get(file) ?? [])]);
+    };
+    const target = batch.emptied?.includes(ending) ? outputOf(job.out) : undefined;
+    const wasOurs = last?.out === out && (!last.error || last.isOurs);
+    const isOurs = target && (wasOurs || !existsSync(target) || readdirSync(target).length === 0);
+    if (!isDone) {
+      process.stderr.write(`${k + 1} of ${jobs.length}  ${job.file}\n`);
+      // A folder that the batch itself has begun is replaced, unless it can be continued.
+      if (target && wasOurs && !(last.key === key && batch.continues?.(target)))
+        rmSync(target, { recursive: true, force: true });
+      recordWith({ error: 'was ended early', isOurs });
+    }
+    recordWith(isDone ? { ...last, isKept: true } : { ...(await runJob(batch, job, values)), isOurs });
   }
   await finish?.(folder, rows);
   console.log(tableOf(rows));
@@ -85,10 +98,14 @@ function endingOf(endings, asked) {
 }
 
 /** Returns the files of inputs, each with its name in the table and its output. */
-function jobsOf(inputs, { accepts = isScene, ending, folder }) {
+function jobsOf(inputs, { accepts = isScene, ending, folder, known }) {
   const found = new Map();
+  // The folder of the outputs may be that of the inputs.
+  const outputs = new Set([...known.values()].map(({ out }) => out && join(folder, out)));
   for (const input of inputs)
-    for (const [path, name] of filesOf(input, accepts, folder)) if (!found.has(path)) found.set(path, name);
+    for (const [path, name] of filesOf(input, accepts, folder))
+      if (!found.has(path) && !(isCollection(input) && [path, dirname(path)].some((one) => outputs.has(one))))
+        found.set(path, name);
   if (found.size === 0) throw new UsageError(`expected scenes, found none in ${inputs.join(', ')}`);
   const plain = [...found.values()].map((name) => withoutEnd(name));
   const jobs = [...found].map(([path, file], k) => {
@@ -123,8 +140,11 @@ function filesOf(input, accepts, out) {
 }
 
 /** Returns the files below a folder. Of a folder with a manifest only the manifest, unless a pattern asks for `all`. */
-function walk(folder, out, all) {
+function walk(folder, out, all, above = []) {
   if (!existsSync(folder)) return [];
+  const own = realpathSync(folder);
+  // A link to a folder above it would never end.
+  if (above.includes(own)) return [];
   const entries = readdirSync(folder, { withFileTypes: true }).filter(({ name }) => !name.startsWith('.'));
   entries.sort((a, b) => (a.name < b.name ? -1 : 1));
   const manifest = all ? undefined : entries.find((entry) => isManifest(entry.name));
@@ -132,7 +152,7 @@ function walk(folder, out, all) {
   return entries.flatMap((entry) => {
     const path = join(folder, entry.name);
     if (!isFolder(path)) return [path];
-    return path === out ? [] : walk(path, out, all);
+    return path === out ? [] : walk(path, out, all, [...above, own]);
   });
 }
 
@@ -214,7 +234,9 @@ async function runJob({ name, argumentsFor, own: batchOptions = [] }, { path, ou
   const begun = performance.now();
   const { status, signal, text, message } = await ended([BIN, name, ...own, ...options]);
   const seconds = Math.round((performance.now() - begun) / 100) / 10;
-  if (status === 2) throw new UsageError(message?.error?.message ?? text);
+  const wrong = status === 2 ? (message?.error?.message ?? text) : '';
+  // Wrong options end the batch, except for those that are wrong for this file alone.
+  if (status === 2 && ![path, out].some((one) => one && wrong.includes(one))) throw new UsageError(wrong);
   if (status !== 0) {
     const error = message?.error?.message ?? (signal ? `ended by ${signal}` : lastLine(text));
     return { error, code: message?.error?.code, seconds };

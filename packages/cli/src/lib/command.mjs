@@ -102,6 +102,8 @@ const send = (message) => new Promise((resolve) => (process.send ? process.send(
  */
 export async function runCommand(usage, parse, main, batch) {
   const shownUsage = usage.replaceAll('gaussian-splat ', `${PROGRAM} `);
+  // A file of a batch ends with it: the next call would meet its process in the same folder.
+  process.once('disconnect', () => process.exit(1));
   try {
     const options = parse(process.argv.slice(2));
     if (options === undefined) console.log(shownUsage + severalIn(usage));
