@@ -101,7 +101,7 @@ test('a folder with three broken files: the others are written, the three are na
 test('a second call replaces folders of changed scenes and of an ended run, and reads neither its outputs nor links to above', async () => {
   const write = (name: string, count: number): void =>
     writeFileSync(inFolder('cases', name), writePly([{ name: 'vertex', columns: inriaColumns(rawSplats(count, 0)) }]));
-  // A folder that was there before is of the user, and stays.
+  // A folder that the user created stays.
   mkdirSync(inFolder('cases', 'c'), { recursive: true });
   writeFileSync(inFolder('cases', 'c', 'notes.txt'), 'of the user');
   ['a.ply', 'b.ply'].forEach((name) => write(name, 300));

@@ -74,7 +74,9 @@ function parseOptions(args) {
   const scene = resolve(parsed.scene);
   const obstacle = obstacleToFolder(out);
   if (obstacle) throw new UsageError(`--out: ${obstacle}`);
-  if (existsSync(out) && !isEmpty(out) && !isUnfinished(out)) throw new UsageError(`--out: ${values.out} is not empty`);
+  const isJoined = values.join && existsSync(join(out, 'detail.json'));
+  if (existsSync(out) && !isEmpty(out) && !isUnfinished(out) && !isJoined)
+    throw new UsageError(`--out: ${values.out} is not empty`);
   const tile = /^([1-9]\d{0,3})x([1-9]\d{0,3})$/.exec(values.tile ?? '1x1');
   if (tile === null) throw new UsageError(`--tile: expected AxB such as 24x24, found "${values.tile}"`);
   const spacing = values.spacing === undefined ? undefined : Number(values.spacing);
@@ -205,8 +207,10 @@ async function main(options) {
   const { scene, out, degree, geometry, minPsnr, scored, given, columns, rows, memory, part, isJoining } = options;
   const { isMeasuring, credits } = options;
   const inputs = inputsOf(scene);
-  if (isJoining && !existsSync(join(out, UNFINISHED)))
+  if (isJoining && !existsSync(join(out, UNFINISHED))) {
+    if (existsSync(join(out, 'detail.json'))) return console.log(`${out}: the parts were joined before`);
     throw new CommandError(`${out}: expected cells of parts, found none. Run the parts first, with the same --out`);
+  }
   // Pages without a plan are those of another program.
   if (existsSync(out) && !existsSync(join(out, UNFINISHED)))
     rmSync(join(out, 'pages'), { recursive: true, force: true });
