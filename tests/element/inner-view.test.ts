@@ -1,16 +1,21 @@
 /** The first view of a captured room is within it, and that of an object is from outside. */
 import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
+import { createServer } from 'node:http';
+import type { AddressInfo } from 'node:net';
 import { test } from 'node:test';
 import { boundsOf, type Bounds, type GaussianCloud, type Vector3 } from '@gaussian-splat/core';
 import { innerViewOf } from '@gaussian-splat/core/views';
 import { readScene } from '@gaussian-splat/formats';
+import { writeStreamedSog } from '@gaussian-splat/optimize';
 import { boundsOfPacked, boundsOfWorld, packCloud } from '@gaussian-splat/renderer/tools';
 import { World } from '@gaussian-splat/renderer';
+import { encodeWebp } from '../../packages/cli/src/lib/encoders.mjs';
+import { openBoxes } from '../support/element/loading.js';
 import { CameraController, eyeOfPose, poseOf, viewerFrame, toScene } from '../support/element/camera.js';
 import { settings } from '../support/camera-settings.js';
 import { needsSharedData, sharedFile } from '../support/data.js';
-import { someOf } from '../support/extent.js';
+import { onlyInLab, someOf } from '../support/extent.js';
 import { seenAt } from '../support/studio-geometry.js';
 import { STUDIO, studio, type StudioScene } from '../support/studio.js';
 
@@ -70,6 +75,38 @@ test('the skull of the site is seen from outside', async () => {
     withInside(await readScene(new Uint8Array(readFileSync(file)), { name: 'skull.spz' })).inside,
     undefined,
   );
+});
+
+/** Bounds of a scene that streams as SOG, of which the coarsest level is known. */
+async function streamedBounds(cloud: GaussianCloud): Promise<Bounds> {
+  const files = await writeStreamedSog(cloud, { steps: STEPS, palette: 64, encodeWebp, effort: 0 });
+  const server = createServer(({ url }, response) => {
+    response.end(files.get(decodeURIComponent(url!.slice(1))));
+  });
+  await new Promise<void>((resolve) => server.listen(0, resolve));
+  const url = `http://localhost:${(server.address() as AddressInfo).port}/lod-meta.json`;
+  const request = { url, credentials: 'omit', sh: 'auto' } as const;
+  try {
+    return (await openBoxes(request, new AbortController().signal, { onProgress: () => undefined })).levels.scene
+      .bounds;
+  } finally {
+    server.closeAllConnections();
+    server.close();
+  }
+}
+
+const STEPS = { place: 1, size: 0.01, turn: 1, opacity: 1, color: 0.01, harmonics: 0.05 };
+for (const name of ['hall', 'apartment'] as const)
+  test(`${name} as streamed SOG is seen from within`, { skip: onlyInLab }, async () => {
+    const scene = await studio(name);
+    const bounds = await streamedBounds(scene.cloud);
+    assert.ok(bounds.inside, `${name} has a view from within`);
+    assert.ok(isFree(scene, firstEye(bounds)), `${firstEye(bounds).join()} is in the scene`);
+  });
+
+test('plant.splat as streamed SOG is seen from outside', { skip: onlyInLab || needsSharedData }, async () => {
+  const cloud = await readScene(sharedFile('scenes/plant.splat'), { name: 'plant.splat' });
+  assert.equal((await streamedBounds(cloud)).inside, undefined);
 });
 
 const ROOM: Bounds = {

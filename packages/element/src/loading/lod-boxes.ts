@@ -1,5 +1,6 @@
 /** Reads streamed SOG scenes box by box. The worker loads this module for the first such scene. */
 import type { Credits } from '@gaussian-splat/core';
+import { innerViewOf } from '@gaussian-splat/core/views';
 import {
   fetchScene,
   LoadBudget,
@@ -89,7 +90,10 @@ export async function openBoxes(
     const coarsest = await readCoarsestLevel(lod, files, fetch, name, signal, limits());
     const boxes = lod.boxes.map(({ min, max, runs }) => ({ min, max, counts: runs.map(({ count }) => count) }));
     const credits = lod.credits ?? coarsest.hints?.credits;
-    return { levels: layoutLevels(coarsest, boxes, { sh }), ...placesOf(lod), credits };
+    const levels = layoutLevels(coarsest, boxes, { sh });
+    const { bounds } = levels.scene;
+    const scene = { ...levels.scene, bounds: { ...bounds, inside: innerViewOf(coarsest, bounds) } };
+    return { levels: { ...levels, scene }, ...placesOf(lod), credits };
   } catch (error) {
     signal.throwIfAborted();
     throw named(error, name);
