@@ -214,7 +214,7 @@ class DepthGrid {
   /** Returns the transmittance from a point to a splat, 0..1. */
   visibility([x, y, z]: Vector3, to: Vector3): number {
     const [dx, dy, dz] = [to[0] - x, to[1] - y, to[2] - z];
-    const length = Math.hypot(dx, dy, dz);
+    const length = Math.sqrt(dx * dx + dy * dy + dz * dz);
     let depth = 0;
     // From the splat, which is in the grid, toward the point, which may be far away.
     for (let way = length - OWN_SURFACE; way > 0 && depth < HIDDEN; way--) {
@@ -278,7 +278,7 @@ function bestView(
     const sectors = new Float64Array(SECTORS);
     for (const to of splats) {
       const [dx, dy, dz] = [to[0] - place.at[0], to[1] - place.at[1], to[2] - place.at[2]];
-      const distance = Math.hypot(dx, dz);
+      const distance = Math.sqrt(dx * dx + dz * dz);
       if (distance < MIN_DISTANCE || Math.abs(dy) > TANGENT * distance) continue;
       const turn = Math.atan2(dz, dx) / (2 * Math.PI) + 1;
       sectors[Math.floor((turn % 1) * SECTORS)] += grid.visibility(place.at, to);
