@@ -377,7 +377,7 @@ describe('meshes', () => {
       const good = mesh({}, { position: '3 0 0' });
       element.append(broken, missing, good);
       await element.ready;
-      assertEqual([broken.error?.reason, missing.error?.reason], ['decode/truncated', 'network/status'], 'errors');
+      assertEqual([broken.error?.reason, missing.error?.reason], ['decode/unknown-format', 'network/status'], 'errors');
       assert(good.loaded && element.error === null, 'the others');
       const image = await screenOf(element);
       for (let i = 0; i < (isLab ? 3 : 1); i++) {
