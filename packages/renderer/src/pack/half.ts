@@ -1,6 +1,8 @@
 const float = new Float32Array(1);
 const bits = new Uint32Array(float.buffer);
 
+// core/half.js rounds in the same way, but has infinity. An import of it would be one more script of every page.
+
 /** Largest finite float16. */
 const HALF_MAX = 65504;
 
