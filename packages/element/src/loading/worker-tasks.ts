@@ -1,6 +1,7 @@
 /** The tasks of the scene worker. A task is one row of {@link WORKER_TASKS}, and a module that its row imports. */
 import { loadModule } from '@gaussian-splat/core';
 import { fetchScene } from '@gaussian-splat/formats';
+import { throttled } from './load-helpers.js';
 import { loadScene } from './load-scene.js';
 import { buffersOf, type FileRequest, type TaskListeners } from './protocol.js';
 
@@ -110,9 +111,14 @@ export const runOnPage: typeof runTask = async (type, ...rest) =>
   WORKER_TASKS[type].isOnlyInWorker ? (undefined as never) : runTask(type, ...rest);
 
 /** Fetches a file. Returns its bytes in a buffer of their own, or the decoded words of a coded file of pages. */
-async function fetchFile({ url, credentials, limits, coded }: FileRequest, signal: AbortSignal): Promise<ArrayBuffer> {
+async function fetchFile(
+  { url, credentials, limits, coded }: FileRequest,
+  signal: AbortSignal,
+  listeners: TaskListeners,
+): Promise<ArrayBuffer> {
   const { maxBytes, maxSeconds } = limits ?? {};
-  const bytes = await fetchScene(url, { mode: 'cors', credentials, signal, maxBytes, maxSeconds });
+  const onProgress = throttled(listeners.onProgress);
+  const bytes = await fetchScene(url, { mode: 'cors', credentials, signal, onProgress, maxBytes, maxSeconds });
   if (coded === undefined) return bytes.slice().buffer;
   // This code has been loaded before, to read the manifest.
   const { decodePage } = await loadModule(streams, () => import('./open-manifest.js'));

@@ -5,6 +5,8 @@ import type { Feature } from '../../viewer/features.js';
 import { unitOf } from '../../viewer/unit.js';
 import type { Viewer } from '../../viewer/viewer.js';
 import { mapUrlOf, setMapUrl } from '../../floor/floor-source.js';
+import { keyOf } from '../../loading/scene-loader.js';
+import type { ProgressListener, SceneRequest } from '../../loading/protocol.js';
 import { kindOf } from '../../sources/source-kinds.js';
 import { arrivalAt, backOf, readDoors, type Arrival, type Door } from './rooms.js';
 import type { FloorPlan } from './floor-plan.js';
@@ -15,6 +17,11 @@ const [THROUGH, AWAY] = [0.6, 0.8];
 /** Maximum size of the files that were fetched ahead, bytes. */
 const MAX_BYTES = 64e6;
 
+interface Fetching {
+  readonly url: string;
+  readonly controller: AbortController;
+}
+
 /** Leads from scene to scene through doors, and fetches the scenes behind those of the present room. */
 export class Doors implements ReactiveController, Feature {
   readonly #viewer: Viewer;
@@ -23,11 +30,12 @@ export class Doors implements ReactiveController, Feature {
   #first = '';
   #firstMap: string | null = null;
   #room = '';
-  /** URL of the scene that this class has requested last, which is that of a local file for rooms fetched ahead. */
+  /** URL of the scene that this class has requested last. */
   #shownUrl = '';
-  /** Files of rooms that were fetched ahead, by URL. */
-  readonly #files = new Map<string, File>();
-  #fetching: AbortController | undefined;
+  /** Files that were fetched ahead, in this order: their keys of the loader by URL, and their sizes in bytes. */
+  readonly #files = new Map<string, { key: string; size: number }>();
+  /** The file that is being fetched ahead. A visitor who goes through its door waits for the rest of it. */
+  #fetching: Fetching | undefined;
   #arrival: Arrival | undefined;
   /** Whether the visitor is far enough from all doors to go through one. */
   #isAway = false;
@@ -43,6 +51,10 @@ export class Doors implements ReactiveController, Feature {
       this.#fetchAhead();
       this.#showPlan();
     });
+    // The loader is the page's, so that it would keep the files of an element that was removed for good.
+    element.addEventListener('emptied', () => {
+      if (!element.isConnected) for (const url of this.#files.keys()) this.#forget(url);
+    });
     element.addController(this);
   }
 
@@ -50,7 +62,11 @@ export class Doors implements ReactiveController, Feature {
     if (this.#first === '') return;
     this.#doors = readDoors(this.#viewer.element, this.#first, this.#viewer.warn);
     this.#showDoors();
-    if (this.#viewer.sources.ownEntry.scene.state === 'ready') this.#fetchAhead();
+    this.#fetchAhead();
+  }
+
+  hostConnected(): void {
+    this.#fetchAhead();
   }
 
   hostUpdated(): void {
@@ -72,7 +88,7 @@ export class Doors implements ReactiveController, Feature {
   }
 
   hostDisconnected(): void {
-    this.#fetching?.abort();
+    this.#stop();
     this.#removePlan();
   }
 
@@ -127,13 +143,13 @@ export class Doors implements ReactiveController, Feature {
     if (this.#isPassing || room === this.#room) return;
     this.#isPassing = true;
     this.#isAway = false;
-    this.#fetching?.abort();
+    if (this.#fetching?.url !== room) this.#stop();
     const { element, sources, announcer } = this.#viewer;
     const [from, door] = [this.#room, this.#doors.find((each) => each.to === room)];
     const entry = door && backOf(door, this.#doors);
     this.#arrival = arrival ?? (entry && arrivalAt(entry, unitOf(this.#viewer) ?? 1));
     setMapUrl(this.#viewer, floorMap);
-    Object.assign(element, { src: this.#files.get(room) ?? room });
+    Object.assign(element, { src: room });
     await element.updateComplete;
     const { scene } = sources.ownEntry;
     await scene.settled;
@@ -165,37 +181,63 @@ export class Doors implements ReactiveController, Feature {
     if (shownRequest) this.#plan?.show(this.#first, this.#firstMap, this.#doors, this.#room);
   }
 
-  /** Fetches the files behind the doors of the present room, one after the other. */
+  /** Fetches the files behind the doors of the present room, one after the other. One that is on its way stays so. */
   #fetchAhead(): void {
-    this.#fetching?.abort();
-    this.#fetching = new AbortController();
-    const { signal } = this.#fetching;
-    const next = new Set(this.#doors.filter(({ room }) => room === this.#room).map(({ to }) => to));
-    this.#fetchAll([...next], signal).catch((error: unknown) => {
-      if (!signal.aborted && error instanceof GaussianSplatError) this.#viewer.warn(error.message);
-    });
+    const { state, shownRequest: request } = this.#viewer.sources.ownEntry.scene;
+    if (state !== 'ready' || !request || this.#isPassing) return;
+    const rooms = this.#doors.filter(({ room }) => room === this.#room).map(({ to }) => to);
+    if (this.#fetching && rooms.includes(this.#fetching.url)) return;
+    this.#stop();
+    // A streamed room fetches what its view needs.
+    const isFile = (url: string): boolean =>
+      /^https?:/.test(url) && kindOf({ ...request, url, file: undefined }).name === 'file';
+    const url = rooms.find((room) => !this.#files.has(room) && isFile(room));
+    if (url !== undefined) void this.#fetch((this.#fetching = { url, controller: new AbortController() }), request);
   }
 
-  async #fetchAll(rooms: readonly string[], signal: AbortSignal): Promise<void> {
-    const { services, sources } = this.#viewer;
-    const request = sources.ownEntry.scene.shownRequest;
-    if (!request) return;
-    for (const url of rooms) {
-      // A streamed room fetches what its view needs.
-      const isRemote = /^https?:/.test(url) && kindOf({ ...request, url, file: undefined }).name === 'file';
-      if (this.#files.has(url) || !isRemote) continue;
-      const { credentials, limits } = request;
-      const bytes = await services.sceneLoader.fetchFile({ url, credentials, limits }, signal);
-      signal.throwIfAborted();
-      this.#files.set(url, new File([bytes], new URL(url).pathname.split('/').at(-1)!));
+  #stop(): void {
+    this.#fetching?.controller.abort();
+    this.#fetching = undefined;
+  }
+
+  async #fetch(fetching: Fetching, { credentials, limits }: SceneRequest): Promise<void> {
+    const { services, warn } = this.#viewer;
+    const { url, controller } = fetching;
+    const key = keyOf({ url, credentials });
+    let listener: ProgressListener | undefined;
+    const bytes = services.sceneLoader.fetchFile({ url, credentials, limits }, controller.signal, (...progress) =>
+      listener?.(...progress),
+    );
+    const content = bytes.then(
+      (whole) => new Blob([whole]),
+      () => undefined,
+    );
+    services.sceneLoader.ahead.set(key, (onProgress) => ((listener = onProgress), content));
+    const file = { key, size: 0 };
+    this.#files.set(url, file);
+    try {
+      file.size = (await bytes).byteLength;
       this.#evict();
+    } catch (error) {
+      // A visitor who goes through the door has the scene requested again, whose error is shown.
+      if (this.#files.get(url) === file) this.#forget(url);
+      if (!controller.signal.aborted && error instanceof GaussianSplatError) warn(error.message);
     }
+    if (this.#fetching !== fetching) return;
+    this.#fetching = undefined;
+    if (this.#files.has(url)) this.#fetchAhead();
   }
 
   /** Forgets the files that were fetched first while all together are too large. */
   #evict(): void {
     const sizeOf = (): number => [...this.#files.values()].reduce((sum, { size }) => sum + size, 0);
-    for (const url of this.#files.keys()) if (this.#files.size > 1 && sizeOf() > MAX_BYTES) this.#files.delete(url);
+    for (const url of this.#files.keys()) if (this.#files.size > 1 && sizeOf() > MAX_BYTES) this.#forget(url);
+  }
+
+  #forget(url: string): void {
+    const file = this.#files.get(url);
+    if (file) this.#viewer.services.sceneLoader.ahead.delete(file.key);
+    this.#files.delete(url);
   }
 
   /** Returns the door of the present room that is nearest to a point, and its horizontal distance, meters. */
