@@ -8,12 +8,11 @@ import { existsSync, mkdirSync, readdirSync, readFileSync, realpathSync, rmSync,
 import { basename, dirname, extname, join, relative, resolve, sep } from 'node:path';
 import { fileURLToPath } from 'node:url';
 import { sceneFormats } from '@gaussian-splat/formats';
-import { CommandError, isCollection, UsageError } from './command.mjs';
+import { CommandError, isCollection, UsageError, version } from './command.mjs';
 import { filesBeside } from './files-beside.mjs';
 import { obstacleToFolder, writeWhole } from './output-file.mjs';
 
 const BIN = fileURLToPath(new URL('../../bin/gaussian-splat.mjs', import.meta.url));
-const { version } = JSON.parse(readFileSync(new URL('../../package.json', import.meta.url), 'utf8'));
 
 /** File of an output folder with the rows of the table. */
 export const RESULTS = 'results.json';

@@ -1,7 +1,10 @@
 /** Common parts of the commands for one scene: options, usage errors, and exit codes. */
-import { existsSync, statSync } from 'node:fs';
+import { existsSync, readFileSync, statSync } from 'node:fs';
 import { parseArgs } from 'node:util';
 import { GaussianSplatError } from '@gaussian-splat/core';
+
+/** Version of this package, on which recorded results depend. */
+export const { version } = JSON.parse(readFileSync(new URL('../../package.json', import.meta.url), 'utf8'));
 
 /** Words that run the program: those of a checkout, of `npx`, or the name of an installed one. */
 export const PROGRAM =

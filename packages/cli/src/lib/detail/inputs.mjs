@@ -157,13 +157,17 @@ async function* spzBlocks(path, { head, count, widths, end, size }, temporary) {
 }
 
 async function* wholeBlocks(path, maxBytes) {
-  const { size } = statSync(path);
-  if (size > maxBytes)
-    throw new CommandError(
-      `${path}: expected at most ${Math.floor(maxBytes / 1e6)} MB, because this format is read whole, found ${Math.ceil(size / 1e6)} MB. ` +
+  const tooLarge = (found) =>
+    new CommandError(
+      `${path}: expected at most ${Math.floor(maxBytes / 1e6)} MB, because this format is read whole, found ${found}. ` +
         'Raise --memory, or convert it to PLY or SPZ.',
     );
-  const cloud = await readScene(await readWhole(path), { name: path, openFile: readerBeside(path), maxBytes });
+  const { size } = statSync(path);
+  if (size > maxBytes) throw tooLarge(`${Math.ceil(size / 1e6)} MB`);
+  const options = { name: path, openFile: readerBeside(path), maxBytes };
+  const cloud = await readScene(await readWhole(path), options).catch((error) => {
+    throw error.code === 'out-of-memory/budget' ? tooLarge('more in its splats') : error;
+  });
   const stride = cloud.sh.length / cloud.count;
   for (let first = 0; first < cloud.count; first += BLOCK) {
     const end = Math.min(cloud.count, first + BLOCK);

@@ -30,7 +30,7 @@ import {
   positionsFrom,
   sampleStep,
 } from '@gaussian-splat/optimize/pages';
-import { CommandError } from '../command.mjs';
+import { CommandError, version } from '../command.mjs';
 import { readWhole } from '../input-file.mjs';
 import { writeOnce } from '../output-file.mjs';
 import { blocksOf, readAt, stateOf } from './inputs.mjs';
@@ -85,13 +85,15 @@ const bytesOf = (array) => new Uint8Array(array.buffer, array.byteOffset, array.
  */
 export async function openSpool(folder, inputs, { degree: highest, geometry, maxBytes, facts, divide }) {
   const key = createHash('sha256')
-    .update(JSON.stringify([stateOf(inputs), highest, geometry ?? null, facts]))
+    .update(JSON.stringify([version, stateOf(inputs), highest, geometry ?? null, facts]))
     .digest('hex');
   const path = join(folder, 'plan.json');
   if (existsSync(path)) {
     const known = JSON.parse(readFileSync(path, 'utf8'));
     if (known.key !== key)
-      throw new CommandError(`${folder} is of other files or options: remove it, or repeat the command as it was`);
+      throw new CommandError(
+        `${folder} is of other files or options, or of another version: remove it, or repeat the command as it was`,
+      );
     return { ...known, folder };
   }
   mkdirSync(folder, { recursive: true });
