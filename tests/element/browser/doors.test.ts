@@ -1,13 +1,12 @@
 /** Doors between scenes: by click, by keyboard and on foot, back and forth, with rooms fetched once, flat memory and a plan. */
 import { holdings } from './support/ledger.js';
-import '@gaussian-splat/element';
-import type { GaussianSplatElement } from '@gaussian-splat/element';
+import { GaussianSplatElement } from '@gaussian-splat/element';
 import { encodeFloorMap } from '@gaussian-splat/formats/floor';
 import { sendKeys } from '@web/test-runner-commands';
 import { itInLab } from '../../support/extent-in-pages.js';
 import { headset } from './support/headset.js';
 import { insideOf } from './support/inside.js';
-import { assert, assertEqual, atRest, delay, frames, nextEvent, show, until } from './support/harness.js';
+import { assert, assertEqual, atRest, claimFault, delay, frames, nextEvent, show, until } from './support/harness.js';
 
 /** Rooms of 4 by 4 m in a row: each door leads to the next one or back. One arrives at z = 0.9. */
 const NAMES = ['a', 'b', 'c'] as const;
@@ -96,6 +95,8 @@ const doorTo = (element: GaussianSplatElement, name: string): HTMLElement =>
 /** Names of the files that the server was asked for. */
 const log = async (): Promise<string[]> => (await (await fetch(`${folder}/log`)).json()) as string[];
 
+const scenesAsked = async (): Promise<string[]> => (await log()).filter((name) => name.endsWith('.splat'));
+
 async function pass(element: GaussianSplatElement, name: string): Promise<void> {
   const changed = nextEvent<CustomEvent<{ url: string }>>(element, 'room-change', 60_000);
   doorTo(element, name).click();
@@ -159,30 +160,90 @@ describe('doors', () => {
     assertEqual(element.getCameraTarget().z.toFixed(3), '0.100', 'the view from the door back');
   });
 
+  /** A door to room b whose file waits for a gate. */
+  const gatedDoor = (gate: string): HTMLElement => {
+    const door = doorOf('a', 'b', -1.9, '0deg');
+    door.dataset.door += `?gate=${gate}&passing=0`;
+    return door;
+  };
+
   it('a visitor who is faster than the file behind a door waits for the rest of it, which is not requested again', async () => {
     const element = await showTour({}, 0, undefined, []);
     await until(() => element.loaded, 'the first room');
     const gate = folder.replaceAll('/', '-');
-    const door = doorOf('a', 'b', -1.9, '0deg');
-    door.dataset.door += `?gate=${gate}&passing=0`;
+    const door = gatedDoor(gate);
     element.append(door);
     await until(async () => (await log()).includes('b.splat'), 'a request ahead');
-    const loaded: number[] = [];
-    element.addEventListener('progress', ({ loaded: bytes }) => loaded.push(bytes));
+    const bar = (): Element | null => element.shadowRoot!.querySelector('[role=progressbar]');
+    assertEqual(bar(), null, 'progress before');
     const changed = nextEvent(element, 'room-change', 60_000);
     door.click();
-    await until(() => !element.loaded, 'the load of the room');
+    await until(() => bar() !== null, 'progress');
     await frames(3);
+    assertEqual(element.loaded, true, 'the room stays until the next is there');
     await fetch(`/net/open/${gate}`);
     await changed;
-    assertEqual((await log()).filter((name) => name.endsWith('.splat')), ['a.splat', 'b.splat'], 'requests'); // prettier-ignore
-    assert(loaded.includes(800 * 32), `no progress of the file: ${loaded.join()}`);
+    assertEqual(await scenesAsked(), ['a.splat', 'b.splat'], 'requests');
+    await until(() => bar() === null, 'the end of progress');
+  });
 
-    // A removed element leaves no files with the loader of the page.
-    const { ahead } = insideOf(element).services.sceneLoader;
-    assert(ahead.size > 0, 'the file is kept for the way back');
-    element.remove();
-    await until(() => ahead.size === 0, 'the files of a removed element are forgotten', 30_000);
+  it('the latest choice counts: another door, or a scene that the page sets meanwhile', async () => {
+    const element = await showTour({}, 0, undefined, []);
+    await until(() => element.loaded, 'the first room');
+    const gate = folder.replaceAll('/', '-');
+    const rooms: string[] = [];
+    element.addEventListener('room-change', ({ detail }) => rooms.push(detail.url));
+    const [slow, other] = [gatedDoor(gate), doorOf('a', 'c', 1.9, '180deg')];
+    element.append(slow, other, doorOf('c', 'a', 1.9, '0deg'));
+    await until(async () => (await log()).includes('b.splat'), 'a request ahead');
+    slow.click();
+    other.click();
+    await until(() => rooms.length > 0, 'a room');
+    assertEqual(rooms, [addressOf('c.splat')], 'rooms');
+    doorTo(element, 'a').click();
+    element.src = `${folder}/b.splat`;
+    await until(() => insideOf(element).sources.ownEntry.scene.shownRequest?.url === addressOf('b.splat'), 'b');
+    await frames(3);
+    assertEqual(rooms, [addressOf('c.splat')], 'rooms after the page has set another scene');
+    assertEqual(shownDoors(element), [], 'doors');
+    await fetch(`/net/open/${gate}`);
+  });
+
+  it('a room that failed can be entered again; doors without a room are those of the scene that the page sets', async () => {
+    const element = await showTour({}, 0, undefined, []);
+    await until(() => element.loaded, 'the first room');
+    const [absent, present] = [doorOf('a', 'absent', -1.9, '0deg'), doorOf('a', 'c', 1.9, '180deg')];
+    element.append(absent, present);
+    await until(async () => (await scenesAsked()).includes('c.splat'), 'the file behind the second door');
+    claimFault(/absent.splat.*404/);
+    const failed = nextEvent(element, 'error', 60_000);
+    absent.click();
+    await failed;
+    await until(() => !absent.hidden, 'the door is still there');
+    await put('absent.splat', await (await fetch(`${folder}/b.splat`)).blob());
+    const changed = nextEvent<CustomEvent<{ url: string }>>(element, 'room-change', 60_000);
+    absent.click();
+    assertEqual((await changed).detail.url, addressOf('absent.splat'), 'room');
+
+    const own = doorOf('b', 'a', -1.9, '0deg');
+    delete own.dataset.room;
+    element.replaceChildren(own);
+    element.src = `${folder}/b.splat`;
+    await until(() => !own.hidden && element.loaded, 'the door of another tour');
+    await pass(element, 'a');
+  });
+
+  it('addresses that the page rewrites: the file ahead and the room have them, doors have their own', async () => {
+    const { urlModifier } = GaussianSplatElement;
+    GaussianSplatElement.urlModifier = (url) => `${url}?signed`;
+    try {
+      const element = await showTour();
+      await until(() => shownDoors(element).length === 1, 'the doors of the first room');
+      await pass(element, 'b');
+      assertEqual(shownDoors(element), ['To c', 'To a'], 'doors');
+    } finally {
+      GaussianSplatElement.urlModifier = urlModifier;
+    }
   });
 
   it('doors of other rooms are not seen while the code for doors is on its way', async () => {
@@ -297,7 +358,7 @@ describe('doors', () => {
         if (i % 4 === 3) bytes.push(holdings().bytes);
       }
       observer.disconnect();
-      const asked = (await log()).filter((name) => name.endsWith('.splat'));
+      const asked = await scenesAsked();
       console.log(
         `60 crossings in a ${place}: ${asked.length} requests (${asked.join()}), ${bytes.join()} bytes on the GPU, ${longTasks} tasks above 50 ms`,
       );

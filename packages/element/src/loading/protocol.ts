@@ -41,7 +41,7 @@ export interface SceneRequest extends FileRequest {
   readonly levels?: boolean;
   /** Whether the file is shown as triangle meshes, without splats. */
   readonly isMesh?: boolean | undefined;
-  /** Content of the file, if another worker has downloaded it, or it was fetched ahead. Other files are still found beside `url`. */
+  /** Content of the file, if another worker has downloaded it. Other files are still found beside `url`. */
   readonly downloaded?: Blob | undefined;
   /** Renderer of the scene; default: WebGPU. */
   readonly renderer?: RendererChoice;

@@ -15,8 +15,6 @@ import type { AnswerOf, RequestOf, TaskType } from './worker-tasks.js';
 export class SceneLoader {
   /** Starts a worker that the caller owns and must terminate. */
   readonly spawn: () => Worker;
-  /** Contents of files that were fetched ahead, or are on their way, by {@link keyOf}: a load takes them instead of a request. */
-  readonly ahead = new Map<string, (onProgress: ProgressListener) => Promise<Blob | undefined>>();
   readonly #pool: WorkerPool;
   /** Index in {@link WORKER_SOURCES} of the current way to start a worker. */
   #way = 0;
@@ -67,9 +65,7 @@ export class SceneLoader {
     onProgress: ProgressListener,
     onPreview?: PreviewListener,
   ): Promise<LoadedScene> {
-    const downloaded = await this.ahead.get(keyOf(request))?.(onProgress);
-    const asked = downloaded ? { ...request, downloaded } : request;
-    const loaded = await this.ask('load', asked, signal, { onProgress, onPreview });
+    const loaded = await this.ask('load', request, signal, { onProgress, onPreview });
     if ('frames' in loaded) throw await why(({ sequenceWithin }) => sequenceWithin(request.url));
     // Without `onPart`, the answer contains the splats.
     return loaded as LoadedScene;
@@ -111,9 +107,6 @@ export class SceneLoader {
     }
   }
 }
-
-/** Key of a file in {@link SceneLoader.ahead}: visitors may get another file with their cookies than without. */
-export const keyOf = ({ credentials, url }: FileRequest): string => `${credentials} ${url}`;
 
 /**
  * Adds the content of a `blob:` address to a request. Workers cannot read such addresses of pages without an origin,

@@ -271,12 +271,18 @@ export class GaussianSplatElement extends ViewingMethods {
     this.#showStates();
     const bar = this.renderRoot.querySelector<HTMLElement>('[part="progress-bar"]');
     // Set through the style object, which a strict Content-Security-Policy allows, unlike the attribute.
-    if (bar) bar.style.transform = `scaleX(${this.core.sources.progress ?? 0})`;
+    if (bar) bar.style.transform = `scaleX(${this.#loading ?? 0})`;
+  }
+
+  /** Progress of what is loading, 0..1; null while unknown, undefined if nothing is. */
+  get #loading(): number | null | undefined {
+    const { sources, features } = this.core;
+    return sources.state === 'loading' ? sources.progress : features.first('progress');
   }
 
   protected override render(): TemplateResult {
     const { attributes, strings, sources, reveal, features, announcer } = this.core;
-    const { state, progress, hasImage } = sources;
+    const { hasImage } = sources;
     // If one of several scenes fails, the others stay visible.
     const error = hasImage ? null : sources.error;
     const model: TemplateModel = {
@@ -286,8 +292,8 @@ export class GaussianSplatElement extends ViewingMethods {
       posterLoading: attributes.loading,
       showPoster: reveal.isCovered,
       onReveal: reveal.mayReveal ? null : this.#onReveal,
-      isLoading: state === 'loading',
-      progress,
+      isLoading: this.#loading !== undefined,
+      progress: this.#loading ?? null,
       error,
       hasPoster: this.#hasPoster,
       strings,

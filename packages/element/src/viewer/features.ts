@@ -54,6 +54,8 @@ export interface Feature {
   mayMove?(): boolean;
   /** Returns the player of all automatic playback: `player` together with that of the feature. */
   playerWith?(player: Player | undefined): Player | undefined;
+  /** Share of a file that has arrived and the next scene waits for, 0..1; null while unknown, undefined for none. */
+  progress?(): number | null | undefined;
   /** Help text for the keys, for screen readers. */
   keys?(): string | undefined;
   /** Parts of the shadow tree. They lie over the frame, and below the poster. */

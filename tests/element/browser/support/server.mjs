@@ -390,6 +390,8 @@ const ANSWERS = {
       const { gate, passing, ranges } = context.query;
       const [, first, last] = (ranges !== undefined && /^bytes=(\d+)-(\d+)$/.exec(context.get('Range'))) || [];
       log.push(first === undefined ? name : `${name} ${first}-${last}`);
+      // The browser's cache would hide requests from the log.
+      context.set('Cache-Control', 'no-store');
       if (gate && log.length > Number(passing)) await gateOf(gate).opened;
       context.status = files.has(name) ? 200 : 404;
       context.body = files.get(name) ?? 'absent';

@@ -1,59 +1,54 @@
-import { GaussianSplatError, loadModule, type Vector3 } from '@gaussian-splat/core';
+import { loadModule, type Vector3 } from '@gaussian-splat/core';
 import type { ReactiveController } from 'lit';
 import { eyeOfPose } from '../../viewer/camera/orbit.js';
 import type { Feature } from '../../viewer/features.js';
 import { unitOf } from '../../viewer/unit.js';
 import type { Viewer } from '../../viewer/viewer.js';
 import { mapUrlOf, setMapUrl } from '../../floor/floor-source.js';
-import { keyOf } from '../../loading/scene-loader.js';
-import type { ProgressListener, SceneRequest } from '../../loading/protocol.js';
 import { kindOf } from '../../sources/source-kinds.js';
+import { Ahead } from './ahead.js';
 import { arrivalAt, backOf, readDoors, type Arrival, type Door } from './rooms.js';
 import type { FloorPlan } from './floor-plan.js';
 
 /** Horizontal distance from a door, meters, at which visitors go through it, and beyond which doors open again after an arrival. */
 const [THROUGH, AWAY] = [0.6, 0.8];
 
-/** Maximum size of the files that were fetched ahead, bytes. */
-const MAX_BYTES = 64e6;
+/** Files that name others, which are found beside their own address alone. */
+const HAS_PARTS = /\.(json|gltf|lcc2?)$/i;
 
-interface Fetching {
-  readonly url: string;
-  readonly controller: AbortController;
+/** A visitor who is on the way to a room. */
+interface Passing {
+  readonly room: string;
+  /** Share of the file of the room that has arrived, 0..1, while it is waited for; null while unknown. */
+  progress: number | null | undefined;
 }
 
 /** Leads from scene to scene through doors, and fetches the scenes behind those of the present room. */
 export class Doors implements ReactiveController, Feature {
   readonly #viewer: Viewer;
   #doors: readonly Door[] = [];
-  /** URL of the scene that the page names, of the scene that is shown, and map of the floor of the first. */
+  /** Address of the scene that the page has set, of the scene that is shown, and map of the floor of the first. */
   #first = '';
   #firstMap: string | null = null;
   #room = '';
-  /** URL of the scene that this class has requested last. */
-  #shownUrl = '';
-  /** Files that were fetched ahead, in this order: their keys of the loader by URL, and their sizes in bytes. */
-  readonly #files = new Map<string, { key: string; size: number }>();
-  /** The file that is being fetched ahead. A visitor who goes through its door waits for the rest of it. */
-  #fetching: Fetching | undefined;
+  /** Value of `src` that is known here: an address, or the file of a room that was fetched ahead. */
+  #src: string | Blob | null | undefined;
+  readonly #ahead: Ahead;
+  #passing: Passing | undefined;
   #arrival: Arrival | undefined;
   /** Whether the visitor is far enough from all doors to go through one. */
   #isAway = false;
-  #isPassing = false;
   #plan: FloorPlan | undefined;
 
   constructor(viewer: Viewer) {
     this.#viewer = viewer;
+    this.#ahead = new Ahead(viewer.warnOf);
     const { element } = viewer;
     element.addEventListener('click', this.#onClick);
     element.addEventListener('load', () => {
-      if (this.#isPassing) return;
+      if (this.#passing) return;
       this.#fetchAhead();
       this.#showPlan();
-    });
-    // The loader is the page's, so that it would keep the files of an element that was removed for good.
-    element.addEventListener('emptied', () => {
-      if (!element.isConnected) for (const url of this.#files.keys()) this.#forget(url);
     });
     element.addController(this);
   }
@@ -70,14 +65,8 @@ export class Doors implements ReactiveController, Feature {
   }
 
   hostUpdated(): void {
-    const { attributes, warnOf, sources } = this.#viewer;
-    const { url } = sources.ownEntry.scene;
-    // The page has set another scene.
-    if (url !== '' && url !== this.#shownUrl && !this.#isPassing) {
-      this.#shownUrl = this.#room = url;
-      if (this.#first === '') [this.#first, this.#firstMap] = [url, mapUrlOf(this.#viewer)];
-      this.childrenChanged();
-    }
+    const { attributes, warnOf, source } = this.#viewer;
+    if (source.src !== this.#src) this.#pageShows((this.#src = source.src));
     if (!attributes.floorPlan) return this.#removePlan();
     if (this.#plan) return;
     loadModule('the code of the plan', () => import('./floor-plan.js')).then(({ FloorPlan }) => {
@@ -88,13 +77,17 @@ export class Doors implements ReactiveController, Feature {
   }
 
   hostDisconnected(): void {
-    this.#stop();
+    this.#ahead.stop();
     this.#removePlan();
   }
 
   /** A session in a headset continues behind the door. */
   keepsSession(): true | undefined {
-    return this.#isPassing || undefined;
+    return this.#passing && true;
+  }
+
+  progress(): number | null | undefined {
+    return this.#passing?.progress;
   }
 
   headMoved(head: Vector3): void {
@@ -111,7 +104,7 @@ export class Doors implements ReactiveController, Feature {
 
   /** Goes through the door that a visitor has reached. @param eye Viewer space in meters. */
   #visitorAt(eye: Vector3): void {
-    if (this.#isPassing) return;
+    if (this.#passing) return;
     const near = this.#nearest(eye);
     if (near === undefined) return;
     if (near.distance > AWAY) this.#isAway = true;
@@ -139,23 +132,46 @@ export class Doors implements ReactiveController, Feature {
     await this.#enter(door.to, back && arrivalAt(back, unitOf(this.#viewer) ?? 1), door.floorMap);
   }
 
+  /** Takes what the page has set as `src`, and with it the place of doors that name no room, unless that is a room of the tour. */
+  #pageShows(src: string | Blob | null | undefined): void {
+    this.#passing = this.#arrival = undefined;
+    if (!src) return;
+    const { element, sources } = this.#viewer;
+    this.#room = typeof src === 'string' ? new URL(src, element.baseURI).href : sources.ownEntry.scene.url;
+    const isOfTour = this.#doors.some(({ room, to }) => room === this.#room || to === this.#room);
+    if (!isOfTour) [this.#first, this.#firstMap] = [this.#room, mapUrlOf(this.#viewer)];
+    this.childrenChanged();
+  }
+
+  /** The latest door wins: a visitor who waits for a room may choose another. */
   async #enter(room: string, arrival?: Arrival, floorMap = this.#mapOf(room)): Promise<void> {
-    if (this.#isPassing || room === this.#room) return;
-    this.#isPassing = true;
-    this.#isAway = false;
-    if (this.#fetching?.url !== room) this.#stop();
     const { element, sources, announcer } = this.#viewer;
+    const { scene } = sources.ownEntry;
+    if (room === (this.#passing?.room ?? (scene.error ? undefined : this.#room))) return;
+    const passing: Passing = { room, progress: this.#ahead.isFetching(room) ? null : undefined };
+    this.#passing = passing;
+    this.#isAway = false;
     const [from, door] = [this.#room, this.#doors.find((each) => each.to === room)];
     const entry = door && backOf(door, this.#doors);
+    element.requestUpdate();
+    const file = await this.#ahead.take(room, (loaded, total) => {
+      passing.progress = total ? loaded / total : null;
+      element.requestUpdate();
+    });
+    passing.progress = undefined;
+    if (this.#passing !== passing) return;
+    if (!element.isConnected) return void (this.#passing = undefined);
     this.#arrival = arrival ?? (entry && arrivalAt(entry, unitOf(this.#viewer) ?? 1));
     setMapUrl(this.#viewer, floorMap);
-    Object.assign(element, { src: room });
+    // The same address again, after an error.
+    if (this.#src === (file ?? room)) sources.ownEntry.reload();
+    Object.assign(element, { src: (this.#src = file ?? room) });
     await element.updateComplete;
-    const { scene } = sources.ownEntry;
     await scene.settled;
-    this.#isPassing = false;
-    this.#room = room;
-    this.#shownUrl = scene.url;
+    if (this.#passing !== passing) return;
+    this.#passing = undefined;
+    if (scene.error) this.#ahead.forget(room);
+    else this.#room = room;
     this.#showDoors();
     if (scene.error || !element.isConnected) return;
     announcer.value?.say(door?.element.textContent?.trim() ?? '');
@@ -181,63 +197,22 @@ export class Doors implements ReactiveController, Feature {
     if (shownRequest) this.#plan?.show(this.#first, this.#firstMap, this.#doors, this.#room);
   }
 
-  /** Fetches the files behind the doors of the present room, one after the other. One that is on its way stays so. */
+  /** Fetches the files behind the doors of the present room. */
   #fetchAhead(): void {
-    const { state, shownRequest: request } = this.#viewer.sources.ownEntry.scene;
-    if (state !== 'ready' || !request || this.#isPassing) return;
-    const rooms = this.#doors.filter(({ room }) => room === this.#room).map(({ to }) => to);
-    if (this.#fetching && rooms.includes(this.#fetching.url)) return;
-    this.#stop();
+    const { sources, services } = this.#viewer;
+    const { state, shownRequest: request } = sources.ownEntry.scene;
+    if (state !== 'ready' || !request || this.#passing) return;
+    const { credentials, limits } = request;
     // A streamed room fetches what its view needs.
     const isFile = (url: string): boolean =>
-      /^https?:/.test(url) && kindOf({ ...request, url, file: undefined }).name === 'file';
-    const url = rooms.find((room) => !this.#files.has(room) && isFile(room));
-    if (url !== undefined) void this.#fetch((this.#fetching = { url, controller: new AbortController() }), request);
-  }
-
-  #stop(): void {
-    this.#fetching?.controller.abort();
-    this.#fetching = undefined;
-  }
-
-  async #fetch(fetching: Fetching, { credentials, limits }: SceneRequest): Promise<void> {
-    const { services, warn } = this.#viewer;
-    const { url, controller } = fetching;
-    const key = keyOf({ url, credentials });
-    let listener: ProgressListener | undefined;
-    const bytes = services.sceneLoader.fetchFile({ url, credentials, limits }, controller.signal, (...progress) =>
-      listener?.(...progress),
-    );
-    const content = bytes.then(
-      (whole) => new Blob([whole]),
-      () => undefined,
-    );
-    services.sceneLoader.ahead.set(key, (onProgress) => ((listener = onProgress), content));
-    const file = { key, size: 0 };
-    this.#files.set(url, file);
-    try {
-      file.size = (await bytes).byteLength;
-      this.#evict();
-    } catch (error) {
-      // A visitor who goes through the door has the scene requested again, whose error is shown.
-      if (this.#files.get(url) === file) this.#forget(url);
-      if (!controller.signal.aborted && error instanceof GaussianSplatError) warn(error.message);
-    }
-    if (this.#fetching !== fetching) return;
-    this.#fetching = undefined;
-    if (this.#files.has(url)) this.#fetchAhead();
-  }
-
-  /** Forgets the files that were fetched first while all together are too large. */
-  #evict(): void {
-    const sizeOf = (): number => [...this.#files.values()].reduce((sum, { size }) => sum + size, 0);
-    for (const url of this.#files.keys()) if (this.#files.size > 1 && sizeOf() > MAX_BYTES) this.#forget(url);
-  }
-
-  #forget(url: string): void {
-    const file = this.#files.get(url);
-    if (file) this.#viewer.services.sceneLoader.ahead.delete(file.key);
-    this.#files.delete(url);
+      /^https?:/.test(url) &&
+      !HAS_PARTS.test(new URL(url).pathname) &&
+      kindOf({ ...request, url, file: undefined }).name === 'file';
+    const rooms = this.#doors.filter(({ room }) => room === this.#room).map(({ to }) => to);
+    this.#ahead.want(rooms.filter(isFile), (url, signal, onProgress) => {
+      const address = services.urlModifier?.(url) ?? url;
+      return services.sceneLoader.fetchFile({ url: address, credentials, limits }, signal, onProgress);
+    });
   }
 
   /** Returns the door of the present room that is nearest to a point, and its horizontal distance, meters. */
