@@ -1,7 +1,7 @@
 /**
  * `npm test`: installs missing parts (Node packages, a Chromium), builds, and tests the whole product: real Chromium with WebGPU and, beside it, the tests that draw in Node
  * (stages on Dawn, images against the oracle), the tests that need no GPU, types and style. Other ways to call it:
- * `npm test -- PATTERN` the Node test files whose path contains it; `-- --package NAME` the tests of one package; `-- --changed [COMMIT]` those of the packages that changed since a commit (else
+ * `npm test -- PATTERN ...` the test files whose path contains one; `-- --package NAME` the tests of one package; `-- --changed [COMMIT]` those of the packages that changed since a commit (else
  * since this branch left `main`) and of all that depend on them; `-- --full` tests whole lists, not a part of them.
  * `npm run test:lab` is `--lab`: the laboratory's breadth, which the product does not depend on.
  */
@@ -49,7 +49,7 @@ function chosen() {
   const only = (test) => ({ node: node.filter(test), browser: browser.filter(test) });
   if (isFull && words.length === 0) return { node, browser, isWhole: true };
   if (isLab) return only((file) => isLaboratory(file) || hasBreadth(file));
-  const [option, name] = words;
+  const [option = '', name] = words;
   if (option === '--package') return only(ofPackages([known(name)]));
   if (option === '--changed') {
     const { files, packages } = changedPackages(name);
@@ -59,7 +59,7 @@ function chosen() {
     );
     return { ...only((file) => ofPackages(concerned)(file) && !isLaboratory(file)), isFine: true };
   }
-  if (option !== undefined) return { node: node.filter((file) => file.includes(option)), browser: [] };
+  if (option !== '') return only((file) => words.some((word) => file.includes(word)));
   return { ...only((file) => !isLaboratory(file)), isWhole: true };
 }
 

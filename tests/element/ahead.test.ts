@@ -51,7 +51,7 @@ test('a file that fails keeps no other from being fetched, and is tried again in
   assert.deepEqual(asked, ['lost', 'b', 'lost']);
 });
 
-test('a download goes on while it is wanted, or taken; another choice stops it', async () => {
+test('a download continues while it is wanted, or taken; another choice stops it', async () => {
   const { asked, waiting, fetch } = server({ b: 10 });
   const ahead = new Ahead((error) => assert.fail(error));
   ahead.want(['slow', 'b'].map(addressOf), fetch);

@@ -11,7 +11,7 @@ const TRUE: ReadonlyMap<string, string> = new Map([
 
 /**
  * Wraps a component so that some props are assigned to its element only when they change. `@lit/react` assigns every
- * prop in every render, but an equal value counts for these: the camera returns to its orbit, the clock seeks.
+ * prop in every render, but an equal value counts for these: the camera returns to its orbit, the clock seeks, and a visitor who went through a door is back in the first room.
  *
  * @param Component Component of an element, as `createComponent` returns it.
  * @param names Names of these props.

@@ -41,7 +41,7 @@ export const GaussianSplat: React.ForwardRefExoticComponent<GaussianSplatProps> 
     events: HANDLERS,
     displayName: 'GaussianSplat',
   }),
-  ['cameraOrbit', 'cameraTarget', 'fieldOfView', 'currentTime'],
+  ['cameraOrbit', 'cameraTarget', 'fieldOfView', 'currentTime', 'src', 'walkMap'],
 );
 
 export {

@@ -219,11 +219,22 @@ describe('doors', () => {
     const failed = nextEvent(element, 'error', 60_000);
     absent.click();
     await failed;
-    await until(() => !absent.hidden, 'the door is still there');
+    await until(() => element.loaded && !absent.hidden, 'the room before, with its doors');
+    assertEqual(insideOf(element).sources.ownEntry.scene.shownRequest?.url, addressOf('a.splat'), 'scene');
+    const spoken = element.shadowRoot!.querySelector('[role=status]')!;
+    await until(() => /could not be downloaded/.test(spoken.textContent), 'the failure is read');
     await put('absent.splat', await (await fetch(`${folder}/b.splat`)).blob());
     const changed = nextEvent<CustomEvent<{ url: string }>>(element, 'room-change', 60_000);
     absent.click();
     assertEqual((await changed).detail.url, addressOf('absent.splat'), 'room');
+    // Back by the page: its own pose and map, not those of the visitor's way.
+    element.src = `${folder}/a.splat`;
+    await until(() => !absent.hidden && element.loaded, 'the first room again');
+    assertEqual(
+      [element.getAttribute('camera-target'), new URL(element.walkMap!, location.href).href],
+      ['0m 1.6m 0m', addressOf('a.floor')],
+      'target and map',
+    );
 
     const own = doorOf('b', 'a', -1.9, '0deg');
     delete own.dataset.room;
@@ -281,6 +292,7 @@ describe('doors', () => {
     await sendKeys({ press: 'Enter' });
     await changed;
     await until(() => /To b/.test(element.shadowRoot!.querySelector('[role=status]')!.textContent), 'the room is read');
+    assertEqual(element.shadowRoot!.activeElement?.id, 'view', 'the focus after the door');
   });
 
   it('a visitor walks through doors, from room to room', async () => {
@@ -299,6 +311,20 @@ describe('doors', () => {
     }
   });
 
+  it('a walk that begins beside a door stays in its room until the visitor walks', async () => {
+    // The camera is first far from the floor.
+    const element = await showTour({ navigation: 'walk', 'camera-orbit': '0deg 20deg 6m' }, 0, undefined, []);
+    const rooms: string[] = [];
+    element.addEventListener('room-change', ({ detail }) => rooms.push(detail.url));
+    await until(() => element.loaded, 'the first room');
+    element.append(doorOf('a', 'b', 0, '0deg'));
+    await until(() => shownDoors(element).length === 1, 'the door');
+    await until(() => element.getCameraTarget().y > 1.5 && element.getCameraOrbit().phi > 1.5, 'the floor');
+    await atRest(element);
+    await frames(5);
+    assertEqual(rooms, [], 'rooms');
+  });
+
   it('the plan shows all rooms, and a click on one goes there', async () => {
     // The code of the plan is here before the scene.
     const element = await showTour({ 'floor-plan': '' }, 1_500);
@@ -306,6 +332,7 @@ describe('doors', () => {
     await until(() => (plan()?.height ?? 0) > 2.5 * (plan()?.width ?? 1), 'three rooms in a row');
     const changed = nextEvent<CustomEvent<{ url: string }>>(element, 'room-change', 60_000);
     const { left, top, width, height } = plan()!.getBoundingClientRect();
+    assert(height < 0.5 * element.clientHeight && width < 0.5 * element.clientWidth, `a plan of ${width} x ${height}`);
     // The first room is nearest to the viewer: the last is on top.
     const at = { clientX: left + width / 2, clientY: top + height / 8, bubbles: true };
     plan()!.dispatchEvent(new MouseEvent('click', at));

@@ -27,6 +27,10 @@ export function mapUrlOf({ attributes, element }: Viewer): string | null {
   return url === 'auto' ? null : new URL(url, element.baseURI).href;
 }
 
+/** Returns the address of a map as the page rewrites it. */
+export const rewritten = ({ services }: Viewer, url: string | null): string | null =>
+  url && (services.urlModifier?.(url) ?? url);
+
 /** Sets the map of the next scene; null to find its floor in the splats. */
 export function setMapUrl({ element }: Viewer, url: string | null): void {
   Object.assign(element, { walkMap: url });

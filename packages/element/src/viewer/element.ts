@@ -1,5 +1,5 @@
 import { loadModule } from '@gaussian-splat/core';
-import { isServer, type PropertyValues, type ReactiveElement, type TemplateResult } from 'lit';
+import { isServer, nothing, type PropertyValues, type ReactiveElement, type TemplateResult } from 'lit';
 import { adoptStyles, styles } from './styles.js';
 import type { Attributes, FeatureMembers } from './attributes.js';
 import { readAttributes } from './element-attributes.js';
@@ -300,7 +300,7 @@ export class GaussianSplatElement extends ViewingMethods {
       spoken: error ? this.#spokenError(error) : (announcer.value?.text ?? ''),
       slots: features.call('slots').flat(),
     };
-    const parts = features.call('view', model).filter((part) => part !== undefined);
+    const parts = features.call('view', model).map((part) => part ?? nothing);
     return template(model, parts);
   }
 

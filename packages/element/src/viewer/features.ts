@@ -54,7 +54,7 @@ export interface Feature {
   mayMove?(): boolean;
   /** Returns the player of all automatic playback: `player` together with that of the feature. */
   playerWith?(player: Player | undefined): Player | undefined;
-  /** Share of a file that has arrived and the next scene waits for, 0..1; null while unknown, undefined for none. */
+  /** Fraction of a file that has arrived and the next scene waits for, 0..1; null while unknown, undefined for none. */
   progress?(): number | null | undefined;
   /** Help text for the keys, for screen readers. */
   keys?(): string | undefined;
@@ -75,6 +75,8 @@ export interface FeatureRow {
   readonly by?: (viewer: Viewer) => unknown;
   /** Selector of children that need the feature. */
   readonly children?: string;
+  /** Attributes of children that change what the feature shows. `slot` is one of all. */
+  readonly childAttributes?: readonly string[];
   /** Whether the first frame of a scene waits for code that is being loaded. */
   readonly precedesFrames?: boolean;
   /** Imports the code, and returns the feature. */
@@ -119,6 +121,10 @@ export class Features {
   /** Fulfills when the code is loaded that a first frame waits for. Never rejects. */
   get readyForFrames(): Promise<unknown> {
     return Promise.all([...this.#rows.values()].map(([row, lazy]) => row.precedesFrames && lazy.settled));
+  }
+
+  get childAttributes(): readonly string[] {
+    return [...this.#rows.values()].flatMap(([{ childAttributes = [] }]) => childAttributes);
   }
 
   /** Loads the code that attributes need. */

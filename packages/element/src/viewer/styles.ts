@@ -7,7 +7,8 @@ const stylesOf = new WeakMap<ShadowRoot, CSSResult[]>();
  * the style sheets of others. Does nothing in a document without a window, which renders nothing.
  */
 export function adoptStyles(root: ShadowRoot, ...more: CSSResult[]): void {
-  const all = [...(stylesOf.get(root) ?? [styles]), ...more];
+  const before = stylesOf.get(root) ?? [styles];
+  const all = [...before, ...more.filter((each) => !before.includes(each))];
   stylesOf.set(root, all);
   const view = root.ownerDocument.defaultView as (Window & typeof globalThis) | null;
   if (view === null) return;

@@ -31,7 +31,7 @@ export interface TemplateModel {
 const PLAY_SIGN = 'M8 5v14l11-7z';
 
 /** Returns the content of the element's shadow tree. @param parts Those of the features. */
-export function template(model: TemplateModel, parts: readonly TemplateResult[]): TemplateResult {
+export function template(model: TemplateModel, parts: readonly unknown[]): TemplateResult {
   return html`
     ${view(model)} ${slots(model)} ${parts} ${poster(model)} ${model.isLoading ? progressBar(model) : nothing}
     ${model.error ? message(model, model.error) : nothing}

@@ -124,7 +124,8 @@ export class Viewer implements SourceOwner {
         motion.addEventListener('change', onMotion);
         document.addEventListener('visibilitychange', onPageVisibility);
         this.#children ??= new MutationObserver(() => this.features.readChildren());
-        this.#children.observe(element, { childList: true, subtree: true, attributeFilter: ['slot', 'data-orbit'] });
+        const attributeFilter = ['slot', ...this.features.childAttributes];
+        this.#children.observe(element, { childList: true, subtree: true, attributeFilter });
         this.features.readChildren();
         // An eager element that is inserted again after a while reloads even if it is not in view.
         this.sources.request();

@@ -1,4 +1,5 @@
-/** Changes that a framework makes to the children of an element. */
+/** Changes that a framework makes to an element and its children. */
+import type { GaussianSplatElement } from '@gaussian-splat/element';
 import { boxGlb } from '../../../element/browser/support/glb.js';
 import { assert, assertEqual, COMPASS, FIXTURES, frames, until } from '../../../element/browser/support/harness.js';
 import { isGreen, isRed, screenOf } from '../../../element/browser/support/screen.js';
@@ -72,6 +73,21 @@ export function describeScenes(name: string, script: string, toAttributes: (prop
       assertEqual([await at(isGreen), await at(isRed)], [null, 2], 'removed');
       app.unmount();
       assert(place.childElementCount === 0, 'unmounted');
+    });
+
+    it('a rendering leaves the scene to which a door has led', async () => {
+      const { mount } = (await import(/* @vite-ignore */ script)) as App;
+      const place = document.createElement('div');
+      document.body.append(place);
+      const app = mount(place, toAttributes({ src: COMPASS, walkMap: 'auto', loading: 'eager' }), () => undefined);
+      await app.render([]);
+      const element = place.firstElementChild as GaussianSplatElement;
+      await until(() => element.loaded, 'the first room');
+      Object.assign(element, { src: GREEN, walkMap: 'green.floor' });
+      await app.render([]);
+      await frames(3);
+      assertEqual([element.src, element.walkMap], [GREEN, 'green.floor'], 'scene and map');
+      app.unmount();
     });
   });
 }

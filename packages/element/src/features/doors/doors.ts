@@ -2,6 +2,7 @@ import { loadModule, type Vector3 } from '@gaussian-splat/core';
 import type { ReactiveController } from 'lit';
 import { eyeOfPose } from '../../viewer/camera/orbit.js';
 import type { Feature } from '../../viewer/features.js';
+import { visitorMessage } from '../../viewer/errors.js';
 import { unitOf } from '../../viewer/unit.js';
 import type { Viewer } from '../../viewer/viewer.js';
 import { mapUrlOf, setMapUrl } from '../../floor/floor-source.js';
@@ -12,6 +13,8 @@ import type { FloorPlan } from './floor-plan.js';
 
 /** Horizontal distance from a door, meters, at which visitors go through it, and beyond which doors open again after an arrival. */
 const [THROUGH, AWAY] = [0.6, 0.8];
+/** Distance between two frames, meters, beyond which the visitor was put somewhere and did not walk. */
+const JUMP = 1;
 
 /** Files that name others, which are found beside their own address alone. */
 const HAS_PARTS = /\.(json|gltf|lcc2?)$/i;
@@ -19,7 +22,7 @@ const HAS_PARTS = /\.(json|gltf|lcc2?)$/i;
 /** A visitor who is on the way to a room. */
 interface Passing {
   readonly room: string;
-  /** Share of the file of the room that has arrived, 0..1, while it is waited for; null while unknown. */
+  /** Fraction of the file of the room that has arrived, 0..1, while it is waited for; null while unknown. */
   progress: number | null | undefined;
 }
 
@@ -33,11 +36,19 @@ export class Doors implements ReactiveController, Feature {
   #room = '';
   /** Value of `src` that is known here: an address, or the file of a room that was fetched ahead. */
   #src: string | Blob | null | undefined;
+  /** Value of `src` with which the present room is shown. */
+  #srcOfRoom: string | Blob | null | undefined;
   readonly #ahead: Ahead;
   #passing: Passing | undefined;
   #arrival: Arrival | undefined;
   /** Whether the visitor is far enough from all doors to go through one. */
   #isAway = false;
+  /** Position of the visitor in the frame before, viewer space in meters. */
+  #eye: Vector3 | undefined;
+  /** Attributes of the pose: what the page has set, and what the last arrival has put there. */
+  readonly #pose = new Map<string, { readonly authored: string | null; readonly own: string }>();
+  /** Map of the floor that was set last for a room; undefined for none. */
+  #map: string | null | undefined;
   #plan: FloorPlan | undefined;
 
   constructor(viewer: Viewer) {
@@ -99,7 +110,12 @@ export class Doors implements ReactiveController, Feature {
     const eye = eyeOfPose(camera.goal);
     this.#plan?.move(eye, camera.goal.theta);
     const unit = unitOf(this.#viewer) ?? 1;
-    if (navigation !== 'orbit') this.#visitorAt([eye[0] * unit, eye[1] * unit, eye[2] * unit]);
+    if (navigation === 'orbit') return;
+    const [x, y, z] = [eye[0] * unit, eye[1] * unit, eye[2] * unit];
+    const last = this.#eye;
+    this.#eye = [x, y, z];
+    if (!last || Math.hypot(x - last[0], z - last[2]) > JUMP) this.#isAway = false;
+    this.#visitorAt(this.#eye);
   }
 
   /** Goes through the door that a visitor has reached. @param eye Viewer space in meters. */
@@ -113,6 +129,8 @@ export class Doors implements ReactiveController, Feature {
 
   /** The first frame of a room is drawn from its door. */
   async prepareFor(): Promise<void> {
+    // Also of a preview: the doors are those of the room before.
+    if (this.#passing) this.#showDoors(true);
     const arrival = this.#arrival;
     if (!arrival) return;
     this.#arrival = undefined;
@@ -121,9 +139,21 @@ export class Doors implements ReactiveController, Feature {
     // One meter before the eyes, so that the view turns about the visitor.
     const reach = 1 / (unitOf(this.#viewer) ?? 1);
     const target = [eye[0] - reach * Math.sin(heading), eye[1], eye[2] - reach * Math.cos(heading)];
-    element.setAttribute('camera-orbit', `${heading}rad 90deg ${reach}m`);
-    element.setAttribute('camera-target', target.map((value) => `${value}m`).join(' '));
+    this.#setPose('camera-orbit', `${heading}rad 90deg ${reach}m`);
+    this.#setPose('camera-target', target.map((value) => `${value}m`).join(' '));
     await element.updateComplete;
+  }
+
+  #setPose(name: string, own: string): void {
+    const { element } = this.#viewer;
+    const [present, before] = [element.getAttribute(name), this.#pose.get(name)];
+    this.#pose.set(name, { authored: before && present === before.own ? before.authored : present, own });
+    element.setAttribute(name, own);
+  }
+
+  #setMap(url: string | null): void {
+    this.#map = url;
+    setMapUrl(this.#viewer, url);
   }
 
   /** Goes through a door. Resolves when the scene behind it is shown, or has failed. */
@@ -137,15 +167,25 @@ export class Doors implements ReactiveController, Feature {
     this.#passing = this.#arrival = undefined;
     if (!src) return;
     const { element, sources } = this.#viewer;
+    this.#srcOfRoom = src;
     this.#room = typeof src === 'string' ? new URL(src, element.baseURI).href : sources.ownEntry.scene.url;
+    for (const [name, { authored, own }] of this.#pose) {
+      if (element.getAttribute(name) !== own) continue;
+      if (authored === null) element.removeAttribute(name);
+      else element.setAttribute(name, authored);
+    }
+    this.#pose.clear();
     const isOfTour = this.#doors.some(({ room, to }) => room === this.#room || to === this.#room);
-    if (!isOfTour) [this.#first, this.#firstMap] = [this.#room, mapUrlOf(this.#viewer)];
+    const map = mapUrlOf(this.#viewer);
+    const isOwn = this.#map !== undefined && this.#map === map;
+    if (!isOfTour) [this.#first, this.#firstMap] = [this.#room, isOwn ? null : map];
+    if (isOwn) this.#setMap(this.#mapOf(this.#room));
     this.childrenChanged();
   }
 
   /** The latest door wins: a visitor who waits for a room may choose another. */
   async #enter(room: string, arrival?: Arrival, floorMap = this.#mapOf(room)): Promise<void> {
-    const { element, sources, announcer } = this.#viewer;
+    const { element, sources, announcer, camera, surface } = this.#viewer;
     const { scene } = sources.ownEntry;
     if (room === (this.#passing?.room ?? (scene.error ? undefined : this.#room))) return;
     const passing: Passing = { room, progress: this.#ahead.isFetching(room) ? null : undefined };
@@ -153,6 +193,8 @@ export class Doors implements ReactiveController, Feature {
     this.#isAway = false;
     const [from, door] = [this.#room, this.#doors.find((each) => each.to === room)];
     const entry = door && backOf(door, this.#doors);
+    const hasFocus = this.#doors.some((each) => each.element === element.ownerDocument.activeElement);
+    const here: Arrival = { eye: eyeOfPose(camera.goal), heading: camera.goal.theta };
     element.requestUpdate();
     const file = await this.#ahead.take(room, (loaded, total) => {
       passing.progress = total ? loaded / total : null;
@@ -162,7 +204,7 @@ export class Doors implements ReactiveController, Feature {
     if (this.#passing !== passing) return;
     if (!element.isConnected) return void (this.#passing = undefined);
     this.#arrival = arrival ?? (entry && arrivalAt(entry, unitOf(this.#viewer) ?? 1));
-    setMapUrl(this.#viewer, floorMap);
+    this.#setMap(floorMap);
     // The same address again, after an error.
     if (this.#src === (file ?? room)) sources.ownEntry.reload();
     Object.assign(element, { src: (this.#src = file ?? room) });
@@ -170,13 +212,27 @@ export class Doors implements ReactiveController, Feature {
     await scene.settled;
     if (this.#passing !== passing) return;
     this.#passing = undefined;
-    if (scene.error) this.#ahead.forget(room);
-    else this.#room = room;
+    // The keyboard continues from the frame, because the door is hidden.
+    if (hasFocus) surface?.focus({ preventScroll: true });
+    if (scene.error) return this.#goBack(room, here);
+    [this.#room, this.#srcOfRoom] = [room, this.#src];
     this.#showDoors();
-    if (scene.error || !element.isConnected) return;
+    if (!element.isConnected) return;
     announcer.value?.say(door?.element.textContent?.trim() ?? '');
     element.dispatchEvent(new CustomEvent('room-change', { detail: { url: room, from } }));
     this.#fetchAhead();
+  }
+
+  /** Shows the room again from which a visitor comes, because the one behind the door has failed. */
+  #goBack(failed: string, here: Arrival): void {
+    const { element, sources, announcer, strings } = this.#viewer;
+    const { error } = sources.ownEntry.scene;
+    this.#ahead.forget(failed);
+    this.#arrival = here;
+    this.#setMap(this.#mapOf(this.#room));
+    this.#showDoors();
+    Object.assign(element, { src: (this.#src = this.#srcOfRoom) });
+    if (error) announcer.value?.say(visitorMessage(error, strings));
   }
 
   /** Map of the floor of a room: that of any door that leads there. */
@@ -185,9 +241,9 @@ export class Doors implements ReactiveController, Feature {
     return this.#doors.find(({ to, floorMap }) => to === room && floorMap !== null)?.floorMap ?? null;
   }
 
-  /** Shows the doors of the present room alone. */
-  #showDoors(): void {
-    for (const { element, room } of this.#doors) element.hidden = room !== this.#room;
+  /** Shows the doors of the present room alone; none between two rooms. */
+  #showDoors(isBetween = false): void {
+    for (const { element, room } of this.#doors) element.hidden = isBetween || room !== this.#room;
     this.#showPlan();
   }
 

@@ -2,20 +2,26 @@ import type { Vector3 } from '@gaussian-splat/core';
 import type { FloorMap } from '@gaussian-splat/formats/floor';
 import { css } from 'lit';
 import { eyeOfPose } from '../../viewer/camera/orbit.js';
-import { openFloor } from '../../floor/floor-source.js';
+import { openFloor, rewritten } from '../../floor/floor-source.js';
 import { adoptStyles } from '../../viewer/styles.js';
 import { unitOf } from '../../viewer/unit.js';
 import type { Viewer } from '../../viewer/viewer.js';
 import { onPlan, placeRooms, type Door, type Placed } from './rooms.js';
 
+/** Distance of the plan from the edge of its box, CSS pixels. */
+const PADDING = 6;
 const STYLES = css`
   [part='floor-plan'] {
     position: absolute;
     inset-block-start: 8px;
     inset-inline-end: 8px;
     inline-size: var(--floor-plan-width, 180px);
+    block-size: auto;
     max-inline-size: 40%;
-    padding: 6px;
+    max-block-size: 45%;
+    box-sizing: border-box;
+    object-fit: contain;
+    padding: ${PADDING}px;
     border-radius: 8px;
     background: var(--interaction-prompt-background, rgb(0 0 0 / 0.6));
     cursor: pointer;
@@ -115,10 +121,11 @@ export class FloorPlan {
     return map;
   }
 
-  async #open(mapUrl: string): Promise<FloorMap | undefined> {
+  async #open(address: string): Promise<FloorMap | undefined> {
     const { services, sources, frame } = this.#viewer;
     const request = sources.ownEntry.scene.shownRequest;
     if (!request) return undefined;
+    const mapUrl = rewritten(this.#viewer, address);
     const source = { loader: services.sceneLoader, request, mapUrl, frame, metersPerUnit: unitOf(this.#viewer) ?? 1 };
     return openFloor({ ...source, eyeHeight: 0, near: [0, 0, 0] }, this.#loading.signal).catch((error: Error) => {
       if (!this.#loading.signal.aborted) this.#viewer.warn(error.message);
@@ -172,13 +179,20 @@ export class FloorPlan {
 
   /** Returns the room whose floor is at CSS pixels of the plan, or the nearest floor of another room. */
   #roomAt(offsetX: number, offsetY: number): Room | undefined {
-    const factor = this.#canvas.width / this.#canvas.clientWidth;
+    const { width, height, clientWidth, clientHeight } = this.#canvas;
+    const [inner, innerHeight] = [clientWidth - 2 * PADDING, clientHeight - 2 * PADDING];
+    // The plan is as large as fits, in the middle.
+    const factor = Math.max(width / inner, height / innerHeight);
+    const at = [
+      (offsetX - PADDING - inner / 2) * factor + width / 2,
+      (offsetY - PADDING - innerHeight / 2) * factor + height / 2,
+    ];
     const distanceTo = ({ placed, map }: Room): number => {
       let best = Infinity;
       for (let i = 0; i < map.width * map.depth; i++) {
         if (map.layers.every((layer) => Number.isNaN(layer[i]))) continue;
         const [x, z] = this.#pixel(onPlan(placed, [map.corner[0] + (i % map.width) * map.cell, map.corner[1] + Math.floor(i / map.width) * map.cell])); // prettier-ignore
-        best = Math.min(best, Math.hypot(x - offsetX * factor, z - offsetY * factor));
+        best = Math.min(best, Math.hypot(x - at[0], z - at[1]));
       }
       return best;
     };

@@ -34,6 +34,7 @@ export const views: FeatureRow = {
   attributes: VIEWS_ATTRIBUTES,
   by: ({ attributes }) => attributes.views,
   children: ':scope>[data-orbit]',
+  childAttributes: ['data-orbit'],
   open: async (viewer) => {
     const [{ Tour }] = await Promise.all([import('./tour.js'), viewer.announcer.get()]);
     return new Tour(viewer);

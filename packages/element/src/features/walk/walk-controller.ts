@@ -10,7 +10,7 @@ import type { Feature } from '../../viewer/features.js';
 import { LatestTask } from '../../viewer/latest-task.js';
 import { unitOf } from '../../viewer/unit.js';
 import type { Viewer } from '../../viewer/viewer.js';
-import { mapUrlOf, openFloor } from '../../floor/floor-source.js';
+import { mapUrlOf, openFloor, rewritten } from '../../floor/floor-source.js';
 import { Gamepads } from './gamepads.js';
 import { Joystick } from './joystick.js';
 import { FloorBody } from '../../floor/floor-body.js';
@@ -215,7 +215,7 @@ export class WalkController implements ReactiveController, Feature {
     const options = { loader: services.sceneLoader, request, frame, metersPerUnit, eyeHeight, near };
     this.#opening.run(
       async (signal) => {
-        const map = await openFloor({ ...options, mapUrl: mapUrlOf(this.#viewer) }, signal);
+        const map = await openFloor({ ...options, mapUrl: rewritten(this.#viewer, mapUrlOf(this.#viewer)) }, signal);
         if (signal.aborted) return;
         if (map.area < MIN_AREA) return this.#refuse(`its floor has ${map.area.toFixed(1)} m², ${MIN_AREA} are needed`);
         this.#begin(map);

@@ -5,7 +5,7 @@ import { lengthGrammar } from '../../viewer/camera/lengths.js';
 import { unitOf } from '../../viewer/unit.js';
 import { prefersReducedMotion } from '../../viewer/motion.js';
 import type { Viewer } from '../../viewer/viewer.js';
-import { mapUrlOf, openFloor } from '../../floor/floor-source.js';
+import { mapUrlOf, openFloor, rewritten } from '../../floor/floor-source.js';
 import { GlDrawing } from './gl-drawing.js';
 import { GpuDrawing, gpuOf } from './gpu-drawing.js';
 import { BindingTarget, CopyTarget } from './gpu-targets.js';
@@ -128,7 +128,7 @@ async function findFloor(core: Viewer, unit: number, signal: AbortSignal): Retur
   const source = {
     loader: services.sceneLoader,
     request,
-    mapUrl: mapUrlOf(core),
+    mapUrl: rewritten(core, mapUrlOf(core)),
     frame,
     metersPerUnit: unit,
     eyeHeight,
