@@ -244,7 +244,7 @@ it('what a shader moves has a pause button, stands still with reduced motion, an
     await delay(300);
     return submits > before;
   };
-  assert(await moves(), 'it moves');
+  await until(moves, 'it moves');
   buttonOf(element)!.click();
   await until(
     () => buttonOf(element)?.getAttribute('aria-label') === 'Start the motion',
