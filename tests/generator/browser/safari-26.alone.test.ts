@@ -11,8 +11,19 @@ import { isFull, isLab } from '../../support/extent-in-pages.js';
 import { CAMERA } from './support.js';
 
 const FAMILIES = [
-  ...['scaffold', 'octree-round', 'hexplane'],
-  ...(isLab ? ['classic-view', 'avatar', 'feed-forward-1', 'octree-progressive', 'octree-ceil', 'feed-forward-2'] : []),
+  'hexplane',
+  ...(isLab
+    ? [
+        'scaffold',
+        'octree-round',
+        'classic-view',
+        'avatar',
+        'feed-forward-1',
+        'octree-progressive',
+        'octree-ceil',
+        'feed-forward-2',
+      ]
+    : []),
   ...(isLab ? ['spacetime', 'deformable', '4dgs', 'avatar-instances', 'hexplane-instances', 'style', 'noise'] : []),
 ];
 const POST_PROCESSORS = ['style', 'noise'];

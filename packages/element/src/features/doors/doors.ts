@@ -8,7 +8,7 @@ import type { Viewer } from '../../viewer/viewer.js';
 import { mapUrlOf, setMapUrl } from '../../floor/floor-source.js';
 import { kindOf } from '../../sources/source-kinds.js';
 import { Ahead } from './ahead.js';
-import { arrivalAt, backOf, readDoors, type Arrival, type Door } from './rooms.js';
+import { addressOf, arrivalAt, backOf, readDoors, type Arrival, type Door } from './rooms.js';
 import type { FloorPlan } from './floor-plan.js';
 
 /** Horizontal distance from a door, meters, at which visitors go through it, and beyond which doors open again after an arrival. */
@@ -168,7 +168,7 @@ export class Doors implements ReactiveController, Feature {
     if (!src) return;
     const { element, sources } = this.#viewer;
     this.#srcOfRoom = src;
-    this.#room = typeof src === 'string' ? new URL(src, element.baseURI).href : sources.ownEntry.scene.url;
+    this.#room = typeof src === 'string' ? addressOf(src, element) : sources.ownEntry.scene.url;
     for (const [name, { authored, own }] of this.#pose) {
       if (element.getAttribute(name) !== own) continue;
       if (authored === null) element.removeAttribute(name);
@@ -262,6 +262,7 @@ export class Doors implements ReactiveController, Feature {
     // A streamed room fetches what its view needs.
     const isFile = (url: string): boolean =>
       /^https?:/.test(url) &&
+      URL.canParse(url) &&
       !HAS_PARTS.test(new URL(url).pathname) &&
       kindOf({ ...request, url, file: undefined }).name === 'file';
     const rooms = this.#doors.filter(({ room }) => room === this.#room).map(({ to }) => to);

@@ -24,12 +24,16 @@ export interface Arrival {
 /** Distance from the door, in meters, at which visitors arrive. */
 const BEFORE_DOOR = 1;
 
+/** Returns the absolute address of a room; a text that is none unchanged, which its load reports. */
+export const addressOf = (url: string, { baseURI }: Node): string =>
+  URL.canParse(url, baseURI) ? new URL(url, baseURI).href : url;
+
 /**
  * Returns the doors among the children of an element. A door without a position is left out, with a warning.
  * @param first URL of the scene that the element shows first, for doors without `data-room`.
  */
 export function readDoors(element: HTMLElement, first: string, warn: (sentence: string) => void): Door[] {
-  const absolute = (url: string): string => new URL(url, element.baseURI).href;
+  const absolute = (url: string): string => addressOf(url, element);
   return [...element.querySelectorAll<HTMLElement>(':scope > [data-door]')].flatMap((child) => {
     const { door, room, position = '', heading = '0', floorMap } = child.dataset;
     const at = parsePoint(position);
