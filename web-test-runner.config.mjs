@@ -112,7 +112,6 @@ function countReporter() {
         // Tests that a failed hook has ended before they began have no message.
         for (const { name, error } of found)
           process.stdout.write(failureLine(relative(root, testFile), name, (error ?? errors[0])?.message));
-        console.log(`Failed: ${Math.max(1, countOf(testResults).failed)} of ${testFile}`);
       }
       console.log(`Chromium: ${passed} passed, ${failed + broken} failed, ${skipped} skipped`);
     },

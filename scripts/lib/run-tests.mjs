@@ -1,8 +1,7 @@
 /** Runs test files of Node and of Chromium beside each other, and counts. */
 import { availableParallelism } from 'node:os';
-import { relative } from 'node:path';
 import { runAsync } from './processes.mjs';
-import { root, TSC } from './run.mjs';
+import { TSC } from './run.mjs';
 import { byGroup, byProcess, isLaboratory } from './test-files.mjs';
 
 /** Files that are given a second chance alone, at most: more than that is no matter of a busy machine. */
@@ -39,7 +38,7 @@ export async function runTests({ node, browser }, { env, built, isStatic = false
     built.then(() => runSharing(together, options)),
     inTurn(...(isStatic ? [() => runStatic(options)] : []), () => built.then(() => runAlone(alone, 2, options))),
   ]);
-  return results.flat().reduce(sum, NONE);
+  return total(await secondChance(results.flat(), options));
 }
 
 /** Counts of some runs, one after the other. */
@@ -49,7 +48,7 @@ async function inTurn(...runs) {
   return counts.flat();
 }
 
-/** Every file in its own process, on half of the CPU cores. A few that fail run once more, alone. */
+/** Every file in its own process, on half of the CPU cores. */
 async function runEach({ node, browser }, env) {
   const optionsAt = (slot) => ({
     env: { ...env, NODE_ENV: 'test', TEST_PORT: String(8000 + PORT_STEP * slot) },
@@ -58,8 +57,8 @@ async function runEach({ node, browser }, env) {
   const { sharing, together, alone } = byProcess(node);
   const { timing, ...others } = byGroup(browser);
   const longestFirst = (files) => [...files].sort((a, b) => isLaboratory(b) - isLaboratory(a));
-  const inNode = (files) => files.map((file) => ({ file, run: (options) => runAlone([file], 1, options) }));
-  const ofGroup = ([group, files]) => files.map((file) => ({ file, run: (o) => inChromium(group, [file], o) }));
+  const inNode = (files) => files.map((file) => (options) => runAlone([file], 1, options));
+  const ofGroup = ([group, files]) => files.map((file) => (options) => inChromium(group, [file], options));
   // Files that are alone take longest, above all those of the laboratory, and come first.
   const jobs = [
     ...inNode(longestFirst(alone)),
@@ -69,22 +68,41 @@ async function runEach({ node, browser }, env) {
   ];
   const results = [];
   const work = async (slot) => {
-    for (let job = jobs.shift(); job !== undefined; job = jobs.shift())
-      results.push({ job, counts: await job.run(optionsAt(slot)) });
+    for (let job = jobs.shift(); job !== undefined; job = jobs.shift()) results.push(await job(optionsAt(slot)));
   };
   await Promise.all(Array.from({ length: availableParallelism() >> 1 }, (_, slot) => work(slot)));
-  const failed = results.filter(({ counts }) => counts.failed > 0);
-  for (const result of failed.length > MAX_UNSTEADY ? [] : failed) {
-    const counts = await result.job.run(optionsAt(0));
-    if (counts.failed > 0) continue;
-    console.log(unsteady(result.job.file));
-    result.counts = counts;
-  }
-  return results.map(({ counts }) => counts).reduce(sum, NONE);
+  return total(await secondChance(results, optionsAt(0)));
 }
 
-const unsteady = (file) => `unsteady: ${file} failed beside the others and passed alone`;
+/**
+ * Pages draw on the CPU, and connections have time limits: a few files that fail while the machine is busy run once more, alone. One that passes then is named as unsteady; one that fails again has failed.
+ */
+async function secondChance(results, options) {
+  const failed = results.flatMap((result) =>
+    [...(result.failedIn ?? [])].map(([file, count]) => ({ result, file, count })),
+  );
+  if (failed.length > MAX_UNSTEADY) return results;
+  for (const { result, file, count } of failed) {
+    const again = await rerun(file, result.group, { ...options, isBeside: false });
+    if (again.failed > 0 || again.passed === 0) continue;
+    console.log(`unsteady: ${file} failed beside the others and passed alone`);
+    result.passed += count;
+    result.failed -= count;
+    result.failures = result.failures.filter((line) => !line.includes(`${file}:`));
+  }
+  return results;
+}
+
+const rerun = (file, group, options) =>
+  !file.endsWith('.test.ts')
+    ? NONE
+    : group === undefined
+      ? runAlone([file], 1, options)
+      : inChromium(group === 'dense' ? group : 'timing', [file], options);
+
 const NONE = { passed: 0, failed: 0, skipped: 0, failures: [] };
+
+const total = (results) => results.reduce(sum, NONE);
 
 function sum(a, b) {
   return {
@@ -117,7 +135,7 @@ async function runNode(files, concurrency, options, count) {
     '--test-reporter-destination=stdout',
   ]);
   const args = ['--import', 'tsx', '--test', `--test-concurrency=${concurrency}`, ...reporters, ...files];
-  return countsOf('Node', await runAsync(process.execPath, args, options));
+  return countsOf('Node', await runAsync(process.execPath, args, options), files);
 }
 
 /** Types of the tests and the style of everything: one failure each, if any. */
@@ -130,53 +148,34 @@ async function runStatic(options) {
   return counts;
 }
 
-/**
- * The pages draw on the CPU, and some tests measure times: a few files that fail while the machine is busy run once more, alone. One that passes then is named as unsteady; one that fails again has failed.
- */
 async function runBrowser(groups, options) {
   const results = [];
   for (const [group, files] of Object.entries(groups))
-    if (files.length > 0) results.push({ group, ...(await inChromium(group, files, options)) });
-  const failed = results.flatMap(({ group, failedIn }) =>
-    [...failedIn].map(([file, count]) => ({ group, file, count })),
-  );
-  if (failed.length > MAX_UNSTEADY) return results;
-  for (const { group, file, count } of failed) {
-    const again = await inChromium(group === 'dense' ? group : 'timing', [file], options);
-    if (again.failed > 0) continue;
-    console.log(unsteady(file));
-    const result = results.find(({ failedIn }) => failedIn.has(file));
-    result.passed += count;
-    result.failed -= count;
-    result.failures = result.failures.filter((line) => !line.includes(`${file}:`));
-  }
+    if (files.length > 0) results.push(await inChromium(group, files, options));
   return results;
 }
 
-/** Counts of one group of files, and those that failed with how many of their tests did. */
 async function inChromium(group, files, options) {
   const args = ['node_modules/@web/test-runner/dist/bin.js', '--config', 'web-test-runner.config.mjs'];
   const env = { ...options.env, TEST_GROUP: group, TEST_FILES: files.join(' ') };
-  const result = await runAsync(process.execPath, args, { ...options, env });
-  const failedIn = new Map(
-    [...result.text.matchAll(/^Failed: (\d+) of (.+)$/gm)].map(([, count, file]) => [
-      relative(root, file).replaceAll('\\', '/'),
-      Number(count),
-    ]),
-  );
-  return { ...countsOf('Chromium', result), failedIn };
+  return { group, ...countsOf('Chromium', await runAsync(process.execPath, args, { ...options, env }), files) };
 }
 
-/** The sentence of a closing line. A run that failed without naming a test counts as a failure. */
-function countsOf(name, { text, status }) {
+/** The sentence of a closing line, and the files that failed. A run that failed without naming a test counts as a failure, of its file if it has one. */
+function countsOf(name, { text, status }, files) {
   const line = new RegExp(`^${name}: (\\d+) passed, (\\d+) failed, (\\d+) skipped$`, 'm').exec(text);
   const [, passed = 0, failed = 0, skipped = 0] = line?.map(Number) ?? [];
   const failures = [...text.matchAll(/^Failed test: .+$/gm)].map(([failure]) => failure);
-  if (status === 0 || failed > 0) return { passed, failed, skipped, failures };
+  const failedIn = new Map();
+  for (const failure of failures) {
+    const [, file] = /^Failed test: ([^:]+): /.exec(failure) ?? [];
+    failedIn.set(file, (failedIn.get(file) ?? 0) + 1);
+  }
+  if (status === 0 || failed > 0) return { passed, failed, skipped, failures, failedIn };
+  const [file = ''] = files;
+  const ended = `Failed test: ${file}: the run of ${name} ended with status ${status}`;
   return {
-    passed,
-    failed: 1,
-    skipped,
-    failures: [...failures, `Failed: the run of ${name} ended with status ${status}`],
+    ...{ passed, failed: 1, skipped, failures: [...failures, ended] },
+    failedIn: new Map(files.length === 1 ? [[file, 1]] : []),
   };
 }

@@ -4,6 +4,12 @@
  */
 export const SILENCE_MS = 30_000;
 const SILENCE_BYTES = 1024;
+/**
+ * Codes of Node for a kept connection that the server closed meanwhile. Browsers send such a request again by
+ * themselves (RFC 9112, 9.3.1), Node does not.
+ */
+const CLOSED = /^(ECONNRESET|EPIPE|UND_ERR_SOCKET)$/;
+const MAX_REPEATS = 2;
 
 /** A server or connection that sent too little data within {@link SILENCE_MS}. */
 export class SilenceError extends Error {
@@ -20,12 +26,22 @@ export async function fetchPatiently(url: string | URL, { signal, ...init }: Req
   const timer = setTimeout(() => silence.abort(new SilenceError()), SILENCE_MS);
   const either = signal ? AbortSignal.any([signal, silence.signal]) : silence.signal;
   try {
-    return await fetch(url, { ...init, signal: either });
+    return await send(url, { ...init, signal: either });
   } catch (error) {
     signal?.throwIfAborted();
     throw silence.signal.aborted ? silence.signal.reason : error;
   } finally {
     clearTimeout(timer);
+  }
+}
+
+async function send(url: string | URL, init: RequestInit, repeats = 0): Promise<Response> {
+  try {
+    return await fetch(url, init);
+  } catch (error) {
+    const { code = '' } = ((error as Error | undefined)?.cause as { code?: string } | undefined) ?? {};
+    if (repeats === MAX_REPEATS || !CLOSED.test(code)) throw error;
+    return send(url, init, repeats + 1);
   }
 }
 
