@@ -132,12 +132,13 @@ test('ZIP64, with sizes behind the content', async () => {
 });
 
 test('directories that announce more than they hold are refused at once', async () => {
-  const start = performance.now();
+  const start = process.cpuUsage();
   for (const count of [2, 99_999, 4e9]) {
     const code = count > 1e5 ? 'decode/unsupported' : 'decode/corrupt';
     await expectRefusal(inZip64(ksplat, 'scene.ksplat', count), code, /found (1 of|4,000)/, { name: 'a.zip' });
   }
-  assert.ok(performance.now() - start < 1_000, `${performance.now() - start} ms`);
+  const { user } = process.cpuUsage(start);
+  assert.ok(user < 1e6, `${user / 1e6} s`);
 });
 
 test('content that is not what was packed is refused by name', async () => {

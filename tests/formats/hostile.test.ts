@@ -212,7 +212,7 @@ test('lists within lists within lists, where a description has something else, a
 });
 
 test('texts whose patterns could be matched in countless ways are read or refused at once', async () => {
-  const start = performance.now();
+  const start = process.cpuUsage();
   await expectRefusal(Buffer.from(`${'<!---->'.repeat(140)}x`), 'decode/unknown-format', /a text: "<!---->/);
   const spaces = '\xa0'.repeat(200_000);
   for (const comment of [
@@ -235,5 +235,6 @@ test('texts whose patterns could be matched in countless ways are read or refuse
     const error = await refusalOf(Buffer.from(JSON.stringify(tileset)), { name: 'tileset.json', openFile });
     assert.match(error?.message ?? '', sentence);
   }
-  assert.ok(performance.now() - start < 2000, `${performance.now() - start} ms`);
+  const { user } = process.cpuUsage(start);
+  assert.ok(user < 2e6, `${user / 1e6} s`);
 });

@@ -231,7 +231,7 @@ after(() => {
 for (const name of someOf(names, Math.ceil(names.length / 2))) {
   const k = names.indexOf(name);
   const [outcome] = SERVERS[name];
-  test(`${name}: ${outcome}`, { timeout: 120_000 }, async () => {
+  test(`${name}: ${outcome}`, { timeout: 500_000 }, async () => {
     const start = performance.now();
     const options: FetchSceneOptions = { maxBytes: MAX_BYTES };
     const found = await fetchScene(address(k), options).then(
@@ -307,7 +307,7 @@ const OTHERS: Readonly<Record<string, (url: string) => Promise<unknown>>> = {
 };
 
 for (const [what, open] of Object.entries(OTHERS))
-  test(`servers that never answer, stop or drip end ${what}, too`, { timeout: 120_000 }, async () => {
+  test(`servers that never answer, stop or drip end ${what}, too`, { timeout: 500_000 }, async () => {
     const cases = someOf(['headers, then silence', 'no answer', 'a byte at a time', 'a part, then silence'], 2);
     const tried = cases.map(async (name) => {
       const k = names.indexOf(name);

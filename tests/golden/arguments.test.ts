@@ -3,6 +3,7 @@ import assert from 'node:assert/strict';
 import { after, test } from 'node:test';
 import { cameraFromCalibration, type CalibratedView } from '@gaussian-splat/core';
 import { GaussianBuffers, packGaussians } from '@gaussian-splat/renderer';
+import { someOf } from '../support/extent.js';
 import { cloudOf } from '../support/clouds.js';
 import { anyDevice, endNodeDevice } from '../support/node-device.js';
 import { cameraAt } from '../support/scenes.js';
@@ -136,7 +137,7 @@ test('targets that encode what is written hold the same numbers as others', asyn
     [target, staging, renderer].forEach((thing) => thing.destroy());
     return found;
   };
-  for (const rasterizer of ['quads', 'tiles'] as const) {
+  for (const rasterizer of someOf(['quads', 'tiles'] as const, 1)) {
     const plain = await bytes(rasterizer, 'rgba8unorm');
     const encoding = await bytes(rasterizer, 'rgba8unorm-srgb');
     assert.ok(plain.some((byte) => byte > 200));

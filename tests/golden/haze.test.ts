@@ -3,6 +3,7 @@ import assert from 'node:assert/strict';
 import { after, test } from 'node:test';
 import type { GaussianCloud } from '@gaussian-splat/core';
 import { requestNodeAdapter } from '../../packages/cli/src/lib/node-gpu.mjs';
+import { someOf } from '../support/extent.js';
 import { cloudOf, repeat } from '../support/clouds.js';
 import { compareWithOracle } from '../support/compare.js';
 import { anyDevice, asOnSwiftShader, endNodeDevice } from '../support/node-device.js';
@@ -49,7 +50,7 @@ test('quads that blend in float32 keep haze', async (t) => {
 
 test('the figures of docs/stability.md: quads in float16, and tiles', async () => {
   const device = await anyDevice();
-  for (const { name, cloud } of CASES) {
+  for (const { name, cloud } of someOf(CASES, 2)) {
     const quads = await closeness(device, cloud, { rasterizer: 'quads', accumulation: 'rgba16float' });
     const tiles = await closeness(device, cloud, { rasterizer: 'tiles' });
     console.log(`${name}: quads in float16 ${quads.toFixed(1)} dB, tiles ${tiles.toFixed(1)} dB`);

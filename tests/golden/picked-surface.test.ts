@@ -77,7 +77,7 @@ for (const [noise, shape] of [
     assert.ok(turned < 0.4, `${turned} rad`);
   });
 
-test('an orthographic image: a smooth plane has its depth and normal', async () => {
+test('an orthographic image: a smooth plane has its depth and normal', { skip: onlyInLab }, async () => {
   const camera: Camera = { ...CAMERA, orthographic: true, fx: 150, fy: 150, near: 0.05 };
   const lean = (35 * Math.PI) / 180;
   const found = await picks(roughPlane({ noise: 0.002, shape: 'flat', lean, distance: 3 }), camera, [100, 80]);

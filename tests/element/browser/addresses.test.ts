@@ -4,6 +4,7 @@
  */
 import '@gaussian-splat/element';
 import { GaussianSplatElement } from '@gaussian-splat/element';
+import { itInLab } from '../../support/extent-in-pages.js';
 import { assert, assertEqual, COMPASS, delay, nextEvent, show, until } from './support/harness.js';
 
 const FOLDER = '/net/kept/addresses/';
@@ -48,7 +49,7 @@ describe('untrusted scenes', () => {
     assertEqual(await shown(), [[], true], 'one that the page allows');
   });
 
-  it('a missing frame is requested at growing intervals, and reported once', async () => {
+  itInLab('a missing frame is requested at growing intervals, and reported once', async () => {
     const ball = await (await fetch(COMPASS)).arrayBuffer();
     await keep({ 'b.splat': ball, 'missing.json': sequence(['b.splat', 'none.splat', 'b.splat?2'], 20) });
     const element = show({ src: `${FOLDER}missing.json`, loop: '' });

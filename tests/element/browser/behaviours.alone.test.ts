@@ -2,6 +2,7 @@
 import '@gaussian-splat/element';
 import type { GaussianSplatElement } from '@gaussian-splat/element';
 import { emulateMedia, resetMouse, sendKeys, sendMouse } from '@web/test-runner-commands';
+import { itInLab } from '../../support/extent-in-pages.js';
 import {
   assert,
   assertEqual,
@@ -135,7 +136,7 @@ describe('the interaction prompt', () => {
     assertEqual([partOf(plain, '.prompt'), partOf(none, '.prompt')], [null, null]);
   });
 
-  it('that wiggles moves the camera to and fro and leaves it where it was', async () => {
+  itInLab('that wiggles moves the camera to and fro and leaves it where it was', async () => {
     // A busy machine sees few moments of it.
     hurry(0.5);
     const element = await showLoaded({ ...prompted, 'interaction-prompt-style': 'wiggle' });

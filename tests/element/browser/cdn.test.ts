@@ -29,20 +29,23 @@ describe('the CDN build', () => {
     assert(workers.length === 1 && workers[0].startsWith('blob:'), `one worker by way of a blob: ${workers.join(' ')}`);
   });
 
-  it('keeps its worker in a sandboxed frame, whose origin is none, as editors of code on the web have them', async () => {
-    const origin = await (await fetch('/net/other-origin')).text();
-    const page = await (await fetch(`${FIXTURES}sandboxed.html`)).text();
-    const places = { src: `${origin}/fixtures/sandboxed.html`, srcdoc: `<base href="${origin}/fixtures/" />${page}` };
-    for (const [name, value] of someOf(Object.entries(places), 1)) {
-      const frame = document.createElement('iframe');
-      frame.sandbox.add('allow-scripts');
-      frame.setAttribute(name, value);
-      const answer = nextEvent<MessageEvent<Record<string, unknown>>>(window, 'message');
-      document.body.append(frame);
-      const { data } = await answer;
-      assertEqual([data.error, data.loaded, data.warnings, data.origin], [undefined, true, [], 'null'], name);
-    }
-  });
+  itInLab(
+    'keeps its worker in a sandboxed frame, whose origin is none, as editors of code on the web have them',
+    async () => {
+      const origin = await (await fetch('/net/other-origin')).text();
+      const page = await (await fetch(`${FIXTURES}sandboxed.html`)).text();
+      const places = { src: `${origin}/fixtures/sandboxed.html`, srcdoc: `<base href="${origin}/fixtures/" />${page}` };
+      for (const [name, value] of someOf(Object.entries(places), 1)) {
+        const frame = document.createElement('iframe');
+        frame.sandbox.add('allow-scripts');
+        frame.setAttribute(name, value);
+        const answer = nextEvent<MessageEvent<Record<string, unknown>>>(window, 'message');
+        document.body.append(frame);
+        const { data } = await answer;
+        assertEqual([data.error, data.loaded, data.warnings, data.origin], [undefined, true, [], 'null'], name);
+      }
+    },
+  );
 
   it('fetches from there what streamed scenes, sequences and refused files need, and only for them', async () => {
     const origin = await (await fetch('/net/other-origin')).text();

@@ -144,7 +144,7 @@ describe('a clip', () => {
     assertEqual(waits, 0, 'waits');
   });
 
-  it('waits for frames in transit, also after a late frame, and continues from there', async () => {
+  itInLab('waits for frames in transit, also after a late frame, and continues from there', async () => {
     const gate = `clip-${Math.round(performance.timeOrigin)}`;
     const element = await showLoaded({ src: `${CLIP}?gate=${gate}` });
     const said: string[] = [];
@@ -163,7 +163,7 @@ describe('a clip', () => {
     assertEqual(order.slice(0, 4), ['playing', 'waiting', 'canplay', 'playing'], 'events');
   });
 
-  it('that is replaced on its server while it plays continues with the new version', async () => {
+  itInLab('that is replaced on its server while it plays continues with the new version', async () => {
     const gate = `replaced-${Math.round(performance.timeOrigin)}`;
     const element = await showLoaded({ src: `${CLIP}?frames=84&replaced=${gate}` });
     assertEqual(element.duration, 8.4, 'duration');

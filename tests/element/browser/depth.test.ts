@@ -2,7 +2,7 @@
 import '@gaussian-splat/element';
 import type { GaussianSplatElement, MeasuredView } from '@gaussian-splat/element';
 import type { SplatSceneElement } from '@gaussian-splat/element/scenes.js';
-import { isLab } from '../../support/extent-in-pages.js';
+import { itInLab, isLab } from '../../support/extent-in-pages.js';
 import { assert, assertEqual, COMPASS, FIXTURES, showLoaded } from './support/harness.js';
 
 const GREEN = `${FIXTURES}green.splat`;
@@ -67,7 +67,7 @@ describe('renderDepth()', () => {
     assert(without.owners[0] === element, 'owner of the smaller view');
   });
 
-  it('follows parallel rays, and leaves the page as it was', async () => {
+  itInLab('follows parallel rays, and leaves the page as it was', async () => {
     const element = await showLoaded({ ...VIEW, src: COMPASS, orthographic: '' }, SIZE);
     const before = element.toDataURL();
     const view = await element.renderDepth();

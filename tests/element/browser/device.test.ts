@@ -90,7 +90,7 @@ describe('a function that gives devices', () => {
     }
   };
 
-  it('may have one ready, and its exceptions are no fault of the file', async () => {
+  itInLab('may have one ready, and its exceptions are no fault of the file', async () => {
     const own = await (await navigator.gpu.requestAdapter())!.requestDevice();
     const element = await shown(() => own);
     assertEqual([element.loaded, element.error], [true, null], 'loaded');
@@ -232,7 +232,7 @@ describe('the loss of the device', () => {
     }
   });
 
-  it('is followed by a frame once the browser has a device again, without a reload', async () => {
+  itInLab('is followed by a frame once the browser has a device again, without a reload', async () => {
     hurry(4);
     const original = GaussianSplatElement.sharedDevice;
     let refusals = 0;
@@ -359,7 +359,7 @@ describe('the loss of the device', () => {
   });
 });
 
-it('a page with vr draws with WebGPU if no adapter is compatible with headsets', async () => {
+itInLab('a page with vr draws with WebGPU if no adapter is compatible with headsets', async () => {
   const { gpu } = navigator;
   const asked: unknown[] = [];
   const others = {

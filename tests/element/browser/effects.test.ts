@@ -209,7 +209,7 @@ itInLab('functions of two elements that are compiled at the same time stay apart
   assert(await comesToShow(elements[1], only(isBlue)), 'the second is blue');
 });
 
-it('a cut acts on a clip in every frame', async () => {
+itInLab('a cut acts on a clip in every frame', async () => {
   const element = await showLoaded({ src: '/net/clip/ball.gsv' });
   assert((await countOf(element, isRed)) > 0, 'red is seen');
   const child = await cut(element, { shape: 'sphere', scale: '100' });

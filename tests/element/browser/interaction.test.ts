@@ -3,6 +3,7 @@ import '@gaussian-splat/element/scenes.js';
 import type { GaussianSplatElement } from '@gaussian-splat/element';
 import type { ScenePointerEvent, SplatMeshElement, SplatSceneElement } from '@gaussian-splat/element/scenes.js';
 import { sendKeys, sendMouse } from '@web/test-runner-commands';
+import { itInLab } from '../../support/extent-in-pages.js';
 import { violationsIn } from './support/axe.js';
 import { boxGlb } from './support/glb.js';
 import {
@@ -73,7 +74,7 @@ describe('positionFromPoint', () => {
     assertEqual([wood.mesh, wood.material, wood.splat], ['Seat', 'Oak', null], 'names of the file');
   });
 
-  it('finds a mesh where a bone has moved it', async () => {
+  itInLab('finds a mesh where a bone has moved it', async () => {
     document.body.style.margin = '0';
     const element = await showLoaded({ src: COMPASS, ...VIEW }, 'width: 240px; height: 200px');
     const box = document.createElement('splat-mesh') as SplatMeshElement;

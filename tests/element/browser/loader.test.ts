@@ -48,6 +48,8 @@ describe('the scene worker', () => {
     );
     assertEqual(workers.length, 1, 'workers');
     hurry(12);
+    // The time until the end begins with the last load.
+    await showLoaded();
     await until(() => workers[0].isEnded, 'the end of an idle worker');
     hurry(0.3);
     await showLoaded();

@@ -158,7 +158,7 @@ describe('meshes', () => {
     }
   });
 
-  it('without light keep their base colors, and lit by even light nearly so', async () => {
+  itInLab('without light keep their base colors, and lit by even light nearly so', async () => {
     const grays = [0, 0.02, 0.1, 0.214, 0.5, 1];
     const shown = [0, 39, 89, 127, 188, 255];
     const element = place();
@@ -189,7 +189,7 @@ describe('meshes', () => {
     assert(max <= 24, `lit grays ${lit.join()} for ${shown.join()}`);
   });
 
-  it('are shown with any bounds in their file, and opaque where their glass is', async () => {
+  itInLab('are shown with any bounds in their file, and opaque where their glass is', async () => {
     const canvas = new OffscreenCanvas(1, 1);
     canvas.getContext('2d')!.fillRect(0, 0, 1, 1);
     const bytes = new Uint8Array(await (await canvas.convertToBlob()).arrayBuffer());

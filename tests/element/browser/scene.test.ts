@@ -1,6 +1,7 @@
 import '@gaussian-splat/element';
 import type { ElementError, GaussianSplatElement } from '@gaussian-splat/element';
 import { executeServerCommand } from '@web/test-runner-commands';
+import { itInLab } from '../../support/extent-in-pages.js';
 import {
   assert,
   assertEqual,
@@ -58,7 +59,7 @@ describe('a scene', () => {
     assert(Math.abs(between[0] - between[2]) < 60, `no color fringe at a half-transparent pixel: ${between.join()}`);
   });
 
-  it('asked for as reference after it was loaded has the colors of one that was loaded as such', async () => {
+  itInLab('asked for as reference after it was loaded has the colors of one that was loaded as such', async () => {
     const src = `${URL.createObjectURL(new Blob([glossy()]))}#glossy.ply`;
     const asked = await showLoaded({ src, quality: 'reference' });
     const element = await showLoaded({ src });

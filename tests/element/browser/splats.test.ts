@@ -106,7 +106,7 @@ describe('the property splats', () => {
     await turns(element, isBlue, 'blue harmonics');
   });
 
-  it('is shown with WebGL 2: other arrays, more of them, ranges and errors, without a gap', async () => {
+  itInLab('is shown with WebGL 2: other arrays, more of them, ranges and errors, without a gap', async () => {
     const element = await shown(ball(500, RED), { renderer: 'webgl' });
     await turns(element, isRed, 'red splats');
     assertEqual(element.stats!.renderer, 'webgl', 'renderer');

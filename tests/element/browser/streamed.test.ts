@@ -239,28 +239,31 @@ describe('a streamed scene', () => {
     none.stop();
   });
 
-  it('comes back after a lost device, while pages were coming, within the pixels that it was to be drawn within', async () => {
-    const { requests, stop } = await serve('/net/kept/lost/');
-    const element = show({ src: '/net/kept/lost/detail.json', 'camera-orbit': '30deg 60deg 3m', detail: '0.3px' });
-    await element.ready;
-    assertEqual(element.stats?.detail.pixels, 0.3, 'pixels');
-    for (let loss = 0; loss < 2; loss++) {
-      await until(() => requests.filter((name) => name !== 'pages/scene-00000.bin').length > 0, 'pages on their way');
-      const restored = nextEvent(element, 'contextrestored');
-      requests.length = 0;
-      devices[devices.length - 1].destroy();
-      await restored;
-      await until(() => element.stats?.detail.pixels === 0.3, 'as much detail as before');
-    }
-    await until(
-      () => requests.filter((name) => name !== 'pages/scene-00000.bin').length > 0,
-      'pages of the new device',
-    );
-    assertEqual(new Set(requests).size, requests.length, 'no page twice');
-    await close(element);
-    assertEqual(MemoryLedger.of(devices[devices.length - 1]).bytes, 0, 'bytes held');
-    stop();
-  });
+  itInLab(
+    'comes back after a lost device, while pages were coming, within the pixels that it was to be drawn within',
+    async () => {
+      const { requests, stop } = await serve('/net/kept/lost/');
+      const element = show({ src: '/net/kept/lost/detail.json', 'camera-orbit': '30deg 60deg 3m', detail: '0.3px' });
+      await element.ready;
+      assertEqual(element.stats?.detail.pixels, 0.3, 'pixels');
+      for (let loss = 0; loss < 2; loss++) {
+        await until(() => requests.filter((name) => name !== 'pages/scene-00000.bin').length > 0, 'pages on their way');
+        const restored = nextEvent(element, 'contextrestored');
+        requests.length = 0;
+        devices[devices.length - 1].destroy();
+        await restored;
+        await until(() => element.stats?.detail.pixels === 0.3, 'as much detail as before');
+      }
+      await until(
+        () => requests.filter((name) => name !== 'pages/scene-00000.bin').length > 0,
+        'pages of the new device',
+      );
+      assertEqual(new Set(requests).size, requests.length, 'no page twice');
+      await close(element);
+      assertEqual(MemoryLedger.of(devices[devices.length - 1]).bytes, 0, 'bytes held');
+      stop();
+    },
+  );
 
   itInLab("'is loaded on the main thread if workers are refused'", async () => {
     const original = GaussianSplatElement.sceneLoader;

@@ -188,7 +188,7 @@ describe('a tileset', () => {
     }
   });
 
-  it('stays within little memory with coarser tiles, and within the limit of splats of a page', async () => {
+  itInLab('stays within little memory with coarser tiles, and within the limit of splats of a page', async () => {
     GaussianSplatElement.memoryBudget = LITTLE;
     const served = await tiles();
     const element = await opened(served, NEAR);

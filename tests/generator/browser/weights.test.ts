@@ -2,6 +2,7 @@
 import { ImageTensor } from '@gaussian-splat/renderer';
 import { Generator } from '@gaussian-splat/generator';
 import { assert, assertEqual, delay, until } from '../../element/browser/support/harness.js';
+import { itInLab } from '../../support/extent-in-pages.js';
 import { FIXTURES, makeDevice, numbersOf, ReadingSink, RUNTIME } from './support.js';
 
 const released = { count: 0 };
@@ -32,35 +33,38 @@ function redOf(sink: ReadingSink, run: number): Promise<number> {
   return sink.runs[run].tensors.gaussians.then((bytes) => numbersOf(bytes, 'float32')[9]);
 }
 
-it('a large network of images is released at rest, a small one stays; the next image starts it again', async () => {
-  const options = { onError: reportError, gpuCheck: false } as const;
-  const [heavy, light] = await Promise.all(
-    [await large('picture.onnx'), `${FIXTURES}picture.onnx`].map((url) => Generator.open({ url }, device, options)),
-  );
-  const sink = (heavy.sink = new ReadingSink(device));
-  light.sink = new ReadingSink(device);
-  const tensor = new ImageTensor(device, { width: 8, height: 8, dtype: 'float32' });
-  const canvas = new OffscreenCanvas(8, 8);
-  const context = canvas.getContext('2d')!;
-  const ask = async (color: string): Promise<void> => {
-    context.fillStyle = color;
-    context.fillRect(0, 0, 8, 8);
-    tensor.upload(canvas);
-    for (const generator of [heavy, light]) {
-      generator.request({ images: { image: tensor } });
-      await generator.idle;
-    }
-  };
-  await ask('#f00');
-  assertEqual(released.count, 0, 'released while it may be used');
-  await until(() => released.count > 0, 'release of the large one');
-  await delay(300);
-  assertEqual(released.count, 1, 'releases');
-  await ask('#000');
-  assertEqual([await redOf(sink, 0), await redOf(sink, 1)], [1, 0], 'red of both images');
-  for (const generator of [heavy, light]) generator.close();
-  tensor.destroy();
-});
+itInLab(
+  'a large network of images is released at rest, a small one stays; the next image starts it again',
+  async () => {
+    const options = { onError: reportError, gpuCheck: false } as const;
+    const [heavy, light] = await Promise.all(
+      [await large('picture.onnx'), `${FIXTURES}picture.onnx`].map((url) => Generator.open({ url }, device, options)),
+    );
+    const sink = (heavy.sink = new ReadingSink(device));
+    light.sink = new ReadingSink(device);
+    const tensor = new ImageTensor(device, { width: 8, height: 8, dtype: 'float32' });
+    const canvas = new OffscreenCanvas(8, 8);
+    const context = canvas.getContext('2d')!;
+    const ask = async (color: string): Promise<void> => {
+      context.fillStyle = color;
+      context.fillRect(0, 0, 8, 8);
+      tensor.upload(canvas);
+      for (const generator of [heavy, light]) {
+        generator.request({ images: { image: tensor } });
+        await generator.idle;
+      }
+    };
+    await ask('#f00');
+    assertEqual(released.count, 0, 'released while it may be used');
+    await until(() => released.count > 0, 'release of the large one');
+    await delay(300);
+    assertEqual(released.count, 1, 'releases');
+    await ask('#000');
+    assertEqual([await redOf(sink, 0), await redOf(sink, 1)], [1, 0], 'red of both images');
+    for (const generator of [heavy, light]) generator.close();
+    tensor.destroy();
+  },
+);
 
 it('a model without inputs runs once and is released', async () => {
   const before = released.count;

@@ -64,7 +64,7 @@ async function open(page: string): Promise<App> {
   const frame = document.createElement('iframe');
   const scenes = new URLSearchParams({ first: COMPASS, second: MOVING });
   frame.src = `${page}?${scenes}`;
-  frame.style.cssText = 'width: 500px; height: 500px; border: 0';
+  frame.style.cssText = 'width: 300px; height: 400px; border: 0';
   const loaded = nextEvent(frame, 'load');
   document.body.append(frame);
   await loaded;
