@@ -80,7 +80,7 @@ test('cells, and parts in any order, have the bytes of a scene in one piece', ()
 
 test(
   'a killed part is done again; --join names what is missing; coded files are the same',
-  { timeout: 300_000 },
+  { timeout: 300_000, skip: onlyInLab },
   async () => {
     const scene = write('more.ply', farSplats(20_100, 0));
     const [once, out] = [inFolder('once'), inFolder('killed')];
@@ -173,7 +173,7 @@ const bytesIn = (clouds: readonly GaussianCloud[], column: (typeof COLUMNS)[numb
 
 test('SPZ is read in blocks that are equal to the whole; other formats are read whole, within the memory', async () => {
   const cloud = await readScene(readFileSync(write('wide.ply', rawSplats(70_000, 1))), { name: 'wide.ply' });
-  for (const name of ['a.spz', 'a.glb']) {
+  for (const name of someOf(['a.spz', 'a.glb'], 1)) {
     const { bytes } = await changeFormat(cloud, { name });
     writeFileSync(inFolder(name), bytes);
     const whole = await readScene(bytes, { name });
@@ -185,11 +185,13 @@ test('SPZ is read in blocks that are equal to the whole; other formats are read 
     assert.equal(existsSync(inFolder('inflated')), false);
   }
   // The file is too large, or its splats are.
+  const file = inFolder('large.glb');
+  writeFileSync(file, (await changeFormat(cloud, { name: file })).bytes);
   for (const [memory, found] of [
     ['301MB', /found \d+ MB\./],
-    [`${300 + Math.ceil(statSync(inFolder('a.glb')).size / 1e6)}MB`, /found more in its splats\./],
+    [`${300 + Math.ceil(statSync(file).size / 1e6)}MB`, /found more in its splats\./],
   ] as const) {
-    const { status, text } = detail(inFolder('a.glb'), '--out', inFolder('no'), '--memory', memory, '--quantized');
+    const { status, text } = detail(file, '--out', inFolder('no'), '--memory', memory, '--quantized');
     assert.equal(status, 1);
     assert.match(text, /is read whole/);
     assert.match(text, found);

@@ -2,7 +2,7 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import fc from 'fast-check';
-import { someOf } from '../support/extent.js';
+import { isLab, someOf } from '../support/extent.js';
 import { DisplayInterval, QUALITY_LEVELS, nextQuality, INITIAL_QUALITY } from '../support/element/quality.js';
 import { COSTS, LEVELS, p95, restlessWindows, reversals, run } from '../support/pace-gpu.js';
 
@@ -35,7 +35,7 @@ test('load steps: in time within a second, turning at most once in five', () => 
         assert.ok(reversals(frames, start, start + 5_000) <= 1, `${reversals(frames, start, start + 5_000)} reversals`);
       }
     }),
-    { numRuns: 120, seed: 5 },
+    { numRuns: isLab ? 120 : 40, seed: 5 },
   );
 });
 
@@ -60,7 +60,7 @@ test('a wide GPU, where fewer pixels win little: load steps are kept to as on ot
       assert.ok(found <= TOLERANCE, `p95 is ${found} of the target`);
       assert.ok(reversals(frames, STEP_MS, STEP_MS + 5_000) <= 1, 'reversals');
     }),
-    { numRuns: 60, seed: 7 },
+    { numRuns: isLab ? 60 : 20, seed: 7 },
   );
 });
 
@@ -153,7 +153,7 @@ test('noise and spikes: the usual frame misses no refresh of the display, and th
         assert.ok(reversals(frames, start, start + 5_000) <= 1, `${reversals(frames, start, start + 5_000)} reversals`);
       }
     }),
-    { numRuns: 60, seed: 6 },
+    { numRuns: isLab ? 60 : 20, seed: 6 },
   );
 });
 

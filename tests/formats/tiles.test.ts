@@ -6,6 +6,7 @@ import type { GaussianCloud } from '@gaussian-splat/core';
 import { expectRefusal } from './support/expect.js';
 import { buildGltf, writeGlb } from './support/gltf-writer.js';
 import { smallCloud } from './support/small-cloud.js';
+import { isLab } from '../support/extent.js';
 
 type Files = Record<string, Uint8Array>;
 
@@ -295,7 +296,7 @@ test('subtrees that are damaged, or have no end, are refused by name', async () 
     const root = tileset(tile('a{x}.glb', { implicitTiling }));
     return expectRefusal(root, code, message, { name: 'tileset.json', openFile: () => Promise.resolve(answer) });
   };
-  await read(16, endless({ constant: 0 }), 'decode/header', /at most 100,000 tiles/);
+  if (isLab) await read(16, endless({ constant: 0 }), 'decode/header', /at most 100,000 tiles/);
   await read(1, endless(all), 'out-of-memory/budget', /at most 1,\d+ requests/);
 });
 

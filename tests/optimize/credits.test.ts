@@ -142,7 +142,7 @@ const manifestIn = (path: string): Credits => {
 test('optimize, detail and page keep the credits of five formats', async () => {
   const sources = ['a.ply', 'b.glb', 'c.spz', 'd.sog', 'e.usdz'];
   for (const name of sources) writeFileSync(join(folder, name), [...(await written(name, CREDITS)).values()][0]);
-  for (const [k, name] of someOf([...sources.entries()], 2)) {
+  for (const [k, name] of someOf([...sources.entries()], 1)) {
     const other = `optimized-${k}${sources[(k + 1) % sources.length].slice(1)}`;
     command('optimize', name, '--format-only', '--threads', '1', '--out', other);
     assert.deepEqual(await read(other), CREDITS, `optimize ${name} --out ${other}`);

@@ -411,56 +411,60 @@ test('gaussian-splat render says in a sentence what it was asked wrongly', () =>
   }
 });
 
-test('gaussian-splat render measures depth and identity of several scenes, in three formats', async () => {
-  const scenes = ['gltf/scene.gltf', '--beside', 'gltf/scene.gltf'];
-  const maps = ['--depth', 'd.npy', '--expected-depth', 'd.png', '--coverage', 'c.exr', '--ids', 'i.npy'];
-  const { status, text } = command('render', ...scenes, '--camera', 'camera.json', ...maps);
-  assert.equal(status, 0, text);
-  const { width, height } = JSON.parse(readFileSync(inFolder('camera.json'), 'utf8')) as PNG;
-  const npy = (name: string): { header: string; words: DataView } => {
-    const bytes = readFileSync(inFolder(name));
-    const length = 10 + bytes.readUInt16LE(8);
-    assert.equal(length % 64, 0);
-    return {
-      header: bytes.toString('latin1', 10, length),
-      words: new DataView(bytes.buffer, bytes.byteOffset + length),
+test(
+  'gaussian-splat render measures depth and identity of several scenes, in three formats',
+  { skip: onlyInLab },
+  async () => {
+    const scenes = ['gltf/scene.gltf', '--beside', 'gltf/scene.gltf'];
+    const maps = ['--depth', 'd.npy', '--expected-depth', 'd.png', '--coverage', 'c.exr', '--ids', 'i.npy'];
+    const { status, text } = command('render', ...scenes, '--camera', 'camera.json', ...maps);
+    assert.equal(status, 0, text);
+    const { width, height } = JSON.parse(readFileSync(inFolder('camera.json'), 'utf8')) as PNG;
+    const npy = (name: string): { header: string; words: DataView } => {
+      const bytes = readFileSync(inFolder(name));
+      const length = 10 + bytes.readUInt16LE(8);
+      assert.equal(length % 64, 0);
+      return {
+        header: bytes.toString('latin1', 10, length),
+        words: new DataView(bytes.buffer, bytes.byteOffset + length),
+      };
     };
-  };
-  const [depth, ids] = [npy('d.npy'), npy('i.npy')];
-  assert.match(depth.header, new RegExp(`'<f4'.*\\(${height}, ${width}\\)`));
-  assert.match(ids.header, /'<u4'/);
-  const exr = readFileSync(inFolder('c.exr'));
-  // three reads luminance alone: the name of the channel, after that of the type and the length, becomes Y.
-  assert.equal(exr.write('Y', exr.indexOf('chlist') + 11), 1);
-  // @ts-expect-error: three has no types here
-  const { FloatType } = await import('three');
-  // @ts-expect-error: three has no types here
-  const { EXRLoader } = await import('three/addons/loaders/EXRLoader.js');
-  const loader = new EXRLoader().setDataType(FloatType);
-  const { data, width: columns, height: rows } = loader.parse(Uint8Array.from(exr).buffer);
-  assert.deepEqual([columns, rows], [width, height]);
-  const png = PNG.sync.read(readFileSync(inFolder('d.png')), { skipRescale: true });
-  const expected = png.data as unknown as Uint16Array;
-  let seen = 0;
-  for (let i = 0; i < width * height; i++) {
-    const [id, median] = [ids.words.getUint32(4 * i, true), depth.words.getFloat32(4 * i, true)];
-    // The loader's first row is the bottom one.
-    const coverage = data[4 * ((height - 1 - Math.floor(i / width)) * width + (i % width))];
-    assert.equal(coverage > 0, id > 0, `pixel ${i}: coverage ${coverage}, id ${id}`);
-    assert.equal(median > 0, coverage >= 0.5, `pixel ${i}: coverage ${coverage}, depth ${median}`);
-    if (median === 0) continue;
-    seen++;
-    // The first of two equal scenes is in front.
-    assert.equal(id, 1);
-    assert.ok(Math.abs(expected[4 * i] / 1000 - median) < 0.5, `${expected[4 * i]} mm and ${median} m`);
-  }
-  assert.ok(seen > 0, 'pixels with a depth');
-  refused(2, /--ids: expected a file that ends in/, 'render', ...scenes, '--camera', 'camera.json', '--ids', 'i.jpg');
-  refused(2, /--raster: expected tiles or auto, found quads/, 'render', ...scenes, '--camera', 'camera.json', '--ids', 'i.png', '--raster', 'quads'); // prettier-ignore
-  // It draws all again.
-  if (isLab)
+    const [depth, ids] = [npy('d.npy'), npy('i.npy')];
+    assert.match(depth.header, new RegExp(`'<f4'.*\\(${height}, ${width}\\)`));
+    assert.match(ids.header, /'<u4'/);
+    const exr = readFileSync(inFolder('c.exr'));
+    // three reads luminance alone: the name of the channel, after that of the type and the length, becomes Y.
+    assert.equal(exr.write('Y', exr.indexOf('chlist') + 11), 1);
+    // @ts-expect-error: three has no types here
+    const { FloatType } = await import('three');
+    // @ts-expect-error: three has no types here
+    const { EXRLoader } = await import('three/addons/loaders/EXRLoader.js');
+    const loader = new EXRLoader().setDataType(FloatType);
+    const { data, width: columns, height: rows } = loader.parse(Uint8Array.from(exr).buffer);
+    assert.deepEqual([columns, rows], [width, height]);
+    const png = PNG.sync.read(readFileSync(inFolder('d.png')), { skipRescale: true });
+    const expected = png.data as unknown as Uint16Array;
+    let seen = 0;
+    for (let i = 0; i < width * height; i++) {
+      const [id, median] = [ids.words.getUint32(4 * i, true), depth.words.getFloat32(4 * i, true)];
+      // The loader's first row is the bottom one.
+      const coverage = data[4 * ((height - 1 - Math.floor(i / width)) * width + (i % width))];
+      assert.equal(coverage > 0, id > 0, `pixel ${i}: coverage ${coverage}, id ${id}`);
+      assert.equal(median > 0, coverage >= 0.5, `pixel ${i}: coverage ${coverage}, depth ${median}`);
+      if (median === 0) continue;
+      seen++;
+      // The first of two equal scenes is in front.
+      assert.equal(id, 1);
+      assert.ok(Math.abs(expected[4 * i] / 1000 - median) < 0.5, `${expected[4 * i]} mm and ${median} m`);
+    }
+    assert.ok(seen > 0, 'pixels with a depth');
+    refused(2, /--ids: expected a file that ends in/, 'render', ...scenes, '--camera', 'camera.json', '--ids', 'i.jpg');
+    refused(2, /--raster: expected tiles or auto, found quads/, 'render', ...scenes, '--camera', 'camera.json', '--ids', 'i.png', '--raster', 'quads'); // prettier-ignore
+    // It draws all again.
+    if (isLab)
     refused(1, /Z: expected values up to 0\.065535/, 'render', ...scenes, '--camera', 'camera.json', '--depth', 'd.png', '--depth-unit', '0.000001'); // prettier-ignore
-});
+  },
+);
 
 const hasFfmpeg = spawnSync('ffmpeg', ['-version']).error === undefined;
 
