@@ -126,7 +126,7 @@ test('invalid arguments are reported in a line, without a stack trace, and at on
 
 test(
   'a run that was ended early is no obstacle to the next, and what fails to be written leaves no pages',
-  { skip: process.platform === 'win32' },
+  { skip: onlyInLab || process.platform === 'win32' },
   () => {
     const out = join(folder, 'ended');
     mkdirSync(join(out, 'pages'), { recursive: true });

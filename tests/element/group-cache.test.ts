@@ -6,6 +6,7 @@ import { test } from 'node:test';
 import type { ClipIndex } from '@gaussian-splat/formats';
 import type { PackedAnimation } from '@gaussian-splat/renderer/tools';
 import { GroupCache, partsIn } from '../../packages/element/dist/sources/clip/group-cache.js';
+import { onlyInLab } from '../support/extent.js';
 
 const FRAMES = 30;
 const SPLATS = 150_000;
@@ -87,7 +88,7 @@ test('at the end of a loop the beginning is fetched', async () => {
   }
 });
 
-test('an hour of play holds no more than a minute', async () => {
+test('an hour of play holds no more than a minute', { skip: onlyInLab }, async () => {
   const { cache, settle } = bench(clip(3600));
   let [minute, hour] = [0, 0];
   for (let group = 0; group < 3600; group++) {

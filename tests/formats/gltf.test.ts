@@ -3,6 +3,7 @@ import { test } from 'node:test';
 import type { GaussianCloud, Vector3 } from '@gaussian-splat/core';
 import { readScene, splatRanges } from '@gaussian-splat/formats';
 import { shBasis } from '../oracle/sh.js';
+import { onlyInLab } from '../support/extent.js';
 import { seededRandom } from '../support/random.js';
 import { assertAtMost, assertSameCloud, expectRefusal, largestDifference } from './support/expect.js';
 import { buildGltf, withMeshopt, writeGlb } from './support/gltf-writer.js';
@@ -185,7 +186,7 @@ test('JSON with a buffer of its own, and with one written as text', async () => 
   await expectRefusal(text('b.bin'), 'decode/unsupported', /only this one.*, s\/scene\.glb/, { name: 's/a.gltf' });
 });
 
-test('a buffer of 50 MB written as text', async () => {
+test('a buffer of 50 MB written as text', { skip: onlyInLab }, async () => {
   const { json, buffer } = buildGltf([[{ cloud: smallCloud(6, 1) }]], [{ mesh: 0 }], [0]);
   const padded = Buffer.concat([buffer, Buffer.alloc(51e6)]);
   const uri = `data:application/octet-stream;base64,${padded.toString('base64')}`;
@@ -210,7 +211,7 @@ test('JSON is recognized as glTF in any order of its keys', async () => {
   }
 });
 
-test('copies are bounded, and what is in the file once is not', async () => {
+test('copies are bounded, and what is in the file once is not', { skip: onlyInLab }, async () => {
   // 1.1 MB, which may take 355 MB of memory, and 20,000 splats of 56 bytes: 60 copies are given, 2,000 would be 2 GiB.
   const { json, buffer } = buildGltf([[{ cloud: smallCloud(20_000, 0) }]], [{ mesh: 0 }], [0]);
   const shown = (times: number): Uint8Array =>

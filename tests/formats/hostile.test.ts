@@ -5,6 +5,7 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import fc from 'fast-check';
+import { isLab } from '../support/extent.js';
 import { needsSharedData, sharedFile } from '../support/data.js';
 import { assertHelpful, CUT_STEP, expectRefusal, refusalOf } from './support/expect.js';
 import { writePly } from './support/ply-writer.js';
@@ -89,7 +90,7 @@ for (const [name, file] of Object.entries(FILES)) {
         const error = await refusalOf(damaged, { name });
         if (error) assertHelpful(error, name);
       }),
-      { numRuns: 300 },
+      { numRuns: isLab ? 300 : 100 },
     );
   });
 }
@@ -123,7 +124,7 @@ test('random bytes are read or refused by name, under any file name', async () =
       const error = await refusalOf(bytes, { name });
       if (error) assertHelpful(error, name);
     }),
-    { numRuns: 2000 },
+    { numRuns: isLab ? 2000 : 500 },
   );
 });
 
@@ -152,7 +153,7 @@ test('random headers of PLY files are read or refused by name', async () => {
       assert.ok(error);
       assertHelpful(error, 'a.ply');
     }),
-    { numRuns: 1000 },
+    { numRuns: isLab ? 1000 : 300 },
   );
 });
 

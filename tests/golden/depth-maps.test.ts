@@ -104,7 +104,7 @@ const placed = (cloud: GaussianCloud, sceneToWorld?: Matrix4): PlacedCloud => ({
   sceneToWorld,
 });
 
-test('a room: depths to a centimeter', async () => {
+test('a room: depths to a centimeter', { skip: onlyInLab }, async () => {
   const { cloud, cameras } = room();
   assertRight('room', await measure([placed(cloud)], resized(cameras[0], width(320))));
 });

@@ -56,8 +56,8 @@ function part(cloud: GaussianCloud, first: number, end: number): GaussianCloud {
 
 for (const { make, frames } of [
   // Two hundred of them, and turns between, are a row of `npm run lab -- stability`.
-  { make: equalDepthPlane, frames: isLab ? 5 : 3 },
-  { make: room, frames: isLab ? 8 : 3 },
+  { make: equalDepthPlane, frames: isLab ? 5 : 2 },
+  { make: room, frames: isLab ? 8 : 2 },
 ]) {
   test(`${frames} frames of one view of ${make.name} are the same bytes`, async () => {
     const device = await anyDevice();

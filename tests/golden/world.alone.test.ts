@@ -128,9 +128,9 @@ async function worldOf(device: GPUDevice, placed: readonly Omit<PlacedCloud, 'cl
 const asClouds = (placed: Case['placed']): PlacedCloud[] =>
   placed.map((each, i) => ({ ...each, cloud: clouds[i], mode: clouds[i].antialiased ? 'antialiased' : 'classic' }));
 
-for (const rasterizer of RASTERIZERS) {
-  // Matrices mean the same to both.
-  for (const { name, size, placed, camera = view(size) } of someOf(CASES, rasterizer === 'quads' ? 7 : 1)) {
+// Matrices mean the same to both, and SwiftShader compiles tiles for seconds.
+for (const rasterizer of someOf(RASTERIZERS, 1)) {
+  for (const { name, size, placed, camera = view(size) } of someOf(CASES, 3)) {
     test(`${rasterizer}: two scenes, ${name}: 59 dB against the oracle`, async () => {
       const device = await serialDevice();
       const { world, free } = await worldOf(device, placed);

@@ -110,7 +110,7 @@ class MemoryStore implements ClipStore {
   }
 }
 
-test('an interrupted call continues after its last group, and returns the same clip', async () => {
+test('an interrupted call continues after its last group, and returns the same clip', { skip: onlyInLab }, async () => {
   const given = options(flashing, TARGET);
   const whole = await flashingClip();
   const store = new MemoryStore();

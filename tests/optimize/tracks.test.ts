@@ -8,13 +8,14 @@ import { followedWithin } from '../../packages/optimize/src/clip/partial-curves.
 import { roundMotion } from '../../packages/optimize/src/clip/round-motion.js';
 import { followSplats } from '../../packages/optimize/src/clip/tracks.js';
 import { parseClip, readClipPart, upright } from '@gaussian-splat/formats';
+import { onlyInLab } from '../support/extent.js';
 import { clipOf, framesOf } from '../support/clips.js';
 import { cloudOf } from '../support/clouds.js';
 import { seededRandom } from '../support/random.js';
 import { fountain } from '../support/scenes/fountain.js';
 import { MADE_CLIPS } from '../support/scenes/made-clips.js';
 
-test('drops that are born fast and close together keep their own track', () => {
+test('drops that are born fast and close together keep their own track', { skip: onlyInLab }, () => {
   const frameOf = fountain({ splats: 40_000, frames: 300, framesPerSecond: 30 });
   const frames = Array.from({ length: 6 }, (_, frame) => frameOf(45 + frame));
   const tracks = followSplats(frames);

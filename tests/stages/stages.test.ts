@@ -5,8 +5,8 @@ import { runCase } from '../support/gpu.js';
 import { endNodeDevice, nodeDevice } from '../support/node-device.js';
 import { stageCases } from './cases/index.js';
 
-/** Every third case; all of them in the laboratory. */
-for (const stageCase of someOf(stageCases, Math.ceil(stageCases.length / 3))) {
+/** Every fourth case; all of them in the laboratory. */
+for (const stageCase of someOf(stageCases, Math.ceil(stageCases.length / 4))) {
   test(stageCase.name, async () => runCase(await nodeDevice(), stageCase));
 }
 

@@ -143,7 +143,7 @@ describe('the CDN build', () => {
     assertEqual(report.violations, [], 'violations');
   });
 
-  it('takes what a page has put into globalThis.GaussianSplatElement', async () => {
+  itInLab('takes what a page has put into globalThis.GaussianSplatElement', async () => {
     const frame = document.createElement('iframe');
     frame.srcdoc = `<!doctype html><title>Configured</title>
       <script>

@@ -42,7 +42,7 @@ async function pickedPixels(element: GaussianSplatElement, view: MeasuredView, i
 }
 
 describe('renderDepth()', () => {
-  it('has the depths and elements that picks find, of the element and its children', async () => {
+  itInLab('has the depths and elements that picks find, of the element and its children', async () => {
     const element = await showLoaded({ ...VIEW, src: COMPASS }, SIZE);
     const child = Object.assign(document.createElement('splat-scene'), { src: GREEN });
     child.setAttribute('position', '2m 0 0.5m');

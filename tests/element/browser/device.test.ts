@@ -104,7 +104,7 @@ describe('a function that gives devices', () => {
 });
 
 describe('memory that is not to be had', () => {
-  it('for a larger frame than the first is reported, and the page keeps working', async () => {
+  itInLab('for a larger frame than the first is reported, and the page keeps working', async () => {
     const element = await showLoaded({ src: COMPASS }, 'width: 60px; height: 50px');
     const { createTexture } = GPUDevice.prototype;
     let refused = 0;
@@ -201,7 +201,7 @@ describe('the loss of the device', () => {
     assertEqual(devices.length - before, 1, 'new devices');
   });
 
-  it('that lasts is an error after two tries: device-lost', async () => {
+  itInLab('that lasts is an error after two tries: device-lost', async () => {
     const original = GaussianSplatElement.sharedDevice;
     let requests = 0;
     const { gpu } = navigator;

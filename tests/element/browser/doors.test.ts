@@ -325,7 +325,7 @@ describe('doors', () => {
     assertEqual(rooms, [], 'rooms');
   });
 
-  it('the plan shows all rooms, and a click on one goes there', async () => {
+  itInLab('the plan shows all rooms, and a click on one goes there', async () => {
     // The code of the plan is here before the scene.
     const element = await showTour({ 'floor-plan': '' }, 1_500);
     const plan = (): HTMLCanvasElement | null => element.shadowRoot!.querySelector('[part=floor-plan]');

@@ -121,7 +121,7 @@ itInLab('a cut tints', async () => {
   assertEqual(await countOf(element, isColored), 0, 'shades of gray');
 });
 
-it('a scene appears by the progress of the page, and by time', async () => {
+itInLab('a scene appears by the progress of the page, and by time', async () => {
   const element = await showLoaded({ ...VIEW, 'reveal-effect': 'fade' });
   element.revealProgress = 0;
   await frames(4);
@@ -270,7 +270,7 @@ it('what a shader moves has a pause button, stands still with reduced motion, an
   }
 });
 
-it('WebGL 2 draws the scene without them, and says so', async () => {
+itInLab('WebGL 2 draws the scene without them, and says so', async () => {
   const element = await showLoaded({ ...VIEW, renderer: 'webgl' });
   const child = document.createElement('splat-cut');
   element.append(child);

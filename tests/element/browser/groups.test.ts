@@ -114,7 +114,7 @@ describe('groups of a file', () => {
       },
     );
 
-  it('are hidden, tinted and shown alone by a cut, which creates nothing on the GPU when it changes', async () => {
+  itInLab('are hidden, tinted and shown alone by a cut, which creates nothing on the GPU when it changes', async () => {
     const element = await shown({ groups: 'object_id', 'group-names': NAMES });
     const before = await screenOf(element);
     const cut = cutOf(element, { group: 'table' });

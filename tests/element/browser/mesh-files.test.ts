@@ -44,7 +44,7 @@ describe('files of meshes', () => {
     document.body.replaceChildren();
   });
 
-  it('textures within a GLB, buffers in the JSON, and meshopt are shown', async () => {
+  itInLab('textures within a GLB, buffers in the JSON, and meshopt are shown', async () => {
     const textured = await meshOf(`${FIXTURES}textured.glb`);
     await until(() => textured.loaded || textured.error !== null, 'the textured mesh', 60_000);
     assertEqual(textured.error, null, `${textured.error?.message}`);

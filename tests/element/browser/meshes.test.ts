@@ -48,7 +48,7 @@ function assertNear(
 }
 
 describe('meshes', () => {
-  it('alone, draw no empty batch of splats, which would cause a warning', async () => {
+  itInLab('alone, draw no empty batch of splats, which would cause a warning', async () => {
     const drawIndexed = GPURenderPassEncoder.prototype.drawIndexed;
     const counts: (number | undefined)[] = [];
     GPURenderPassEncoder.prototype.drawIndexed = function watching(...args) {
@@ -135,7 +135,7 @@ describe('meshes', () => {
     assert(hidden[0] <= green[0] + 12, `glass behind the ball: ${hidden.join()}`);
   });
 
-  it('of glass show those behind them, in the order of their depth and not of their loading', async () => {
+  itInLab('of glass show those behind them, in the order of their depth and not of their loading', async () => {
     const element = place();
     const pane = (color: readonly [number, number, number], position: string): SplatMeshElement =>
       mesh({ surface: 'unlit', color, alpha: 0.5, half: [0.4, 0.4, 0.01] }, { position });

@@ -67,7 +67,7 @@ describe('scenes that are read for seconds', () => {
     GaussianSplatElement.sceneLoader = original;
   });
 
-  it('are asked for once each, and read by several workers', async () => {
+  itInLab('are asked for once each, and read by several workers', async () => {
     const folder = `slow-${performance.timeOrigin}`;
     await assertAskedOnce(folder, await showSeveral(folder, 6));
     assert(workers.length > 1 && workers.length <= 7, `${workers.length} workers`);

@@ -236,7 +236,7 @@ describe('a tileset', () => {
     wrong.remove();
   });
 
-  it('on the Earth has its vertical axis, and all tiles that a view needs', async () => {
+  itInLab('on the Earth has its vertical axis, and all tiles that a view needs', async () => {
     const [lon, lat] = [0.2, 0.8];
     const up = [Math.cos(lat) * Math.cos(lon), Math.cos(lat) * Math.sin(lon), Math.sin(lat)];
     const north = [-Math.sin(lat) * Math.cos(lon), -Math.sin(lat) * Math.sin(lon), Math.cos(lat)];

@@ -64,7 +64,7 @@ describe('flyTo', () => {
     near(theta(element), 0, 'theta after a reset');
   });
 
-  it('begins where the camera is, which may be on its way to another place', async () => {
+  itInLab('begins where the camera is, which may be on its way to another place', async () => {
     const element = await scene({ 'interpolation-decay': '2000', views: VIEWS });
     await until(() => partOf(element, 'next-view') !== null, 'the bar');
     element.cameraOrbit = '150deg 90deg 8m';

@@ -2,7 +2,7 @@
 import '@gaussian-splat/element';
 import type { GaussianSplatElement } from '@gaussian-splat/element';
 import { resetMouse, sendKeys, sendMouse } from '@web/test-runner-commands';
-import { isLab } from '../../support/extent-in-pages.js';
+import { itInLab, isLab } from '../../support/extent-in-pages.js';
 import { randomSource } from '../../support/gpu.js';
 import { assert, assertEqual, delay, frames, hurry, showLoaded, until } from './support/harness.js';
 import { screenOf, sendTouch, Taps, turnWheel, type Rgb } from './support/screen.js';
@@ -464,7 +464,7 @@ describe('small and certain', () => {
     }
   });
 
-  it('the prompt stands low, and goes when it has been seen', async () => {
+  itInLab('the prompt stands low, and goes when it has been seen', async () => {
     const element = await showLoaded({ 'camera-controls': '', 'interaction-prompt-threshold': '0' }, SIZE);
     await until(() => partOf(element, 'interaction-prompt') !== null, 'the prompt');
     const { top, bottom } = partOf(element, 'interaction-prompt')!.getBoundingClientRect();

@@ -268,7 +268,7 @@ describe('renderer="webgl"', () => {
     await until(() => gl.isContextLost(), 'the end of the context');
   });
 
-  it('a scene whose order does not arrive is replaced by the next one', async () => {
+  itInLab('a scene whose order does not arrive is replaced by the next one', async () => {
     const original = ElementClass.sceneLoader;
     const Loader = original.constructor as new (spawn: () => Worker) => typeof original;
     const script = new URL('/packages/element/dist/loading/scene-worker.js', location.href).href;
@@ -324,7 +324,7 @@ describe('renderer="webgl"', () => {
     return { ...WEBGL, src: `/net/kept/${name}/detail.json` };
   }
 
-  it('a scene in pages is drawn whole if it fits', async () => {
+  itInLab('a scene in pages is drawn whole if it fits', async () => {
     const element = show(await putPages('webgl-pages'));
     await element.ready;
     assert(element.loaded, element.error?.message ?? 'loaded');

@@ -15,6 +15,7 @@ import {
   hurry,
 } from '../../element/browser/support/harness.js';
 import { screenOf } from '../../element/browser/support/screen.js';
+import { itInLab } from '../../support/extent-in-pages.js';
 import { calls, FIXTURES } from './support.js';
 
 GaussianSplatElement.runtimeLocation = '/net/compressed/onnxruntime-web/dist/';
@@ -280,7 +281,7 @@ describe('a generator in the element', () => {
     assertEqual([a.stats?.splats, b.stats?.splats], [64, 64]);
   });
 
-  it('is slow: orbiting continues at its own rate, and the latest time is shown in the end', async () => {
+  itInLab('is slow: orbiting continues at its own rate, and the latest time is shown in the end', async () => {
     const element = await showLoaded({ src: `${FIXTURES}heavy.onnx` });
     let frames = 0;
     const shown: number[] = [];

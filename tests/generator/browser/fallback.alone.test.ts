@@ -3,6 +3,7 @@ import { ImageTensor } from '@gaussian-splat/renderer';
 import { Generator, setRunLimit } from '@gaussian-splat/generator';
 import type * as LoadRuntime from '../../../packages/generator/dist/runtime/load-runtime.js';
 import { assert, assertEqual } from '../../element/browser/support/harness.js';
+import { itInLab } from '../../support/extent-in-pages.js';
 import { CAMERA, FIXTURES, makeDevice, ReadingSink } from './support.js';
 
 const BUILT = '/packages/generator/dist/runtime/load-runtime.js';
@@ -48,7 +49,7 @@ it('a software GPU leaves models of images to the CPU, and keeps those that run 
   assertEqual((await runOf('picture.onnx', await deviceOf(false))).kind, 'webgpu', 'a model of images on hardware');
 });
 
-it('a model whose first run on the GPU takes too long runs on the CPU', async () => {
+itInLab('a model whose first run on the GPU takes too long runs on the CPU', async () => {
   const { ort } = await ((await import(BUILT)) as typeof LoadRuntime).loadRuntime();
   const { create } = ort.InferenceSession;
   // The GPU of this copy of the runtime never finishes; the next copy is as it should be.
