@@ -6,6 +6,7 @@ import { arrivalAt, backOf, onPlan, placeRooms, type Door } from '../../packages
 const door = (room: string, to: string, [x, z]: readonly [number, number], degrees: number): Door => ({
   ...{ element: {} as HTMLElement, room, to, position: [x, 1.6, z], floorMap: null },
   heading: (degrees * Math.PI) / 180,
+  view: ((degrees + 180) * Math.PI) / 180,
 });
 const near = (found: readonly number[], expected: readonly number[]): void =>
   found.forEach((value, k) =>
@@ -29,6 +30,7 @@ test('visitors arrive a meter before the door that leads back, with their back t
   near(eye, [2, 1.6, 1]);
   near([-Math.sin(heading), -Math.cos(heading)], [1, 0]);
   near(arrivalAt(back, 0.5).eye, [3, 1.6, 1]);
+  assert.equal(arrivalAt({ ...back, view: 0.3 }, 1).heading, 0.3, 'or where the door says');
   assert.equal(backOf(ALL[4], ALL), undefined);
 });
 

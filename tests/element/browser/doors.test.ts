@@ -158,6 +158,12 @@ describe('doors', () => {
     // Back, one comes in at the other end and looks the other way.
     await pass(element, 'a');
     assertEqual(element.getCameraTarget().z.toFixed(3), '0.100', 'the view from the door back');
+    // The door of the second room that leads back says where to look: to -x.
+    element.querySelector<HTMLElement>('[slot="hotspot-b-a"]')!.dataset.arrivalHeading = '90deg';
+    await frames();
+    await pass(element, 'b');
+    const turned = [element.getCameraTarget().x, element.getCameraOrbit().theta].map((value) => value.toFixed(3));
+    assertEqual(turned, ['-1.000', (Math.PI / 2).toFixed(3)], 'the view that the door names');
   });
 
   /** A door to room b whose file waits for a gate. */

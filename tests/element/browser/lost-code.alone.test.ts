@@ -1,4 +1,4 @@
-import { GaussianSplatElement } from '@gaussian-splat/element';
+import { GaussianSplatElement, SharedDevice } from '@gaussian-splat/element';
 import { assert, assertEqual, claimComing, COMPASS, FIXTURES, show, showLoaded } from './support/harness.js';
 
 type SceneLoader = (typeof GaussianSplatElement)['sceneLoader'];
@@ -63,6 +63,32 @@ describe('code that cannot be loaded when it is needed', () => {
     await assertLost(COMPASS, 'readers/splat.js', /reads \.splat/);
     await claimComing(/no worker could be started/);
     await showLoaded({ src: `${FIXTURES}compass.ply` });
+  });
+
+  it('for WebGL, which comes after the splats of a large scene, shows them', async () => {
+    const { sharedDevice } = GaussianSplatElement;
+    GaussianSplatElement.sharedDevice = new SharedDevice();
+    Object.defineProperty(navigator, 'gpu', {
+      configurable: true,
+      value: { requestAdapter: () => Promise.resolve(null) },
+    });
+    try {
+      await fetch('/net/hold/webgl/open-gl-scene.js?ms=2500');
+      const row = new Uint8Array([
+        ...new Uint8Array(new Float32Array([0, 0, 0, 0.1, 0.1, 0.1]).buffer),
+        ...Array<number>(8).fill(200),
+      ]);
+      const element = show({
+        src: `${URL.createObjectURL(new Blob(Array<Uint8Array<ArrayBuffer>>(40_000).fill(row)))}#a.splat`,
+      });
+      await element.ready;
+      assertEqual([element.error, element.stats?.renderer, element.stats?.splats], [null, 'webgl', 40_000], 'scene');
+      element.remove();
+    } finally {
+      await fetch('/net/hold/');
+      Reflect.deleteProperty(navigator, 'gpu');
+      GaussianSplatElement.sharedDevice = sharedDevice;
+    }
   });
 
   it("'on the main thread: the code for generators'", async () => {

@@ -22,7 +22,13 @@ export async function openScene(request: SceneRequest, settings: Omit<OpenOption
       reason = error;
       if (request.renderer !== 'auto' || (error as Partial<GaussianSplatError>).family !== 'unsupported') throw error;
     }
-  const { openGlScene } = await loadModule('the code that draws with WebGL', () => import('../webgl/open-gl-scene.js'));
+  const { openGlScene } = await loadModule(
+    'the code that draws with WebGL',
+    () => import('../webgl/open-gl-scene.js'),
+  ).catch((error: unknown) => {
+    options.begun.load?.abort.abort(error);
+    throw error;
+  });
   return openGlScene(request, options, reason);
 }
 

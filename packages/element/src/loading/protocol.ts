@@ -112,7 +112,9 @@ export type ScenePart = { readonly head: PackedHead } | { readonly portion: Pack
  * Called with each part of a scene. The last part contains the bounds of all chunks. Resolves when the part is used, with
  * the buffers of its splats, which the worker uses again.
  */
-export type PartListener = (part: ScenePart) => void | Promise<BlockBuffers | undefined>;
+export type PartListener = (part: ScenePart) => void | ReturnType<PartTaker>;
+/** A listener that uses each part. */
+export type PartTaker = (part: ScenePart) => Promise<BlockBuffers | undefined>;
 
 /** The manifest of a sequence of scenes. Its paths are relative to its own address. */
 export type LoadedSequence = SceneSequence;

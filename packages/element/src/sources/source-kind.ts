@@ -3,6 +3,7 @@ import type { DeviceLease, SharedDevice } from '../gpu/shared-device.js';
 import type {
   LoadedScene,
   LoadedSequence,
+  PartTaker,
   ProgressListener,
   SceneRequest,
   SentScene,
@@ -41,6 +42,8 @@ export interface BegunLoad {
   /** Listeners of the load, which may be replaced. */
   readonly listeners: Partial<Pick<TaskListeners, 'onPreview' | 'onPart'>>;
   readonly abort: AbortController;
+  /** Gives the parts of the scene, which have waited for the code of WebGL, to it. Call once. */
+  readonly take: (add: PartTaker) => void;
 }
 
 /** Services and settings for opening a source, and functions that are called meanwhile. */

@@ -184,15 +184,15 @@ export class ViewController implements FrameClient {
     if (pixels === null) return this.#finishUnseen();
     this.#host.advance(now);
     const source = camera.step(now, this.#host.decayMs);
+    const fail = (error: unknown): void => this.#host.sources.fail(error);
     try {
       const request = this.#frameRequest(backend, pixels);
-      if (request === null)
-        return void why(({ noContext }) => noContext()).then((error) => this.#host.sources.fail(error));
+      if (request === null) return void why(({ noContext }) => noContext()).then(fail, fail);
       this.#host.sources.advance(request.camera, now);
       this.#render(backend, request, now, source !== null);
       this.#host.afterFrame(request.camera);
     } catch (error) {
-      return this.#host.sources.fail(error);
+      return fail(error);
     }
     if (camera.isMoving) this.requestFrame();
     if (source !== null) this.#host.cameraChanged(source);

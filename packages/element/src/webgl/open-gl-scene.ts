@@ -62,7 +62,8 @@ export async function openGlScene(
     const previews = new Previews(options);
     const parts = new JoinedParts();
     const onPreview = options.onPreview && previews.show;
-    if (load) Object.assign(load.listeners, { onPreview, onPart: parts.add });
+    load?.take(parts.add);
+    if (load) Object.assign(load.listeners, { onPreview });
     const loading = load?.loading ?? loader.ask('load', request, signal, { onProgress, onPreview });
     const scene = await loading.finally(() => previews.end());
     signal.throwIfAborted();

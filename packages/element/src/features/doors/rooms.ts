@@ -11,6 +11,8 @@ export interface Door {
   readonly position: Vector3;
   /** Azimuth in which visitors leave through it, radians: 0 is -z, 90° is -x, as `theta` of a camera that looks this way. */
   readonly heading: number;
+  /** Azimuth of the view of visitors who come in through it, radians; by default away from the door. */
+  readonly view: number;
   /** Absolute URL of the map of the floor behind the door; null for none. */
   readonly floorMap: string | null;
 }
@@ -35,31 +37,37 @@ export const addressOf = (url: string, { baseURI }: Node): string =>
 export function readDoors(element: HTMLElement, first: string, warn: (sentence: string) => void): Door[] {
   const absolute = (url: string): string => addressOf(url, element);
   return [...element.querySelectorAll<HTMLElement>(':scope > [data-door]')].flatMap((child) => {
-    const { door, room, position = '', heading = '0', floorMap } = child.dataset;
+    const { door, room, position = '', heading: out = '0', arrivalHeading, floorMap } = child.dataset;
     const at = parsePoint(position);
-    const degrees = /^\s*(-?[\d.]+)deg\s*$/.exec(heading)?.[1] ?? (Number(heading) === 0 ? '0' : undefined);
-    if (at === null || degrees === undefined) {
+    const heading = azimuthOf(out);
+    const view = arrivalHeading === undefined ? heading + Math.PI : azimuthOf(arrivalHeading);
+    if (at === null || Number.isNaN(heading + view)) {
+      const found = [position, out, arrivalHeading].filter((text) => text !== undefined);
       warn(
-        `<gaussian-splat> data-door="${door}": expected data-position="x y z" and data-heading="90deg", found "${position}" and "${heading}".`,
+        `<gaussian-splat> data-door="${door}": expected data-position="x y z" and headings as "90deg", found "${found.join('", "')}".`,
       );
       return [];
     }
     return {
       ...{ element: child, room: room === undefined ? first : absolute(room), to: absolute(door!) },
-      ...{ position: at, heading: (Number(degrees) * Math.PI) / 180 },
+      ...{ position: at, heading, view },
       floorMap: floorMap === undefined ? null : absolute(floorMap),
     };
   });
 }
 
+/** Returns an angle in radians; NaN for a text that is none. */
+const azimuthOf = (text: string): number =>
+  (Number(/^\s*(-?[\d.]+)deg\s*$/.exec(text)?.[1] ?? (Number(text) === 0 ? 0 : NaN)) * Math.PI) / 180;
+
 /** Returns the door that leads back from the room behind a door; undefined if there is none. */
 export const backOf = (door: Door, all: readonly Door[]): Door | undefined =>
   all.find(({ room, to }) => room === door.to && to === door.room);
 
-/** Returns the pose at which visitors arrive who come in through a door of the room: before it, with their back to it. */
-export function arrivalAt({ position: [x, y, z], heading }: Door, unit: number): Arrival {
+/** Returns the pose at which visitors arrive who come in through a door of the room: before it, with its view. */
+export function arrivalAt({ position: [x, y, z], heading, view }: Door, unit: number): Arrival {
   const way = BEFORE_DOOR / unit;
-  return { eye: [x + way * Math.sin(heading), y, z + way * Math.cos(heading)], heading: heading + Math.PI };
+  return { eye: [x + way * Math.sin(heading), y, z + way * Math.cos(heading)], heading: view };
 }
 
 /** Place of a room on the plan: rotation about y in radians, then translation, from its viewer space in meters to that of the first room. */

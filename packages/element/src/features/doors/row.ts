@@ -28,7 +28,7 @@ export const doors: FeatureRow = {
   what: 'the code for doors',
   attributes: DOORS_ATTRIBUTES,
   children: ':scope>[data-door]',
-  childAttributes: ['data-door', 'data-room', 'data-floor-map'],
+  childAttributes: ['data-door', 'data-room', 'data-heading', 'data-arrival-heading', 'data-floor-map'],
   open: async (viewer) => {
     const [{ Doors }] = await Promise.all([import('./doors.js'), viewer.announcer.get()]);
     return new Doors(viewer);

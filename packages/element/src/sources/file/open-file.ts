@@ -3,7 +3,7 @@ import { pickInitialVariants, prepareInitialVariants } from '@gaussian-splat/ren
 import { sceneBytes } from '@gaussian-splat/renderer/tools';
 import { images, unlessWrong } from '../../gpu/initial-frames.js';
 import { limitScenes } from '../../gpu/memory-budget.js';
-import type { LoadedScene, PartListener } from '../../loading/protocol.js';
+import type { LoadedScene, PartListener, PartTaker } from '../../loading/protocol.js';
 import type { BegunLoad, OpenSource } from '../source-kind.js';
 import type { PartUploads } from './part-uploads.js';
 import type { PreviewUploads } from './preview-uploads.js';
@@ -73,8 +73,13 @@ export const open: OpenSource = async (request, options, acquiring) => {
     parts?.then((uploads) => uploads.destroy(), ignore);
     loading.catch(ignore);
     const isWithoutGpu = request.renderer === 'auto' && (error as Partial<GaussianSplatError>).family === 'unsupported';
-    if (isWithoutGpu && !parts && !request.levels) options.begun.load = { loading, listeners, abort };
-    else abort.abort(error);
+    if (isWithoutGpu && !parts && !request.levels) {
+      let take!: (add: PartTaker) => void;
+      const taker = new Promise<PartTaker>((resolve) => (take = resolve));
+      const giveLater: PartListener = (part) => taker.then((add) => add(part));
+      Object.assign(listeners, { onPreview: undefined, onPart: giveLater });
+      options.begun.load = { loading, listeners, abort, take };
+    } else abort.abort(error);
     throw error;
   } finally {
     if (!options.begun.load) options.signal.removeEventListener('abort', giveUp);
