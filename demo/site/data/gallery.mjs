@@ -42,7 +42,7 @@ const SCENES = [
     doors: [
       ['garden', 'apartment', '0m 1.6m 0.3m', '0deg', 'Into the house'],
       ['apartment', 'garden', '0.3m 1.6m 1.2m', '90deg', 'To the garden'],
-      ['apartment', 'hall', '7.2m 1.6m -2.4m', '0deg', 'To the hall'],
+      ['apartment', 'hall', '7.2m 1.6m -2.4m', '0deg', 'To the hall', '112deg'],
       ['hall', 'apartment', '-8.7m 1.6m 0m', '90deg', 'To the study'],
     ],
     words:
@@ -172,11 +172,12 @@ const tagOf = (attributes, addressOf, space) =>
 /** Children that lead to other scenes: the slots of labels, with the rooms on both sides. */
 const doorsOf = ({ doors = [] }, addressOf) =>
   doors
-    .map(([room, to, position, heading, label], i) => {
+    .map(([room, to, position, heading, label, view], i) => {
       const [from, behind, map] = [`${room}.spz`, `${to}.spz`, `${to}.floor`].map((name) =>
         addressOf(`scenes/studio/${name}`),
       );
-      return `\n  <button slot="hotspot-${i}" data-position="${position}" data-heading="${heading}"\n    data-room="${from}" data-door="${behind}" data-floor-map="${map}">${label}</button>`;
+      const arrival = view === undefined ? '' : ` data-arrival-heading="${view}"`;
+      return `\n  <button slot="hotspot-${i}" data-position="${position}" data-heading="${heading}"${arrival}\n    data-room="${from}" data-door="${behind}" data-floor-map="${map}">${label}</button>`;
     })
     .join('') + (doors.length > 0 ? '\n' : '');
 
