@@ -24,7 +24,7 @@ export const DENSE = 'tests/element/browser/high-density.lab.test.ts';
 export const SHARED_PAGES = [
   [
     ...['element', 'credits', 'trees', 'pages', 'scene'],
-    ...['labels', 'meaning', 'measure', 'depth', 'slow-reads', 'splats'],
+    ...['labels', 'meaning', 'measure', 'depth', 'slow-reads', 'splats', 'groups'],
   ],
   [
     ...['element', 'accessibility', 'addresses', 'doors', 'embed', 'image-loss', 'clip', 'scenes'],

@@ -60,7 +60,7 @@ function measured(all: readonly Multiplied[]): Cost[] {
   return lines.map((line) => JSON.parse(line) as Cost);
 }
 
-for (const [name, multiply] of someOf(Object.entries({ ...MULTIPLIED, ...MULTIPLIED_MESHES }), 4)) {
+for (const [name, multiply] of someOf(Object.entries({ ...MULTIPLIED, ...MULTIPLIED_MESHES }), 6)) {
   test(`${name}, 10 to 1,000,000 times`, (context) => {
     const sized: { factor: number; made: Multiplied; bytes: number }[] = [];
     for (const factor of FACTORS) {

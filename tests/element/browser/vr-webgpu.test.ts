@@ -248,7 +248,7 @@ describe('VR by WebGPU', () => {
     assert(passed <= real + 0.3, `${passed} s in place of ${real} s`);
   });
 
-  it('shows a clip that plays, and fails with the context of the copies', async () => {
+  itInLab('shows a clip that plays, and fails with the context of the copies', async () => {
     headset();
     binding = fakeBinding('array', 1, 'not granted');
     element = await showVr('', { src: '/net/clip/ball.gsv', loop: '' });
