@@ -176,7 +176,7 @@ test(
   { skip: onlyInLab },
   async () => {
     const cloud = await readScene(readFileSync(write('wide.ply', rawSplats(70_000, 1))), { name: 'wide.ply' });
-    for (const name of someOf(['a.spz', 'a.glb'], 1)) {
+    for (const name of ['a.spz', 'a.glb']) {
       const { bytes } = await changeFormat(cloud, { name });
       writeFileSync(inFolder(name), bytes);
       const whole = await readScene(bytes, { name });
@@ -188,8 +188,7 @@ test(
       assert.equal(existsSync(inFolder('inflated')), false);
     }
     // The file is too large, or its splats are.
-    const file = inFolder('large.glb');
-    writeFileSync(file, (await changeFormat(cloud, { name: file })).bytes);
+    const file = inFolder('a.glb');
     for (const [memory, found] of [
       ['301MB', /found \d+ MB\./],
       [`${300 + Math.ceil(statSync(file).size / 1e6)}MB`, /found more in its splats\./],
