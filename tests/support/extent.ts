@@ -1,7 +1,7 @@
 import { evenly } from './evenly.js';
 
 /**
- * The extent of tests. `npm test` runs the checks that find different faults within ten minutes on two cores; `npm run test:lab` adds what only repeats or widens, and `npm test -- --full` also runs what repeats the
+ * The extent of tests. `npm test` runs the checks that find different faults, 9 to 14 minutes on two cores; `npm run test:lab` adds what only repeats or widens, and `npm test -- --full` also runs what repeats the
  * same check on more views, formats and sizes.
  */
 export const isFull = process.env.TESTS === 'full';
