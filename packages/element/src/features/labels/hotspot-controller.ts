@@ -32,6 +32,10 @@ const STYLES = css`
   .hotspot ::slotted(*) {
     pointer-events: auto;
   }
+  /* A page's own display of its buttons does not show a label that is hidden. */
+  .hotspot ::slotted([hidden]:not([hidden='until-found'])) {
+    display: none !important;
+  }
   .hotspot.hidden > div {
     opacity: var(--min-hotspot-opacity, 0.25);
   }
